@@ -1,0 +1,1 @@
+"""Estimators of attitude, trajectory and track geometry: one method per file."""

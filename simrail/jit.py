@@ -1,0 +1,49 @@
+"""Compiled kernels: one decorator and one cache that cannot go stale.
+
+numba does not notice a change in a kernel that another kernel imports, so its disk cache can
+silently hold old physics. Here the cache folder is named after a hash of every kernel source of
+simrail and of numba's version: a changed source is a new folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+import numpy as np
+import numpy.typing as npt
+import platformdirs
+
+FloatArray = npt.NDArray[np.float64]
+"""A float64 array; every hot loop takes these, C-contiguous."""
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def cache_folder() -> Path:
+    """Folder of everything that simrail may throw away: rides and compiled kernels."""
+    return Path(platformdirs.user_cache_dir("simrail", appauthor=False))
+
+
+def kernel_hash() -> str:
+    """SHA-256 over the sources that hold compiled kernels, and numba's version."""
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for folder in (here, here.parent / "estimators"):
+        for source in sorted(folder.rglob("*.py")):
+            text = source.read_bytes()
+            if b"@njit" in text:
+                digest.update(source.name.encode() + b"\0" + text)
+    return digest.hexdigest()[:16]
+
+
+numba.config.CACHE_DIR = str(cache_folder() / "kernels" / kernel_hash())
+
+
+def njit(function: _Function) -> _Function:
+    """Compile a function for float64 arrays: cached on disk, without the GIL, IEEE division."""
+    compiled: _Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return compiled

@@ -1,0 +1,125 @@
+"""What the logger on the train saw, and what the train may know: the wall before the truth.
+
+A `Recording` holds the signals (IMU, encoder), an odometry frame that says where on the track each
+sample was taken, and the knowledge that a real train has: the design track, the nominal wheel
+radius, the IMU's data sheet, where it is mounted. It never holds a true value, except in an odometry
+frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read into the same
+class, so the same estimators run on them.
+
+This module neither simulates nor estimates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import pandas as pd
+
+from simrail.track.design import TrackDesign
+
+
+@dataclass(frozen=True)
+class ImuSheet:
+    """What the data sheet says of an IMU: what an estimator may use for its tuning.
+
+    Attributes
+    ----------
+    grade : str
+        Name of the grade.
+    rate_hz : float
+        Sample rate.
+    delay_s : float
+        How much later than its time stamp a sample leaves the sensor (group delay of its filter).
+        Time stamps are already corrected for it.
+    gyro_noise_radpsqrts, accel_noise_mpsqrts : float
+        Allan coefficients N of the white noise, rad/s/sqrt(Hz) and m/s2/sqrt(Hz) (IEEE 952): the
+        standard deviation of one sample is N sqrt(rate).
+    gyro_bias_instability_radps, accel_bias_instability_mps2 : float
+        In-run bias instability B (Allan floor / 0.664).
+    gyro_turn_on_bias_radps, accel_turn_on_bias_mps2 : float
+        Bound of the bias at switch-on.
+    """
+
+    grade: str
+    rate_hz: float
+    delay_s: float
+    gyro_noise_radpsqrts: float
+    accel_noise_mpsqrts: float
+    gyro_bias_instability_radps: float
+    accel_bias_instability_mps2: float
+    gyro_turn_on_bias_radps: float
+    accel_turn_on_bias_mps2: float
+
+
+@dataclass(frozen=True)
+class EncoderSheet:
+    """What the train knows of its wheel encoder.
+
+    Attributes
+    ----------
+    wheel : str
+        Name of the wheel, e.g. ``"front.left"``.
+    pulses_per_revolution : int
+        Pulses counted per turn of the wheel.
+    wheel_radius_m : float
+        Nominal wheel radius; the true one differs.
+    rate_hz : float
+        Rate at which the logger reads the counter.
+    """
+
+    wheel: str
+    pulses_per_revolution: int
+    wheel_radius_m: float
+    rate_hz: float
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Signals of one ride, and what the train knows.
+
+    Attributes
+    ----------
+    name : str
+        Name of the ride.
+    imu : pandas.DataFrame
+        Indexed by ``time_s``, columns `simrail.columns.IMU`, uniform in time.
+    imu_sheet : ImuSheet
+        Its data sheet.
+    mount : str
+        Name of the IMU.
+    mount_position_m : tuple of float
+        (x, y, z) of the IMU in its body when it stands centred on level track: x forward from the
+        body's reference point, y left of the track centre, z above the rail plane.
+    track : TrackDesign
+        The design track.
+    encoder : pandas.DataFrame, optional
+        Indexed by ``time_s``, column ``pulse_count``.
+    encoder_sheet : EncoderSheet, optional
+        Its data sheet.
+    start_position_m : float
+        Where on the track the IMU stood at the first sample (the train knows its platform).
+    odometry : pandas.DataFrame
+        Indexed by the IMU's ``time_s``; columns `simrail.columns.ODOMETRY` + `ODOMETRY_SD`: position,
+        speed and acceleration of the IMU along the track.
+    odometry_source : str
+        ``"encoder"``, ``"truth"`` (an ablation), or the name of the method that made it.
+    gravity_mps2 : float
+        Local gravity.
+    """
+
+    name: str
+    imu: pd.DataFrame
+    imu_sheet: ImuSheet
+    mount: str
+    mount_position_m: tuple[float, float, float]
+    track: TrackDesign
+    encoder: pd.DataFrame | None
+    encoder_sheet: EncoderSheet | None
+    start_position_m: float
+    odometry: pd.DataFrame
+    odometry_source: str
+    gravity_mps2: float = 9.81
+
+    def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
+        """Return the same recording with another odometry frame."""
+        return replace(self, odometry=odometry, odometry_source=source)

@@ -1,0 +1,1 @@
+"""A person's text becomes nouns: the only place that reads and judges TOML files."""

@@ -1,0 +1,148 @@
+"""Reading and judging TOML: finds a file by name or path, and turns every fault into one message.
+
+A scenario and each of its parts (track, vehicle, IMU) is one TOML file, checked by a pydantic model
+that derives from `Part`. Shipped files are found by their bare name; a path finds a person's own.
+What the numbers mean physically is judged by the models, not here.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from simrail.errors import InputError
+
+FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imus"}
+
+
+class Part(BaseModel):
+    """Base of every file model: unknown keys are refused, numbers are finite, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+
+
+_Part = TypeVar("_Part", bound=Part)
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """Shipped files of a kind (``scenario``, ``track``, ``vehicle``, ``imu``), by name."""
+    folder = Path(str(files("scenarios"))) / FOLDERS[kind]
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def find(kind: str, name: str, *, beside: Path | None = None) -> Path:
+    """Find a file: a path as given, a path beside another file, or a shipped name.
+
+    Raises
+    ------
+    InputError
+        If there is no such file; the message lists the nearest shipped names.
+    """
+    looks_like_path = name.endswith(".toml") or "/" in name or "\\" in name
+    if looks_like_path:
+        for candidate in (Path(name), *([beside.parent / name] if beside else [])):
+            if candidate.is_file():
+                return candidate
+        raise InputError("no such file", file=name, remedy=f"give the path of a {kind} file, or a shipped name")
+    known = shipped(kind)
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(name, known, n=3) or sorted(known)
+    raise InputError(
+        f"no {kind} of this name is shipped",
+        value=name,
+        limit="e.g. " + ", ".join(near),
+        remedy=f"'simrail list' shows all; a file of your own needs its path, ending in .toml (./{name}.toml)",
+    )
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file, or say in which line it is broken."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=path) from error
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text", file=path, remedy="save the file as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not valid TOML: {error}", file=path) from error
+
+
+def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
+    """Build a file model from raw TOML data; the first fault becomes an `InputError`."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise _as_input_error(error, model, file) from None
+
+
+def load(model: type[_Part], kind: str, name: str, *, beside: Path | None = None) -> _Part:
+    """Find, read and judge one file."""
+    path = find(kind, name, beside=beside)
+    return judge(model, read_toml(path), file=path)
+
+
+def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
+    faults = error.errors()
+    # An unknown key is usually a misspelling that also leaves a required one missing: say it first.
+    first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
+    field = ""
+    for step in first["loc"]:
+        field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
+    problem, limit, remedy = first["msg"], None, None
+    value = first.get("input")
+    if isinstance(value, (dict, list)) and len(repr(value)) > 60:
+        value = None
+    context = first.get("ctx", {})
+    if first["type"] == "extra_forbidden":
+        allowed = _fields_at(model, first["loc"][:-1])
+        near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
+        problem = "unknown key"
+        limit = "one of " + ", ".join(allowed) if allowed else None
+        remedy = f"did you mean {near[0]}?" if near else "remove it"
+    elif first["type"] == "missing":
+        problem, value, remedy = "is required", None, "add it"
+    elif first["type"] == "value_error":
+        inner = context.get("error")
+        if isinstance(inner, InputError):
+            inner.file = file if inner.file is None else inner.file
+            inner.field = ".".join(part for part in (field, inner.field) if part) or None
+            return inner
+        problem = str(inner)
+    elif first["type"] == "finite_number":
+        problem, limit, remedy = "is not a finite number", "a finite number", "replace NaN or infinity"
+    elif first["type"] in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
+        sign = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+        key = next(key for key in sign if key in context)
+        problem, limit = "is out of range", f"{sign[key]} {context[key]}"
+        remedy = "mind the unit, which is in the name of the field"
+    more = len(faults) - 1
+    if more:
+        problem += f" (and {more} more fault{'s' if more > 1 else ''} in this file)"
+    return InputError(problem, file=file, field=field or None, value=value, limit=limit, remedy=remedy)
+
+
+def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Names of the fields that are allowed at a place in a model."""
+    current: type[BaseModel] | None = model
+    for step in location:
+        if isinstance(step, int) or current is None:
+            continue
+        annotation = current.model_fields.get(step)
+        current = _model_in(annotation.annotation) if annotation else None
+    return list(current.model_fields) if current else []
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None
