@@ -87,6 +87,8 @@ class Recording:
         Its data sheet.
     mount : str
         Name of the IMU.
+    mount_body : str
+        Body that it is mounted on, e.g. ``"front"`` (an axle), ``"frame"``, ``"body"``.
     mount_position_m : tuple of float
         (x, y, z) of the IMU in its body when it stands centred on level track: x forward from the
         body's reference point, y left of the track centre, z above the rail plane.
@@ -111,6 +113,7 @@ class Recording:
     imu: pd.DataFrame
     imu_sheet: ImuSheet
     mount: str
+    mount_body: str
     mount_position_m: tuple[float, float, float]
     track: TrackDesign
     encoder: pd.DataFrame | None
