@@ -8,7 +8,10 @@ What the numbers mean physically is judged by the models, not here.
 from __future__ import annotations
 
 import difflib
+import json
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,9 +24,14 @@ FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imu
 
 
 class Part(BaseModel):
-    """Base of every file model: unknown keys are refused, numbers are finite, values are frozen."""
+    """Base of every file model.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+    Unknown keys are refused, numbers are finite, values are frozen. Types are strict: text is never
+    read as a number (``"20 km/h"``), nor true as 1. Whole numbers stand for floats, and TOML arrays
+    for tuples.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 _Part = TypeVar("_Part", bound=Part)
@@ -61,22 +69,46 @@ def find(kind: str, name: str, *, beside: Path | None = None) -> Path:
     )
 
 
+def label(path: Path) -> str:
+    """Name a file in messages and results: no more of the machine's folders than its reader needs."""
+    for root, prefix in ((Path(str(files("scenarios"))), "scenarios"), (Path.cwd(), "")):
+        if path.resolve().is_relative_to(root.resolve()):
+            return (Path(prefix) / path.resolve().relative_to(root.resolve())).as_posix()
+    return str(path)
+
+
+def read_text(path: Path) -> str:
+    """Read a text file, or say why it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from error
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text", file=label(path), remedy="save the file as UTF-8") from error
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file, or say in which line it is broken."""
+    return parse_toml(read_text(path), file=label(path))
+
+
+def parse_toml(text: str, *, file: object) -> dict[str, Any]:
+    """Parse TOML text, or say in which line it is broken."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8 text", file=path, remedy="save the file as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", file=path) from error
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(
+            f"is not valid TOML: {error}",
+            file=file,
+            remedy='mend that place; text stands in quotes, numbers do not: name = "go20A", speed_kmh = 20.0',
+        ) from error
 
 
 def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
     """Build a file model from raw TOML data; the first fault becomes an `InputError`."""
     try:
-        return model.model_validate(data)
+        # JSON is the mode in which pydantic is strict about numbers and still takes arrays for tuples.
+        return model.model_validate_json(json.dumps(data, default=str))
     except ValidationError as error:
         raise _as_input_error(error, model, file) from None
 
@@ -84,7 +116,19 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
 def load(model: type[_Part], kind: str, name: str, *, beside: Path | None = None) -> _Part:
     """Find, read and judge one file."""
     path = find(kind, name, beside=beside)
-    return judge(model, read_toml(path), file=path)
+    return judge(model, read_toml(path), file=label(path))
+
+
+@contextmanager
+def blame(file: object, field: str) -> Iterator[None]:
+    """Say in which file and field an `InputError` arose, where it does not say so itself."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is None:
+            error.file = file
+            error.field = f"{field}.{error.field}" if error.field else field
+        raise
 
 
 def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
@@ -99,32 +143,60 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
     if isinstance(value, (dict, list)) and len(repr(value)) > 60:
         value = None
     context = first.get("ctx", {})
-    if first["type"] == "extra_forbidden":
+    kind = first["type"]
+    if kind == "extra_forbidden":
         allowed = _fields_at(model, first["loc"][:-1])
         near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
         problem = "unknown key"
         limit = "one of " + ", ".join(allowed) if allowed else None
         remedy = f"did you mean {near[0]}?" if near else "remove it"
-    elif first["type"] == "missing":
+    elif kind == "missing":
         problem, value, remedy = "is required", None, "add it"
-    elif first["type"] == "value_error":
+    elif kind == "value_error":
         inner = context.get("error")
         if isinstance(inner, InputError):
             inner.file = file if inner.file is None else inner.file
             inner.field = ".".join(part for part in (field, inner.field) if part) or None
             return inner
         problem = str(inner)
-    elif first["type"] == "finite_number":
+    elif kind == "finite_number":
         problem, limit, remedy = "is not a finite number", "a finite number", "replace NaN or infinity"
-    elif first["type"] in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
+    elif kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
         sign = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
         key = next(key for key in sign if key in context)
         problem, limit = "is out of range", f"{sign[key]} {context[key]}"
         remedy = "mind the unit, which is in the name of the field"
+    elif kind in _TYPES:
+        problem, limit = "has the wrong type", _TYPES[kind]
+        remedy = "write it without quotes, in the unit that the field's name says" if isinstance(value, str) else None
+        remedy = "write it in quotes" if kind == "string_type" else remedy
+    elif kind == "literal_error":
+        expected = str(context.get("expected", ""))
+        problem, limit = "is not one of the possible values", f"one of {expected}"
+        near = difflib.get_close_matches(str(value), expected.replace("'", "").replace(" or ", ", ").split(", "), n=1)
+        remedy = f"did you mean {near[0]}?" if near else None
+    elif kind in {"too_short", "too_long"}:
+        problem, limit = "has the wrong number of items", first["msg"].split(" after ")[0]
     more = len(faults) - 1
     if more:
         problem += f" (and {more} more fault{'s' if more > 1 else ''} in this file)"
     return InputError(problem, file=file, field=field or None, value=value, limit=limit, remedy=remedy)
+
+
+_TYPES = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number that fits 64 bits",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "tuple_type": "an array, e.g. [0.0, 0.0, 0.6]",
+    "list_type": "an array of tables, e.g. [[ride]]",
+    "model_type": "a table",
+    "dict_type": "a table",
+}
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

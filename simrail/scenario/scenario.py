@@ -1,0 +1,237 @@
+"""What a person writes into a scenario file, as models; and the reading of it.
+
+A `Scenario` is a name, the text it was read from, and a `ScenarioFile`: the judged content. Any
+scalar may be a list (`simrail.scenario.axes`), so one scenario is one ride or a whole campaign.
+Only the form of each field is judged here; whether track, vehicle, rides and sensors fit each other
+is judged by `simrail.scenario.check`, and what is run is listed by `simrail.scenario.cells`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator
+
+from simrail.scenario.axes import Axis, Listed
+from simrail.scenario.files import Part, find, judge, label, parse_toml, read_text
+from simrail.scenario.overrides import override
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
+"""A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
+
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class IrregularityPart(Part):
+    """``[irregularity]``: how the rails deviate from the design. Without it they do not."""
+
+    spectrum: Listed[str]
+    wavelengths_m: Annotated[tuple[Positive, Positive], Field(description="shortest, longest")] = (1.5, 100.0)
+    fade_m: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 40.0
+    scale: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = 1.0
+
+    @field_validator("wavelengths_m")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[0] >= value[1]:
+            raise ValueError(f"are not (shortest, longest): {list(value)}")
+        return value
+
+
+class StopPart(Part):
+    """A stop on the way: where the reference point of the vehicle stands, and for how long."""
+
+    position_m: float
+    dwell_s: Annotated[float, Field(ge=0.0, le=3600.0)]
+
+
+class RidePart(Part):
+    """``[[ride]]``: one ride over the track. It runs backwards if ``end_m < start_m``."""
+
+    name: Name
+    start_m: Listed[float]
+    end_m: Listed[float]
+    speed_kmh: Listed[Annotated[float, Field(gt=0.0, le=400.0)]]
+    acceleration_mps2: Listed[Annotated[float, Field(gt=0.0, le=3.0)]] = 0.6
+    jerk_mps3: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = 0.4
+    rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 20.0
+    final_rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 5.0
+    stops: tuple[StopPart, ...] = ()
+
+
+class ImuPart(Part):
+    """``[[imu]]``: an IMU of some grade, mounted on a body of the vehicle."""
+
+    name: Name
+    grade: Listed[str]
+    body: Listed[str]
+    position_m: tuple[float, float, float]
+    roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
+    yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+
+    @field_validator("position_m")
+    @classmethod
+    def _metres(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        if max(abs(part) for part in value) > 50.0:
+            raise ValueError(f"lies more than 50 m from the vehicle's reference point: {list(value)}; it is in metres")
+        return value
+
+
+class EncoderPart(Part):
+    """``[encoder]``: pulses of one wheel, whose radius is known up to a relative error."""
+
+    wheel: Listed[str]
+    pulses_per_revolution: Listed[Annotated[int, Field(ge=1, le=1_000_000)]] = 1024
+    rate_hz: Listed[Annotated[float, Field(gt=0.0, le=1000.0)]] = 250.0
+    radius_error_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.0
+
+
+class EstimatorPart(Part):
+    """``[[estimator]]``: a method under a name, with the keyword arguments of its class."""
+
+    name: Name
+    method: str
+    options: dict[str, Any] = {}
+
+
+class ScorePart(Part):
+    """``[score]``: what of the score table is kept; everything, unless said otherwise.
+
+    ``"curve:*"`` among the windows keeps every single curve.
+    """
+
+    windows: tuple[str, ...] | None = None
+    metrics: tuple[str, ...] | None = None
+
+
+class ScenarioFile(Part):
+    """The content of a scenario file."""
+
+    title: str
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    track: Listed[str]
+    vehicle: Listed[str]
+    engine: Listed[Literal["exudyn", "kinematic"]] = "exudyn"
+    step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
+    track_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+    sensor_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+    odometry: Listed[Literal["encoder", "truth"]] = "encoder"
+    irregularity: IrregularityPart | None = None
+    ride: Annotated[list[RidePart], Field(min_length=1)]
+    imu: Annotated[list[ImuPart], Field(min_length=1)]
+    encoder: EncoderPart | None = None
+    estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
+    score: ScorePart = ScorePart()
+
+    @field_validator("step_s")
+    @classmethod
+    def _divides_the_output(cls, value: float | Axis) -> float | Axis:
+        for step in value if isinstance(value, Axis) else (value,):
+            if abs(0.001 / float(step) - round(0.001 / float(step))) > 1e-6:
+                raise ValueError(f"does not divide the output interval of 0.001 s: {step}; try 0.0005")
+        return value
+
+    @field_validator("ride", "imu", "estimator")
+    @classmethod
+    def _unique_names(cls, value: list[Any]) -> list[Any]:
+        names = [part.name for part in value]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two of them are named {name!r}; give each a name of its own")
+        return value
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario that has been read: its name, where it stood, its text and its content.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the file; names the folder of the results.
+    file : str
+        How messages call the file.
+    folder : Path, optional
+        Where parts that are given by a relative path are looked for.
+    text : str
+        The file as it was written.
+    overrides : tuple of str
+        Settings of the command line, ``key=value``.
+    spec : ScenarioFile
+        The judged content, settings applied.
+    """
+
+    name: str
+    file: str
+    folder: Path | None
+    text: str
+    overrides: tuple[str, ...]
+    spec: ScenarioFile
+
+    @property
+    def title(self) -> str:
+        """Title of the scenario."""
+        return self.spec.title
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 over the content (not over its comments), 16 hexadecimal digits.
+
+        It covers the names of the parts (track, vehicle, IMU), not what stands in their files.
+        """
+        content = json.dumps(self.spec.model_dump(mode="json"), sort_keys=True)
+        return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
+    """Read a scenario.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a shipped scenario (``"go20a"``) or path of a file.
+    overrides : sequence of str, optional
+        Settings ``key=value`` that replace what the file says, e.g. ``"ride.speed_kmh=[20, 70]"``.
+    seed : int, optional
+        Replaces the file's seed.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or has a fault: an unknown key, a wrong type or unit, NaN.
+    """
+    path = find("scenario", str(name))
+    settings = [*overrides, *([f"seed={seed}"] if seed is not None else [])]
+    return read_scenario(read_text(path), name=path.stem, file=label(path), folder=path.parent, overrides=settings)
+
+
+def read_scenario(
+    text: str,
+    *,
+    name: str,
+    file: str | None = None,
+    folder: Path | None = None,
+    overrides: Sequence[str] = (),
+) -> Scenario:
+    """Read a scenario from TOML text; see `load_scenario`."""
+    file = file or f"{name}.toml"
+    data = override(parse_toml(text, file=file), overrides)
+    spec = judge(ScenarioFile, data, file=file)
+    listed = [_options_as_axes(part) for part in spec.estimator]
+    spec = spec.model_copy(update={"estimator": listed})
+    return Scenario(name=name, file=file, folder=folder, text=text, overrides=tuple(overrides), spec=spec)
+
+
+def _options_as_axes(part: EstimatorPart) -> EstimatorPart:
+    """Read lists among an estimator's options as axes; a list of lists is a list-valued option."""
+    options: dict[str, Any] = {}
+    for key, value in part.options.items():
+        is_axis = isinstance(value, list) and value and not any(isinstance(item, (list, dict)) for item in value)
+        options[key] = Axis(value) if is_axis else value
+    return part.model_copy(update={"options": options})
