@@ -1,0 +1,36 @@
+"""One ride looked at closely: what the report draws, handed over by the campaign.
+
+It is a plain bundle. It lies below the campaign, which makes it, and the report, which draws it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from simrail.estimate import Estimate
+from simrail.recording import Recording
+
+
+@dataclass(frozen=True)
+class CellResult:
+    """Recording, truth and estimates of one cell.
+
+    Attributes
+    ----------
+    cell : dict
+        The labels of the cell, as in the score table (``ride``, ``vehicle``, ``imu``, ...), and the
+        values of the scenario's axes.
+    recording : Recording
+        What the train recorded.
+    motion : pandas.DataFrame
+        True motion of the mount at the IMU times (`simrail.score.truth_at_imu`).
+    estimates : dict of str to Estimate
+        By the estimator's name in the scenario, in the scenario's order; failed ones are left out.
+    """
+
+    cell: dict[str, object]
+    recording: Recording
+    motion: pd.DataFrame
+    estimates: dict[str, Estimate]

@@ -1,0 +1,266 @@
+"""The score table: one row per figure, always the same columns and the same words.
+
+Tables of different campaigns, and of different years, are laid side by side, so neither columns nor
+words may drift: a word that is not in the vocabulary here is refused. This module knows the table
+only; what the figures mean and how they are computed is in `simrail.score`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pandas as pd
+
+FIGURE_COLUMNS = (
+    "quantity",
+    "band",
+    "reference",
+    "window",
+    "metric",
+    "value",
+    "unit",
+    "n_samples",
+    "status",
+)
+"""What one figure is: the part of a row that `simrail.score` fills."""
+
+LABEL_COLUMNS = (
+    "cell",
+    "scenario",
+    "ride",
+    "vehicle",
+    "mount",
+    "imu",
+    "odometry",
+    "tuning",
+    "track_draw",
+    "sensor_draw",
+    "estimator",
+)
+"""What the figure is about: the part that the campaign fills."""
+
+SCORE_COLUMNS = LABEL_COLUMNS + FIGURE_COLUMNS
+"""All columns of a score table, in their order."""
+
+INTEGER_COLUMNS = ("cell", "track_draw", "sensor_draw", "n_samples")
+
+QUANTITY_UNITS = {
+    "roll": "deg",
+    "pitch": "deg",
+    "yaw": "deg",
+    "lateral": "mm",
+    "vertical": "mm",
+    "position": "m",
+    "speed": "m/s",
+    "acceleration_x": "m/s2",
+    "acceleration_y": "m/s2",
+    "alignment": "mm",
+    "vertical_profile": "mm",
+    "cross_level": "mm",
+    "gauge": "mm",
+    "twist": "mm",
+    "yaw_debiased": "deg",
+    "distance_relative": "1",
+    "gyro_bias": "deg/s",
+    "accel_bias": "m/s2",
+}
+"""Every quantity that can be scored, with the unit of its error."""
+
+METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us"}
+"""Metrics whose unit is not the quantity's."""
+
+BANDS = ("full", "D0", "D1", "D2", "D3")
+REFERENCES = ("truth", "design")
+WINDOWS = ("whole", "straight", "transition", "curve", "standstill", "moving")
+METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
+OK = "ok"
+CURVE_PREFIX = "curve:"
+"""A window of one curve is ``curve:`` and the name of its segment."""
+
+_CLOSED = {
+    "quantity": tuple(QUANTITY_UNITS),
+    "band": BANDS,
+    "reference": REFERENCES,
+    "window": WINDOWS,
+    "metric": METRICS,
+    "unit": tuple(dict.fromkeys((*QUANTITY_UNITS.values(), *METRIC_UNITS.values()))),
+    "status": (OK,),
+}
+
+
+def unit_of(quantity: str, metric: str) -> str:
+    """Unit of a figure: the metric's own if it has one, else the quantity's."""
+    return METRIC_UNITS.get(metric, QUANTITY_UNITS[quantity])
+
+
+def as_score_table(frame: pd.DataFrame, *, bands: Sequence[str] = ()) -> pd.DataFrame:
+    """Give a frame of scores the fixed column order and dtypes, and refuse words that are not in the vocabulary.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        All `FIGURE_COLUMNS`, and as many `LABEL_COLUMNS` as are filled already.
+    bands : sequence of str
+        The scenario's own wavelength bands, by name.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Text columns categorical with the whole vocabulary first, ``value`` float64, counts int64.
+
+    Raises
+    ------
+    ValueError
+        On a missing or unknown column, an unknown word, a unit that is not the quantity's, a value
+        beside a failure status, or a figure that is not finite beside ``ok``.
+    """
+    unknown = [str(name) for name in frame.columns if name not in SCORE_COLUMNS]
+    missing = [name for name in FIGURE_COLUMNS if name not in frame.columns]
+    if unknown or missing:
+        raise ValueError(f"score table: unknown columns {unknown}, missing columns {missing}")
+    columns: dict[str, pd.Series] = {}
+    for name in SCORE_COLUMNS:
+        if name not in frame.columns:
+            continue
+        if name in INTEGER_COLUMNS:
+            columns[name] = frame[name].astype(np.int64)
+        elif name == "value":
+            columns[name] = frame[name].astype(np.float64)
+        else:
+            columns[name] = _categorical(name, frame[name], bands)
+    table = pd.DataFrame(columns, index=frame.index)
+    _check(table)
+    return table
+
+
+def concat_scores(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Stack score tables; categories are united, columns stay categorical and in order."""
+    kept = list(tables)
+    if not kept:
+        return as_score_table(pd.DataFrame(columns=list(SCORE_COLUMNS)))
+    names = kept[0].columns
+    columns: dict[str, object] = {}
+    for name in names:
+        parts = [table[name] for table in kept]
+        if isinstance(parts[0].dtype, pd.CategoricalDtype):
+            # Far faster than pandas' own concat of unlike categories, which falls back to objects.
+            words = list(dict.fromkeys(word for part in parts for word in part.cat.categories))
+            dtype = pd.CategoricalDtype(words)
+            codes = [pd.Categorical(part, dtype=dtype).codes for part in parts]
+            columns[name] = pd.Categorical.from_codes(np.concatenate(codes), dtype=dtype)
+        else:
+            columns[name] = np.concatenate([part.to_numpy() for part in parts])
+    return pd.DataFrame(columns)
+
+
+def labelled(figures: pd.DataFrame, labels: dict[str, object]) -> pd.DataFrame:
+    """Put the campaign's labels before the figures of one estimate.
+
+    Parameters
+    ----------
+    figures : pandas.DataFrame
+        What `simrail.score.score` returned.
+    labels : dict
+        A value for each of `LABEL_COLUMNS`.
+    """
+    missing = [name for name in LABEL_COLUMNS if name not in labels]
+    if missing or len(labels) != len(LABEL_COLUMNS):
+        raise ValueError(f"score table: labels must be exactly {LABEL_COLUMNS}; missing {missing}")
+    n = len(figures)
+    columns: dict[str, object] = {}
+    for name in LABEL_COLUMNS:
+        if name in INTEGER_COLUMNS:
+            columns[name] = np.full(n, labels[name], dtype=np.int64)
+        else:
+            columns[name] = pd.Categorical.from_codes(np.zeros(n, dtype=np.int8), [str(labels[name])])
+    columns |= {name: figures[name].array for name in FIGURE_COLUMNS}
+    return pd.DataFrame(columns)
+
+
+def failed_figures(reason: str) -> pd.DataFrame:
+    """The one row that stands for an estimate or a cell that could not be made."""
+    first = ("roll", "full", "truth", "whole", "rms", np.nan, "deg", 0, reason.strip() or "failed")
+    return as_score_table(pd.DataFrame([first], columns=list(FIGURE_COLUMNS)))
+
+
+def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.DataFrame:
+    """Average the figures over draws, the two levels of the Monte Carlo apart.
+
+    Parameters
+    ----------
+    scores : pandas.DataFrame
+        A score table with labels.
+    cells : pandas.DataFrame, optional
+        One row per cell (column ``cell``) with the values of the scenario's axes, in columns that
+        the score table does not have: figures of unlike axes are never averaged.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The text columns and axes, then ``value`` (mean over all draws that are ok), ``sd_sensor``
+        (pooled standard deviation between sensor draws of one track), ``sd_track`` (standard
+        deviation between the means of the tracks), ``track_draws``, ``draws`` (ok), ``failed``.
+        A standard deviation that the number of draws does not allow is empty.
+    """
+    axes: list[str] = []
+    frame = scores.drop(columns=["n_samples"])
+    if cells is not None:
+        axes = [str(name) for name in cells.columns if name not in SCORE_COLUMNS]
+        frame = frame.merge(cells[["cell", *axes]], on="cell", how="left")
+    # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
+    frame["failed"] = (frame["status"] != OK).astype(np.int64)
+    text = [n for n in SCORE_COLUMNS if n not in (*INTEGER_COLUMNS, "value", "status")]
+    keys = [*text[:-5], *axes, *text[-5:]]
+    per_track = (
+        frame.groupby([*keys, "track_draw"], observed=True, dropna=False, sort=False)
+        .agg(mean=("value", "mean"), var=("value", "var"), draws=("value", "count"), failed=("failed", "sum"))
+        .reset_index()
+    )
+    per_track["total"] = per_track["mean"].fillna(0.0) * per_track["draws"]
+    per_track["spread"] = per_track["var"].fillna(0.0) * (per_track["draws"] - 1).clip(lower=0)
+    per_track["freedom"] = (per_track["draws"] - 1).clip(lower=0)
+    per_track["tracks"] = (per_track["draws"] > 0).astype(np.int64)
+    grouped = per_track.groupby(keys, observed=True, dropna=False, sort=False)
+    sums = grouped[["total", "draws", "failed", "spread", "freedom", "tracks"]].sum()
+    result = pd.DataFrame(
+        {
+            "value": sums["total"] / sums["draws"].where(sums["draws"] > 0),
+            "sd_sensor": np.sqrt(sums["spread"] / sums["freedom"].where(sums["freedom"] > 0)),
+            "sd_track": grouped["mean"].std(),
+            "track_draws": sums["tracks"],
+            "draws": sums["draws"],
+            "failed": sums["failed"],
+        }
+    )
+    return result.reset_index()
+
+
+def _categorical(name: str, column: pd.Series, bands: Sequence[str]) -> pd.Series:
+    words = [str(word) for word in column.unique()]
+    known = (*_CLOSED.get(name, ()), *(bands if name == "band" else ()))
+    extra = sorted(word for word in words if word not in known)
+    is_open = name in LABEL_COLUMNS or name == "status"
+    if not is_open:
+        refused = [word for word in extra if not (name == "window" and word.startswith(CURVE_PREFIX))]
+        if refused:
+            raise ValueError(f"score table: {name} {refused[0]!r} is not in the vocabulary {known}")
+    dtype = pd.CategoricalDtype([*known, *extra])
+    return pd.Series(pd.Categorical(column.astype(str), dtype=dtype), index=column.index, name=name)
+
+
+def _check(table: pd.DataFrame) -> None:
+    if table.empty:
+        return
+    pairs = table[["quantity", "metric", "unit"]].drop_duplicates().astype(str)
+    for quantity, metric, unit in pairs.itertuples(index=False):
+        if unit != unit_of(quantity, metric):
+            raise ValueError(
+                f"score table: unit of {quantity} {metric} is {unit_of(quantity, metric)}, not {unit}"
+            )
+    ok = (table["status"] == OK).to_numpy()
+    value = table["value"].to_numpy()
+    if not np.isfinite(value[ok]).all():
+        raise ValueError("score table: a figure with status ok is not finite")
+    if not np.isnan(value[~ok]).all():
+        raise ValueError("score table: a figure with a failure status has a value")
