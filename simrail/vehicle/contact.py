@@ -1,0 +1,212 @@
+"""Forces between one wheel and its rail: the kernel that every engine calls.
+
+`wheel_force` takes where a wheel is and how it moves, and gives the force and moment on it. Normal
+force by Hertz's law on the soft-maximum penetration of `simrail.vehicle.contact_geometry`, creep
+forces by Kalker's linear theory with cubic saturation, fed by relaxation states in place of the
+quotient slip over speed, so that rest and reversal need no special case.
+
+Also here: readings of a table that a person wants to see (conicity, rolling radii, forces at rest).
+
+Not here: making the table, integrating the states.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simrail.jit import FloatArray, njit
+from simrail.vehicle.contact_geometry import COLUMNS, ContactTable, build_contact
+
+__all__ = ["COLUMNS", "ContactTable", "build_contact", "static_height", "wheel_force"]
+
+
+def static_height(table: ContactTable) -> float:
+    """Height (m) of a centred wheelset's centre above nominal at which its wheels carry their load."""
+    _, _, _, _, hertz = table.const[:5]
+    i = int((0.0 - table.const[0]) * table.const[1])
+    x = 0.0 - table.const[0] - i / table.const[1]
+    c = table.coef[0, i, 0]
+    penetration = ((c[0] * x + c[1]) * x + c[2]) * x + c[3]
+    slope = (3.0 * c[0] * x + 2.0 * c[1]) * x + c[2]
+    cosine = 1.0 / np.sqrt(1.0 + slope**2)
+    # The vertical part of N = hertz (pen cos)^1.5 is the load.
+    return float(penetration - (table.static_load_n / (hertz * cosine)) ** (2.0 / 3.0) / cosine)
+
+
+@njit
+def wheel_force(
+    coef: FloatArray,
+    const: FloatArray,
+    side: float,
+    y: float,
+    z: float,
+    phi: float,
+    psi: float,
+    y_rail: float,
+    z_rail: float,
+    V: float,
+    v_x: float,
+    y_dot: float,
+    z_dot: float,
+    phi_dot: float,
+    psi_dot: float,
+    W: float,
+    kappa_h: float,
+    dy_rail: float,
+    dz_rail: float,
+    zeta: FloatArray,
+    zeta_dot: FloatArray,
+    out: FloatArray,
+) -> int:
+    """Force and moment of a rail on a wheel, and the rates of its four creep states.
+
+    Parameters
+    ----------
+    coef, const : ndarray
+        Of a `ContactTable`.
+    side : float
+        +1 left wheel, -1 right wheel.
+    y, z : float
+        Displacement of the axle's centre from its nominal place in the track frame, m.
+    phi, psi : float
+        Roll and yaw of the axle relative to the track frame, rad.
+    y_rail, z_rail, dy_rail, dz_rail : float
+        This rail's deviation, m, and its derivative along the track.
+    V : float
+        Speed along the track ds/dt, signed, m/s.
+    v_x : float
+        Absolute velocity of the axle's centre along the track frame's X, m/s.
+    y_dot, z_dot, phi_dot, psi_dot : float
+        Rates relative to the track frame.
+    W : float
+        Absolute rate of the wheel about the axle, positive rolling forward, rad/s.
+    kappa_h : float
+        Horizontal curvature k3 of the track frame, 1/m.
+    zeta, zeta_dot : ndarray, shape (4,)
+        Creep states (tread longitudinal, lateral; flange longitudinal, lateral), and their rates
+        (written).
+    out : ndarray, shape (8,)
+        Written: force on the wheel in the track frame, N; its moment about the axle's centre, N m,
+        spin moment included; sum of the normal forces, N; largest vertical penetration, m.
+
+    Returns
+    -------
+    int
+        0 no contact, 1 tread, 2 flange, 3 both, -1 derailed: beyond the table's range, forces no
+        longer mean anything.
+
+    Notes
+    -----
+    Creep: ``zeta' = (slip - |V| zeta)/(L0 + tau |V|) - h (zeta + spin share)/T``. The second term
+    keeps the state from winding up while the wheel slides without rolling: h is zero, with zero
+    slope, until the linear force reaches three times the friction limit, where the saturated force
+    is constant. It pulls along the direction of the linear force, so the direction of a saturated
+    force in steady rolling is exact as well. Spin creepage is spin V^3/(V^4 + v^4): spin/V when
+    rolling, nothing at rest, where a contact does not spin.
+    """
+    u0, inv_du, half, r0, hertz = const[0], const[1], const[2], const[3], const[4]
+    friction, chi, length0, tau, taud = const[5], const[6], const[7], const[8], const[9]
+    v_spin, windup_rate, u_min, u_max, touch = const[10], const[11], const[12], const[13], const[14]
+
+    for k in range(8):
+        out[k] = 0.0
+    out[7] = -1.0
+    u = side * (y + r0 * phi - y_rail)
+    height = z + 0.5 * r0 * phi * phi - z_rail
+    p = side * phi
+    x = (u - u0) * inv_du
+    i = min(max(int(x), 0), coef.shape[1] - 1)
+    x = min(max(u - u0, 0.0), coef.shape[1] / inv_du) - i / inv_du
+
+    speed = abs(V)
+    length = length0 + tau * speed
+    # 1/V for a rolling contact, 0 at rest; with the sign of V and without; and that sign.
+    per_speed = V * V * V / (V * V * V * V + v_spin * v_spin * v_spin * v_spin)
+    direction = speed * per_speed
+    flag = 0
+    for k in range(2):
+        c = coef[k, i]
+        P = ((c[0, 0] * x + c[0, 1]) * x + c[0, 2]) * x + c[0, 3]
+        dP = (3.0 * c[0, 0] * x + 2.0 * c[0, 1]) * x + c[0, 2]
+        s = ((c[1, 0] * x + c[1, 1]) * x + c[1, 2]) * x + c[1, 3]
+        F = ((c[2, 0] * x + c[2, 1]) * x + c[2, 2]) * x + c[2, 3]
+        C = ((c[3, 0] * x + c[3, 1]) * x + c[3, 2]) * x + c[3, 3]
+        D = ((c[4, 0] * x + c[4, 1]) * x + c[4, 2]) * x + c[4, 3]
+        pen = P - height - p * (half + s) + p * F * dP + 0.5 * p * p * C + 0.5 * psi * psi * D
+        out[7] = max(out[7], pen)
+        z1, z2 = zeta[2 * k], zeta[2 * k + 1]
+        zeta_dot[2 * k] = -z1 * (speed / length + windup_rate)
+        zeta_dot[2 * k + 1] = -z2 * (speed / length + windup_rate)
+        if not pen > 0.0:
+            continue
+        ds = (3.0 * c[1, 0] * x + 2.0 * c[1, 1]) * x + c[1, 2]
+        dC = (3.0 * c[3, 0] * x + 2.0 * c[3, 1]) * x + c[3, 2]
+        dD = (3.0 * c[4, 0] * x + 2.0 * c[4, 1]) * x + c[4, 2]
+        t = dP - p * ds + 0.5 * p * p * dC + 0.5 * psi * psi * dD
+        cd = 1.0 / np.sqrt(1.0 + t * t)
+        sd = t * cd
+        s -= p * C
+        r = r0 + F + t * p * C
+        Y = side * (half + s)
+        lead = side * r * t * psi
+
+        slip_x = v_x - kappa_h * V * Y - psi_dot * Y - W * r
+        slip_y = y_dot - V * dy_rail + (phi_dot - W * psi) * r + psi_dot * lead
+        slip_z = z_dot - V * dz_rail + phi_dot * Y - W * lead
+        v_n = cd * slip_z - side * sd * slip_y
+        v_2 = cd * slip_y + side * sd * slip_z
+        spin = cd * (psi_dot + kappa_h * V + W * phi) - side * sd * W
+
+        d = pen * cd
+        root = np.sqrt(d)
+        N = hertz * d * root * (1.0 - chi * v_n)
+        if not N > 0.0:
+            continue
+        flag += k + 1
+        f11 = (((c[5, 0] * x + c[5, 1]) * x + c[5, 2]) * x + c[5, 3]) * d
+        f22 = (((c[6, 0] * x + c[6, 1]) * x + c[6, 2]) * x + c[6, 3]) * d
+        f23 = (((c[7, 0] * x + c[7, 1]) * x + c[7, 2]) * x + c[7, 3]) * d * root
+        f33 = (((c[8, 0] * x + c[8, 1]) * x + c[8, 2]) * x + c[8, 3]) * d * d
+
+        bound = friction * N
+        turn = f23 * spin * per_speed
+        share = turn / f22
+        l1 = f11 * z1
+        l2 = f22 * z2 + turn
+        excess = max(np.sqrt(l1 * l1 + l2 * l2) / bound - 3.0, 0.0)
+        brake = windup_rate * excess * excess / (9.0 + excess * excess)
+        grip = min(N / touch, 1.0)
+        grip = grip * grip * (3.0 - 2.0 * grip)
+        d1 = (grip * slip_x - speed * z1) / length - brake * z1
+        d2 = (grip * v_2 - speed * z2) / length - brake * (z2 + share)
+        zeta_dot[2 * k] = d1
+        zeta_dot[2 * k + 1] = d2
+
+        x1 = z1 + taud * d1
+        x2 = z2 + taud * d2
+        T1 = -f11 * x1
+        T2 = -f22 * x2 - turn
+        M = direction * f23 * x2 - f33 * spin * abs(per_speed)
+        q = np.sqrt(T1 * T1 + T2 * T2) / bound
+        factor = 1.0 - q / 3.0 + q * q / 27.0 if q < 3.0 else 1.0 / q
+        T1 *= factor
+        T2 *= factor
+        M *= factor
+
+        fy = cd * T2 - side * sd * N
+        fz = side * sd * T2 + cd * N
+        px = lead - psi * Y
+        py = Y + phi * r
+        pz = phi * Y - r
+        out[0] += T1
+        out[1] += fy
+        out[2] += fz
+        out[3] += py * fz - pz * fy
+        out[4] += pz * T1 - px * fz
+        out[5] += px * fy - py * T1
+        out[4] -= side * sd * M
+        out[5] += cd * M
+        out[6] += N
+    if u < u_min or u > u_max:
+        flag = -1
+    return flag
