@@ -28,7 +28,7 @@ FLICKER_FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
 # Peak of the Allan deviation of a Gauss-Markov process over its standard deviation, and where it lies
 # in correlation times. Both follow from `gauss_markov_allan`; a test finds them again. In terms of the
 # driving noise q = sigma sqrt(2/T) the peak reads 0.437 q sqrt(T), as printed by IEEE Std 952.
-GAUSS_MARKOV_PEAK = 0.6173741
+GAUSS_MARKOV_PEAK = 0.6173643
 GAUSS_MARKOV_PEAK_AT = 1.8926
 
 
@@ -113,7 +113,9 @@ class ImuGrade:
             value = getattr(self, field.name)
             if not isinstance(value, int | float):
                 continue
-            positive = field.name.endswith(("rate_hz", "correlation_s", "bandwidth_hz")) or "range" in field.name
+            positive = (
+                field.name.endswith(("rate_hz", "correlation_s", "bandwidth_hz")) or "range" in field.name
+            )
             if math.isnan(value) or value < 0.0 or (positive and value == 0.0):
                 raise InputError(
                     "is out of range",
@@ -128,7 +130,7 @@ class ImuGrade:
         name: str,
         rate_hz: float,
         *,
-        gyro_noise_degpsqrts: float = 0.0,
+        gyro_noise_degpsqrthz: float = 0.0,
         accel_noise_ugpsqrthz: float = 0.0,
         gyro_bias_instability_degph: float = 0.0,
         accel_bias_instability_mg: float = 0.0,
@@ -151,7 +153,7 @@ class ImuGrade:
             Name of the grade.
         rate_hz : float
             Output rate.
-        gyro_noise_degpsqrts, accel_noise_ugpsqrthz : float
+        gyro_noise_degpsqrthz, accel_noise_ugpsqrthz : float
             Noise densities, deg/s/sqrt(Hz) and ug/sqrt(Hz), read as Allan coefficients N.
         gyro_bias_instability_degph, accel_bias_instability_mg : float
             Bias instabilities B, deg/h and mg.
@@ -177,7 +179,7 @@ class ImuGrade:
         return cls(
             name=name,
             rate_hz=rate_hz,
-            gyro_noise_radpsqrts=math.radians(gyro_noise_degpsqrts),
+            gyro_noise_radpsqrts=math.radians(gyro_noise_degpsqrthz),
             accel_noise_mpsqrts=accel_noise_ugpsqrthz * 1e-3 * milli_g,
             gyro_bias_instability_radps=math.radians(gyro_bias_instability_degph) / 3600.0,
             accel_bias_instability_mps2=accel_bias_instability_mg * milli_g,

@@ -1,0 +1,140 @@
+"""Truth in, recording out: everything that the logger on the train would have seen of a ride.
+
+The only place where sensors meet the truth. What comes out holds no true value, unless the true
+odometry is asked for by name (an ablation, labelled in every table).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from simrail.columns import ODOMETRY, ODOMETRY_SD
+from simrail.errors import InputError
+from simrail.odometry import encoder_odometry
+from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
+from simrail.sensors.grades import ImuGrade
+from simrail.sensors.imu import EarthRate, sample_imu
+from simrail.truth import Mount, Truth
+
+
+def measure(
+    truth: Truth,
+    *,
+    name: str,
+    mount: Mount,
+    grade: ImuGrade,
+    encoder: EncoderSpec | None = None,
+    odometry: str = "encoder",
+    seed: int,
+    draw: int,
+    earth_rate: EarthRate | None = None,
+) -> Recording:
+    """Record a ride.
+
+    Parameters
+    ----------
+    truth : Truth
+        What happened.
+    name : str
+        Name of the ride.
+    mount : Mount
+        Where the IMU sits.
+    grade : ImuGrade
+        The IMU.
+    encoder : EncoderSpec, optional
+        The wheel encoder; None for a train without one.
+    odometry : str
+        ``"encoder"``, or ``"truth"`` for the true position, speed and acceleration of the mount.
+    seed, draw : int
+        Seed of the scenario and number of the sensor draw: a new draw is a new set of sensors.
+    earth_rate : EarthRate, optional
+        Rotation of the Earth; None for an Earth at rest.
+
+    Returns
+    -------
+    Recording
+        Its odometry speaks of the mount; the train knows where the mount stood at time 0.
+
+    Raises
+    ------
+    InputError
+        If body, wheel or odometry is unknown, or a rate does not divide the truth's.
+    """
+    motion = truth.motion(mount)
+    imu, delay_s = sample_imu(motion, grade, seed=seed, draw=draw, name=mount.name, earth=earth_rate or None)
+    start_m = float(motion["position_m"].iloc[0])
+    counts, sheet = None, None
+    if encoder is not None:
+        counts = sample_encoder(
+            truth.wheel_angle(encoder.wheel),
+            truth.time_s,
+            pulses_per_revolution=encoder.pulses_per_revolution,
+            rate_hz=encoder.rate_hz,
+            seed=seed,
+            draw=draw,
+            name=encoder.wheel,
+        )
+        sheet = EncoderSheet(
+            wheel=encoder.wheel,
+            pulses_per_revolution=encoder.pulses_per_revolution,
+            wheel_radius_m=nominal_radius(truth.wheel_radius_m[encoder.wheel], encoder, seed=seed, draw=draw),
+            rate_hz=encoder.rate_hz,
+        )
+    if odometry == "truth":
+        frame = true_odometry(motion, imu.index)
+    elif odometry != "encoder":
+        raise InputError("no such odometry", field="odometry", value=odometry, limit="encoder, truth")
+    elif encoder is None or counts is None or sheet is None:
+        raise InputError(
+            "the odometry needs an encoder",
+            field="odometry",
+            value=odometry,
+            remedy='add an [encoder], or set odometry = "truth" for an ablation',
+        )
+    else:
+        frame = encoder_odometry(
+            counts,
+            sheet,
+            imu.index.to_numpy(),
+            start_position_m=start_m,
+            radius_relative_sd=encoder.radius_error_sd,
+        )
+    return Recording(
+        name=name,
+        imu=imu,
+        imu_sheet=imu_sheet(grade, delay_s=delay_s),
+        mount=mount.name,
+        mount_body=mount.body,
+        mount_position_m=mount.position_m,
+        track=truth.track,
+        encoder=counts,
+        encoder_sheet=sheet,
+        start_position_m=start_m,
+        odometry=frame,
+        odometry_source=odometry,
+        gravity_mps2=truth.gravity_mps2,
+    )
+
+
+def imu_sheet(grade: ImuGrade, *, delay_s: float) -> ImuSheet:
+    """What the data sheet of a grade tells an estimator."""
+    return ImuSheet(
+        grade=grade.name,
+        rate_hz=grade.rate_hz,
+        delay_s=delay_s,
+        gyro_noise_radpsqrts=grade.gyro_noise_radpsqrts,
+        accel_noise_mpsqrts=grade.accel_noise_mpsqrts,
+        gyro_bias_instability_radps=grade.gyro_bias_instability_radps,
+        accel_bias_instability_mps2=grade.accel_bias_instability_mps2,
+        gyro_turn_on_bias_radps=grade.gyro_turn_on_bias_radps,
+        accel_turn_on_bias_mps2=grade.accel_turn_on_bias_mps2,
+    )
+
+
+def true_odometry(motion: pd.DataFrame, times: pd.Index) -> pd.DataFrame:
+    """The true odometry of a mount at times of its motion, with standard deviations of zero."""
+    frame = motion.loc[times, list(ODOMETRY)].copy()
+    frame[list(ODOMETRY_SD)] = np.zeros((len(frame), len(ODOMETRY_SD)))
+    return frame
