@@ -4,16 +4,8 @@ An estimate is compared with the true attitude of its mount and with the design 
 at its true position (the papers' reference), over windows that the track and the true speed define.
 Figures go into the score table of `simrail.score_table`. Nothing here knows scenarios or draws.
 
-What the metrics are, with e = estimate - reference over the samples of a window:
-
-* ``rms``, ``mean`` (signed), ``sd`` (about the mean, so rms^2 = mean^2 + sd^2);
-* ``p95`` and ``max``: 95th percentile and maximum of abs(e); ``final``: e at the last sample;
-* ``nees``: mean of (e / sd)^2, 1 for a consistent method; ``coverage95``: share of the samples with
-  abs(e) <= 1.96 sd. Both only against the truth, and only where the method gives a standard deviation;
-* ``nis``: mean normalised innovation squared divided by the number of innovations, again 1;
-* ``us_per_sample``: the method's own time.
-
-``nis`` and ``us_per_sample`` belong to a method as a whole and stand beside its first quantity.
+``nis`` and ``us_per_sample`` belong to a method as a whole and stand beside its first quantity. What
+the other metrics mean stands in `simrail.score_metrics`.
 """
 
 from __future__ import annotations
@@ -23,25 +15,23 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
-from scipy.special import ndtri
 
-from simrail.columns import ATTITUDE, INNOVATION, MOTION, ODOMETRY, require
+from simrail.columns import ATTITUDE, MOTION, ODOMETRY, require
 from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
-from simrail.score_table import CURVE_PREFIX, FIGURE_COLUMNS, METRICS, OK, WINDOWS, as_score_table, unit_of
+from simrail.score_metrics import IntArray, Row, Series, figures, nis_figures
+from simrail.score_table import CURVE_PREFIX, FIGURE_COLUMNS, METRICS, OK, WINDOWS, as_score_table
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION
 from simrail.truth import Mount
 
 STANDSTILL_MPS = 0.01
 """Below this true speed the vehicle counts as standing."""
 
-IntArray = npt.NDArray[np.intp]
-_Row = tuple[str, str, str, str, str, float, str, int, str]
-_DEVIATION_METRICS = ("rms", "mean", "sd", "p95", "max", "final")
+EVERY_CURVE = CURVE_PREFIX + "*"
+"""In a choice of windows: each single curve."""
 
 
 class HasMotion(Protocol):
@@ -144,7 +134,7 @@ def score(
     us_per_sample : float, optional
         Time that the method took, in microseconds per IMU sample.
     windows, metrics : collection of str, optional
-        What to keep; by default all. ``"curve:"`` in `windows` keeps the window of every curve.
+        What to keep; by default all. ``"curve:*"`` in `windows` keeps the window of every curve.
 
     Returns
     -------
@@ -165,14 +155,14 @@ def score(
         raise InputError("the estimate is not at the recording's IMU times", field="states.time_s")
     chosen = _chosen(against.windows, windows)
     keep = _kept(metrics)
-    rows: list[_Row] = []
+    rows: list[Row] = []
     for series in _attitude_series(states, against):
-        rows += _figures(series, chosen, keep)
+        rows += figures(series, chosen, keep)
     for series in _other_series(states, against.motion):
-        rows += _figures(series, chosen, keep)
+        rows += figures(series, chosen, keep)
     first = rows[0][0] if rows else "roll"
     if estimate.innovations is not None and "nis" in keep:
-        rows += _nis_rows(estimate.innovations, first, chosen)
+        rows += nis_figures(estimate.innovations, first, chosen)
     if us_per_sample is not None and "us_per_sample" in keep:
         n = len(states)
         rows.append((first, "full", "truth", "whole", "us_per_sample", float(us_per_sample), "us", n, OK))
@@ -193,30 +183,20 @@ def score_odometry(
     """
     against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
     chosen, keep = _chosen(against.windows, windows), _kept(metrics)
-    rows: list[_Row] = []
+    rows: list[Row] = []
     for series in _other_series(recording.odometry, against.motion):
-        rows += _figures(series, chosen, keep)
+        rows += figures(series, chosen, keep)
     return _table(rows)
-
-
-@dataclass(frozen=True)
-class _Series:
-    """Errors of one quantity against one reference, in the unit of the score table."""
-
-    quantity: str
-    reference: str
-    error: FloatArray
-    sd: FloatArray | None
-    reason: str = ""
 
 
 def _wrap(angle: FloatArray) -> FloatArray:
     """Angle in [-pi, pi)."""
-    wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    with np.errstate(invalid="ignore"):  # what is not finite stays so, and is counted later
+        wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
     return wrapped
 
 
-def _attitude_series(states: pd.DataFrame, against: Reference) -> Iterator[_Series]:
+def _attitude_series(states: pd.DataFrame, against: Reference) -> Iterator[Series]:
     for column, name in enumerate(ATTITUDE):
         if name not in states.columns:
             continue
@@ -229,10 +209,11 @@ def _attitude_series(states: pd.DataFrame, against: Reference) -> Iterator[_Seri
             ("design", against.design[:, column]),
         ):
             error = _wrap(angle - values)
-            yield _Series(quantity, reference, np.rad2deg(error), sd if reference == "truth" else None)
+            yield Series(quantity, reference, np.rad2deg(error), sd if reference == "truth" else None)
             if quantity == "yaw":
                 # The initial heading is given to the methods, not found by them.
-                yield _Series("yaw_debiased", reference, np.rad2deg(_wrap(error - error[0])), None)
+                reason = "" if np.isfinite(error[0]) else "estimate not finite at the first sample"
+                yield Series("yaw_debiased", reference, np.rad2deg(_wrap(error - error[0])), None, reason)
 
 
 _LINEAR = (
@@ -243,17 +224,17 @@ _LINEAR = (
 )
 
 
-def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[_Series]:
+def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[Series]:
     for quantity, name, sd_name, scale in _LINEAR:
         if name not in states.columns or name not in motion.columns:
             continue
         error = scale * (states[name].to_numpy(dtype=np.float64) - motion[name].to_numpy())
         sd = scale * states[sd_name].to_numpy(dtype=np.float64) if sd_name in states.columns else None
-        yield _Series(quantity, "truth", error, sd)
+        yield Series(quantity, "truth", error, sd)
         if quantity == "position":
             run = float(np.abs(np.diff(motion[name].to_numpy())).sum())
             reason = "" if run > 1.0 else "less than 1 m run"
-            yield _Series("distance_relative", "truth", (error - error[0]) / max(run, 1.0), None, reason)
+            yield Series("distance_relative", "truth", (error - error[0]) / max(run, 1.0), None, reason)
 
 
 def _windows(recording: Recording, position: FloatArray, speed: FloatArray) -> dict[str, IntArray]:
@@ -281,8 +262,10 @@ def _chosen(found: Mapping[str, IntArray], wanted: Collection[str] | None) -> di
         return dict(found)
     for name in wanted:
         if name not in WINDOWS and not name.startswith(CURVE_PREFIX):
-            raise InputError("no such window", value=name, limit="one of " + ", ".join((*WINDOWS, "curve:")))
-    every_curve = CURVE_PREFIX in wanted
+            raise InputError(
+                "no such window", value=name, limit="one of " + ", ".join((*WINDOWS, EVERY_CURVE))
+            )
+    every_curve = EVERY_CURVE in wanted
     return {n: i for n, i in found.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
 
 
@@ -295,102 +278,5 @@ def _kept(wanted: Collection[str] | None) -> tuple[str, ...]:
     return tuple(name for name in METRICS if name in wanted)
 
 
-def _figures(series: _Series, windows: Mapping[str, IntArray], keep: tuple[str, ...]) -> list[_Row]:
-    """All figures of one series, window by window."""
-    deviations = [name for name in _DEVIATION_METRICS if name in keep]
-    consistency = [name for name in ("nees", "coverage95") if name in keep and series.sd is not None]
-    rows: list[_Row] = []
-    for window, samples in windows.items():
-        whole = len(samples) == len(series.error)
-        error = series.error if whole else series.error[samples]
-        values, status = _deviations(error, deviations)
-        status = series.reason or status
-        rows += _rows(series, window, deviations, values, len(samples), status)
-        if consistency:
-            assert series.sd is not None
-            sd = series.sd if whole else series.sd[samples]
-            values, sd_status = _consistency(error, sd, consistency)
-            rows += _rows(
-                series, window, consistency, values, len(samples), status if status != OK else sd_status
-            )
-    return rows
-
-
-def _rows(
-    series: _Series, window: str, metrics: list[str], values: list[float], n: int, status: str
-) -> list[_Row]:
-    if status != OK:
-        values = [np.nan] * len(metrics)
-    return [
-        (
-            series.quantity,
-            "full",
-            series.reference,
-            window,
-            metric,
-            value,
-            unit_of(series.quantity, metric),
-            n,
-            status,
-        )
-        for metric, value in zip(metrics, values, strict=True)
-    ]
-
-
-def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str]:
-    n = len(error)
-    if n == 0:
-        return [np.nan] * len(metrics), "no samples"
-    total = float(error.sum())
-    if not np.isfinite(total):
-        bad = int(n - np.isfinite(error).sum())
-        return [np.nan] * len(metrics), f"estimate not finite in {bad} of {n} samples"
-    mean = total / n
-    centred = error - mean
-    variance = float(centred @ centred) / n
-    size = np.abs(error)
-    known = {
-        "mean": mean,
-        "sd": variance**0.5,
-        "rms": (mean * mean + variance) ** 0.5,
-        "max": float(size.max()),
-        "final": float(error[-1]),
-    }
-    if "p95" in metrics:
-        known["p95"] = float(np.percentile(size, 95.0, overwrite_input=True))
-    return [known[name] for name in metrics], OK
-
-
-def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple[list[float], str]:
-    n = len(error)
-    if n == 0:
-        return [np.nan] * len(metrics), "no samples"
-    good = int(np.count_nonzero(np.isfinite(sd) & (sd > 0.0)))
-    if good < n:
-        return [np.nan] * len(metrics), f"standard deviation not positive in {n - good} of {n} samples"
-    ratio = error / sd
-    inside = np.count_nonzero(np.abs(ratio) <= float(ndtri(0.975)))
-    known = {"nees": float(ratio @ ratio) / n, "coverage95": inside / n}
-    return [known[name] for name in metrics], OK
-
-
-def _nis_rows(innovations: pd.DataFrame, quantity: str, windows: Mapping[str, IntArray]) -> list[_Row]:
-    names = [name for name in innovations.columns if str(name).startswith("innovation_")]
-    nis = innovations[INNOVATION[-1]].to_numpy(dtype=np.float64) / max(len(names), 1)
-    # Samples without an update have no innovation at all: they are not counted. A NIS that is
-    # missing although there was an innovation is a fault and is told.
-    updated = innovations[names].notna().any(axis=1).to_numpy() if names else np.ones(len(nis), dtype=bool)
-    rows: list[_Row] = []
-    for window, samples in windows.items():
-        values = nis[samples][updated[samples]]
-        bad = int(len(values) - np.isfinite(values).sum())
-        status = OK if len(values) and not bad else "no samples"
-        if bad:
-            status = f"NIS not finite in {bad} of {len(values)} samples"
-        value = float(values.mean()) if status == OK else np.nan
-        rows.append((quantity, "full", "truth", window, "nis", value, "1", len(values), status))
-    return rows
-
-
-def _table(rows: list[_Row]) -> pd.DataFrame:
+def _table(rows: list[Row]) -> pd.DataFrame:
     return as_score_table(pd.DataFrame(rows, columns=list(FIGURE_COLUMNS)))

@@ -95,7 +95,7 @@ def unit_of(quantity: str, metric: str) -> str:
 
 
 def as_score_table(frame: pd.DataFrame, *, bands: Sequence[str] = ()) -> pd.DataFrame:
-    """Give a frame of scores the fixed column order and dtypes, and refuse words that are not in the vocabulary.
+    """Give a frame of scores the fixed columns and dtypes, and refuse words outside the vocabulary.
 
     Parameters
     ----------
@@ -173,7 +173,9 @@ def labelled(figures: pd.DataFrame, labels: dict[str, object]) -> pd.DataFrame:
         if name in INTEGER_COLUMNS:
             columns[name] = np.full(n, labels[name], dtype=np.int64)
         else:
-            columns[name] = pd.Categorical.from_codes(np.zeros(n, dtype=np.int8), [str(labels[name])])
+            columns[name] = pd.Categorical.from_codes(
+                np.zeros(n, dtype=np.int64), pd.Index([str(labels[name])])
+            )
     columns |= {name: figures[name].array for name in FIGURE_COLUMNS}
     return pd.DataFrame(columns)
 
