@@ -47,7 +47,7 @@ class ImuFile(Part):
         )
 
 
-def load_grade(name: str, *, beside: Path | None = None) -> ImuGrade:
+def load_grade(name: str, *, folder: Path | None = None) -> ImuGrade:
     """Grade from a shipped name or a path.
 
     Raises
@@ -55,5 +55,5 @@ def load_grade(name: str, *, beside: Path | None = None) -> ImuGrade:
     InputError
         If there is no such file, or it says something impossible.
     """
-    file = load(ImuFile, "imu", name, beside=beside)
+    file = load(ImuFile, "imu", name, folder=folder)
     return file.grade(Path(name).stem)
