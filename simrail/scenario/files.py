@@ -43,8 +43,8 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def find(kind: str, name: str, *, beside: Path | None = None) -> Path:
-    """Find a file: a path as given, a path beside another file, or a shipped name.
+def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
+    """Find a file: a path as given, a path in a folder (that of the scenario), or a shipped name.
 
     Raises
     ------
@@ -53,10 +53,15 @@ def find(kind: str, name: str, *, beside: Path | None = None) -> Path:
     """
     looks_like_path = name.endswith(".toml") or "/" in name or "\\" in name
     if looks_like_path:
-        for candidate in (Path(name), *([beside.parent / name] if beside else [])):
+        for candidate in (*([folder / name] if folder else []), Path(name)):
             if candidate.is_file():
                 return candidate
-        raise InputError("no such file", file=name, remedy=f"give the path of a {kind} file, or a shipped name")
+        raise InputError(
+            "no such file",
+            value=name,
+            limit=f"the path of a {kind} file, or a shipped name",
+            remedy=f"mend the path; shipped: {', '.join(shipped(kind))}",
+        )
     known = shipped(kind)
     if name in known:
         return known[name]
@@ -113,9 +118,9 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
         raise _as_input_error(error, model, file) from None
 
 
-def load(model: type[_Part], kind: str, name: str, *, beside: Path | None = None) -> _Part:
+def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None) -> _Part:
     """Find, read and judge one file."""
-    path = find(kind, name, beside=beside)
+    path = find(kind, name, folder=folder)
     return judge(model, read_toml(path), file=label(path))
 
 

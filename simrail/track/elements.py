@@ -1,20 +1,33 @@
 """The elements that a track is designed from: straights, curves, transitions, gradients.
 
-Plain values in metres. How they are joined to a line, and which combinations are refused, is the
-matter of `simrail.track.alignment`; what the line looks like at a place is that of
-`simrail.track.design`.
+Plain values in metres, and the check that they can be joined without a step. How they are joined to a
+line is the matter of `simrail.track.alignment` and `simrail.track.vertical`; what the line looks like
+at a place is that of `simrail.track.design`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
+
+import numpy as np
+
+from simrail.errors import InputError
 
 STRAIGHT, TRANSITION, CURVE = 0, 1, 2
 """Values of `TrackDesign.kind`."""
 
 RAIL_BASE_M = 1.5
 """Lateral distance of the two running tables, over which cant and cross-level are measured."""
+
+MAX_CANT_M = 0.5 * RAIL_BASE_M
+MAX_SLOPE = 0.5
+"""Bounds of the geometry (30 deg, 27 deg), not of any standard: they catch a wrong unit."""
+
+SMOOTH_STEP = np.array([6.0, -15.0, 10.0, 0.0, 0.0, 0.0])
+"""The quintic from 0 to 1 with zero slope and bend at both ends, highest power first."""
 
 
 @dataclass(frozen=True)
@@ -128,3 +141,49 @@ def element_from_dict(data: dict[str, Any]) -> Element:
     """Element from the plain data that `element_to_dict` makes."""
     values = dict(data)
     return _ELEMENTS[values.pop("kind")](**values)
+
+
+def check_elements(elements: Sequence[Element]) -> None:
+    """Refuse elements that cannot be joined to a line of continuous curvature and cant.
+
+    Raises
+    ------
+    InputError
+        Naming the element (counted from 0, as in ``segment[3]``) and its field.
+    """
+    if not elements:
+        raise InputError("has no elements", field="segment", remedy="add a straight")
+    for i, element in enumerate(elements):
+        here = f"segment[{i}]"
+        require_number(element.length_m, f"{here}.length_m", above=0.0)
+        if isinstance(element, Curve):
+            require_number(element.radius_m, f"{here}.radius_m", zero=False)
+            require_number(element.cant_m, f"{here}.cant_m", within=MAX_CANT_M)
+        after = elements[i + 1] if i + 1 < len(elements) else None
+        if isinstance(element, Transition):
+            if i == 0 or after is None or isinstance(after, Transition):
+                raise InputError(
+                    "a transition joins two neighbours, each a straight or a curve",
+                    field=here,
+                    remedy="put a straight or a curve before and after it",
+                )
+        elif after is not None and not isinstance(after, Transition):
+            ends = ((part.curvature_1pm, part.cross_slope_m) for part in (element, after))
+            if len(set(ends)) > 1:
+                raise InputError(
+                    "curvature or cant steps between two elements",
+                    field=f"segment[{i + 1}]",
+                    value=after,
+                    remedy="put a transition between them",
+                )
+
+
+def require_number(
+    value: float, field: str, *, above: float = -math.inf, within: float = math.inf, zero: bool = True
+) -> None:
+    """Refuse a number that is not finite, not above a bound, or larger in magnitude than another."""
+    good = math.isfinite(value) and value > above and abs(value) <= within and (zero or value != 0.0)
+    if not good:
+        limits = ["finite"] + ([f"> {above:g}"] if above > -math.inf else [])
+        limits += ([f"magnitude <= {within:g}"] if within < math.inf else []) + ([] if zero else ["not 0"])
+        raise InputError("is out of range", field=field, value=value, limit=", ".join(limits))

@@ -77,6 +77,7 @@ def kinematic_truth(
     profile: SpeedProfile,
     *,
     channels: dict[str, Channel] | None = None,
+    offset_m: float = 0.0,
     height_m: float = 0.0,
     wheel_radius_m: float = 0.29,
     rate_hz: float = 1000.0,
@@ -93,8 +94,9 @@ def kinematic_truth(
     channels : dict of str to Channel, optional
         Motion relative to the track frame by name (`CHANNELS`); those that are missing are zero.
         ``lateral`` and ``vertical`` in m, the angles in rad.
-    height_m : float
-        Height of the body's point above the rail plane.
+    offset_m, height_m : float
+        Distance of the body's point ahead of the vehicle's reference point, and its height above the
+        rail plane.
     wheel_radius_m : float
         Radius of its wheel ``"wheel"``, which rolls without slip along the track's centre.
     rate_hz, gravity_mps2 : float
@@ -107,7 +109,8 @@ def kinematic_truth(
     """
     n = int(np.floor(profile.duration_s * rate_hz + 1e-9)) + 1
     t = np.arange(n) / rate_hz
-    s, v, a = profile.motion(t)
+    reference, v, a = profile.motion(t)
+    s = reference + offset_m
     frame = track.frame(s)
     zero = np.zeros((3, n))
     value = {
@@ -149,7 +152,7 @@ def kinematic_truth(
     # d/dt of (C_rel^T omega_t), body components: the track's own rate seen from the turning body.
     alpha = np.einsum("nji,nj->ni", relative, alpha_t) - np.cross(omega_r, omega_tb) + alpha_r
     body = BodyMotion(
-        offset_m=0.0,
+        offset_m=offset_m,
         height_m=height_m,
         position=frame.position + np.einsum("nij,nj->ni", design, rho),
         velocity=np.einsum("nij,nj->ni", design, velocity),
@@ -161,7 +164,7 @@ def kinematic_truth(
     return Truth(
         time_s=t,
         track=track,
-        reference_position_m=s,
+        reference_position_m=reference,
         bodies={"body": body},
         wheel_angles={"wheel": (s - s[0]) / wheel_radius_m},
         wheel_states={},

@@ -1,0 +1,216 @@
+"""From a scenario's words to the nouns of the testbed: track, vehicle, ride, mount, grade, estimator.
+
+Each noun is made for one cell, and every fault is an `InputError` that names the field of
+the scenario, or the file of the part and its field. Nothing is simulated here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from math import radians
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.errors import PydanticUserError
+
+from simrail.errors import InputError
+from simrail.estimate import Estimator, estimator_class
+from simrail.profile import SpeedProfile
+from simrail.ride import Ride
+from simrail.scenario.cells import Cell, Method
+from simrail.scenario.files import blame, load
+from simrail.scenario.imu_file import ImuFile
+from simrail.scenario.scenario import Scenario
+from simrail.scenario.track_file import TrackFile
+from simrail.scenario.vehicle_file import VehicleFile
+from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.grades import ImuGrade
+from simrail.track.design import TrackDesign
+from simrail.track.irregularity import Irregularity
+from simrail.truth import Mount
+from simrail.vehicle.model import VehicleModel
+
+NO_VEHICLE = "none"
+"""The vehicle of the kinematic engine: one body ``"body"`` with one wheel ``"wheel"``."""
+
+NO_IRREGULARITY = Irregularity(spectrum="none", wavelengths_m=(1.5, 100.0), fade_m=0.0)
+
+
+class Parts:
+    """The parts that a scenario names, each file read once.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose parts; relative paths are looked for in its folder first.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self._read: dict[tuple[str, str], Any] = {}
+
+    def track(self, cell: Cell) -> TrackDesign:
+        """Design track of a cell."""
+        name = cell.spec.track
+        if ("track", name) not in self._read:
+            with blame(self.scenario.file, "track"):
+                part = load(TrackFile, "track", name, folder=self.scenario.folder)
+            with blame(name, "track"):
+                design = part.design(Path(name).stem)
+                design.check()
+            self._read["track", name] = design
+        found: TrackDesign = self._read["track", name]
+        return found
+
+    def vehicle(self, cell: Cell) -> VehicleModel | None:
+        """Vehicle of a cell; None for the kinematic engine, which moves one body without one."""
+        name, engine = cell.spec.vehicle, cell.spec.engine
+        if (engine == "kinematic") != (name == NO_VEHICLE):
+            raise InputError(
+                "engine and vehicle do not belong together",
+                file=self.scenario.file,
+                field="vehicle",
+                value=f"{name} with engine {engine}",
+                limit=f'vehicle = "{NO_VEHICLE}" with engine = "kinematic", and only with it',
+                remedy="the kinematic engine moves a body along the rails by itself: it has no vehicle",
+            )
+        if name == NO_VEHICLE:
+            return None
+        if ("vehicle", name) not in self._read:
+            with blame(self.scenario.file, "vehicle"):
+                part = load(VehicleFile, "vehicle", name, folder=self.scenario.folder)
+            self._read["vehicle", name] = part.model(Path(name).stem)
+        vehicle: VehicleModel = self._read["vehicle", name]
+        return vehicle
+
+    def grade(self, cell: Cell) -> ImuGrade:
+        """IMU grade of a cell."""
+        name = cell.imu.grade
+        if ("imu", name) not in self._read:
+            with blame(self.scenario.file, f"imu[{cell.imu_index}].grade"):
+                part = load(ImuFile, "imu", name, folder=self.scenario.folder)
+            self._read["imu", name] = part.grade(Path(name).stem)
+        grade: ImuGrade = self._read["imu", name]
+        return grade
+
+    def ride(self, cell: Cell) -> Ride:
+        """Ride of a cell: all that decides the motion."""
+        return Ride(
+            name=cell.ride.name,
+            design=self.track(cell),
+            irregularity=irregularity_of(cell),
+            seed=cell.ride_seed,
+            vehicle=self.vehicle(cell),
+            profile=profile_of(cell),
+            engine=cell.spec.engine,
+            step_s=cell.spec.step_s,
+        )
+
+
+def profile_of(cell: Cell) -> SpeedProfile:
+    """Speed profile of a cell's ride."""
+    ride = cell.ride
+    return SpeedProfile(
+        start_m=ride.start_m,
+        end_m=ride.end_m,
+        speed_mps=ride.speed_kmh / 3.6,
+        acceleration_mps2=ride.acceleration_mps2,
+        jerk_mps3=ride.jerk_mps3,
+        rest_s=ride.rest_s,
+        final_rest_s=ride.final_rest_s,
+        stops=tuple((stop.position_m, stop.dwell_s) for stop in ride.stops),
+    )
+
+
+def irregularity_of(cell: Cell) -> Irregularity:
+    """How the rails of a cell deviate from the design; a spectrum ``"none"`` if the scenario names none."""
+    part = cell.spec.irregularity
+    if part is None:
+        return NO_IRREGULARITY
+    return Irregularity(
+        spectrum=part.spectrum, wavelengths_m=part.wavelengths_m, fade_m=part.fade_m, scale=part.scale
+    )
+
+
+def mount_of(cell: Cell) -> Mount:
+    """Where the IMU of a cell sits."""
+    imu = cell.imu
+    return Mount(
+        name=imu.name,
+        body=imu.body,
+        position_m=imu.position_m,
+        roll_rad=radians(imu.roll_deg),
+        pitch_rad=radians(imu.pitch_deg),
+        yaw_rad=radians(imu.yaw_deg),
+    )
+
+
+def encoder_of(cell: Cell) -> EncoderSpec | None:
+    """Encoder of a cell, if its scenario has one."""
+    part = cell.spec.encoder
+    return None if part is None else EncoderSpec(**part.model_dump())
+
+
+def estimator_of(scenario: Scenario, method: Method) -> Estimator:
+    """Make an estimator from its class and the options of the scenario.
+
+    Raises
+    ------
+    InputError
+        If no such estimator is registered, it has no such option (the message lists those that it
+        has), or an option has a value that it cannot have.
+    """
+    field = f"estimator[{method.index}]"
+    with blame(scenario.file, f"{field}.method"):
+        known_class = estimator_class(method.part.method)
+    with blame(scenario.file, f"{field}.options"):
+        return _construct(known_class, method.part.options)
+
+
+def _construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:
+    if not dataclasses.is_dataclass(known_class):
+        raise InputError(
+            "is no dataclass, so its options cannot be judged",
+            value=known_class.__qualname__,
+            remedy="make the estimator a frozen dataclass, as in 'simrail new estimator'",
+        )
+    known = {entry.name for entry in dataclasses.fields(known_class) if entry.init and entry.name != "causal"}
+    types = get_type_hints(known_class)
+    values: dict[str, Any] = {}
+    for name, value in options.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            raise InputError(
+                f"{known_class.__name__} has no such option",
+                field=name,
+                value=value,
+                limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
+                remedy=f"did you mean {near[0]}?" if near else "remove it",
+            )
+        values[name] = _option(types.get(name, Any), name, value)
+    try:
+        made: Estimator = known_class(**values)
+    except InputError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{known_class.__name__} refuses them: {error}", value=options) from error
+    return made
+
+
+def _option(kind: Any, name: str, value: Any) -> Any:
+    """Judge one option against the type that the class declares for it; tuples may be given as arrays."""
+    if isinstance(value, list):
+        value = tuple(tuple(item) if isinstance(item, list) else item for item in value)
+    try:
+        adapter = TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False))
+    except PydanticUserError:
+        return value
+    try:
+        return adapter.validate_python(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InputError(
+            "has the wrong type or value", field=name, value=value, limit=first["msg"].removeprefix("Input should be ")
+        ) from None

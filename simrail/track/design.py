@@ -1,0 +1,309 @@
+"""The design track: position, angles and Darboux curvatures at any place, in closed form.
+
+A `TrackDesign` is what the track's drawing says: straights, clothoids and arcs with cant, gradients
+joined by vertical curves. An estimator may know it. Irregularities are not part of it: see
+`simrail.track.irregularity` and `simrail.track.laid`.
+
+Conventions (EQUATIONS section 0 of the design papers): X forward in the direction of increasing s,
+Y left, Z up; ZYX Euler angles, pitch positive nose down, roll positive left side up; s is the arc
+length of the horizontal projection of the centreline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PPoly
+
+from simrail.errors import InputError
+from simrail.jit import FloatArray
+from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
+from simrail.track.elements import (
+    CURVE,
+    RAIL_BASE_M,
+    STRAIGHT,
+    TRANSITION,
+    Curve,
+    Element,
+    Gradient,
+    Straight,
+    Transition,
+    check_elements,
+    element_from_dict,
+    element_to_dict,
+    require_number,
+)
+from simrail.track.vertical import build_vertical, check_gradients
+
+__all__ = [
+    "CURVE",
+    "STRAIGHT",
+    "TRANSITION",
+    "Curve",
+    "Element",
+    "Gradient",
+    "Straight",
+    "TrackDesign",
+    "TrackFrame",
+    "Transition",
+]
+
+
+class TrackFrame(NamedTuple):
+    """The design track frame at places s; every array has the shape of s, vectors a last axis of 3.
+
+    Attributes
+    ----------
+    s_m : ndarray (...)
+        Arc length of the horizontal projection.
+    position : ndarray (..., 3)
+        Centreline in the rail plane, global, m.
+    roll_rad, pitch_rad, yaw_rad : ndarray (...)
+        ZYX Euler angles of the track frame; yaw is unwrapped.
+    rates, second : ndarray (..., 3)
+        First and second derivative of (roll, pitch, yaw) with respect to s, rad/m and rad/m^2.
+    k, dk : ndarray (..., 3)
+        Darboux vector (twist, vertical, horizontal) in the track frame, rad/m, and its derivative with
+        respect to s: the frame that moves at V = ds/dt turns at V k.
+    """
+
+    s_m: FloatArray
+    position: FloatArray
+    roll_rad: FloatArray
+    pitch_rad: FloatArray
+    yaw_rad: FloatArray
+    rates: FloatArray
+    second: FloatArray
+    k: FloatArray
+    dk: FloatArray
+
+
+class _Shape(NamedTuple):
+    """Piecewise polynomials of a design, made once and kept."""
+
+    starts_m: FloatArray
+    plan: Plan
+    cant: tuple[PPoly, PPoly, PPoly]
+    height: tuple[PPoly, PPoly, PPoly, PPoly]
+
+
+@dataclass(frozen=True)
+class TrackDesign:
+    """A design track.
+
+    Attributes
+    ----------
+    name : str
+        Name of the track.
+    start_m : float
+        s at the start of the first element.
+    elements : tuple of Straight, Curve, Transition
+        The plan, in the order of s. A transition joins its neighbours; without one, curvature and cant
+        may not step.
+    gradients : tuple of Gradient
+        In the order of s; level before the first.
+    vertical_radius_m : float or tuple of float
+        Radius of the vertical curves: one for all, or one per change of gradient.
+    vertical_ramp_m : float
+        Length over which the bend of a vertical curve rises and falls; 0 for bare parabolas, whose
+        pitch rate steps.
+    cant_ramp : str
+        ``"smooth"`` (quintic) or ``"linear"``.
+    source : str
+        Where the design comes from.
+    synthetic : bool
+        True if it is made up, in whole or in part.
+    start_position_m : tuple of float
+        Global x, y, z at `start_m`.
+    start_yaw_rad : float
+        Yaw at `start_m`.
+    """
+
+    name: str
+    start_m: float
+    elements: tuple[Element, ...]
+    gradients: tuple[Gradient, ...] = ()
+    vertical_radius_m: float | tuple[float, ...] = 2000.0
+    vertical_ramp_m: float = 5.0
+    cant_ramp: str = "smooth"
+    source: str = ""
+    synthetic: bool = False
+    start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_yaw_rad: float = 0.0
+
+    @property
+    def length_m(self) -> float:
+        """Length of the horizontal projection."""
+        return self.end_m - self.start_m
+
+    @cached_property
+    def end_m(self) -> float:
+        """s at the end of the last element."""
+        return float(element_starts(self.elements, self.start_m)[-1])
+
+    def check(self) -> None:
+        """Refuse a design that makes no line; every other method does so on its first use.
+
+        Raises
+        ------
+        InputError
+            Naming the element or gradient, the value and the limit.
+        """
+        _ = self._shape
+
+    @cached_property
+    def _shape(self) -> _Shape:
+        require_number(self.start_m, "start_m")
+        require_number(self.vertical_ramp_m, "vertical_ramp_m", above=-np.nextafter(0.0, 1.0))
+        if self.cant_ramp not in ("smooth", "linear"):
+            raise InputError("is unknown", field="cant_ramp", value=self.cant_ramp, limit="smooth or linear")
+        check_elements(self.elements)
+        check_gradients(self.gradients, end_m=self.end_m)
+        x, y, z = self.start_position_m
+        plan = build_plan(self.elements, self.start_m, position_m=(x, y), yaw_rad=self.start_yaw_rad)
+        cant = build_cant(self.elements, self.start_m, ramp=self.cant_ramp)
+        height = build_vertical(
+            self.gradients,
+            self.start_m,
+            end_m=self.end_m,
+            radius_m=self.vertical_radius_m,
+            ramp_m=self.vertical_ramp_m,
+            height_m=z,
+        )
+        return _Shape(
+            element_starts(self.elements, self.start_m),
+            plan,
+            (cant, cant.derivative(1), cant.derivative(2)),
+            (height, height.derivative(1), height.derivative(2), height.derivative(3)),
+        )
+
+    def frame(self, s: npt.ArrayLike) -> TrackFrame:
+        """Track frame at places s.
+
+        Parameters
+        ----------
+        s : array_like (...)
+            Places in [start_m, end_m], m.
+
+        Raises
+        ------
+        InputError
+            If a place is off the track or not a number.
+        """
+        return self.frame_extended(self.on_track(s))
+
+    def frame_extended(self, s: npt.ArrayLike) -> TrackFrame:
+        """Like `frame`, but the first and the last element go on beyond the ends of the track."""
+        s = np.asarray(s, dtype=float)
+        shape = self._shape
+        x, y = shape.plan.xy(s)
+        yaw, yaw1, yaw2 = shape.plan.state(s)
+        u, u1, u2 = (cant(s) / RAIL_BASE_M for cant in shape.cant)
+        z, z1, z2, z3 = (height(s) for height in shape.height)
+        # roll = asin(u), pitch = -atan(z1), and their derivatives
+        level = 1.0 / np.sqrt(1.0 - u * u)
+        roll, roll1, roll2 = np.arcsin(u), u1 * level, u2 * level + u * u1 * u1 * level**3
+        flat = 1.0 / (1.0 + z1 * z1)
+        pitch, pitch1 = -np.arctan(z1), -z2 * flat
+        pitch2 = -z3 * flat + 2.0 * z1 * (z2 * flat) ** 2
+        rates, second = _stack(roll1, pitch1, yaw1), _stack(roll2, pitch2, yaw2)
+        k, dk = _darboux(roll, pitch, rates, second)
+        return TrackFrame(s, _stack(x, y, z), roll, pitch, yaw, rates, second, k, dk)
+
+    def curvature(self, s: npt.ArrayLike) -> FloatArray:
+        """Plan curvature d yaw / ds at places s, 1/m, positive to the left; shaped like s."""
+        return self._shape.plan.state(self.on_track(s))[1]
+
+    def segment(self, s: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Index of the element at places s; at a joint, of the one that begins there."""
+        starts = self._shape.starts_m
+        found = np.searchsorted(starts, self.on_track(s), side="right") - 1
+        return np.minimum(found, len(self.elements) - 1)
+
+    def kind(self, s: npt.ArrayLike) -> npt.NDArray[np.int8]:
+        """`STRAIGHT`, `TRANSITION` or `CURVE` at places s; shaped like s."""
+        return np.array([element.kind for element in self.elements], dtype=np.int8)[self.segment(s)]
+
+    def segment_name(self, index: int) -> str:
+        """Name of an element, e.g. ``"curve 4 R-250"``: its kind, number from 1, and radius."""
+        element = self.elements[index]
+        radius = f" R{element.radius_m:g}" if isinstance(element, Curve) else ""
+        return f"{element.word} {index + 1}{radius}"
+
+    def mirrored(self) -> TrackDesign:
+        """The same track with left and right exchanged (y -> -y)."""
+        x, y, z = self.start_position_m
+        return replace(
+            self,
+            elements=tuple(element.mirrored() for element in self.elements),
+            start_position_m=(x, -y, z),
+            start_yaw_rad=-self.start_yaw_rad,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data (str, float, bool, list, dict); `from_dict` returns an equal design."""
+        data = asdict(self)
+        data["elements"] = [element_to_dict(element) for element in self.elements]
+        data["gradients"] = [asdict(gradient) for gradient in self.gradients]
+        data["start_position_m"] = list(self.start_position_m)
+        if isinstance(self.vertical_radius_m, tuple):
+            data["vertical_radius_m"] = list(self.vertical_radius_m)
+        return data
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> TrackDesign:
+        """Design from the plain data that `to_dict` makes, e.g. after a way through JSON."""
+        values = dict(data)
+        values["elements"] = tuple(element_from_dict(element) for element in data["elements"])
+        values["gradients"] = tuple(Gradient(**gradient) for gradient in data["gradients"])
+        values["start_position_m"] = tuple(data["start_position_m"])
+        if isinstance(data["vertical_radius_m"], list):
+            values["vertical_radius_m"] = tuple(data["vertical_radius_m"])
+        return cls(**values)
+
+    def on_track(self, s: npt.ArrayLike) -> FloatArray:
+        """The places s as an array of floats; refused with an `InputError` if one is off the track."""
+        s = np.asarray(s, dtype=float)
+        off = ~((s >= self.start_m) & (s <= self.end_m))  # also true for NaN
+        if off.any():
+            first = float(s[off].flat[0])
+            raise InputError(
+                f"s = {first:g} m is not on track '{self.name}'",
+                field="s",
+                value=first,
+                limit=f"between {self.start_m:g} and {self.end_m:g} m",
+                remedy="shorten the ride or lengthen the track",
+            )
+        return s
+
+
+def _stack(*parts: FloatArray) -> FloatArray:
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def _darboux(
+    roll: FloatArray, pitch: FloatArray, rates: FloatArray, second: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Darboux vector of a ZYX frame and its derivative, both per metre and in the frame's components.
+
+    k1 = roll' - sin(pitch) yaw'
+    k2 = cos(roll) pitch' + sin(roll) cos(pitch) yaw'
+    k3 = -sin(roll) pitch' + cos(roll) cos(pitch) yaw'
+
+    (EQUATIONS section 1.1; the tests derive both from the rotation matrix.)
+    """
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    r1, p1, y1 = np.moveaxis(rates, -1, 0)
+    r2, p2, y2 = np.moveaxis(second, -1, 0)
+    across, across1 = cp * y1, cp * y2 - sp * p1 * y1  # cos(pitch) yaw', and its derivative
+    k = _stack(r1 - sp * y1, cr * p1 + sr * across, cr * across - sr * p1)
+    dk = _stack(
+        r2 - sp * y2 - cp * p1 * y1,
+        cr * p2 + sr * across1 + r1 * k[..., 2],
+        cr * across1 - sr * p2 - r1 * k[..., 1],
+    )
+    return k, dk

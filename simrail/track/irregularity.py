@@ -1,0 +1,140 @@
+"""Draws track irregularities: what the rails deviate from the design, as a function of s and a seed.
+
+The realisation is a sum of harmonics with fixed amplitudes and random phases,
+
+    r(s) = sum over k of sqrt(2 S(f_k) df) cos(2 pi f_k s + p_k),   f_k = k df,   df = 1/65536 m,
+
+on a frequency grid that never changes. So the value at s depends on s, the seed and the spectrum, never on
+the length of the track or on what was sampled before; another band keeps the phases of the waves that
+remain. The four irregularities have independent streams.
+
+This module knows nothing of rails or splines: see `simrail.track.laid`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simrail.columns import IRREGULARITY
+from simrail.errors import InputError
+from simrail.jit import FloatArray
+from simrail.seeds import stream
+from simrail.track.elements import require_number
+from simrail.track.spectra import SPECTRA
+
+PERIOD_M = 65536.0
+"""Length after which a realisation repeats itself."""
+
+SHORTEST_WAVELENGTH_M = 0.5
+"""Shortest wavelength that has a phase."""
+
+SAMPLES_PER_WAVE = 8
+"""Knots that the shortest wave needs to be carried by a cubic spline (to 0.2 % of its amplitude)."""
+
+
+@dataclass(frozen=True)
+class Irregularity:
+    """What the rails deviate from the design, before a seed draws it.
+
+    Attributes
+    ----------
+    spectrum : str
+        A key of `simrail.track.spectra.SPECTRA`.
+    wavelengths_m : tuple of float
+        Shortest and longest wavelength.
+    fade_m : float
+        Length over which the irregularities rise from zero at the start of the track and fall at its end.
+    scale : float
+        Factor on the amplitudes.
+    """
+
+    spectrum: str = "none"
+    wavelengths_m: tuple[float, float] = (3.0, 100.0)
+    fade_m: float = 40.0
+    scale: float = 1.0
+
+    def check(self) -> None:
+        """Refuse what cannot be drawn.
+
+        Raises
+        ------
+        InputError
+            Naming the field and its limit.
+        """
+        if self.spectrum not in SPECTRA:
+            raise InputError(
+                "is unknown", field="spectrum", value=self.spectrum, limit="one of " + ", ".join(SPECTRA)
+            )
+        for value in (*self.wavelengths_m, self.fade_m, self.scale):
+            require_number(value, "irregularity")
+        if not SHORTEST_WAVELENGTH_M <= self.wavelengths_m[0] < self.wavelengths_m[1] <= PERIOD_M / 16:
+            raise InputError(
+                "is not a band",
+                field="wavelengths_m",
+                value=self.wavelengths_m,
+                limit=f"{SHORTEST_WAVELENGTH_M:g} <= shortest < longest <= {PERIOD_M / 16:g} m",
+            )
+        if self.fade_m < 0.0 or self.scale < 0.0:
+            name = "fade_m" if self.fade_m < 0.0 else "scale"
+            raise InputError("is negative", field=name, value=getattr(self, name), limit=">= 0")
+
+
+def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float) -> FloatArray:
+    """One period of one irregularity, without fade.
+
+    Parameters
+    ----------
+    irregularity : Irregularity
+        Spectrum, band and scale.
+    column : str
+        One of `simrail.columns.IRREGULARITY`.
+    seed : int
+        Root seed.
+    step_m : float
+        Sample distance; the period must be a multiple of it.
+
+    Returns
+    -------
+    ndarray (PERIOD_M / step_m,)
+        Values in m at s = 0, step, 2 step, ...; s < 0 wraps around.
+
+    Raises
+    ------
+    InputError
+        If the step does not divide the period or is too coarse for the shortest wave.
+    """
+    irregularity.check()
+    n = round(PERIOD_M / step_m)
+    if n * step_m != PERIOD_M or n % 2 or step_m * SAMPLES_PER_WAVE > irregularity.wavelengths_m[0]:
+        raise InputError(
+            "does not carry these wavelengths",
+            field="step_m",
+            value=step_m,
+            limit=f"a divisor of {PERIOD_M:g} m, <= shortest wavelength / {SAMPLES_PER_WAVE}",
+            remedy="take 0.125 m or a half or a quarter of it, or longer waves",
+        )
+    generator = stream(seed, "track", "irregularity", column.removesuffix("_m"))
+    phases = generator.uniform(0.0, 2.0 * np.pi, int(PERIOD_M / SHORTEST_WAVELENGTH_M))
+    shortest, longest = irregularity.wavelengths_m
+    first, last = int(np.ceil(PERIOD_M / longest)), int(np.floor(PERIOD_M / shortest))
+    harmonics = np.arange(first, last + 1)
+    density = SPECTRA[irregularity.spectrum].densities[column].density(harmonics / PERIOD_M)
+    amplitudes = irregularity.scale * np.sqrt(2.0 * density / PERIOD_M)
+    lines = np.zeros(n // 2 + 1, dtype=complex)
+    lines[harmonics] = 0.5 * n * amplitudes * np.exp(1j * phases[harmonics - 1])
+    return np.fft.irfft(lines, n)
+
+
+def realise_all(irregularity: Irregularity, *, seed: int, step_m: float) -> FloatArray:
+    """One period of all four irregularities in the order of `simrail.columns.IRREGULARITY`, (n, 4)."""
+    return np.stack([realise(irregularity, name, seed=seed, step_m=step_m) for name in IRREGULARITY], axis=-1)
+
+
+def fade(s_m: FloatArray, start_m: float, *, end_m: float, length_m: float) -> FloatArray:
+    """Factor that rises from 0 at the start and falls to 0 at the end, as quintic smooth steps, (n,)."""
+    if length_m == 0.0:
+        return np.ones_like(s_m)
+    u = np.clip(np.minimum(s_m - start_m, end_m - s_m) / length_m, 0.0, 1.0)
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)

@@ -1,0 +1,148 @@
+"""Power spectral densities of track irregularities: ERRI B176 low and high, FRA classes 1 to 6.
+
+All of them are rational in the square of the spatial frequency, so that the variance in a band has a
+closed form too. Densities are one-sided, in m^2/(1/m), over the spatial frequency f = 1/wavelength.
+This module draws no random numbers: see `simrail.track.irregularity`.
+
+Sources: ORE/ERRI B176 ("German low and high disturbance") with alignment, vertical, cross-level (an
+angle over the half base b = 0.75 m, taken here as a height over 2 b) and gauge; the amplitude of gauge
+is the least certain, +-30 %. FRA (AAR form) with k = 0.25.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simrail.columns import IRREGULARITY
+from simrail.jit import FloatArray
+
+TWO_PI = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class RationalPsd:
+    """S(W) = gain W^(2 order) / product of (W^2 + corner^2), one-sided, W = 2 pi f in rad/m.
+
+    Attributes
+    ----------
+    gain : float
+        In the unit that makes S m^2/(rad/m).
+    order : int
+        0 or 1; less than the number of corners.
+    corners_radpm : tuple of float
+        Corner frequencies, all different; a corner of 0 gives a factor 1/W^2 (`order` 0 only).
+    """
+
+    gain: float
+    order: int
+    corners_radpm: tuple[float, ...]
+
+    def density(self, frequency_1pm: npt.ArrayLike) -> FloatArray:
+        """One-sided density in m^2/(1/m) at spatial frequencies > 0 (S_f(f) = 2 pi S(2 pi f))."""
+        squared = (TWO_PI * np.asarray(frequency_1pm, dtype=float)) ** 2
+        result = TWO_PI * self.gain * squared**self.order
+        for corner in self.corners_radpm:
+            result = result / (squared + corner**2)
+        return np.asarray(result)
+
+    def variance(self, wavelengths_m: tuple[float, float]) -> float:
+        """Closed-form variance, m^2, of the wavelengths from the shorter to the longer one.
+
+        Partial fractions in W^2: each corner c contributes r/(W^2 + c^2), whose integral is
+        r atan(W/c)/c, or -r/W for a corner at 0.
+        """
+        shortest, longest = wavelengths_m
+        low, high = TWO_PI / longest, TWO_PI / shortest
+        total = 0.0
+        for corner in self.corners_radpm:
+            residue = (-(corner**2)) ** self.order
+            for other in self.corners_radpm:
+                if other != corner:
+                    residue /= other**2 - corner**2
+            if corner == 0.0:
+                total += residue * (1.0 / low - 1.0 / high)
+            else:
+                total += residue * (np.arctan(high / corner) - np.arctan(low / corner)) / corner
+        return self.gain * total
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """The four densities of one track quality.
+
+    Attributes
+    ----------
+    name, source : str
+        Its name in a scenario, and where it comes from.
+    densities : mapping of str to RationalPsd
+        One for each of `simrail.columns.IRREGULARITY`: alignment and vertical profile (mean of the
+        rails), cross-level (left minus right height over 1.5 m), gauge (left minus right lateral).
+    """
+
+    name: str
+    source: str
+    densities: Mapping[str, RationalPsd]
+
+
+def _spectrum(
+    name: str,
+    source: str,
+    alignment: RationalPsd,
+    vertical: RationalPsd,
+    *,
+    level: RationalPsd,
+    gauge: RationalPsd,
+) -> Spectrum:
+    return Spectrum(name, source, dict(zip(IRREGULARITY, (alignment, vertical, level, gauge), strict=True)))
+
+
+def _erri(name: str, alignment: float, vertical: float, *, gauge: float) -> Spectrum:
+    """ERRI B176; amplitudes in m rad."""
+    corner, rise, level = 0.8246, 0.0206, 0.4380  # rad/m
+    return _spectrum(
+        name,
+        "ORE/ERRI B176",
+        RationalPsd(alignment * corner**2, 0, (rise, corner)),
+        RationalPsd(vertical * corner**2, 0, (rise, corner)),
+        # An angle of density A_v/b^2 (...), as a height over the base 2 b.
+        level=RationalPsd(4.0 * vertical * corner**2, 1, (rise, corner, level)),
+        gauge=RationalPsd(gauge * corner**2, 1, (rise, corner, level)),
+    )
+
+
+def _fra(number: int, vertical: float, alignment: float, *, level: float) -> Spectrum:
+    """FRA class in the AAR form; amplitudes in cm^2 rad/m, `level` the corner of cross-level in rad/m."""
+    corner, k = 0.8245, 0.25
+    scale = k * 1e-4 * corner**2
+    across = RationalPsd(4.0 * scale * vertical, 0, (corner, level))
+    return _spectrum(
+        f"fra_{number}",
+        f"FRA track class {number}, AAR form",
+        RationalPsd(scale * alignment, 0, (0.0, corner)),
+        RationalPsd(scale * vertical, 0, (0.0, corner)),
+        level=across,
+        gauge=across,
+    )
+
+
+_SMOOTH = RationalPsd(0.0, 0, (1.0, 2.0))
+
+SPECTRA: dict[str, Spectrum] = {
+    spectrum.name: spectrum
+    for spectrum in (
+        _spectrum("none", "no irregularity", _SMOOTH, _SMOOTH, level=_SMOOTH, gauge=_SMOOTH),
+        _erri("erri_b176_low", 2.119e-7, 4.032e-7, gauge=5.32e-8),
+        _erri("erri_b176_high", 6.125e-7, 1.08e-6, gauge=1.032e-7),
+        _fra(1, 1.2107, 3.3634, level=0.6046),
+        _fra(2, 1.0181, 1.2107, level=0.9308),
+        _fra(3, 0.6816, 0.4128, level=0.8520),
+        _fra(4, 0.5376, 0.3027, level=1.1312),
+        _fra(5, 0.2095, 0.0762, level=0.8209),
+        _fra(6, 0.0339, 0.0339, level=0.4380),
+    )
+}
+"""Every spectrum by name."""
