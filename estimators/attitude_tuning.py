@@ -1,0 +1,181 @@
+"""Noise that the attitude EKF assumes: paper 000's two settings, and the recommended one.
+
+Kept apart from the filter because it is a matter of judgement, and the filter is not.
+
+**The recommended setting** follows from the data sheet, the initial rest and one allowance for
+vibration. Gravity corrects roll and pitch with the time constant tau = sqrt(R Ts / Qc) / g
+(EQUATIONS 2.3), and the error of an angle then has three parts that tau trades against each other:
+
+* gyro white noise N leaves the variance N^2 tau / 2;
+* a constant residual gyro bias b leaves the offset b tau;
+* white acceleration of variance R per sample leaves the variance R Ts / (2 g^2 tau).
+
+The sum is least where R Ts / (g^2 tau^2) = N^2 + 4 b^2 tau, and the left-hand side is the intensity Qc
+that gives this tau. So **Qc = N^2 + 4 b^2 tau**, solved together with tau: the filter has the best time
+constant, and its own variance (N^2 tau + 4 b^2 tau^2) is a little above the one it really has
+(N^2 tau + 3 b^2 tau^2).
+
+b^2 = N^2 / T + 2 B^2 after T seconds of rest averaging (white noise of the mean, and the in-run bias
+now and during the rest, each with variance B^2); before and without it, the turn-on bias as well.
+
+R = (accelerometer noise)^2 + (vibration)^2. The vibration is the body's own motion in the track frame,
+which the compensation leaves in. It is far from white: a displacement is bounded, so below tau's band
+nothing is left of it. The allowance is the white noise that disturbs the angle as much: a swing of
+velocity sd u disturbs it by u / (g tau), white noise by sqrt(R Ts / (2 tau)) / g, hence R Ts = 2 u^2 / tau.
+It grows with speed, and is zero at rest, where the filter should believe the accelerometer.
+
+**The accelerometer's turn-on bias** is the floor under all of this: nothing here can tell it from tilt
+(2 mg is 0.11 deg). It does not enter the gain. The reported covariance holds it as a constant of known
+variance ("considered"), and likewise the yaw that the residual gyro bias adds up to.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.rest_bias import RestBias
+from simrail.columns import ODOMETRY_SD
+from simrail.errors import InputError
+from simrail.jit import FloatArray
+from simrail.recording import Recording
+
+PAPER = {"paper_initial": (1e-2, 1.5e-2), "paper_final": (1e-3, 15.0)}
+"""Paper 000, Section 6: the printed "Q_{k-1}" and the sd of the accelerometer in m/s2."""
+
+TUNINGS = ("recommended", *PAPER)
+
+SWING_PER_SPEED = 1e-3
+"""Velocity sd of the body's swing in the track frame over train speed: see `recommended`."""
+
+MODEL_RATE_INTENSITY = 1e-10
+"""rad2/s: what sampling and first-order integration leave; a perfect IMU still gets a finite tau."""
+
+MODEL_FORCE_SD = 1e-3
+"""m/s2: rounding of counts and of the gravity model; keeps a noiseless accelerometer's R positive."""
+
+
+class Noise(NamedTuple):
+    """Noise per sample, n samples.
+
+    Attributes
+    ----------
+    process : ndarray (n,)
+        Variance that a step adds to every angle, rad2.
+    force : ndarray (n, 3)
+        Variance of the specific force, (m/s2)^2.
+    considered : ndarray (n, 3)
+        Variance of roll, pitch, yaw from constants that are not estimated, rad2.
+    """
+
+    process: FloatArray
+    force: FloatArray
+    considered: FloatArray
+
+
+def paper_noise(recording: Recording, tuning: str, *, reading: str) -> Noise:
+    """Settings of paper 000, in one of two readings of its Q_{k-1} (EQUATIONS 2.3).
+
+    Parameters
+    ----------
+    recording : Recording
+        For its number of samples and rate.
+    tuning : str
+        ``"paper_initial"`` or ``"paper_final"``.
+    reading : str
+        ``"per_step"``: the printed number is added at every step, as the text has it (final: tau =
+        0.19 s). ``"intensity"``: it is the k of Q = k Ts (final: tau = 3.0 s).
+    """
+    printed, sd = PAPER[tuning]
+    n = len(recording.imu)
+    step = printed / recording.imu_sheet.rate_hz if reading == "intensity" else printed
+    return Noise(np.full(n, step), np.full((n, 3), sd**2), np.zeros((n, 3)))
+
+
+def recommended_noise(recording: Recording, rest: RestBias, *, vibration: float = SWING_PER_SPEED) -> Noise:
+    """Settings that follow from the data sheet; the module's docstring derives them.
+
+    Every value uses the past alone.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its data sheet and odometry are used.
+    rest : RestBias
+        How much rest the gyro bias was averaged over.
+    vibration : float
+        Velocity sd of the body's swing in the track frame, as a fraction of train speed.
+    """
+    sheet = recording.imu_sheet
+    n = len(recording.imu)
+    step_s = 1.0 / sheet.rate_hz
+    gravity = recording.gravity_mps2
+    white = sheet.gyro_noise_radpsqrts**2
+    drift = sheet.gyro_bias_instability_radps**2
+    turn_on = sheet.gyro_turn_on_bias_radps**2 / 3.0
+    rest_s = rest.count * step_s
+    with np.errstate(divide="ignore"):
+        averaged = np.where(rest_s > 0.0, white / np.maximum(rest_s, step_s) + drift, turn_on)
+    bias = np.minimum(averaged, turn_on) + drift
+
+    speed = np.abs(recording.odometry["speed_mps"].to_numpy(dtype=np.float64))
+    sensor = sheet.accel_noise_mpsqrts**2 + MODEL_FORCE_SD**2 * step_s
+    tau = time_constant(sensor, (vibration * speed) ** 2, white + MODEL_RATE_INTENSITY, bias, gravity=gravity)
+    intensity = white + MODEL_RATE_INTENSITY + 4.0 * bias * tau
+    force = np.empty((n, 3))
+    force[:] = ((sensor + 2.0 * (vibration * speed) ** 2 / tau) / step_s)[:, None]
+    if ODOMETRY_SD[2] in recording.odometry:
+        force[:, 0] += recording.odometry[ODOMETRY_SD[2]].to_numpy(dtype=np.float64) ** 2
+
+    considered = np.zeros((n, 3))
+    considered[:, :2] = sheet.accel_turn_on_bias_mps2**2 / 3.0 / gravity**2
+    considered[:, 2] = bias * ((np.arange(n) - rest.count) * step_s) ** 2
+    return Noise(intensity * step_s, force, considered)
+
+
+def time_constant(
+    sensor: float, swing: FloatArray, white: float, bias: FloatArray, *, gravity: float
+) -> FloatArray:
+    """Best time constant: the tau > 0 of (sensor + 2 swing / tau) / (g tau)^2 = white + 4 bias tau.
+
+    Parameters
+    ----------
+    sensor : float
+        Intensity of the accelerometer's white noise, (m/s2)^2 s.
+    swing : ndarray (n,)
+        Variance of the body's velocity in the track frame, (m/s)^2.
+    white : float
+        Intensity of the gyro's white noise, rad2/s.
+    bias : ndarray (n,)
+        Variance of the residual gyro bias, (rad/s)^2.
+    gravity : float
+        m/s2.
+
+    Returns
+    -------
+    ndarray (n,)
+        s.
+    """
+    # 4 bias g^2 tau^4 + white g^2 tau^3 - sensor tau - 2 swing = 0 has one positive root. Newton from
+    # above falls towards it monotonically, because the left-hand side is convex there.
+    square = gravity**2
+    tau = np.maximum(np.sqrt(2.0 * sensor / (white * square)), np.cbrt(4.0 * swing / (white * square)))
+    for _ in range(60):
+        value = ((4.0 * bias * square * tau + white * square) * tau * tau - sensor) * tau - 2.0 * swing
+        slope = (16.0 * bias * square * tau + 3.0 * white * square) * tau * tau - sensor
+        tau = tau - value / slope
+    return tau
+
+
+def check_tuning(tuning: str, reading: str) -> None:
+    """Refuse names that are not known."""
+    if tuning not in TUNINGS:
+        raise InputError("no such tuning", field="tuning", value=tuning, limit="one of " + ", ".join(TUNINGS))
+    if reading not in ("intensity", "per_step"):
+        raise InputError(
+            "no such reading of the process noise",
+            field="process_noise",
+            value=reading,
+            limit="intensity or per_step",
+        )
