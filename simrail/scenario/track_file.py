@@ -1,0 +1,131 @@
+"""Track files: one TOML file per track, in the units and signs of a track drawing.
+
+`TrackFile` judges the text and makes a `TrackDesign`. Units differ from those inside: cant in mm, gradients
+in permil. Signs do not: radius positive to the left, cant positive with the outer rail raised, gradient
+positive uphill in the direction of s.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from simrail.scenario.files import Part, load
+from simrail.track.design import Curve, Element, Gradient, Straight, TrackDesign, Transition
+
+Length = Annotated[float, Field(gt=0.0)]
+
+
+class StraightPart(Part):
+    """``[[segment]]`` with ``kind = "straight"``."""
+
+    kind: Literal["straight"]
+    length_m: Length
+
+    def element(self) -> Straight:
+        """The element that it describes."""
+        return Straight(self.length_m)
+
+
+class TransitionPart(Part):
+    """``[[segment]]`` with ``kind = "transition"``: joins its two neighbours."""
+
+    kind: Literal["transition"]
+    length_m: Length
+
+    def element(self) -> Transition:
+        """The element that it describes."""
+        return Transition(self.length_m)
+
+
+class CurvePart(Part):
+    """``[[segment]]`` with ``kind = "curve"``."""
+
+    kind: Literal["curve"]
+    length_m: Length
+    radius_m: float
+    cant_mm: float = 0.0
+
+    def element(self) -> Curve:
+        """The element that it describes."""
+        return Curve(self.length_m, self.radius_m, self.cant_mm / 1000.0)
+
+
+SegmentPart = Annotated[StraightPart | TransitionPart | CurvePart, Field(discriminator="kind")]
+
+
+class GradientPart(Part):
+    """``[[gradient]]``: holds from a place on."""
+
+    from_m: float
+    permil: float
+
+    def gradient(self) -> Gradient:
+        """The gradient that it describes."""
+        return Gradient(self.from_m, self.permil / 1000.0)
+
+
+class TrackFile(Part):
+    """A track file.
+
+    Attributes
+    ----------
+    title, source : str
+        One line each: what it is, and where its numbers come from.
+    synthetic : bool
+        True if the numbers are made up, in whole or in part; tables and reports then say so.
+    start_m : float
+        s at the start of the first segment.
+    cant_ramp, vertical_radius_m, vertical_ramp_m
+        As in `TrackDesign`.
+    segment, gradient : tuple
+        The plan and the gradients, in the order of s.
+    """
+
+    title: str
+    source: str
+    synthetic: bool
+    start_m: float = 0.0
+    cant_ramp: Literal["smooth", "linear"] = "smooth"
+    vertical_radius_m: Length | tuple[Length, ...] = 2000.0
+    vertical_ramp_m: float = Field(default=5.0, ge=0.0)
+    segment: tuple[SegmentPart, ...] = Field(min_length=1)
+    gradient: tuple[GradientPart, ...] = ()
+
+    @model_validator(mode="after")
+    def _makes_a_line(self) -> Self:
+        self.design("").check()
+        return self
+
+    def design(self, name: str) -> TrackDesign:
+        """The design that the file describes.
+
+        Parameters
+        ----------
+        name : str
+            What to call it; for a file, its stem.
+        """
+        elements: tuple[Element, ...] = tuple(part.element() for part in self.segment)
+        return TrackDesign(
+            name,
+            self.start_m,
+            elements,
+            gradients=tuple(part.gradient() for part in self.gradient),
+            vertical_radius_m=self.vertical_radius_m,
+            vertical_ramp_m=self.vertical_ramp_m,
+            cant_ramp=self.cant_ramp,
+            source=self.source,
+            synthetic=self.synthetic,
+        )
+
+
+def track_by_name(name: str) -> TrackDesign:
+    """Design of a shipped track, or of a file given by its path.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it describes no track.
+    """
+    return load(TrackFile, "track", name).design(name)
