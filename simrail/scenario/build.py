@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import hashlib
+import json
 from math import radians
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
@@ -20,7 +22,7 @@ from simrail.estimate import Estimator, estimator_class
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride
 from simrail.scenario.cells import Cell, Method
-from simrail.scenario.files import blame, load
+from simrail.scenario.files import Part, blame, load
 from simrail.scenario.imu_file import ImuFile
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.track_file import TrackFile
@@ -32,10 +34,9 @@ from simrail.track.irregularity import Irregularity
 from simrail.truth import Mount
 from simrail.vehicle.model import VehicleModel
 
-NO_VEHICLE = "none"
-"""The vehicle of the kinematic engine: one body ``"body"`` with one wheel ``"wheel"``."""
+_Part = TypeVar("_Part", bound=Part)
 
-NO_IRREGULARITY = Irregularity(spectrum="none", wavelengths_m=(1.5, 100.0), fade_m=0.0)
+NO_IRREGULARITY = Irregularity(spectrum="none", fade_m=0.0)
 
 
 class Parts:
@@ -50,37 +51,33 @@ class Parts:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self._read: dict[tuple[str, str], Any] = {}
+        self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 over the content of the scenario and of the parts read so far, 16 digits.
+
+        Comments and the order of keys do not count; settings of the command line do.
+        """
+        text = json.dumps(self._content, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def track(self, cell: Cell) -> TrackDesign:
         """Design track of a cell."""
         name = cell.spec.track
         if ("track", name) not in self._read:
             with blame(self.scenario.file, "track"):
-                part = load(TrackFile, "track", name, folder=self.scenario.folder)
-            with blame(name, "track"):
-                design = part.design(Path(name).stem)
-                design.check()
-            self._read["track", name] = design
+                part = self._load(TrackFile, "track", name)
+            self._read["track", name] = part.design(Path(name).stem)
         found: TrackDesign = self._read["track", name]
         return found
 
-    def vehicle(self, cell: Cell) -> VehicleModel | None:
-        """Vehicle of a cell; None for the kinematic engine, which moves one body without one."""
-        name, engine = cell.spec.vehicle, cell.spec.engine
-        if (engine == "kinematic") != (name == NO_VEHICLE):
-            raise InputError(
-                "engine and vehicle do not belong together",
-                file=self.scenario.file,
-                field="vehicle",
-                value=f"{name} with engine {engine}",
-                limit=f'vehicle = "{NO_VEHICLE}" with engine = "kinematic", and only with it',
-                remedy="the kinematic engine moves a body along the rails by itself: it has no vehicle",
-            )
-        if name == NO_VEHICLE:
-            return None
+    def vehicle(self, cell: Cell) -> VehicleModel:
+        """Vehicle of a cell."""
+        name = cell.spec.vehicle
         if ("vehicle", name) not in self._read:
             with blame(self.scenario.file, "vehicle"):
-                part = load(VehicleFile, "vehicle", name, folder=self.scenario.folder)
+                part = self._load(VehicleFile, "vehicle", name)
             self._read["vehicle", name] = part.model(Path(name).stem)
         vehicle: VehicleModel = self._read["vehicle", name]
         return vehicle
@@ -90,18 +87,23 @@ class Parts:
         name = cell.imu.grade
         if ("imu", name) not in self._read:
             with blame(self.scenario.file, f"imu[{cell.imu_index}].grade"):
-                part = load(ImuFile, "imu", name, folder=self.scenario.folder)
+                part = self._load(ImuFile, "imu", name)
             self._read["imu", name] = part.grade(Path(name).stem)
         grade: ImuGrade = self._read["imu", name]
         return grade
+
+    def _load(self, model: type[_Part], kind: str, name: str) -> _Part:
+        part = load(model, kind, name, folder=self.scenario.folder)
+        self._content[f"{kind} {name}"] = part.model_dump(mode="json")
+        return part
 
     def ride(self, cell: Cell) -> Ride:
         """Ride of a cell: all that decides the motion."""
         return Ride(
             name=cell.ride.name,
-            design=self.track(cell),
+            track=self.track(cell),
             irregularity=irregularity_of(cell),
-            seed=cell.ride_seed,
+            track_seed=cell.ride_seed,
             vehicle=self.vehicle(cell),
             profile=profile_of(cell),
             engine=cell.spec.engine,

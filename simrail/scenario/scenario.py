@@ -8,8 +8,6 @@ is judged by `simrail.scenario.check`, and what is run is listed by `simrail.sce
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -178,15 +176,6 @@ class Scenario:
     def title(self) -> str:
         """Title of the scenario."""
         return self.spec.title
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 over the content (not over its comments), 16 hexadecimal digits.
-
-        It covers the names of the parts (track, vehicle, IMU), not what stands in their files.
-        """
-        content = json.dumps(self.spec.model_dump(mode="json"), sort_keys=True)
-        return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
 def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
