@@ -11,48 +11,48 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from simrail.errors import InputError
 from simrail.scenario.files import Part, load
 from simrail.track.design import Curve, Element, Gradient, Straight, TrackDesign, Transition
 
 Length = Annotated[float, Field(gt=0.0)]
 
 
-class StraightPart(Part):
-    """``[[segment]]`` with ``kind = "straight"``."""
+class SegmentPart(Part):
+    """``[[segment]]``: a straight, a curve, or a transition that joins its two neighbours."""
 
-    kind: Literal["straight"]
+    kind: Literal["straight", "transition", "curve"]
     length_m: Length
+    radius_m: float | None = None
+    cant_mm: float | None = None
 
-    def element(self) -> Straight:
+    @model_validator(mode="after")
+    def _radius_and_cant_of_curves_only(self) -> Self:
+        if self.kind == "curve" and self.radius_m is None:
+            raise InputError(
+                "a curve needs its radius",
+                field="radius_m",
+                remedy="add it; positive to the left",
+            )
+        for field in ("radius_m", "cant_mm"):
+            if self.kind != "curve" and getattr(self, field) is not None:
+                raise InputError(
+                    "belongs to a curve",
+                    field=field,
+                    value=getattr(self, field),
+                    remedy=f"remove it: a {self.kind} takes it from its neighbours"
+                    if self.kind == "transition"
+                    else "remove it, or make the segment a curve",
+                )
+        return self
+
+    def element(self) -> Element:
         """The element that it describes."""
-        return Straight(self.length_m)
-
-
-class TransitionPart(Part):
-    """``[[segment]]`` with ``kind = "transition"``: joins its two neighbours."""
-
-    kind: Literal["transition"]
-    length_m: Length
-
-    def element(self) -> Transition:
-        """The element that it describes."""
-        return Transition(self.length_m)
-
-
-class CurvePart(Part):
-    """``[[segment]]`` with ``kind = "curve"``."""
-
-    kind: Literal["curve"]
-    length_m: Length
-    radius_m: float
-    cant_mm: float = 0.0
-
-    def element(self) -> Curve:
-        """The element that it describes."""
-        return Curve(self.length_m, self.radius_m, self.cant_mm / 1000.0)
-
-
-SegmentPart = Annotated[StraightPart | TransitionPart | CurvePart, Field(discriminator="kind")]
+        if self.kind == "straight":
+            return Straight(self.length_m)
+        if self.radius_m is None:
+            return Transition(self.length_m)
+        return Curve(self.length_m, self.radius_m, (self.cant_mm or 0.0) / 1000.0)
 
 
 class GradientPart(Part):
@@ -88,7 +88,7 @@ class TrackFile(Part):
     synthetic: bool
     start_m: float = 0.0
     cant_ramp: Literal["smooth", "linear"] = "smooth"
-    vertical_radius_m: Length | tuple[Length, ...] = 2000.0
+    vertical_radius_m: float | tuple[float, ...] = 2000.0
     vertical_ramp_m: float = Field(default=5.0, ge=0.0)
     segment: tuple[SegmentPart, ...] = Field(min_length=1)
     gradient: tuple[GradientPart, ...] = ()

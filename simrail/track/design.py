@@ -37,6 +37,7 @@ from simrail.track.elements import (
     element_to_dict,
     require_number,
 )
+from simrail.track.frame import TrackFrame, darboux, stack
 from simrail.track.vertical import build_vertical, check_gradients
 
 __all__ = [
@@ -51,35 +52,6 @@ __all__ = [
     "TrackFrame",
     "Transition",
 ]
-
-
-class TrackFrame(NamedTuple):
-    """The design track frame at places s; every array has the shape of s, vectors a last axis of 3.
-
-    Attributes
-    ----------
-    s_m : ndarray (...)
-        Arc length of the horizontal projection.
-    position : ndarray (..., 3)
-        Centreline in the rail plane, global, m.
-    roll_rad, pitch_rad, yaw_rad : ndarray (...)
-        ZYX Euler angles of the track frame; yaw is unwrapped.
-    rates, second : ndarray (..., 3)
-        First and second derivative of (roll, pitch, yaw) with respect to s, rad/m and rad/m^2.
-    k, dk : ndarray (..., 3)
-        Darboux vector (twist, vertical, horizontal) in the track frame, rad/m, and its derivative with
-        respect to s: the frame that moves at V = ds/dt turns at V k.
-    """
-
-    s_m: FloatArray
-    position: FloatArray
-    roll_rad: FloatArray
-    pitch_rad: FloatArray
-    yaw_rad: FloatArray
-    rates: FloatArray
-    second: FloatArray
-    k: FloatArray
-    dk: FloatArray
 
 
 class _Shape(NamedTuple):
@@ -210,9 +182,9 @@ class TrackDesign:
         flat = 1.0 / (1.0 + z1 * z1)
         pitch, pitch1 = -np.arctan(z1), -z2 * flat
         pitch2 = -z3 * flat + 2.0 * z1 * (z2 * flat) ** 2
-        rates, second = _stack(roll1, pitch1, yaw1), _stack(roll2, pitch2, yaw2)
-        k, dk = _darboux(roll, pitch, rates, second)
-        return TrackFrame(s, _stack(x, y, z), roll, pitch, yaw, rates, second, k, dk)
+        rates, second = stack(roll1, pitch1, yaw1), stack(roll2, pitch2, yaw2)
+        k, dk = darboux(roll, pitch, rates, second)
+        return TrackFrame(s, stack(x, y, z), roll, pitch, yaw, rates, second, k, dk)
 
     def curvature(self, s: npt.ArrayLike) -> FloatArray:
         """Plan curvature d yaw / ds at places s, 1/m, positive to the left; shaped like s."""
@@ -279,31 +251,3 @@ class TrackDesign:
                 remedy="shorten the ride or lengthen the track",
             )
         return s
-
-
-def _stack(*parts: FloatArray) -> FloatArray:
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
-def _darboux(
-    roll: FloatArray, pitch: FloatArray, rates: FloatArray, second: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Darboux vector of a ZYX frame and its derivative, both per metre and in the frame's components.
-
-    k1 = roll' - sin(pitch) yaw'
-    k2 = cos(roll) pitch' + sin(roll) cos(pitch) yaw'
-    k3 = -sin(roll) pitch' + cos(roll) cos(pitch) yaw'
-
-    (EQUATIONS section 1.1; the tests derive both from the rotation matrix.)
-    """
-    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    r1, p1, y1 = np.moveaxis(rates, -1, 0)
-    r2, p2, y2 = np.moveaxis(second, -1, 0)
-    across, across1 = cp * y1, cp * y2 - sp * p1 * y1  # cos(pitch) yaw', and its derivative
-    k = _stack(r1 - sp * y1, cr * p1 + sr * across, cr * across - sr * p1)
-    dk = _stack(
-        r2 - sp * y2 - cp * p1 * y1,
-        cr * p2 + sr * across1 + r1 * k[..., 2],
-        cr * across1 - sr * p2 - r1 * k[..., 1],
-    )
-    return k, dk
