@@ -1,0 +1,362 @@
+"""The campaign loop: every cell of a scenario, from simulation to scores. There is no second one.
+
+A cell is one recording (`simrail.scenario.cells`): a ride is simulated once and shared by its cells,
+each cell draws its sensors, every estimator runs on the recording, and each estimate is scored. What
+fails becomes a row with its reason and the others go on. Seeds belong to names, so the scores of a
+cell do not depend on which cells ran before it.
+
+Nothing is written here: see `simrail.results`.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, fields, replace
+from itertools import groupby
+from types import FrameType
+from typing import Any
+
+import pandas as pd
+
+from simrail.errors import InputError
+from simrail.estimate import Estimate, Estimator
+from simrail.example import CellResult
+from simrail.measure import measure
+from simrail.recording import Recording
+from simrail.ride import is_cached, simulate
+from simrail.scenario.build import Parts, encoder_of, mount_of
+from simrail.scenario.cells import Cell, Method, cells, methods
+from simrail.scenario.check import Plan, judge_scenario
+from simrail.scenario.scenario import Scenario
+from simrail.score import reference_of, score, score_odometry, truth_at_imu
+from simrail.score_table import concat_scores, failed_figures, labelled
+from simrail.truth import Mount, Truth
+
+Check = Callable[[], None]
+
+MOST_EXAMPLES = 6
+"""Recordings that are kept for the report's figures, one per ride."""
+
+
+class Watcher:
+    """Is told how a campaign goes; this one keeps silent. Subclass it to show progress."""
+
+    def ride_begins(self, number: int, count: int, name: str) -> None:
+        """Ride `number` (from 1) of `count` is simulated, or found in the cache, from now on."""
+
+    def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
+        """The ride has been simulated so far."""
+
+    def estimate_made(self, number: int, count: int, name: str) -> None:
+        """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A cell, or one estimator on it, that failed: the reason for the table, the traceback for its author."""
+
+    cell: int
+    estimator: str
+    reason: str
+    trace: str
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """What a campaign found.
+
+    Attributes
+    ----------
+    scores : pandas.DataFrame
+        The score table, columns `simrail.score_table.SCORE_COLUMNS`.
+    cells : pandas.DataFrame
+        One row per cell: its labels, and the values of the scenario's axes under their dotted names.
+    examples : list of CellResult
+        First draw of each ride, for figures.
+    rides : list of dict
+        What each engine said of its run; plain values.
+    wall_s : dict of str to float
+        Wall time of the stages ``simulate``, ``measure``, ``estimate``, ``score``.
+    failures : list of Failure
+        What failed; each is a row of the scores as well.
+    plan : Plan
+        What was planned, with its warnings.
+    """
+
+    scores: pd.DataFrame
+    cells: pd.DataFrame
+    examples: list[CellResult]
+    rides: list[dict[str, Any]]
+    wall_s: dict[str, float]
+    failures: list[Failure]
+    plan: Plan
+
+
+@dataclass(frozen=True)
+class _RememberedTruth(Truth):
+    """A truth that works out the motion of each mount once: all draws of a ride ask for it again."""
+
+    remembered: dict[Mount, pd.DataFrame] = field(default_factory=dict)
+
+    def motion(self, mount: Mount) -> pd.DataFrame:
+        """See `Truth.motion`."""
+        if mount not in self.remembered:
+            self.remembered[mount] = super().motion(mount)
+        return self.remembered[mount]
+
+
+@dataclass
+class _Ledger:
+    """What the loop gathers."""
+
+    scenario: Scenario
+    estimators: Mapping[str, tuple[Method, Estimator]]
+    tables: list[pd.DataFrame] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    examples: list[CellResult] = field(default_factory=list)
+    rides: list[dict[str, Any]] = field(default_factory=list)
+    wall_s: dict[str, float] = field(
+        default_factory=lambda: {"simulate": 0.0, "measure": 0.0, "estimate": 0.0, "score": 0.0}
+    )
+    warm: set[str] = field(default_factory=set)
+    shown: set[int] = field(default_factory=set)
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the wall time of a block to a stage."""
+        begun = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.wall_s[stage] += time.perf_counter() - begun
+
+    def failed(self, cell: Cell, estimator: str, error: Exception) -> None:
+        """Note a failure as a row with its reason."""
+        reason = _reason(error)
+        trace = "".join(traceback.format_exception(error))
+        self.failures.append(Failure(cell.number, estimator, reason, trace))
+        self.tables.append(labelled(failed_figures(reason), self.labels(cell, estimator)))
+
+    def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
+        """Labels of a row of the score table."""
+        known = self.estimators.get(estimator)
+        return {
+            "cell": cell.number,
+            "scenario": self.scenario.name,
+            "ride": cell.ride.name,
+            "vehicle": cell.spec.vehicle,
+            "mount": cell.imu.name,
+            "imu": cell.imu.grade,
+            "odometry": cell.spec.odometry,
+            "tuning": known[0].tuning if known else "default",
+            "track_draw": cell.track_draw,
+            "sensor_draw": cell.sensor_draw,
+            "estimator": estimator,
+        }
+
+
+def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> CampaignResult:
+    """Run every cell of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As read by `simrail.load_scenario`.
+    watcher : Watcher, optional
+        Is told of the progress.
+
+    Raises
+    ------
+    InputError
+        If the scenario cannot be run; then nothing has been run.
+    KeyboardInterrupt
+        If interrupted; rides that were complete stay in the cache.
+    """
+    watcher = watcher or Watcher()
+    parts = Parts(scenario)
+    plan = judge_scenario(scenario, parts)
+    chosen = {method.name: (method, plan.estimators[method.name]) for method in methods(scenario)}
+    ledger = _Ledger(scenario, chosen)
+    records = []
+    with _interruptible() as check:
+        for ride_number, group in groupby(cells(scenario), key=lambda cell: cell.ride_number):
+            ride_cells = list(group)
+            records += [_cell_record(cell) for cell in ride_cells]
+            watcher.ride_begins(ride_number + 1, plan.rides, ride_cells[0].ride.name)
+            _run_ride(ride_cells, parts, ledger, watcher, check, plan.cells)
+    return CampaignResult(
+        scores=concat_scores(ledger.tables),
+        cells=pd.DataFrame.from_records(records),
+        examples=ledger.examples,
+        rides=ledger.rides,
+        wall_s=ledger.wall_s,
+        failures=ledger.failures,
+        plan=plan,
+    )
+
+
+def _run_ride(
+    ride_cells: list[Cell], parts: Parts, ledger: _Ledger, watcher: Watcher, check: Check, cell_count: int
+) -> None:
+    """Simulate one ride and run its cells."""
+    first = ride_cells[0]
+    try:
+        with ledger.timed("simulate"):
+            ride = parts.ride(first)
+            found = is_cached(ride)
+            begun = time.perf_counter()
+            truth = simulate(ride, progress=watcher.ride_goes)
+            wall = time.perf_counter() - begun
+            truth = _RememberedTruth(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
+    except Exception as error:
+        check()
+        for cell in ride_cells:
+            for name in ledger.estimators:
+                ledger.failed(cell, name, error)
+        return
+    said = {key: value for key, value in truth.manifest.items() if key != "versions"}
+    ledger.rides.append(
+        {**said, "ride": first.ride.name, "track_draw": first.track_draw, "from_cache": found, "took_s": wall}
+    )
+    for cell in ride_cells:
+        _run_cell(cell, truth, parts, ledger, watcher, check, cell_count)
+
+
+def _run_cell(
+    cell: Cell,
+    truth: Truth,
+    parts: Parts,
+    ledger: _Ledger,
+    watcher: Watcher,
+    check: Check,
+    cell_count: int,
+) -> None:
+    """Record one cell, run every estimator on the recording, and score."""
+    keep = {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
+    try:
+        with ledger.timed("measure"):
+            recording = measure(
+                truth,
+                name=cell.ride.name,
+                mount=mount_of(cell),
+                grade=parts.grade(cell),
+                encoder=encoder_of(cell),
+                odometry=cell.spec.odometry,
+                seed=cell.sensor_seed,
+                draw=cell.sensor_draw,
+            )
+        with ledger.timed("score"):
+            motion = truth_at_imu(truth, recording)
+            reference = reference_of(motion, recording)
+            figures = score_odometry(recording, reference, **keep)
+            ledger.tables.append(labelled(figures, ledger.labels(cell, f"odometry:{recording.odometry_source}")))
+    except Exception as error:
+        check()
+        for name in ledger.estimators:
+            ledger.failed(cell, name, error)
+        return
+    estimates: dict[str, Estimate] = {}
+    count = cell_count * len(ledger.estimators)
+    for i, (name, (_, estimator)) in enumerate(ledger.estimators.items()):
+        try:
+            estimate, us_per_sample = _timed_estimate(estimator, recording, name, ledger)
+            with ledger.timed("score"):
+                figures = score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)
+                ledger.tables.append(labelled(figures, ledger.labels(cell, name)))
+            estimates[name] = estimate
+        except Exception as error:
+            check()
+            ledger.failed(cell, name, error)
+        watcher.estimate_made(cell.number * len(ledger.estimators) + i + 1, count, name)
+    first_of_ride = cell.track_draw == 0 and cell.ride_number not in ledger.shown
+    if first_of_ride and len(ledger.examples) < MOST_EXAMPLES:
+        ledger.shown.add(cell.ride_number)
+        described = {**ledger.labels(cell, ""), **_cell_record(cell)}
+        del described["estimator"], described["tuning"]
+        ledger.examples.append(CellResult(described, recording, motion, estimates))
+
+
+def _timed_estimate(
+    estimator: Estimator, recording: Recording, name: str, ledger: _Ledger
+) -> tuple[Estimate, float]:
+    """Estimate, and the microseconds per sample that it took."""
+    if name not in ledger.warm:
+        # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
+        with ledger.timed("estimate"), suppress(Exception):
+            estimator.estimate(_beginning(recording, samples=64))
+        ledger.warm.add(name)
+    with ledger.timed("estimate"):
+        begun = time.perf_counter()
+        estimate = estimator.estimate(recording)
+        seconds = time.perf_counter() - begun
+    return estimate, 1e6 * seconds / len(recording.imu)
+
+
+def _beginning(recording: Recording, *, samples: int) -> Recording:
+    """The first samples of a recording."""
+    imu = recording.imu.iloc[:samples]
+    encoder = recording.encoder
+    if encoder is not None:
+        encoder = encoder.loc[: imu.index[-1]]
+    return replace(recording, imu=imu, encoder=encoder, odometry=recording.odometry.iloc[:samples])
+
+
+def _cell_record(cell: Cell) -> dict[str, object]:
+    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
+    record: dict[str, object] = {
+        "cell": cell.number,
+        "case": cell.case,
+        "ride": cell.ride.name,
+        "vehicle": cell.spec.vehicle,
+        "mount": cell.imu.name,
+        "imu": cell.imu.grade,
+        "odometry": cell.spec.odometry,
+        "track_draw": cell.track_draw,
+        "sensor_draw": cell.sensor_draw,
+        "track": cell.spec.track,
+        "engine": cell.spec.engine,
+        "speed_kmh": cell.ride.speed_kmh,
+        "direction": "forward" if cell.ride.end_m > cell.ride.start_m else "backward",
+    }
+    return record | {name: value for name, value in cell.settings.items() if name not in record}
+
+
+def _reason(error: Exception) -> str:
+    """One line that says why."""
+    text = " ".join(str(error).split())
+    named = text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
+    return named[:300]
+
+
+@contextmanager
+def _interruptible() -> Iterator[Check]:
+    """Remember Ctrl-C, so that no library that catches exceptions can swallow it.
+
+    Yields a function that raises `KeyboardInterrupt` if there was one; it is called wherever the loop
+    has caught an exception.
+    """
+    interrupted = False
+
+    def check() -> None:
+        if interrupted:
+            raise KeyboardInterrupt
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal interrupted
+        interrupted = True
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield check
+        check()
+    finally:
+        signal.signal(signal.SIGINT, before)
