@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from simrail.jit import FloatArray, njit
-from simrail.vehicle.contact_geometry import COLUMNS, ContactTable, build_contact
+from simrail.vehicle.contact_geometry import COLUMNS, CONSTANTS, ContactTable, build_contact
 
-__all__ = ["COLUMNS", "ContactTable", "build_contact", "static_height", "wheel_force"]
+__all__ = ["COLUMNS", "CONSTANTS", "ContactTable", "build_contact", "static_height", "wheel_force"]
 
 
 def static_height(table: ContactTable) -> float:

@@ -209,7 +209,7 @@ def rail_60e1() -> RailProfile:
     return rail_head(
         "60E1",
         radii_m=(0.300, 0.080, 0.013),
-        joints_m=(0.01025, 0.02605),
+        joints_m=(0.0105, 0.025988036),
         side_slope=1.0 / 20.0,
         source="EN 13674-1, head radii 300, 80, 13 mm, side 1:20",
     )
