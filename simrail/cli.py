@@ -1,0 +1,182 @@
+"""The command line: ``simrail run | list | check | new | cache``.
+
+Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
+imports stand inside the commands, so that those that need little answer at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import click
+import typer
+
+from simrail.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+app = typer.Typer(
+    name="simrail",
+    help="A testbed for inertial sensors on trains: simulate a ride, record it, estimate, score.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+DONE, CELL_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def main() -> None:
+    """Entry point of the command ``simrail``."""
+    sys.exit(call(sys.argv[1:]))
+
+
+def call(arguments: list[str]) -> int:
+    """Run the command line and return its exit code."""
+    try:
+        code = app(arguments, standalone_mode=False)
+    except InputError as error:
+        _say(f"simrail: {error}")
+        return BAD_INPUT
+    except click.ClickException as error:
+        error.show()
+        return BAD_INPUT
+    except (KeyboardInterrupt, click.Abort):
+        _say("simrail: interrupted; former results and complete rides are as they were")
+        return INTERRUPTED
+    except OSError as error:
+        place = f" ({Path(str(error.filename)).name})" if error.filename else ""
+        _say(f"simrail: {error.strerror or error}{place}; former results are as they were")
+        return CELL_FAILED
+    return int(code or DONE)
+
+
+def _say(message: str) -> None:
+    print(message, file=sys.stderr)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"simrail {version('simrail')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+Scenario = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value, e.g. --set ride.speed_kmh=70. Repeatable."),
+]
+Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Replace the scenario's seed.")]
+
+
+@app.command()
+def run(
+    scenario: Scenario,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder of the results [results/<name>].")
+    ] = None,
+    seed: Seed = None,
+    settings: Settings = None,
+) -> int:
+    """Simulate, record, estimate and score a scenario; write its results."""
+    from rich.console import Console
+
+    from simrail.progress import ProgressWatcher, print_scores
+    from simrail.results import run as run_scenario
+
+    console = Console()
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        results = run_scenario(scenario, out=out, seed=seed, overrides=settings or [], watcher=watcher)
+    print_scores(console, results)
+    return CELL_FAILED if results.campaign.failures else DONE
+
+
+@app.command()
+def check(scenario: Scenario, seed: Seed = None, settings: Settings = None) -> int:
+    """Judge a scenario without running it."""
+    from simrail.scenario.check import judge_scenario
+    from simrail.scenario.scenario import load_scenario
+
+    read = load_scenario(scenario, overrides=settings or [], seed=seed)
+    plan = judge_scenario(read)
+    for warning in plan.warnings:
+        _say(f"warning: {warning}")
+    print(f"{read.name}: fine. {read.title}")
+    print(
+        f"{_number(plan.rides, 'ride')} of {plan.simulated_s:.0f} s in all, {_number(plan.cells, 'recording')}, "
+        f"{_number(len(plan.estimators), 'estimator')} each: {', '.join(plan.estimators)}"
+    )
+    return DONE
+
+
+@app.command(name="list")
+def list_parts() -> int:
+    """Show the scenarios, tracks, vehicles, IMUs and estimators that are there."""
+    from rich.console import Console
+
+    from simrail.catalogue import catalogue
+
+    console = Console(highlight=False)
+    for kind, entries in catalogue().items():
+        console.print(f"[bold]{kind}[/bold]")
+        width = max((len(name) for name in entries), default=0)
+        for name, title in entries.items():
+            console.print(f"  [cyan]{name:{width}}[/cyan]  {title}", overflow="ellipsis", no_wrap=True)
+    return DONE
+
+
+@app.command()
+def new(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="estimator, track, vehicle, imu or scenario.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Its name, e.g. my_filter.")],
+    folder: Annotated[Path, typer.Option("--in", metavar="DIR", help="Where to write it.")] = Path(),
+) -> int:
+    """Write a working template: one file, to be changed into your own part."""
+    from simrail.new import write_template
+
+    written, next_step = write_template(kind, name, folder=folder)
+    print(f"wrote {written}\n{next_step}")
+    return DONE
+
+
+@app.command()
+def cache(
+    clear: Annotated[bool, typer.Option("--clear", help="Drop all simulated rides.")] = False,
+) -> int:
+    """Show the cache of simulated rides, or clear it."""
+    from simrail import ride_cache
+
+    if clear:
+        print(f"freed {ride_cache.clear() / 1e6:.0f} MB")
+        return DONE
+    rides = ride_cache.rides()
+    for ride in rides:
+        print(f"{ride.size_bytes / 1e6:8.0f} MB  {ride.key[:12]}  {ride.name}")
+    total = sum(ride.size_bytes for ride in rides)
+    print(
+        f"{_number(len(rides), 'ride')}, {total / 1e6:.0f} MB of at most {ride_cache.limit_bytes() / 1e9:g} GB "
+        f"(SIMRAIL_CACHE_GB), in {ride_cache.folder()}"
+    )
+    return DONE
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+if __name__ == "__main__":
+    main()

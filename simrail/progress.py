@@ -1,0 +1,141 @@
+"""What the command line shows of a run: progress bars while it goes, a score table at its end."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+import pandas as pd
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from simrail.campaign import Watcher
+from simrail.report.methods import MethodStyle, method_styles
+from simrail.results import Results
+from simrail.scenario.cells import methods
+from simrail.score_table import OK
+
+COLUMNS = (
+    ("roll", "truth", "whole"),
+    ("roll", "truth", "curve"),
+    ("roll", "design", "curve"),
+    ("pitch", "truth", "whole"),
+    ("pitch", "truth", "curve"),
+    ("pitch", "design", "curve"),
+)
+MOST_GROUPS = 12
+
+
+class ProgressWatcher(Watcher):
+    """Shows simulated time, speed and time left; on a plain stream, a line per stage."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[note]}"),
+            TimeElapsedColumn(),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self._ride: TaskID | None = None
+        self._estimates: TaskID | None = None
+        self._begun = 0.0
+
+    def __enter__(self) -> Self:
+        self._progress.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.__exit__(kind, error, trace)
+
+    def ride_begins(self, number: int, count: int, name: str) -> None:
+        """See `Watcher`."""
+        if self._ride is not None:
+            self._progress.remove_task(self._ride)
+        which = f" {number}/{count}" if count > 1 else ""
+        self._ride = self._progress.add_task(f"ride {name}{which}", total=None, note="")
+        self._begun = time.perf_counter()
+        if not self._console.is_terminal:
+            self._console.print(f"ride {name}{which}", highlight=False)
+
+    def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
+        """See `Watcher`."""
+        if self._ride is None:
+            return
+        wall = max(time.perf_counter() - self._begun, 1e-6)
+        left = (total_s - done_s) * wall / max(done_s, 1e-6)
+        note = (
+            f"{done_s:5.0f} of {total_s:.0f} s simulated at {done_s / wall:.1f} x real time, "
+            f"{3.6 * abs(speed_mps):3.0f} km/h, {left:.0f} s left"
+        )
+        self._progress.update(self._ride, total=total_s, completed=done_s, note=note)
+
+    def estimate_made(self, number: int, count: int, name: str) -> None:
+        """See `Watcher`."""
+        if self._ride is not None:
+            self._progress.update(self._ride, total=1.0, completed=1.0, note="")
+        if self._estimates is None:
+            self._estimates = self._progress.add_task("estimates", total=count, note="")
+        self._progress.update(self._estimates, completed=number, note=f"{number} of {count}, {name}")
+
+
+def print_scores(console: Console, results: Results) -> None:
+    """Print the score table: one block per ride and IMU, one row per estimator, RMS over all draws."""
+    campaign = results.campaign
+    scores, cells = campaign.scores, campaign.cells
+    styles = method_styles(methods(results.scenario))
+    for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
+        if number == MOST_GROUPS:
+            console.print(f"... and {cells['case'].nunique() - number} more cases: see scores.csv")
+            break
+        console.print(_block(scores[scores["cell"].isin(members["cell"])], members, styles))
+    for warning in campaign.plan.warnings:
+        console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False)
+    reasons = list(dict.fromkeys((failure.estimator, failure.reason) for failure in campaign.failures))
+    for estimator, reason in reasons[:10]:
+        console.print(f"[red]failed:[/red] {estimator}: {reason}", highlight=False)
+    wall = results.manifest["wall_s"]
+    factor = results.manifest["real_time_factor"]
+    speed = f", engine at {factor:.1f} x real time" if factor else ""
+    console.print(
+        f"{wall['total']:.1f} s{speed}. Report: {results.folder / 'report.html'}", highlight=False, soft_wrap=True
+    )
+
+
+def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodStyle]) -> Table:
+    """Table of one case: RMS errors in degrees, the mean over its draws."""
+    first = members.iloc[0]
+    draws = f", mean of {len(members)} draws" if len(members) > 1 else ""
+    table = Table(
+        title=f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, {first['imu']} on {first['mount']}, "
+        f"odometry: {first['odometry']}{draws}",
+        caption="RMS errors in degrees; 'vs design' is against the design angles, as in the papers",
+        title_justify="left",
+        caption_justify="left",
+    )
+    table.add_column("estimator")
+    for quantity, reference, window in COLUMNS:
+        against = "" if reference == "truth" else "\nvs design"
+        table.add_column(f"{quantity}\n{window}{against}", justify="right")
+    table.add_column("us per\nsample", justify="right")
+    table.add_column("", style="dim")
+    good = rows[rows["status"] == OK]
+    keys = ["estimator", "quantity", "reference", "window", "metric"]
+    mean = good.groupby(keys, observed=True)["value"].mean()
+    tested = [mean.get((name, *COLUMNS[1], "rms")) for name, style in styles.items() if not style.baseline]
+    best = min((value for value in tested if value is not None), default=None)
+    for name, style in styles.items():
+        values = [mean.get((name, *column, "rms")) for column in COLUMNS]
+        time_us = mean.get((name, "roll", "truth", "whole", "us_per_sample"))
+        cells = ["-" if value is None else f"{value:.3f}" for value in values]
+        note = f"baseline: {style.baseline}" if style.baseline else ""
+        if style.baseline == "no IMU" and best is not None and values[1] is not None and values[1] < best:
+            note += "; better than every filter in curves"
+        table.add_row(name, *cells, "-" if time_us is None else f"{time_us:.2f}", note)
+    return table

@@ -1,0 +1,231 @@
+"""Running a scenario and keeping what it found: the results folder, replaced as a whole or not at all.
+
+Everything is written into a draft folder beside the final one, which takes its place when it is
+complete; an interrupted run leaves the former results as they were. The manifest says what is needed
+to make the results again, and nothing of the machine's folders or users.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from simrail.campaign import CampaignResult, Watcher, run_campaign
+from simrail.errors import InputError
+from simrail.report.page import write_report
+from simrail.scenario.scenario import Scenario, load_scenario
+from simrail.score_table import aggregate
+
+PACKAGES = ("simrail", "exudyn", "numpy", "scipy", "pandas", "numba", "pyarrow", "filterpy", "vqf")
+MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class Results:
+    """What `run` returns: the campaign's tables, the manifest, and the folder that holds them."""
+
+    folder: Path
+    scenario: Scenario
+    campaign: CampaignResult
+    manifest: dict[str, Any]
+
+
+def run(
+    scenario: str | Path | Scenario,
+    *,
+    out: str | Path | None = None,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    watcher: Watcher | None = None,
+) -> Results:
+    """Run a scenario: simulate, record, estimate, score, and write the results.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+        Name of a shipped scenario, path of a file, or a scenario that has been read.
+    out : str or Path, optional
+        Folder of the results; ``results/<name>`` if not given. Former results there are replaced.
+    seed : int, optional
+        Replaces the scenario's seed.
+    overrides : sequence of str, optional
+        Settings ``key=value`` that replace what the file says.
+    watcher : Watcher, optional
+        Is told of the progress.
+
+    Returns
+    -------
+    Results
+        Cells that failed are rows of ``campaign.scores`` whose status is the reason.
+
+    Raises
+    ------
+    InputError
+        If the scenario cannot be run, or the folder is not one of results; nothing has been written.
+    """
+    started, begun = datetime.now(UTC), time.perf_counter()
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario, overrides=overrides, seed=seed)
+    elif overrides or seed is not None:
+        raise TypeError("settings go to load_scenario when the scenario has been read already")
+    folder = Path(out) if out is not None else Path("results") / scenario.name
+    _judge_folder(folder)
+    campaign = run_campaign(scenario, watcher=watcher)
+    manifest = describe(scenario, campaign)
+    manifest["started_utc"] = started.isoformat(timespec="seconds")
+    with draft_of(folder) as draft:
+        campaign.scores.to_parquet(draft / "scores.parquet", index=False)
+        campaign.cells.to_parquet(draft / "cells.parquet", index=False)
+        aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
+        drawing = time.perf_counter()
+        write_report(
+            draft / "report.html",
+            scenario=scenario,
+            scores=campaign.scores,
+            cells=campaign.cells,
+            examples=campaign.examples,
+            manifest=manifest,
+        )
+        ended = time.perf_counter()
+        manifest["wall_s"] |= {"report": ended - drawing, "total": ended - begun}
+        (draft / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+        if campaign.failures:
+            (draft / "failures.txt").write_text(_failures(campaign), encoding="utf-8")
+    return Results(folder, scenario, campaign, manifest)
+
+
+def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
+    """Make the manifest: plain values that say what was run, with what, and how long it took."""
+    factors = [ride["real_time_factor"] for ride in campaign.rides if "real_time_factor" in ride]
+    spec = scenario.spec
+    settings = "".join(f" --set '{setting}'" for setting in scenario.overrides)
+    return {
+        "scenario": scenario.name,
+        "title": scenario.title,
+        "scenario_hash": campaign.plan.content_hash,
+        "seed": spec.seed,
+        "settings": list(scenario.overrides),
+        "command": f"simrail run {scenario.name}{settings}",
+        "engine": sorted({str(ride["engine"]) for ride in campaign.rides}),
+        "real_time_factor": min(factors) if factors else None,
+        "rides": campaign.rides,
+        "cells": len(campaign.cells),
+        "failed": len(campaign.failures),
+        "failures": [
+            {"cell": failure.cell, "estimator": failure.estimator, "reason": failure.reason}
+            for failure in campaign.failures
+        ],
+        "warnings": list(campaign.plan.warnings),
+        "wall_s": dict(campaign.wall_s),
+        "versions": {"python": platform.python_version(), **_versions()},
+        "git_revision": git_revision(),
+        "platform": {
+            "system": platform.system(),
+            "machine": platform.machine(),
+            "cores": os.cpu_count(),
+        },
+        "scenario_text": scenario.text,
+    }
+
+
+def git_revision() -> str | None:
+    """Revision of the source tree that simrail runs from, ``+`` if it was changed; None outside git."""
+    source = Path(__file__).resolve().parents[1]
+    if not (source / ".git").exists():
+        return None
+    found = []
+    for arguments in (["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
+        try:
+            done = subprocess.run(
+                ["git", "-C", str(source), *arguments], capture_output=True, text=True, timeout=10, check=True
+            )
+        except (OSError, subprocess.SubprocessError):
+            return None
+        found.append(done.stdout.strip())
+    return found[0] + ("+" if found[1] else "")
+
+
+@contextmanager
+def draft_of(folder: Path) -> Iterator[Path]:
+    """A folder to write into, which takes the place of `folder` when the block ends without an exception.
+
+    The former folder is kept until the new one is complete.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    _drop_leftovers(folder)
+    draft = folder.parent / f".{folder.name}.{os.getpid()}.draft"
+    former = folder.parent / f".{folder.name}.{os.getpid()}.former"
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir()
+    try:
+        yield draft
+        if folder.exists():
+            folder.replace(former)
+        try:
+            draft.replace(folder)
+        except OSError:
+            if former.exists():
+                former.replace(folder)
+            raise
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+        shutil.rmtree(former, ignore_errors=True)
+
+
+def _drop_leftovers(folder: Path) -> None:
+    """Remove drafts that a killed run left behind: those that nobody wrote to for a day."""
+    for draft in folder.parent.glob(f".{folder.name}.*.draft"):
+        if draft.is_dir() and time.time() - draft.stat().st_mtime > 86400.0:
+            shutil.rmtree(draft, ignore_errors=True)
+
+
+def _judge_folder(folder: Path) -> None:
+    """Refuse a folder that cannot be written, or whose contents are not results."""
+    remedy = "choose another folder with --out"
+    if folder.exists():
+        if not folder.is_dir():
+            raise InputError("the results need a folder, this is a file", field="--out", value=str(folder), remedy=remedy)
+        if any(folder.iterdir()) and not (folder / MANIFEST).is_file():
+            raise InputError(
+                "the folder holds other things than results, and would be replaced",
+                field="--out",
+                value=str(folder),
+                limit=f"a new or empty folder, or one that holds a {MANIFEST}",
+                remedy=remedy,
+            )
+    above = folder.absolute()
+    while not above.exists():
+        above = above.parent
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise InputError("the folder cannot be written", field="--out", value=str(folder), remedy=remedy)
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def _failures(campaign: CampaignResult) -> str:
+    """Tracebacks of what failed, each once, for the author of the part that failed."""
+    cells_of: dict[str, list[str]] = {}
+    for failure in campaign.failures:
+        cells_of.setdefault(failure.trace, []).append(f"cell {failure.cell}, {failure.estimator}")
+    home = str(Path.home())
+    parts = [f"{'; '.join(names)}\n\n{trace}" for trace, names in cells_of.items()]
+    return "\n".join(parts).replace(home, "~")
