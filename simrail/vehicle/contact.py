@@ -5,9 +5,8 @@ force by Hertz's law on the soft-maximum penetration of `simrail.vehicle.contact
 forces by Kalker's linear theory with cubic saturation, fed by relaxation states in place of the
 quotient slip over speed, so that rest and reversal need no special case.
 
-Also here: readings of a table that a person wants to see (conicity, rolling radii, forces at rest).
-
-Not here: making the table, integrating the states.
+Not here: making the table, integrating the states, conicity and other readings of a whole wheelset
+(`simrail.vehicle.wheelset`).
 """
 
 from __future__ import annotations
@@ -21,16 +20,44 @@ __all__ = ["COLUMNS", "CONSTANTS", "ContactTable", "build_contact", "static_heig
 
 
 def static_height(table: ContactTable) -> float:
-    """Height (m) of a centred wheelset's centre above nominal at which its wheels carry their load."""
-    _, _, _, _, hertz = table.const[:5]
-    i = int((0.0 - table.const[0]) * table.const[1])
-    x = 0.0 - table.const[0] - i / table.const[1]
-    c = table.coef[0, i, 0]
-    penetration = ((c[0] * x + c[1]) * x + c[2]) * x + c[3]
-    slope = (3.0 * c[0] * x + 2.0 * c[1]) * x + c[2]
-    cosine = 1.0 / np.sqrt(1.0 + slope**2)
-    # The vertical part of N = hertz (pen cos)^1.5 is the load.
-    return float(penetration - (table.static_load_n / (hertz * cosine)) ** (2.0 / 3.0) / cosine)
+    """Height (m) of a centred wheelset's centre above nominal at which its wheels carry their load.
+
+    The vertical part of the normal force ``hertz (pen cos)^1.5`` is the static load.
+    """
+    first, per_m, hertz = table.const[0], table.const[1], table.const[4]
+    i = int(-first * per_m)
+    piece, x = table.coef[0, i, 0], -first - i / per_m
+    cosine = 1.0 / np.sqrt(1.0 + np.polyval(np.polyder(piece), x) ** 2)
+    pressed = (table.static_load_n / (hertz * cosine)) ** (2.0 / 3.0) / cosine
+    return float(np.polyval(piece, x) - pressed)
+
+
+@njit
+def _touch(
+    c: FloatArray, x: float, half: float, r0: float, height: float, p: float, psi: float
+) -> tuple[float, float, float, float]:
+    """Vertical penetration and its derivative in u, abscissa and radius of one patch; 0s when apart.
+
+    ``c`` are the cubic pieces of the interval, ``x`` the place in it, ``height`` that of the axle over
+    the rail, ``p`` the roll that raises this wheel. The slope is the exact derivative of the
+    penetration, so that the normal force does the work that the penetration stores.
+    """
+    P = ((c[0, 0] * x + c[0, 1]) * x + c[0, 2]) * x + c[0, 3]
+    A = ((c[1, 0] * x + c[1, 1]) * x + c[1, 2]) * x + c[1, 3]
+    C = ((c[2, 0] * x + c[2, 1]) * x + c[2, 2]) * x + c[2, 3]
+    D = ((c[3, 0] * x + c[3, 1]) * x + c[3, 2]) * x + c[3, 3]
+    pp, qq = 0.5 * p * p, 0.5 * psi * psi
+    pen = P - height + p * (A - half) + pp * C + qq * D
+    if not pen > 0.0:
+        return pen, 0.0, 0.0, r0
+    dP = (3.0 * c[0, 0] * x + 2.0 * c[0, 1]) * x + c[0, 2]
+    dA = (3.0 * c[1, 0] * x + 2.0 * c[1, 1]) * x + c[1, 2]
+    dC = (3.0 * c[2, 0] * x + 2.0 * c[2, 1]) * x + c[2, 2]
+    dD = (3.0 * c[3, 0] * x + 2.0 * c[3, 1]) * x + c[3, 2]
+    s = ((c[4, 0] * x + c[4, 1]) * x + c[4, 2]) * x + c[4, 3]
+    F = ((c[5, 0] * x + c[5, 1]) * x + c[5, 2]) * x + c[5, 3]
+    t = dP + p * dA + pp * dC + qq * dD
+    return pen, t, s - p * C, r0 + F + t * p * C
 
 
 @njit
@@ -126,29 +153,18 @@ def wheel_force(
     flag = 0
     for k in range(2):
         c = coef[k, i]
-        P = ((c[0, 0] * x + c[0, 1]) * x + c[0, 2]) * x + c[0, 3]
-        dP = (3.0 * c[0, 0] * x + 2.0 * c[0, 1]) * x + c[0, 2]
-        s = ((c[1, 0] * x + c[1, 1]) * x + c[1, 2]) * x + c[1, 3]
-        F = ((c[2, 0] * x + c[2, 1]) * x + c[2, 2]) * x + c[2, 3]
-        C = ((c[3, 0] * x + c[3, 1]) * x + c[3, 2]) * x + c[3, 3]
-        D = ((c[4, 0] * x + c[4, 1]) * x + c[4, 2]) * x + c[4, 3]
-        pen = P - height - p * (half + s) + p * F * dP + 0.5 * p * p * C + 0.5 * psi * psi * D
+        pen, t, s, r = _touch(c, x, half, r0, height, p, psi)
         out[7] = max(out[7], pen)
         z1, z2 = zeta[2 * k], zeta[2 * k + 1]
         zeta_dot[2 * k] = -z1 * (speed / length + windup_rate)
         zeta_dot[2 * k + 1] = -z2 * (speed / length + windup_rate)
         if not pen > 0.0:
             continue
-        ds = (3.0 * c[1, 0] * x + 2.0 * c[1, 1]) * x + c[1, 2]
-        dC = (3.0 * c[3, 0] * x + 2.0 * c[3, 1]) * x + c[3, 2]
-        dD = (3.0 * c[4, 0] * x + 2.0 * c[4, 1]) * x + c[4, 2]
-        t = dP - p * ds + 0.5 * p * p * dC + 0.5 * psi * psi * dD
         cd = 1.0 / np.sqrt(1.0 + t * t)
         sd = t * cd
-        s -= p * C
-        r = r0 + F + t * p * C
         Y = side * (half + s)
-        lead = side * r * t * psi
+        # A yawed wheel touches ahead of its axle, so that the normal force still meets the axle.
+        lead = r * psi * (side * t - phi)
 
         slip_x = v_x - kappa_h * V * Y - psi_dot * Y - W * r
         slip_y = y_dot - V * dy_rail + (phi_dot - W * psi) * r + psi_dot * lead
@@ -163,10 +179,10 @@ def wheel_force(
         if not N > 0.0:
             continue
         flag += k + 1
-        f11 = (((c[5, 0] * x + c[5, 1]) * x + c[5, 2]) * x + c[5, 3]) * d
-        f22 = (((c[6, 0] * x + c[6, 1]) * x + c[6, 2]) * x + c[6, 3]) * d
-        f23 = (((c[7, 0] * x + c[7, 1]) * x + c[7, 2]) * x + c[7, 3]) * d * root
-        f33 = (((c[8, 0] * x + c[8, 1]) * x + c[8, 2]) * x + c[8, 3]) * d * d
+        f11 = (((c[6, 0] * x + c[6, 1]) * x + c[6, 2]) * x + c[6, 3]) * d
+        f22 = (((c[7, 0] * x + c[7, 1]) * x + c[7, 2]) * x + c[7, 3]) * d
+        f23 = (((c[8, 0] * x + c[8, 1]) * x + c[8, 2]) * x + c[8, 3]) * d * root
+        f33 = (((c[9, 0] * x + c[9, 1]) * x + c[9, 2]) * x + c[9, 3]) * d * d
 
         bound = friction * N
         turn = f23 * spin * per_speed

@@ -25,7 +25,18 @@ from simrail.vehicle.contact_pair import ContactPair, SoftContact, incline
 from simrail.vehicle.hertz import POISSON_RATIO, SHEAR_MODULUS_PA, hertz_ellipse, kalker_coefficients
 from simrail.vehicle.profiles import RailProfile, WheelProfile, wheel_depth
 
-COLUMNS = ("penetration", "abscissa", "depth", "spread", "yaw_rise", "f11", "f22", "f23", "f33")
+COLUMNS = (
+    "penetration",
+    "roll_rise",
+    "spread",
+    "yaw_rise",
+    "abscissa",
+    "depth",
+    "f11",
+    "f22",
+    "f23",
+    "f33",
+)
 """What a patch's table holds, in the order of its columns (see `ContactTable.coef`)."""
 CONSTANTS = (
     "first_shift_m",
@@ -67,13 +78,14 @@ class ContactTable:
     ----------
     name : str
         Wheel, rail, inclination and gauge in words.
-    coef : ndarray, shape (2, n, 9, 4)
+    coef : ndarray, shape (2, n, 10, 4)
         Cubic pieces over the shift u (m, wheel outward on its rail): patch (tread, flange), interval,
         column (see `COLUMNS`), power. Value ``((c0 x + c1) x + c2) x + c3`` with x the distance from
-        the interval's left end. Penetration P is vertical at nominal height; abscissa s and depth F
-        are those of the contact on the wheel; spread is var(s)/eps = -ds/d(roll); yaw_rise is
-        d2P/d(yaw)2, all in m. f11, f22, f23, f33 are linear creep coefficients, to be multiplied by
-        d, d, d^1.5, d^2 of the normal approach d.
+        the interval's left end. Penetration P is vertical, at nominal height; roll_rise and spread
+        are its first and second derivative in the roll that raises this wheel (the first without the
+        tape circle's distance), yaw_rise its second derivative in yaw; abscissa s and depth F are
+        those of the contact on the wheel; all in m. f11, f22, f23, f33 are linear creep
+        coefficients, to be multiplied by d, d, d^1.5, d^2 of the normal approach d.
     const : ndarray, shape (15,)
         See `CONSTANTS`.
     static_load_n : float
@@ -151,8 +163,9 @@ def build_contact(
 
     Notes
     -----
-    Identities that hold exactly: dP/du is the tangent of the contact angle, dP/d(roll) is minus the
-    contact's lateral distance from the axle's middle. The lateral curvature of Hertz's ellipse is
+    Identities that hold exactly: dP/du is the tangent of the contact angle; with the axle's roll
+    taken about the point r0 below its centre, dP/d(roll) is F dP/du - s minus the tape circle's
+    distance, and ds/d(roll) is minus the spread. The lateral curvature of Hertz's ellipse is
     <g'^2>/eps; eps/var(s) would be wrong where two places share the load.
     """
     for field, value in (
@@ -200,7 +213,7 @@ def build_contact(
         creep = _creep_factors(
             contact, pair, hertz=hertz, scale=scale, modulus=shear_modulus_pa, poisson=poisson_ratio
         )
-        columns = np.stack([*contact[:5], *creep], axis=1)
+        columns = np.stack([*contact[:6], *creep], axis=1)
         coef[k] = np.moveaxis(CubicSpline(u, columns).c, 0, -1)
     values = {
         "first_shift_m": u[0],

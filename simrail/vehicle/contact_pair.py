@@ -111,10 +111,11 @@ class SoftContact(NamedTuple):
     """Soft maximum of the gap and its moments over a grid of shifts; all arrays of its shape."""
 
     penetration: FloatArray
-    abscissa: FloatArray
-    depth: FloatArray
+    roll_rise: FloatArray
     spread: FloatArray
     yaw_rise: FloatArray
+    abscissa: FloatArray
+    depth: FloatArray
     slope: FloatArray
     curvature: FloatArray
 
@@ -182,8 +183,9 @@ class ContactPair:
         -------
         SoftContact
             With weights w ~ exp(g/eps): penetration ``eps ln(int exp(g/eps) ds / sqrt(2 pi eps/k0))``,
-            mean abscissa and depth, spread var(s)/eps (1/curvature), second derivative of the
-            penetration in yaw, slope = d penetration/du, and the curvature <g'^2>/eps.
+            its first derivative in roll (the tape circle's distance aside) <F> slope - <s> and
+            second, the spread var(s)/eps, its second derivative in yaw, mean abscissa and depth,
+            slope = d penetration/du, and the curvature <g'^2>/eps.
         """
         s = self.s[mask]
         wheel, wheel_slope = self.depth(s), self.depth(s, 1)
@@ -210,5 +212,6 @@ class ContactPair:
             gap = turned_z - self.head.depth(turned_e + shift)
             top = gap.max()
             turned = top + eps_m * np.log(np.exp((gap - top) / eps_m).sum()) + level
+            out.roll_rise[i] = out.depth[i] * out.slope[i] - out.abscissa[i]
             out.yaw_rise[i] = (turned - out.penetration[i]) / (0.5 * _PROBE_YAW_RAD**2)
         return out
