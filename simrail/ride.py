@@ -162,7 +162,6 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     """Run the Exudyn engine segment by segment into arrays on disk."""
     # Exudyn takes long to import, and a cached ride does not need it.
     from simrail.vehicle.exudyn_engine import ExudynEngine
-    from simrail.vehicle.tait_bryan import body_motion
 
     started = time.perf_counter()
     model, profile = ride.vehicle, ride.profile
@@ -189,10 +188,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     for segment in engine.run(duration):
         here = slice(done, done + len(segment.time_s))
         for b in range(bodies):
-            own = slice(6 * b, 6 * b + 6)
-            motion = body_motion(
-                segment.coordinates[:, own], segment.rates[:, own], segment.accelerations[:, own]
-            )
+            motion = segment.body(b)
             # The heading is continuous over the segments, too.
             motion[:, 11] += 2.0 * np.pi * np.round((yaw[b] - motion[0, 11]) / (2.0 * np.pi))
             yaw[b] = motion[-1, 11]

@@ -17,7 +17,10 @@ from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.vehicle.contact import ContactTable, build_contact, static_height, wheel_force
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.profiles import profile_pair
+from simrail.vehicle.profiles import rail_60e1, s1002
+
+WHEEL_PROFILES = {"S1002": s1002}
+RAIL_PROFILES = {"60E1": rail_60e1}
 
 
 class ForceData(NamedTuple):
@@ -46,10 +49,9 @@ class ForceData(NamedTuple):
 def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTable:
     """Contact table of a vehicle's wheels at their mean static load."""
     pair = model.wheel_rail
-    wheel, rail = profile_pair(pair.wheel_profile, pair.rail_profile)
     return build_contact(
-        wheel,
-        rail,
+        WHEEL_PROFILES[pair.wheel_profile](),
+        RAIL_PROFILES[pair.rail_profile](),
         gauge_m=pair.gauge_m,
         rail_inclination=pair.rail_inclination,
         wheel_radius_m=model.wheels[0].radius_m,
