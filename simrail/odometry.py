@@ -6,9 +6,11 @@ filter's measurement is the middle of the smallest interval that the count allow
 width^2/12. A train without pulses is put to rest exactly: its estimated speed would otherwise decay
 for ever, and drift.
 
-It knows the nominal wheel radius, not the true one, and nothing of slip or of the longer way of the
-outer wheel in a curve: these are errors of the position that its standard deviation holds only as
-far as `radius_relative_sd` says.
+Of the wheel it knows the nominal radius; the error of that enters the standard deviations through
+`radius_relative_sd`. It knows nothing of slip, nor of the longer way of the outer wheel in a curve:
+those errors are not in the standard deviations. The error of a count is treated as white. That is
+wrong in one case: at an exactly constant speed of a whole number of pulses per reading the count's
+error is a slow sawtooth, which the filter follows.
 """
 
 from __future__ import annotations
@@ -180,8 +182,9 @@ def _filter(
             quiet = max(idle, 1e-3)
             p[:, :] = 0.0
             p[0, 0] = q * q / 12.0
-            p[1, 1] = min(start_speed, q / quiet) ** 2 / 12.0
-            p[2, 2] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 12.0
+            # Less than one pulse in this time, in either direction: uniform in [-b, b] has sd b/sqrt(3).
+            p[1, 1] = min(start_speed, q / quiet) ** 2 / 3.0
+            p[2, 2] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
             ahead_x[:] = x
