@@ -130,7 +130,7 @@ class TrackDesign:
     @cached_property
     def _shape(self) -> _Shape:
         require_number(self.start_m, "start_m")
-        require_number(self.vertical_ramp_m, "vertical_ramp_m", above=-np.nextafter(0.0, 1.0))
+        require_number(self.vertical_ramp_m, "vertical_ramp_m", least=0.0)
         if self.cant_ramp not in ("smooth", "linear"):
             raise InputError("is unknown", field="cant_ramp", value=self.cant_ramp, limit="smooth or linear")
         check_elements(self.elements)

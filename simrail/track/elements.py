@@ -179,11 +179,41 @@ def check_elements(elements: Sequence[Element]) -> None:
 
 
 def require_number(
-    value: float, field: str, *, above: float = -math.inf, within: float = math.inf, zero: bool = True
+    value: float,
+    field: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    within: float = math.inf,
+    zero: bool = True,
 ) -> None:
-    """Refuse a number that is not finite, not above a bound, or larger in magnitude than another."""
-    good = math.isfinite(value) and value > above and abs(value) <= within and (zero or value != 0.0)
-    if not good:
-        limits = ["finite"] + ([f"> {above:g}"] if above > -math.inf else [])
-        limits += ([f"magnitude <= {within:g}"] if within < math.inf else []) + ([] if zero else ["not 0"])
+    """Refuse a number that is not finite, or outside of its bounds.
+
+    Parameters
+    ----------
+    above, least : float
+        Bounds from below, the first excluded and the second included.
+    within : float
+        Largest magnitude.
+    zero : bool
+        Whether 0 is allowed.
+
+    Raises
+    ------
+    InputError
+        Naming the field, the value and the limits.
+    """
+    fits = above < value and least <= value and abs(value) <= within and (zero or value != 0.0)
+    if not (math.isfinite(value) and fits):
+        limits = [
+            text
+            for text, active in (
+                ("a finite number", True),
+                (f"> {above:g}", above > -math.inf),
+                (f">= {least:g}", least > -math.inf),
+                (f"magnitude <= {within:g}", within < math.inf),
+                ("not 0", not zero),
+            )
+            if active
+        ]
         raise InputError("is out of range", field=field, value=value, limit=", ".join(limits))

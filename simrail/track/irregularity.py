@@ -67,8 +67,8 @@ class Irregularity:
             raise InputError(
                 "is unknown", field="spectrum", value=self.spectrum, limit="one of " + ", ".join(SPECTRA)
             )
-        for value in (*self.wavelengths_m, self.fade_m, self.scale):
-            require_number(value, "irregularity")
+        require_number(self.fade_m, "fade_m", least=0.0)
+        require_number(self.scale, "scale", least=0.0)
         if not SHORTEST_WAVELENGTH_M <= self.wavelengths_m[0] < self.wavelengths_m[1] <= PERIOD_M / 16:
             raise InputError(
                 "is not a band",
@@ -76,9 +76,6 @@ class Irregularity:
                 value=self.wavelengths_m,
                 limit=f"{SHORTEST_WAVELENGTH_M:g} <= shortest < longest <= {PERIOD_M / 16:g} m",
             )
-        if self.fade_m < 0.0 or self.scale < 0.0:
-            name = "fade_m" if self.fade_m < 0.0 else "scale"
-            raise InputError("is negative", field=name, value=getattr(self, name), limit=">= 0")
 
 
 def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float) -> FloatArray:

@@ -1,0 +1,401 @@
+"""The design track against closed forms, finite differences and a symbolic derivation."""
+
+from __future__ import annotations
+
+import functools
+import json
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import fresnel
+
+from simrail.errors import InputError
+from simrail.track.design import (
+    CURVE,
+    STRAIGHT,
+    TRANSITION,
+    Curve,
+    Element,
+    Gradient,
+    Straight,
+    TrackDesign,
+    TrackFrame,
+    Transition,
+)
+
+LEFT_AND_RIGHT = TrackDesign(
+    "left and right",
+    -30.0,
+    (
+        Straight(60.0),
+        Transition(40.0),
+        Curve(50.0, 200.0, 0.11),
+        Transition(55.0),
+        Curve(70.0, -150.0, 0.09),
+        Transition(35.0),
+        Straight(90.0),
+    ),
+    gradients=(Gradient(-30.0, 0.012), Gradient(75.0, -0.025), Gradient(210.0, 0.03)),
+    vertical_radius_m=(1200.0, 900.0),
+)
+
+
+@st.composite
+def designs(draw: st.DrawFn) -> TrackDesign:
+    """Any alternation of curves and straights, S-curves included, with up to three gradients."""
+    length = st.floats(10.0, 120.0)
+    start = draw(st.floats(-500.0, 500.0))
+    elements: list[Element] = [Straight(draw(length))]
+    for _ in range(draw(st.integers(1, 4))):
+        elements.append(Transition(draw(st.floats(15.0, 80.0))))
+        radius = draw(st.floats(80.0, 3000.0)) * draw(st.sampled_from([-1.0, 1.0]))
+        elements.append(Curve(draw(length), radius, draw(st.floats(-0.05, 0.18))))
+        if draw(st.booleans()):
+            elements += [Transition(draw(st.floats(15.0, 80.0))), Straight(draw(length))]
+    slopes = draw(st.lists(st.floats(-0.04, 0.04), max_size=3))
+    total = sum(element.length_m for element in elements)
+    # 0.08 x 150 m = 12 m of vertical curve at most, and a ramp: it fits into an eighth of the track.
+    gradients = tuple(Gradient(start + total * (i + 1) / 4, slope) for i, slope in enumerate(slopes))
+    return TrackDesign(
+        "drawn",
+        start,
+        tuple(elements),
+        gradients=gradients,
+        vertical_radius_m=min(150.0, total),
+        vertical_ramp_m=draw(st.sampled_from([0.0, 1.0])),
+        cant_ramp=draw(st.sampled_from(["smooth", "linear"])),
+        start_yaw_rad=draw(st.floats(-3.0, 3.0)),
+    )
+
+
+properties = settings(max_examples=40, deadline=None, derandomize=True)
+
+
+def joints(design: TrackDesign) -> np.ndarray:
+    """Places where a derivative may step: joints of elements, ends and ramps of vertical curves."""
+    plan = design.start_m + np.cumsum([element.length_m for element in design.elements])[:-1]
+    z = design._shape.height[0].x
+    return np.unique(np.concatenate([plan, z[(z > design.start_m) & (z < design.end_m)]]))
+
+
+def between_joints(design: TrackDesign, n: int, margin: float) -> np.ndarray:
+    """About n places that keep a distance from every joint and from both ends."""
+    s = np.linspace(design.start_m + margin, design.end_m - margin, n)
+    near = np.abs(s[:, None] - joints(design)[None, :]).min(axis=1)
+    return s[near > margin]
+
+
+def rotation(frame: TrackFrame) -> np.ndarray:
+    """Rz Ry Rx, written out from the elementary rotations; (n, 3, 3)."""
+
+    def about(axis: int, angle: np.ndarray) -> np.ndarray:
+        matrix = np.zeros((angle.size, 3, 3))
+        matrix[:, axis, axis] = 1.0
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
+        matrix[:, i, j], matrix[:, j, i] = -np.sin(angle), np.sin(angle)
+        return matrix
+
+    return about(2, frame.yaw_rad) @ about(1, frame.pitch_rad) @ about(0, frame.roll_rad)
+
+
+def slope_of(function: Callable[[np.ndarray], np.ndarray], s: np.ndarray, h: float) -> np.ndarray:
+    """Fourth-order central difference."""
+    near, far = function(s + h) - function(s - h), function(s + 2 * h) - function(s - 2 * h)
+    return (8.0 * near - far) / (12.0 * h)
+
+
+@properties
+@given(designs())
+def test_s_is_the_arc_length_of_the_horizontal_projection(design: TrackDesign) -> None:
+    s = np.linspace(design.start_m, design.end_m, 20001)
+    chords = np.hypot(*np.diff(design.frame(s).position[:, :2], axis=0).T)
+    # A chord over h on an arc of curvature c is shorter than the arc by c^2 h^3 / 24.
+    h = s[1] - s[0]
+    arcs = chords + np.interp(s[1:] - h / 2, s, design.curvature(s)) ** 2 * h**3 / 24.0
+    assert arcs.sum() == pytest.approx(design.length_m, abs=2e-9)
+
+
+@properties
+@given(designs())
+def test_nothing_steps_at_a_joint(design: TrackDesign) -> None:
+    places, eps = joints(design), 1e-9
+    before, after = design.frame(places - eps), design.frame(places + eps)
+    assert np.abs(after.position - before.position).max() < 2 * eps * 1.01 + 1e-11
+    for angle in ("roll_rad", "pitch_rad", "yaw_rad"):
+        assert np.abs(getattr(after, angle) - getattr(before, angle)).max() < 1e-9
+    assert np.abs(after.rates - before.rates)[:, 2].max() < 1e-9  # curvature
+    if design.cant_ramp == "smooth" and design.vertical_ramp_m > 0.0:
+        assert np.abs(after.k - before.k).max() < 1e-9
+        assert np.abs(after.second - before.second)[:, :2].max() < 1e-6
+
+
+@properties
+@given(designs(), st.integers(0, 10**6))
+def test_scalar_equals_vector_equals_any_shape(design: TrackDesign, seed: int) -> None:
+    s = np.random.default_rng(seed).uniform(design.start_m, design.end_m, 6)
+    together, reshaped = design.frame(s), design.frame(s.reshape(2, 3))
+    for i in range(6):
+        alone = design.frame(float(s[i]))
+        for one, all_, grid in zip(alone, together, reshaped, strict=True):
+            assert np.array_equal(one, all_[i])
+            assert np.array_equal(one, grid[divmod(i, 3)])
+        assert design.kind(s[i]) == design.kind(s)[i]
+        assert design.curvature(s[i]) == together.rates[i, 2]
+
+
+@properties
+@given(designs())
+def test_mirrored_track_gives_the_mirrored_frame(design: TrackDesign) -> None:
+    s = np.linspace(design.start_m, design.end_m, 301)
+    here, there = design.frame(s), design.mirrored().frame(s)
+    assert np.array_equal(there.position, here.position * [1, -1, 1])
+    assert np.array_equal(there.roll_rad, -here.roll_rad)
+    assert np.array_equal(there.pitch_rad, here.pitch_rad)
+    assert np.array_equal(there.yaw_rad, -here.yaw_rad)
+    assert np.array_equal(there.k, here.k * [-1, 1, -1])
+    assert np.array_equal(there.dk, here.dk * [-1, 1, -1])
+    assert design.mirrored().mirrored() == design
+
+
+@properties
+@given(designs())
+def test_the_frame_is_the_derivative_of_the_position(design: TrackDesign) -> None:
+    s = between_joints(design, 400, 0.01)
+    frame = design.frame(s)
+    tangent = slope_of(lambda x: design.frame(x).position, s, 2e-3)
+    assert np.abs(np.hypot(tangent[:, 0], tangent[:, 1]) - 1.0).max() < 1e-9
+    x_axis = rotation(frame)[:, :, 0]
+    assert np.abs(tangent - x_axis / np.cos(frame.pitch_rad)[:, None]).max() < 1e-9
+
+
+@properties
+@given(designs())
+def test_rates_and_curvatures_against_finite_differences(design: TrackDesign) -> None:
+    h = 2e-3
+    s = between_joints(design, 400, 5 * h)
+    frame = design.frame(s)
+    angles = slope_of(
+        lambda x: np.column_stack([(f := design.frame(x)).roll_rad, f.pitch_rad, f.yaw_rad]), s, h
+    )
+    assert np.abs(angles - frame.rates).max() < 1e-10
+    assert np.abs(slope_of(lambda x: design.frame(x).rates, s, h) - frame.second).max() < 1e-8
+    # C^T C' = [k]x
+    turn = np.swapaxes(rotation(frame), 1, 2) @ slope_of(lambda x: rotation(design.frame(x)), s, h)
+    k = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=-1)
+    assert np.abs(k - frame.k).max() < 1e-10
+    assert np.abs(slope_of(lambda x: design.frame(x).k, s, h) - frame.dk).max() < 1e-8
+
+
+@functools.cache
+def darboux_by_sympy() -> Callable[..., list[np.ndarray]]:
+    """k and k' of a ZYX frame, derived from its rotation matrix."""
+    s = sympy.Symbol("s")
+    roll, pitch, yaw = (sympy.Function(name)(s) for name in ("roll", "pitch", "yaw"))
+    # sympy's rot_axis matrices rotate the axes, hence the transposes.
+    matrix = sympy.rot_axis3(yaw).T * sympy.rot_axis2(pitch).T * sympy.rot_axis1(roll).T
+    turn = matrix.T * matrix.diff(s)
+    k = [turn[2, 1], turn[0, 2], turn[1, 0]]
+    everything = [*k, *(component.diff(s) for component in k)]
+    symbols = []
+    for order in (2, 1, 0):
+        for function in (roll, pitch, yaw):
+            symbol = sympy.Symbol(f"{function.func}_{order}")
+            symbols.append(symbol)
+            term = function.diff(s, order) if order else function
+            everything = [expression.subs(term, symbol) for expression in everything]
+    return sympy.lambdify(symbols, everything)
+
+
+def test_curvatures_against_the_symbolic_derivation() -> None:
+    s = np.linspace(LEFT_AND_RIGHT.start_m, LEFT_AND_RIGHT.end_m, 2001)
+    frame = LEFT_AND_RIGHT.frame(s)
+    derived = darboux_by_sympy()(
+        *frame.second.T, *frame.rates.T, frame.roll_rad, frame.pitch_rad, frame.yaw_rad
+    )
+    assert np.abs(frame.k.T - np.stack(derived[:3])).max() < 1e-16
+    assert np.abs(frame.dk.T - np.stack(derived[3:])).max() < 1e-16
+    # The test has something to see: every coupling of the angles is at work.
+    assert np.abs(frame.k).max(axis=0).min() > 1e-4
+    assert np.abs(frame.dk).max(axis=0).min() > 1e-5
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "length"),
+    [(None, 300.0, 40.0), (250.0, -150.0, 60.0), (-400.0, None, 80.0), (25.0, -12.0, 90.0)],
+)
+def test_clothoid_against_fresnel_integrals(before: float | None, after: float | None, length: float) -> None:
+    ends = [Straight(20.0) if radius is None else Curve(20.0, radius) for radius in (before, after)]
+    design = TrackDesign("clothoid", 0.0, (ends[0], Transition(length), ends[1]))
+    k0, k1 = (0.0 if radius is None else 1.0 / radius for radius in (before, after))
+    rate = (k1 - k0) / length
+    u = np.linspace(0.0, length, 201)
+    # Completing the square: angle = base + rate (u + shift)^2 / 2.
+    scale, shift = np.sqrt(np.pi / abs(rate)), k0 / rate
+    entry = design.frame(20.0)
+    base = entry.yaw_rad - 0.5 * rate * shift**2
+    sine, cosine = fresnel((u + shift) / scale)
+    sine0, cosine0 = fresnel(shift / scale)
+    spiral = scale * ((cosine - cosine0) + 1j * np.sign(rate) * (sine - sine0)) * np.exp(1j * base)
+    position = design.frame(20.0 + u).position - entry.position
+    assert np.abs(position[:, 0] + 1j * position[:, 1] - spiral).max() < 1e-12
+
+
+def test_arc_lies_on_its_circle() -> None:
+    design = TrackDesign("circle", 5.0, (Curve(1000.0, 100.0, 0.1),))
+    position = design.frame(np.linspace(5.0, 1005.0, 99)).position
+    # A left curve that starts towards +x turns about (0, +R).
+    assert np.abs(np.hypot(position[:, 0], position[:, 1] - 100.0) - 100.0).max() < 1e-12
+    assert design.frame(1005.0).yaw_rad == pytest.approx(10.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("ramp", ["smooth", "linear"])
+def test_cant_ramp(ramp: str, side: float) -> None:
+    design = TrackDesign(
+        "ramp", 0.0, (Straight(30.0), Transition(50.0), Curve(30.0, side * 300.0, 0.12)), cant_ramp=ramp
+    )
+    u = np.linspace(0.0, 1.0, 41)
+    frame = design.frame(30.0 + 50.0 * u)
+    share = u if ramp == "linear" else 10 * u**3 - 15 * u**4 + 6 * u**5
+    # The outer rail of a left curve is the right one: left side down, roll negative.
+    assert np.abs(1.5 * np.sin(frame.roll_rad) + side * 0.12 * share).max() < 1e-15
+    assert design.frame(100.0).roll_rad == pytest.approx(-side * np.arcsin(0.08), abs=1e-16)
+    eps = 1e-7
+    twist = design.frame(np.array([30.0 + eps, 80.0 - eps])).rates[:, 0]
+    bend = design.frame(np.array([30.0 + eps, 80.0 - eps])).second[:, 0]
+    if ramp == "smooth":
+        assert np.abs(twist).max() < 1e-12
+        assert np.abs(bend).max() < 1e-9
+    else:
+        assert twist[0] == pytest.approx(-side * 0.12 / 50.0 / 1.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 5.0, 20.0])
+@pytest.mark.parametrize("change", [0.045, -0.045, 0.001])
+def test_vertical_curve_keeps_the_change_of_slope_exact(ramp: float, change: float) -> None:
+    radius, middle = 1500.0, 200.0
+    design = TrackDesign(
+        "crest",
+        0.0,
+        (Straight(400.0),),
+        gradients=(Gradient(0.0, -0.01), Gradient(middle, change - 0.01)),
+        vertical_radius_m=radius,
+        vertical_ramp_m=ramp,
+    )
+    slope = -np.tan(design.frame(np.array([0.0, 100.0, 300.0, 400.0])).pitch_rad)
+    assert np.abs(slope - [-0.01, -0.01, change - 0.01, change - 0.01]).max() < 1e-16
+    # The gradients meet at the middle, as the two tangents of a parabola do.
+    z = design.frame(np.array([0.0, 400.0])).position[:, 2]
+    assert z[1] - z[0] == pytest.approx(-0.01 * middle + (change - 0.01) * (400.0 - middle), abs=1e-13)
+    length = max(radius * abs(change), ramp)
+    centre = design.frame(middle)
+    bend = -centre.rates[1] / np.cos(centre.pitch_rad) ** 2
+    assert bend == pytest.approx(change / length, rel=1e-12)
+    outside = middle + np.array([-1.0, 1.0]) * (0.5 * (length + ramp) + 1e-6)
+    assert np.array_equal(design.frame(outside).rates[:, 1], [0.0, 0.0])
+    s = np.linspace(middle - 60.0, middle + 60.0, 120001)
+    steps = np.abs(np.diff(design.frame(s).rates[:, 1])).max()
+    # A bare parabola steps by 1/radius; a ramp rises by no more than 15/8 of its mean slope.
+    assert steps == pytest.approx(1.0 / radius, rel=1e-3) if not ramp else steps < 2e-3 / ramp / radius
+
+
+def test_parabola_stands_where_it_should() -> None:
+    design = TrackDesign(
+        "parabola", 0.0, (Straight(300.0),), gradients=(Gradient(100.0, 0.03),), vertical_ramp_m=0.0
+    )
+    s = np.array([50.0, 70.0, 100.0, 130.0, 200.0])  # level until 100 - 30, radius 2000 m, 60 m long
+    assert design.frame(s).position[:, 2] == pytest.approx([0.0, 0.0, 30.0**2 / 4000, 0.9, 3.0], abs=1e-14)
+
+
+@pytest.mark.parametrize("place", [-30.001, 370.5, np.nan, np.inf])
+def test_off_the_track_is_an_error_that_names_place_and_limits(place: float) -> None:
+    for method in (LEFT_AND_RIGHT.frame, LEFT_AND_RIGHT.kind, LEFT_AND_RIGHT.curvature):
+        with pytest.raises(InputError) as caught:
+            method(np.array([0.0, place, 10.0]))
+        message = str(caught.value)
+        assert f"{place:g} m" in message
+        assert "between -30 and 370 m" in message
+        assert "left and right" in message
+    assert LEFT_AND_RIGHT.frame(np.array([-30.0, 370.0])).s_m.shape == (2,)
+
+
+def test_kind_segment_and_their_names() -> None:
+    ends = np.array([-30.0, 29.9, 30.0, 70.0, 120.0, 175.0, 245.0, 280.0, 370.0])
+    assert LEFT_AND_RIGHT.kind(ends).tolist() == [
+        STRAIGHT,
+        STRAIGHT,
+        TRANSITION,
+        CURVE,
+        TRANSITION,
+        CURVE,
+        TRANSITION,
+        STRAIGHT,
+        STRAIGHT,
+    ]
+    assert LEFT_AND_RIGHT.kind(ends).dtype == np.int8
+    assert LEFT_AND_RIGHT.segment(ends).tolist() == [0, 0, 1, 2, 3, 4, 5, 6, 6]
+    assert LEFT_AND_RIGHT.segment_name(4) == "curve 5 R-150"
+    assert LEFT_AND_RIGHT.segment_name(1) == "transition 2"
+
+
+@properties
+@given(designs())
+def test_plain_data_and_back(design: TrackDesign) -> None:
+    again = TrackDesign.from_dict(json.loads(json.dumps(design.to_dict())))
+    assert again == design
+    assert hash(again) == hash(design)
+    assert pickle.loads(pickle.dumps(design)) == design
+
+
+def test_a_design_is_not_worked_on_before_it_is_used() -> None:
+    assert TrackDesign("nonsense", 0.0, (Transition(-1.0),)).name == "nonsense"
+
+
+@pytest.mark.parametrize(
+    ("elements", "field"),
+    [
+        ((), "segment"),
+        ((Straight(0.0),), "segment[0].length_m"),
+        ((Straight(float("nan")),), "segment[0].length_m"),
+        ((Straight(10.0), Transition(10.0)), "segment[1]"),
+        ((Transition(10.0), Straight(10.0)), "segment[0]"),
+        ((Straight(10.0), Transition(10.0), Transition(10.0), Straight(10.0)), "segment[1]"),
+        ((Straight(10.0), Curve(10.0, 300.0)), "segment[1]"),
+        ((Curve(10.0, 300.0, 0.02), Curve(10.0, 300.0, 0.03)), "segment[1]"),
+        ((Curve(10.0, 0.0),), "segment[0].radius_m"),
+        ((Curve(10.0, 300.0, 80.0),), "segment[0].cant_m"),
+    ],
+)
+def test_elements_that_cannot_be_joined(elements: tuple[Element, ...], field: str) -> None:
+    with pytest.raises(InputError) as caught:
+        TrackDesign("bad", 0.0, elements).check()
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"gradients": (Gradient(50.0, 0.02), Gradient(60.0, -0.02))}, "gradient"),
+        ({"gradients": (Gradient(5.0, 0.02),)}, "gradient"),
+        ({"gradients": (Gradient(90.0, 0.02),)}, "gradient"),
+        ({"gradients": (Gradient(60.0, 0.0), Gradient(50.0, 0.0))}, "gradient[1].from_m"),
+        ({"gradients": (Gradient(120.0, 0.0),)}, "gradient[0].from_m"),
+        ({"gradients": (Gradient(50.0, 20.0),)}, "gradient[0].slope"),
+        ({"gradients": (Gradient(50.0, 0.01),), "vertical_radius_m": -1.0}, "vertical_radius_m"),
+        ({"gradients": (Gradient(50.0, 0.01),), "vertical_radius_m": (900.0, 900.0)}, "vertical_radius_m"),
+        ({"vertical_ramp_m": -1.0}, "vertical_ramp_m"),
+        ({"cant_ramp": "cosine"}, "cant_ramp"),
+        ({"start_m": float("nan")}, "start_m"),
+    ],
+)
+def test_what_makes_no_line_is_refused(options: dict[str, object], field: str) -> None:
+    values: dict[str, object] = {"name": "bad", "start_m": 0.0, "elements": (Straight(100.0),), **options}
+    with pytest.raises(InputError) as caught:
+        TrackDesign(**values).check()  # type: ignore[arg-type]
+    assert caught.value.field == field
