@@ -1,0 +1,234 @@
+"""The noise of the IMU by allantools and by plain statistics, and the tests themselves by mutation.
+
+Each term has a check that compares samples with what the grade claims. The same checks are then given
+samples in which that term was doubled, halved or deleted, and must fail: so they test what they say.
+Tolerances: the relative error of an Allan deviation from `edf` equivalent degrees of freedom is
+1/sqrt(2 edf), with about 1.5 degrees per averaging time per series for the overlapping estimate.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+
+import allantools
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from simrail.columns import ACCEL, GYRO, IMU
+from simrail.sensors.grades import (
+    FLICKER_FLOOR,
+    GAUSS_MARKOV_PEAK_AT,
+    ImuGrade,
+    bias_sd,
+    gauss_markov_allan,
+)
+from simrail.sensors.imu import sample_imu
+
+RATES = (10.0, 100.0, 1000.0)
+COLUMNS = {"gyro": list(GYRO), "accel": list(ACCEL)}
+UNITS = {"gyro": ("radps", "radpsqrts"), "accel": ("mps2", "mpsqrts")}
+
+
+def standstill(seconds: float, rate_hz: float) -> pd.DataFrame:
+    index = pd.Index(np.arange(round(seconds * rate_hz)) / rate_hz, name="time_s")
+    return pd.DataFrame(0.0, index=index, columns=list(IMU))
+
+
+def sampled(
+    grade: ImuGrade, seconds: float, *, draw: int = 0, name: str = "imu", seed: int = 11
+) -> pd.DataFrame:
+    return sample_imu(standstill(seconds, grade.rate_hz), grade, seed=seed, draw=draw, name=name)[0]
+
+
+def allan(series: np.ndarray, rate_hz: float, taus: list[float]) -> np.ndarray:
+    """Overlapping Allan deviation at exactly the given averaging times."""
+    found, deviation, _, _ = allantools.oadev(series, rate=rate_hz, data_type="freq", taus=taus)
+    np.testing.assert_allclose(found, taus, rtol=1e-9)
+    return deviation
+
+
+def root_mean_square(values: list[np.ndarray]) -> np.ndarray:
+    return np.sqrt(np.mean(np.square(values), axis=0))
+
+
+# --- checks: what a grade claims against what was sampled ------------------------------------------
+
+
+def check_white(claimed: ImuGrade, real: ImuGrade, kind: str, *, seconds: float = 1200.0) -> None:
+    """Allan deviation N at 1 s within 4 % (sd of the estimate 1 %), and N / sqrt(tau) at 0.1 and 10 s."""
+    density = getattr(claimed, f"{kind}_noise_{UNITS[kind][1]}")
+    frame = sampled(real, seconds)
+    taus = [max(0.1, 1.0 / claimed.rate_hz), 1.0, 10.0]
+    found = root_mean_square([allan(frame[c].to_numpy(), claimed.rate_hz, taus) for c in COLUMNS[kind]])
+    tolerance = np.maximum(0.04, 4.0 / np.sqrt(2.0 * 1.5 * 3.0 * seconds / np.array(taus)))
+    assert np.all(np.abs(found / (density / np.sqrt(taus)) - 1.0) < tolerance)
+
+
+def check_bias(claimed: ImuGrade, real: ImuGrade, kind: str, *, draws: int, seconds: float = 400.0) -> None:
+    """Mean Allan variance of an ensemble within 5 % of the closed form, around the peak and on its slopes."""
+    instability = getattr(claimed, f"{kind}_bias_instability_{UNITS[kind][0]}")
+    correlation = getattr(claimed, f"{kind}_bias_correlation_s")
+    rate = claimed.rate_hz
+    taus = [round(x * correlation * rate) / rate for x in (0.4, GAUSS_MARKOV_PEAK_AT, 4.0)]
+    series = [sampled(real, seconds, draw=draw)[c].to_numpy() for draw in range(draws) for c in COLUMNS[kind]]
+    found = root_mean_square([allan(values, rate, taus) for values in series])
+    expected = gauss_markov_allan(np.array(taus), sd=bias_sd(instability), correlation_s=correlation)
+    assert np.all(np.abs(found / expected - 1.0) < 0.05)
+    assert abs(found[1] / (FLICKER_FLOOR * instability) - 1.0) < 0.05, "the peak is the data sheet's floor"
+
+
+def check_turn_on(claimed: ImuGrade, real: ImuGrade, kind: str) -> None:
+    """Uniform within the bound (Kolmogorov-Smirnov, 900 values), constant over the ride."""
+    bound = getattr(claimed, f"{kind}_turn_on_bias_{UNITS[kind][0]}")
+    frames = [sampled(real, 0.04, draw=draw)[COLUMNS[kind]] for draw in range(300)]
+    assert all(np.ptp(frame.to_numpy(), axis=0).max() == 0.0 for frame in frames)
+    values = np.concatenate([frame.iloc[0].to_numpy() for frame in frames])
+    assert np.abs(values).max() <= bound
+    assert stats.kstest(values, stats.uniform(-bound, 2.0 * bound).cdf).pvalue > 1e-3
+
+
+def check_resolution(claimed: ImuGrade, real: ImuGrade, kind: str) -> None:
+    size = getattr(claimed, f"{kind}_resolution_{UNITS[kind][0]}")
+    counts = sampled(real, 40.0)[COLUMNS[kind]].to_numpy() / size
+    assert np.allclose(counts, np.rint(counts), atol=1e-6)
+    assert np.min(np.diff(np.unique(np.rint(counts)))) == 1.0
+
+
+def check_range(claimed: ImuGrade, real: ImuGrade, kind: str) -> None:
+    limit = getattr(claimed, f"{kind}_range_{UNITS[kind][0]}")
+    values = sampled(real, 40.0)[COLUMNS[kind]].to_numpy()
+    assert values.max() == limit
+    assert values.min() == -limit
+
+
+WHITE = ImuGrade("white", 100.0, gyro_noise_radpsqrts=0.02, accel_noise_mpsqrts=0.3)
+WANDERING = ImuGrade(
+    "wandering",
+    10.0,
+    gyro_bias_instability_radps=0.004,
+    gyro_bias_correlation_s=5.0,
+    accel_bias_instability_mps2=0.05,
+    accel_bias_correlation_s=5.0,
+)
+TURN_ON = ImuGrade("turn_on", 100.0, gyro_turn_on_bias_radps=0.01, accel_turn_on_bias_mps2=0.2)
+COARSE = replace(WHITE, gyro_resolution_radps=0.05, accel_resolution_mps2=0.5)
+NARROW = replace(WHITE, gyro_range_radps=0.3, accel_range_mps2=4.0)
+
+TERMS: dict[str, tuple[ImuGrade, Callable[..., None], dict[str, object]]] = {
+    "noise": (WHITE, check_white, {"seconds": 600.0}),
+    "bias_instability": (WANDERING, check_bias, {"draws": 50}),
+    "bias_correlation": (WANDERING, check_bias, {"draws": 50}),
+    "turn_on_bias": (TURN_ON, check_turn_on, {}),
+    "resolution": (COARSE, check_resolution, {}),
+    "range": (NARROW, check_range, {}),
+}
+
+
+def field_of(term: str, kind: str) -> str:
+    suffix = {"noise": UNITS[kind][1], "bias_correlation": "s"}.get(term, UNITS[kind][0])
+    return f"{kind}_{term}_{suffix}"
+
+
+# --- the checks pass -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ("gyro", "accel"))
+@pytest.mark.parametrize("rate", RATES)
+def test_white_noise_is_the_allan_coefficient_at_one_second(rate, kind):
+    grade = replace(WHITE, rate_hz=rate)
+    check_white(grade, grade, kind)
+    sd = sampled(grade, 60.0)[COLUMNS[kind]].to_numpy().std()
+    density = getattr(grade, f"{kind}_noise_{UNITS[kind][1]}")
+    assert sd == pytest.approx(density * np.sqrt(rate), rel=4.0 / np.sqrt(2.0 * 180.0 * rate) + 1e-3)
+
+
+def test_white_noise_alone_has_no_random_walk():
+    # A random walk of K = N/1000 (one thousandth of N at 1 s) would lift the deviation by 29 % at 1000 s.
+    grade = replace(WHITE, rate_hz=10.0)
+    values = [
+        sampled(grade, 20_000.0, draw=draw)[c].to_numpy() for draw in range(12) for c in COLUMNS["gyro"]
+    ]
+    found = root_mean_square([allan(series, 10.0, [1000.0]) for series in values])[0]
+    assert found == pytest.approx(0.02 / np.sqrt(1000.0), rel=4.0 / np.sqrt(2.0 * 1.5 * 36 * 20.0))
+
+
+@pytest.mark.parametrize("kind", ("gyro", "accel"))
+@pytest.mark.parametrize("rate", RATES)
+def test_bias_instability_is_the_closed_form_at_every_rate(rate, kind):
+    grade = replace(WANDERING, rate_hz=rate)
+    check_bias(grade, grade, kind, draws=50 if rate < 1000.0 else 30)
+
+
+@pytest.mark.parametrize("term", ("turn_on_bias", "resolution", "range"))
+@pytest.mark.parametrize("kind", ("gyro", "accel"))
+def test_other_terms(term, kind):
+    grade, check, settings = TERMS[term]
+    check(grade, grade, kind, **settings)
+
+
+def test_bias_is_stationary_from_the_first_sample():
+    grade = replace(WANDERING, rate_hz=10.0)
+    frames = [sampled(grade, 60.0, draw=draw)[COLUMNS["gyro"]].to_numpy() for draw in range(600)]
+    ensemble = np.concatenate(frames, axis=1)
+    sd = ensemble.std(axis=1) / bias_sd(grade.gyro_bias_instability_radps)
+    # 1800 values each: 1.7 % sd; the first sample, and every later one.
+    assert abs(sd[0] - 1.0) < 0.06
+    assert abs(sd[[10, 50, 200, -1]] - 1.0).max() < 0.06
+    lag = round(grade.gyro_bias_correlation_s * grade.rate_hz)
+    correlation = np.mean(ensemble[0] * ensemble[lag]) / np.mean(ensemble[0] ** 2)
+    assert correlation == pytest.approx(np.exp(-1.0), abs=4.0 / np.sqrt(1800.0))
+
+
+# --- correlation -----------------------------------------------------------------------------------
+
+
+def white_part(frame: pd.DataFrame, grade: ImuGrade) -> np.ndarray:
+    """Innovations of a Gauss-Markov sequence (of a white one: itself), so that 4/sqrt(n) applies."""
+    values = frame.to_numpy()
+    if grade.gyro_bias_instability_radps > 0.0:
+        values = values[1:] - np.exp(-1.0 / (grade.gyro_bias_correlation_s * grade.rate_hz)) * values[:-1]
+    return values[: len(frame) - 1]
+
+
+def test_axes_sensors_draws_seeds_and_terms_are_uncorrelated():
+    grades = (replace(WHITE, rate_hz=10.0), WANDERING)
+    series = [
+        white_part(sampled(grade, 2000.0, draw=draw, name=name, seed=seed), grade)
+        for grade in grades
+        for name in ("axle", "body")
+        for draw in (0, 1)
+        for seed in (11, 12)
+    ]
+    values = np.concatenate(series, axis=1)
+    correlation = np.corrcoef(values.T)
+    pairs = [abs(correlation[i, j]) for i, j in combinations(range(values.shape[1]), 2)]
+    assert len(pairs) == 96 * 95 // 2
+    assert max(pairs) < 4.0 / np.sqrt(len(values))
+
+
+def test_turn_on_biases_are_uncorrelated():
+    values = np.array(
+        [sampled(TURN_ON, 0.04, draw=draw, name=name).iloc[0] for draw in range(400) for name in "ab"]
+    )
+    correlation = np.corrcoef(values.reshape(400, 12).T)
+    assert np.abs(correlation[np.triu_indices(12, 1)]).max() < 4.0 / np.sqrt(400.0)
+
+
+# --- the checks fail when they should --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("factor", (2.0, 0.5, 0.0))
+@pytest.mark.parametrize("kind", ("gyro", "accel"))
+@pytest.mark.parametrize("term", TERMS)
+def test_a_term_doubled_halved_or_deleted_is_caught(term, kind, factor):
+    claimed, check, settings = TERMS[term]
+    field = field_of(term, kind)
+    value = getattr(claimed, field) * factor
+    if factor == 0.0:
+        # Without: no limit, no memory.
+        value = {"range": np.inf, "bias_correlation": 1e-9}.get(term, 0.0)
+    mutated = replace(claimed, **{field: value})
+    with pytest.raises(AssertionError):
+        check(claimed, mutated, kind, **settings)
