@@ -29,6 +29,7 @@ from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
+from simrail.track.design import TrackFrame
 
 
 class _Arrays(NamedTuple):
@@ -127,25 +128,25 @@ class AttitudeEkf:
 
     def _arrays(self, recording: Recording) -> tuple[_Arrays, FloatArray]:
         rest = rest_bias(recording, enabled=self.rest_bias)
-        noise = self._noise(recording, rest)
-        frame = design_frame(recording, count=1)
-        start = np.array([frame.roll_rad[0], frame.pitch_rad[0], frame.yaw_rad[0]])
+        frame = design_frame(recording) if self.compensated else None
+        noise = self._noise(recording, rest, frame)
+        first = design_frame(recording, count=1)
         sd = np.array([self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad])
         arrays = _Arrays(
             rate=step_rates(recording, rest.bias),
-            force=gravity_force(recording, compensated=self.compensated, printed=self.printed),
+            force=gravity_force(recording, frame, compensated=self.compensated, printed=self.printed),
             process=noise.process,
             noise=noise.force,
-            start=start,
+            start=np.array([first.roll_rad[0], first.pitch_rad[0], first.yaw_rad[0]]),
             start_variance=sd**2,
             step_s=1.0 / recording.imu_sheet.rate_hz,
             gravity=recording.gravity_mps2,
         )
         return arrays, noise.considered
 
-    def _noise(self, recording: Recording, rest: RestBias) -> Noise:
+    def _noise(self, recording: Recording, rest: RestBias, frame: TrackFrame | None) -> Noise:
         if self.tuning == "recommended":
-            noise = recommended_noise(recording, rest, vibration=self.vibration)
+            noise = recommended_noise(recording, rest, frame=frame, vibration=self.vibration)
         else:
             noise = paper_noise(recording, self.tuning, reading=self.process_noise)
         if self.gyro_intensity_rad2ps is not None:
@@ -161,12 +162,12 @@ def _require(name: str, value: float | None, *, above: float, limit: str) -> Non
         raise InputError("is out of range", field=name, value=value, limit=limit)
 
 
-class _EulerEkf(ExtendedKalmanFilter):  # type: ignore[misc]
+class _EulerEkf(ExtendedKalmanFilter):
     """filterpy's EKF with the attitude's own state prediction."""
 
     def predict_x(self, u: FloatArray) -> None:
         """Add the step u of the Euler angles."""
-        self.x = self.x + u
+        self.x: FloatArray = self.x + u
 
 
 def _filterpy_ekf(

@@ -40,7 +40,9 @@ def design_frame(recording: Recording, *, count: int | None = None) -> TrackFram
     return recording.track.frame(np.clip(position, recording.track.start_m, recording.track.end_m))
 
 
-def track_acceleration(recording: Recording, *, printed: bool = False) -> FloatArray:
+def track_acceleration(
+    recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
+) -> FloatArray:
     """Acceleration of the IMU's nominal place in the moving track frame (EQUATIONS 1.1 and 2.1).
 
     With k the Darboux curvatures of the track frame per metre of horizontal arc length, k' their
@@ -56,6 +58,8 @@ def track_acceleration(recording: Recording, *, printed: bool = False) -> FloatA
     ----------
     recording : Recording
         Its odometry frame, design track and mount are used; its signals are not.
+    frame : TrackFrame, optional
+        `design_frame(recording)`, if it is at hand.
     printed : bool
         Use paper 000, Eqs. 3-6 as they are printed, to show what it costs: k = (roll', pitch', yaw')
         without the coupling of cant and slope, k' = (0, 0, yaw''), no 1/cos th.
@@ -65,7 +69,7 @@ def track_acceleration(recording: Recording, *, printed: bool = False) -> FloatA
     ndarray (n, 3)
         c, m/s2, components in the track frame.
     """
-    frame = design_frame(recording)
+    frame = design_frame(recording) if frame is None else frame
     speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
     speed_rate = recording.odometry["acceleration_mps2"].to_numpy(dtype=np.float64)
     square = speed * speed
@@ -91,13 +95,17 @@ def track_acceleration(recording: Recording, *, printed: bool = False) -> FloatA
     return np.column_stack([c_x, c_y, c_z])
 
 
-def gravity_force(recording: Recording, *, compensated: bool, printed: bool = False) -> FloatArray:
+def gravity_force(
+    recording: Recording, frame: TrackFrame | None = None, *, compensated: bool, printed: bool = False
+) -> FloatArray:
     """Specific force that is left for gravity, z = accelerometer - c (paper 000, Eq. 33).
 
     Parameters
     ----------
     recording : Recording
         The recording.
+    frame : TrackFrame, optional
+        `design_frame(recording)`, if it is at hand.
     compensated : bool
         False leaves the accelerometer as it is: the general-purpose filter.
     printed : bool
@@ -110,5 +118,5 @@ def gravity_force(recording: Recording, *, compensated: bool, printed: bool = Fa
     """
     force = recording.imu[list(ACCEL)].to_numpy(dtype=np.float64)
     if compensated:
-        force = force - track_acceleration(recording, printed=printed)
+        force = force - track_acceleration(recording, frame, printed=printed)
     return np.ascontiguousarray(force)

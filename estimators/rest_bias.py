@@ -1,8 +1,8 @@
 """Gyro bias from the initial rest: a running mean while the train has not moved, frozen afterwards.
 
 Every attitude method uses this one, so that none gets a better gyro than another. It is causal: the
-bias at a sample is the mean of the samples at least `GUARD_S` older, so that the first jerk of a
-departure, which the encoder notices late, never enters.
+bias at a sample is the mean of the samples at least `simrail.rest.GUARD_S` older, so that the first jerk
+of a departure, which the encoder notices late, never enters.
 """
 
 from __future__ import annotations
@@ -14,9 +14,7 @@ import numpy as np
 from simrail.columns import GYRO
 from simrail.jit import FloatArray
 from simrail.recording import Recording
-
-GUARD_S = 0.5
-"""How long before the first sign of motion the averaging ends."""
+from simrail.rest import GUARD_S, first_motion_s
 
 
 class RestBias(NamedTuple):
@@ -26,28 +24,12 @@ class RestBias(NamedTuple):
     ----------
     bias : ndarray (n, 3)
         Mean rate of the rest so far, rad/s; zero while nothing has been averaged.
-    count : ndarray (n,)
+    samples : ndarray (n,)
         How many samples it is the mean of.
     """
 
     bias: FloatArray
-    count: FloatArray
-
-
-def first_motion(recording: Recording) -> int:
-    """Index of the first IMU sample at which the encoder has counted, or n if it never has.
-
-    Without an encoder the odometry's speed decides.
-    """
-    times = recording.imu.index.to_numpy(dtype=np.float64)
-    if recording.encoder is not None and len(recording.encoder):
-        counts = recording.encoder["pulse_count"].to_numpy()
-        moved = np.flatnonzero(counts != counts[0])
-        if moved.size == 0:
-            return len(times)
-        return int(np.searchsorted(times, recording.encoder.index.to_numpy()[moved[0]]))
-    moving = np.flatnonzero(recording.odometry["speed_mps"].to_numpy() != 0.0)
-    return int(moving[0]) if moving.size else len(times)
+    samples: FloatArray
 
 
 def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
@@ -63,14 +45,15 @@ def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
     Returns
     -------
     RestBias
-        Row k uses samples older than k - `GUARD_S` only, and none after the first motion.
+        Row k uses samples older than `simrail.rest.GUARD_S` only, and none after the first motion.
     """
     gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
     n = gyro.shape[0]
     if not enabled:
         return RestBias(np.zeros((n, 3)), np.zeros(n))
     guard = round(GUARD_S * recording.imu_sheet.rate_hz)
-    used = np.maximum(np.minimum(np.arange(n), first_motion(recording)) - guard, 0)
+    standing = np.searchsorted(recording.imu.index.to_numpy(dtype=np.float64), first_motion_s(recording))
+    used = np.maximum(np.minimum(np.arange(n), standing) - guard, 0)
     # cumsum adds in the order of time, so a prefix of the recording has the very same sums.
     sums = np.vstack([np.zeros(3), np.cumsum(gyro, axis=0)])
     return RestBias(sums[used] / np.maximum(used, 1)[:, None], used.astype(np.float64))
