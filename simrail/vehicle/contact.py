@@ -16,7 +16,15 @@ import numpy as np
 from simrail.jit import FloatArray, njit
 from simrail.vehicle.contact_geometry import COLUMNS, CONSTANTS, ContactTable, build_contact
 
-__all__ = ["COLUMNS", "CONSTANTS", "ContactTable", "build_contact", "static_height", "wheel_force"]
+__all__ = [
+    "COLUMNS",
+    "CONSTANTS",
+    "ContactTable",
+    "build_contact",
+    "read_patch",
+    "static_height",
+    "wheel_force",
+]
 
 
 def static_height(table: ContactTable) -> float:
@@ -58,6 +66,28 @@ def _touch(
     F = ((c[5, 0] * x + c[5, 1]) * x + c[5, 2]) * x + c[5, 3]
     t = dP + p * dA + pp * dC + qq * dD
     return pen, t, s - p * C, r0 + F + t * p * C
+
+
+@njit
+def read_patch(
+    coef: FloatArray,
+    const: FloatArray,
+    side: float,
+    patch: int,
+    y: float,
+    z: float,
+    phi: float,
+    psi: float,
+    y_rail: float,
+    z_rail: float,
+    out: FloatArray,
+) -> None:
+    """Penetration, slope, abscissa, radius of one patch into ``out`` (4,); poses as in `wheel_force`."""
+    u = side * (y + const[3] * phi - y_rail) - const[0]
+    i = min(max(int(u * const[1]), 0), coef.shape[1] - 1)
+    x = min(max(u, 0.0), coef.shape[1] / const[1]) - i / const[1]
+    height = z + 0.5 * const[3] * phi * phi - z_rail
+    out[0], out[1], out[2], out[3] = _touch(coef[patch, i], x, const[2], const[3], height, side * phi, psi)
 
 
 @njit
@@ -141,8 +171,7 @@ def wheel_force(
     u = side * (y + r0 * phi - y_rail)
     height = z + 0.5 * r0 * phi * phi - z_rail
     p = side * phi
-    x = (u - u0) * inv_du
-    i = min(max(int(x), 0), coef.shape[1] - 1)
+    i = min(max(int((u - u0) * inv_du), 0), coef.shape[1] - 1)
     x = min(max(u - u0, 0.0), coef.shape[1] / inv_du) - i / inv_du
 
     speed = abs(V)

@@ -201,7 +201,9 @@ def build_contact(
 
     derailed, split_at = _limits(pair, scale)
     step = _SHIFT_STEP_M * scale
-    u = -(derailed + 0.008 * scale) + step * np.arange(round((2.0 * derailed + 0.009 * scale) / step))
+    u: FloatArray = -(derailed + 0.008 * scale) + step * np.arange(
+        round((2.0 * derailed + 0.009 * scale) / step)
+    )
     masks = [pair.s >= (pair.s[0] if split_at is None else split_at)]
     if split_at is not None:
         masks.append(pair.s < split_at)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from simrail.errors import InputError
@@ -165,7 +166,9 @@ class ContactPair:
             return None
         return float(0.5 * (at[jumps[-1]] + at[jumps[-1] + 1]))
 
-    def soften(self, u: FloatArray, mask: FloatArray, *, eps_m: float, k0_1pm: float) -> SoftContact:
+    def soften(
+        self, u: FloatArray, mask: npt.NDArray[np.bool_], *, eps_m: float, k0_1pm: float
+    ) -> SoftContact:
         """Soft maximum of the gap over the part of the wheel in `mask`, and its moments.
 
         Parameters

@@ -41,8 +41,8 @@ class Ellipse(NamedTuple):
 
 
 def hertz_ellipse(
-    longitudinal: FloatArray,
-    lateral: FloatArray,
+    longitudinal: FloatArray | float,
+    lateral: FloatArray | float,
     *,
     shear_modulus_pa: float = SHEAR_MODULUS_PA,
     poisson_ratio: float = POISSON_RATIO,
@@ -51,7 +51,7 @@ def hertz_ellipse(
 
     Parameters
     ----------
-    longitudinal, lateral : ndarray
+    longitudinal, lateral : ndarray or float
         Half the relative curvatures along and across the rail, 1/m, positive.
     shear_modulus_pa, poisson_ratio : float
         Of both bodies.

