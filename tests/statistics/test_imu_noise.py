@@ -8,7 +8,6 @@ Tolerances: the relative error of an Allan deviation from `edf` equivalent degre
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations
 
 import allantools
 import numpy as np
@@ -72,7 +71,11 @@ def check_bias(claimed: ImuGrade, real: ImuGrade, kind: str, *, draws: int, seco
     correlation = getattr(claimed, f"{kind}_bias_correlation_s")
     rate = claimed.rate_hz
     taus = [round(x * correlation * rate) / rate for x in (0.4, GAUSS_MARKOV_PEAK_AT, 4.0)]
-    series = [sampled(real, seconds, draw=draw)[c].to_numpy() for draw in range(draws) for c in COLUMNS[kind]]
+    other = "accel" if kind == "gyro" else "gyro"
+    alone = replace(real, **{f"{other}_bias_instability_{UNITS[other][0]}": 0.0})
+    series = [
+        sampled(alone, seconds, draw=draw)[c].to_numpy() for draw in range(draws) for c in COLUMNS[kind]
+    ]
     found = root_mean_square([allan(values, rate, taus) for values in series])
     expected = gauss_markov_allan(np.array(taus), sd=bias_sd(instability), correlation_s=correlation)
     assert np.all(np.abs(found / expected - 1.0) < 0.05)
@@ -154,11 +157,14 @@ def test_white_noise_alone_has_no_random_walk():
     assert found == pytest.approx(0.02 / np.sqrt(1000.0), rel=4.0 / np.sqrt(2.0 * 1.5 * 36 * 20.0))
 
 
-@pytest.mark.parametrize("kind", ("gyro", "accel"))
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize(
+    ("rate", "kind"),
+    [(10.0, "gyro"), (10.0, "accel"), (100.0, "gyro"), (100.0, "accel"), (1000.0, "gyro")]
+    + [pytest.param(1000.0, "accel", marks=pytest.mark.slow)],
+)
 def test_bias_instability_is_the_closed_form_at_every_rate(rate, kind):
     grade = replace(WANDERING, rate_hz=rate)
-    check_bias(grade, grade, kind, draws=50 if rate < 1000.0 else 30)
+    check_bias(grade, grade, kind, draws=50 if rate < 1000.0 else 24)
 
 
 @pytest.mark.parametrize("term", ("turn_on_bias", "resolution", "range"))
@@ -192,20 +198,33 @@ def white_part(frame: pd.DataFrame, grade: ImuGrade) -> np.ndarray:
     return values[: len(frame) - 1]
 
 
-def test_axes_sensors_draws_seeds_and_terms_are_uncorrelated():
-    grades = (replace(WHITE, rate_hz=10.0), WANDERING)
+def correlations(grades: tuple[ImuGrade, ...], seeds: tuple[int, ...]) -> np.ndarray:
+    """Correlation of all pairs of axes, sensors, draws (and grades, seeds), times sqrt(n): N(0, 1)."""
     series = [
         white_part(sampled(grade, 2000.0, draw=draw, name=name, seed=seed), grade)
         for grade in grades
         for name in ("axle", "body")
         for draw in (0, 1)
-        for seed in (11, 12)
+        for seed in seeds
     ]
     values = np.concatenate(series, axis=1)
-    correlation = np.corrcoef(values.T)
-    pairs = [abs(correlation[i, j]) for i, j in combinations(range(values.shape[1]), 2)]
-    assert len(pairs) == 96 * 95 // 2
-    assert max(pairs) < 4.0 / np.sqrt(len(values))
+    matrix = np.corrcoef(values.T)
+    return matrix[np.triu_indices(len(matrix), 1)] * np.sqrt(len(values))
+
+
+@pytest.mark.parametrize("grade", (replace(WHITE, rate_hz=10.0), WANDERING), ids=lambda grade: grade.name)
+def test_axes_sensors_and_draws_are_uncorrelated(grade):
+    found = correlations((grade,), (21,))
+    assert len(found) == 24 * 23 // 2
+    assert np.abs(found).max() < 4.0
+
+
+def test_terms_and_seeds_are_uncorrelated_too():
+    found = correlations((replace(WHITE, rate_hz=10.0), WANDERING), (11, 12))
+    assert len(found) == 96 * 95 // 2
+    # Of 4560 pairs one exceeds 4 by chance every fourth time: judge the whole distribution, and 5.
+    assert np.abs(found).max() < 5.0
+    assert stats.kstest(found, "norm").pvalue > 1e-3
 
 
 def test_turn_on_biases_are_uncorrelated():
