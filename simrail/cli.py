@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
 
 from simrail.errors import InputError
@@ -25,6 +24,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+# typer carries its own copy of click, or not, as its version has it: find the class that it raises.
+UsageFault: type[Any] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 
 DONE, CELL_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -41,10 +43,10 @@ def call(arguments: list[str]) -> int:
     except InputError as error:
         _say(f"simrail: {error}")
         return BAD_INPUT
-    except click.ClickException as error:
+    except UsageFault as error:
         error.show()
         return BAD_INPUT
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         _say("simrail: interrupted; former results and complete rides are as they were")
         return INTERRUPTED
     except OSError as error:
@@ -131,11 +133,14 @@ def list_parts() -> int:
     from simrail.catalogue import catalogue
 
     console = Console(highlight=False)
+    wide = not console.is_terminal
     for kind, entries in catalogue().items():
         console.print(f"[bold]{kind}[/bold]")
         width = max((len(name) for name in entries), default=0)
         for name, title in entries.items():
-            console.print(f"  [cyan]{name:{width}}[/cyan]  {title}", overflow="ellipsis", no_wrap=True)
+            console.print(
+                f"  [cyan]{name:{width}}[/cyan]  {title}", overflow="ellipsis", no_wrap=True, soft_wrap=wide
+            )
     return DONE
 
 

@@ -10,6 +10,8 @@ import dataclasses
 import difflib
 import hashlib
 import json
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from math import radians
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -166,9 +168,42 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
     """
     field = f"estimator[{method.index}]"
     with blame(scenario.file, f"{field}.method"):
-        known_class = estimator_class(method.part.method)
+        known_class = _class_named(method.part.method, scenario.folder)
     with blame(scenario.file, f"{field}.options"):
         return _construct(known_class, method.part.options)
+
+
+def _class_named(name: str, folder: Path | None) -> type[Estimator]:
+    """Class of a method: a registered name, or ``"file.py:Class"`` for one's own file."""
+    path_name, colon, class_name = name.rpartition(":")
+    if not colon or not path_name.endswith(".py"):
+        return estimator_class(name)
+    candidates = [*([folder / path_name] if folder else []), Path(path_name)]
+    path = next((candidate for candidate in candidates if candidate.is_file()), None)
+    if path is None:
+        raise InputError("no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder")
+    # A name of its own per content: two files, or two versions of one, never share a module.
+    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
+    if module_name not in sys.modules:
+        spec = spec_from_file_location(module_name, path)
+        assert spec is not None and spec.loader is not None
+        module = module_from_spec(spec)
+        sys.modules[module_name] = module  # dataclasses look their module up there
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            del sys.modules[module_name]
+            raise InputError(f"cannot be imported: {type(error).__name__}: {error}", value=path_name) from error
+    found = getattr(sys.modules[module_name], class_name, None)
+    if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
+        raise InputError(
+            "the file has no such estimator class",
+            value=class_name,
+            limit="a class with a method estimate(recording)",
+            remedy="see 'simrail new estimator NAME'",
+        )
+    own: type[Estimator] = found
+    return own
 
 
 def _construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:

@@ -23,6 +23,7 @@ from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 from simrail.sensors.decimation import decimation_factor
 from simrail.track.design import TrackDesign
+from simrail.track.irregularity import SAMPLES_PER_WAVE
 from simrail.track.laid import lay
 from simrail.vehicle.model import VehicleModel
 
@@ -32,6 +33,7 @@ LONGEST_RIDE_S = 7200.0
 MOST_CELLS = 1_000_000
 TRUTH_RATE_HZ = 1000.0
 GRAVITY_MPS2 = 9.81
+KNOT_STEP_M = 0.125
 
 
 @dataclass(frozen=True)
@@ -142,9 +144,20 @@ def _judge_estimators(scenario: Scenario) -> dict[str, Estimator]:
 
 
 def _judge_irregularity(scenario: Scenario, cell: Cell, track: TrackDesign) -> None:
+    irregularity = irregularity_of(cell)
+    shortest = SAMPLES_PER_WAVE * KNOT_STEP_M
+    if not irregularity.wavelengths_m[0] >= shortest:
+        raise InputError(
+            "the shortest wave is too short for the table of the rails",
+            file=scenario.file,
+            field="irregularity.wavelengths_m",
+            value=irregularity.wavelengths_m,
+            limit=f">= {shortest:g} m",
+            remedy="take longer waves",
+        )
     # Laying the track is the judgement: it takes a moment and no rule can be forgotten.
     try:
-        lay(track, irregularity_of(cell), seed=cell.ride_seed)
+        lay(track, irregularity, seed=cell.ride_seed, table_step_m=KNOT_STEP_M)
     except InputError as error:
         if error.file is None:
             error.file = scenario.file
