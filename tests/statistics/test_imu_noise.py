@@ -159,8 +159,14 @@ def test_white_noise_alone_has_no_random_walk():
 
 @pytest.mark.parametrize(
     ("rate", "kind"),
-    [(10.0, "gyro"), (10.0, "accel"), (100.0, "gyro"), (100.0, "accel"), (1000.0, "gyro")]
-    + [pytest.param(1000.0, "accel", marks=pytest.mark.slow)],
+    [
+        (10.0, "gyro"),
+        (10.0, "accel"),
+        (100.0, "gyro"),
+        (100.0, "accel"),
+        (1000.0, "gyro"),
+        pytest.param(1000.0, "accel", marks=pytest.mark.slow),
+    ],
 )
 def test_bias_instability_is_the_closed_form_at_every_rate(rate, kind):
     grade = replace(WANDERING, rate_hz=rate)
