@@ -1,0 +1,110 @@
+"""What the report knows of a method: its label, its colour, and what it is a baseline for.
+
+All of it follows from the scenario (class and options of each estimator), not from names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from simrail.errors import InputError
+from simrail.estimate import estimator_class
+from simrail.scenario import cells
+
+# Okabe and Ito's colours, which people with any colour vision tell apart: (compensated, not compensated).
+_COLOURS = {
+    "AttitudeEkf": ("#0072B2", "#56B4E9"),
+    "AttitudeGda": ("#D55E00", "#E69F00"),
+    "Vqf": ("#AA4499", "#CC79A7"),
+    "DesignAngles": ("#6b7280", "#6b7280"),
+}
+_OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
+_STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
+_ACRONYMS = {"ekf": "EKF", "gda": "GDA", "vqf": "VQF", "ahrs": "AHRS", "kf": "KF", "imu": "IMU"}
+
+
+@dataclass(frozen=True)
+class MethodStyle:
+    """One method as the report shows it.
+
+    Attributes
+    ----------
+    name, label : str
+        Name in the tables; the same, readable.
+    baseline : str
+        ``""`` for a method under test, else what kind of baseline it is.
+    uses_imu : bool
+        False for "design angles only".
+    twin : str
+        Name of the method that differs in compensation only; "" if there is none.
+    compensated : bool or None
+        Whether it compensates track-frame accelerations; None if it has no such option.
+    colour, stroke
+        For plots.
+    """
+
+    name: str
+    label: str
+    baseline: str
+    uses_imu: bool
+    twin: str
+    compensated: bool | None
+    colour: str
+    stroke: str | tuple[float, tuple[float, ...]]
+
+
+def readable(name: str) -> str:
+    """Name of a method in words: ``"ekf_compensated"`` becomes ``"EKF compensated"``."""
+    head, bracket, tail = name.partition("[")
+    words = " ".join(_ACRONYMS.get(word, word) for word in head.split("_"))
+    return words + bracket + tail
+
+
+def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
+    """Styles of the scenario's methods, by name, in their order."""
+    compensated = {method.name: _compensated(method) for method in methods}
+    styles: dict[str, MethodStyle] = {}
+    seen: list[tuple[str, bool | None]] = []
+    other_classes: list[str] = []
+    for method in methods:
+        family, flag = method.part.method, compensated[method.name]
+        if family not in _COLOURS and family not in other_classes:
+            other_classes.append(family)
+        pair = _COLOURS.get(family) or _OTHERS[other_classes.index(family) % len(_OTHERS)]
+        twins = [m.name for m in methods if m is not method and _is_twin(method, m, compensated)]
+        baseline = ""
+        if family == "DesignAngles":
+            baseline = "no IMU"
+        elif flag is False:
+            baseline = "uncompensated" if twins else "general purpose"
+        styles[method.name] = MethodStyle(
+            name=method.name,
+            label=readable(method.name),
+            baseline=baseline,
+            uses_imu=family != "DesignAngles",
+            twin=twins[0] if twins else "",
+            compensated=flag,
+            colour=pair[1] if flag is False else pair[0],
+            stroke=_STROKES[seen.count((family, flag)) % len(_STROKES)],
+        )
+        seen.append((family, flag))
+    return styles
+
+
+def _compensated(method: cells.Method) -> bool | None:
+    if "compensated" in method.part.options:
+        return bool(method.part.options["compensated"])
+    try:
+        default = getattr(estimator_class(method.part.method), "compensated", None)
+    except InputError:
+        return None
+    return default if isinstance(default, bool) else None
+
+
+def _is_twin(one: cells.Method, other: cells.Method, compensated: dict[str, bool | None]) -> bool:
+    flags = compensated[one.name], compensated[other.name]
+    if None in flags or flags[0] == flags[1] or one.part.method != other.part.method:
+        return False
+    rest = [{k: v for k, v in m.part.options.items() if k != "compensated"} for m in (one, other)]
+    return rest[0] == rest[1]

@@ -1,0 +1,230 @@
+"""The report page: gathers figures, tables and sentences and writes one self-contained HTML file.
+
+Nothing is fetched when the page is opened: styles and figures are in it. What it says is computed
+from the scores (`simrail.report.findings`); how it looks is in ``page.html.j2``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
+
+from simrail.example import CellResult
+from simrail.report.attitude_figures import attitude_figure, error_figure
+from simrail.report.findings import Finding, findings
+from simrail.report.methods import MethodStyle, method_styles
+from simrail.report.pivot import Figures, cases, of_cell
+from simrail.report.provenance import facts, parts
+from simrail.report.ride_figures import direction_of, imu_figure, odometry_figure, speed_figure
+from simrail.report.score_figures import curves_figure, rms_figure
+from simrail.report.tables import Table, consistency_table, error_table, odometry_table
+from simrail.report.tiles import Tile, tiles
+from simrail.report.track_figures import plan_figure, profile_figure
+from simrail.scenario.cells import methods
+from simrail.scenario.scenario import Scenario
+
+MOST_RIDES = 6
+"""Rides that are drawn; the tables hold all."""
+
+MOST_TABLES = 24
+"""Cases whose table is on the page; ``scores.csv`` holds all."""
+
+
+@dataclass(frozen=True)
+class RideView:
+    """One ride as the template needs it."""
+
+    key: str
+    title: str
+    facts: list[str]
+    tiles: list[Tile]
+    findings: list[Finding]
+    speed: Markup
+    imu: Markup
+    attitude: Markup
+    comparisons: list[tuple[str, Markup]]
+    errors: Markup
+    odometry: Markup
+    rms: Markup
+    curves: Markup
+
+
+@dataclass(frozen=True)
+class CaseView:
+    """The tables of one case."""
+
+    title: str
+    draws: str
+    truth: Table
+    design: Table
+    consistency: Table
+
+
+def write_report(
+    path: Path,
+    *,
+    scenario: Scenario,
+    scores: pd.DataFrame,
+    cells: pd.DataFrame,
+    examples: Sequence[CellResult],
+    manifest: Mapping[str, Any],
+) -> None:
+    """Write the report of a campaign.
+
+    Parameters
+    ----------
+    path : Path
+        The HTML file.
+    scenario : Scenario
+        What was run.
+    scores : pandas.DataFrame
+        The score table.
+    cells : pandas.DataFrame
+        One row per cell: labels and values of the axes.
+    examples : sequence of CellResult
+        Rides to draw, first draw of each.
+    manifest : mapping
+        What the campaign noted of itself: command, versions, times; plain values.
+    """
+    all_cases = cases(scores, cells)
+    styles = list(method_styles(methods(scenario)).values())
+    rides = [_ride(example, all_cases, styles) for example in examples[:MOST_RIDES]]
+    environment = Environment(
+        loader=PackageLoader("simrail.report", "."),
+        autoescape=select_autoescape(default=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    text = environment.get_template("page.html.j2").render(
+        scenario=scenario,
+        manifest=manifest,
+        facts=facts(manifest),
+        parts=parts(scenario, cells, examples),
+        styles=styles,
+        tracks=_tracks(examples),
+        rides=rides,
+        rides_left_out=max(len(examples) - MOST_RIDES, 0),
+        cases=[_case(case, styles) for case in all_cases[:MOST_TABLES]],
+        cases_left_out=max(len(all_cases) - MOST_TABLES, 0),
+        odometry=odometry_table(all_cases[:MOST_TABLES]),
+        failures=_failures(scores),
+        rows=len(scores),
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def _ride(example: CellResult, all_cases: list[Figures], styles: list[MethodStyle]) -> RideView:
+    name = example.recording.name
+    drawn = [style for style in styles if style.name in example.estimates]
+    case = of_cell(all_cases, example.cell)
+    said = findings(case, styles, others=all_cases) if case else []
+    first = [s for s in drawn if not s.baseline] + [s for s in drawn if s.baseline == "general purpose"]
+    by_name = {style.name: style for style in drawn}
+    comparisons = []
+    for style in drawn:
+        twin = by_name.get(style.twin)
+        if style.compensated and twin:
+            title = f"{style.label.removesuffix(' compensated')}, with and without compensation"
+            comparisons.append(
+                (title, Markup(attitude_figure(example, [style, twin], what=f"{title}, {name}")))
+            )
+    nothing = Markup("")
+    return RideView(
+        key="ride-" + "".join(c if c.isalnum() else "-" for c in f"{name}-{example.cell.get('cell', '')}"),
+        title=_ride_title(example),
+        facts=_ride_facts(example),
+        tiles=tiles(case, styles) if case else [],
+        findings=said,
+        speed=Markup(speed_figure(example)),
+        imu=Markup(imu_figure(example)),
+        attitude=Markup(attitude_figure(example, first or drawn, what=f"Attitude, {name}"))
+        if drawn
+        else nothing,
+        comparisons=comparisons,
+        errors=Markup(error_figure(example, drawn)) if drawn else nothing,
+        odometry=Markup(odometry_figure(example)),
+        rms=Markup(rms_figure(case, styles)) if case else nothing,
+        curves=Markup(curves_figure(case, styles)) if case else nothing,
+    )
+
+
+def _ride_title(example: CellResult) -> str:
+    axes = [f"{name} {value}" for name, value in example.cell.items() if "." in name]
+    return " \u00b7 ".join([example.recording.name, *axes])
+
+
+def _ride_facts(example: CellResult) -> list[str]:
+    motion, recording = example.motion, example.recording
+    position, speed = motion["position_m"].to_numpy(), np.abs(motion["speed_mps"].to_numpy())
+    moving = speed > 0.01
+    way = "increasing" if direction_of(example) > 0 else "decreasing"
+    mean = 3.6 * float(speed[moving].mean()) if moving.any() else 0.0
+    duration = float(motion.index[-1] - motion.index[0])
+    x, y, z = recording.mount_position_m
+    return [
+        f"{abs(position[-1] - position[0]):.0f} m towards {way} distance, {duration:.0f} s",
+        f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
+        f"IMU {recording.imu_sheet.grade} at {recording.imu_sheet.rate_hz:g} Hz on '{recording.mount_body}', "
+        f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
+        f"position and speed from the odometry '{recording.odometry_source}'"
+        + (" (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""),
+    ]
+
+
+def _tracks(examples: Sequence[CellResult]) -> list[dict[str, Any]]:
+    found: dict[str, dict[str, Any]] = {}
+    for example in examples:
+        track, position = example.recording.track, example.motion["position_m"].to_numpy()
+        entry = found.setdefault(track.name, {"track": track, "stops": {}})
+        if not entry["stops"]:
+            entry["stops"] = {"start": float(position[0]), "end": float(position[-1])}
+    return [
+        {
+            "name": entry["track"].name,
+            "synthetic": entry["track"].synthetic,
+            "length_m": entry["track"].length_m,
+            "plan": Markup(plan_figure(entry["track"], stops=entry["stops"])),
+            "profile": Markup(profile_figure(entry["track"])),
+        }
+        for entry in found.values()
+    ]
+
+
+def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
+    labels = case.labels
+    title = f"{labels['ride']} \u00b7 IMU {labels['mount']} ({labels['imu']}) \u00b7 odometry {labels['odometry']}"
+    axes = [
+        f"{name} {value}"
+        for name, value in labels.items()
+        if "." in name and not name.startswith("imu.grade")
+    ]
+    tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
+    said = (
+        "one draw"
+        if draws <= 1
+        else f"mean \u00b1 standard deviation of {draws} draws, {tracks} of the track"
+    )
+    return CaseView(
+        " \u00b7 ".join([title, *axes]),
+        said,
+        error_table(case, styles, reference="truth"),
+        error_table(case, styles, reference="design"),
+        consistency_table(case, styles),
+    )
+
+
+def _failures(scores: pd.DataFrame) -> list[tuple[str, str, int]]:
+    """(estimator, reason, rows) of what has no value, expected empty windows left out."""
+    failed = scores[(scores["status"] != "ok") & (scores["status"] != "no samples")]
+    if failed.empty:
+        return []
+    counted = failed.groupby(["estimator", "status"], observed=True).size()
+    return [(str(name), str(reason), int(rows)) for (name, reason), rows in counted.items()]

@@ -1,0 +1,128 @@
+"""Figures of the track: its plan, profile, curvature and cant (as Figs. 8 to 10 of Briales et al. 2021)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from simrail.report.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
+from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
+from simrail.track.elements import RAIL_BASE_M
+
+_KIND_COLOUR = {STRAIGHT: "#98a1af", TRANSITION: "#56B4E9", CURVE: "#D55E00"}
+_KIND_WORD = {STRAIGHT: "straight", TRANSITION: "transition", CURVE: "curve"}
+
+
+def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
+    """Plan of the track, with its curves named and the stops of the rides marked.
+
+    Parameters
+    ----------
+    track : TrackDesign
+        The design.
+    stops : dict of str to float
+        Label and position s of the places to mark.
+    """
+    with look():
+        s = np.linspace(track.start_m, track.end_m, 1500)
+        xy = track.frame(s).position[:, :2]
+        turned = _along_the_page(xy)
+        span = np.ptp(turned, axis=0)
+        wide = WIDTH_IN - 0.9
+        tall = float(np.clip(wide * (span[1] / span[0]) + 1.1, 1.8, 4.2))
+        figure = Figure(figsize=(WIDTH_IN, tall + 0.4))
+        axis = figure.add_axes((0.45 / WIDTH_IN, 0.12 / (tall + 0.4), wide / WIDTH_IN, tall / (tall + 0.4)))
+        kind = track.kind(s)
+        steps = np.flatnonzero(np.diff(kind)) + 1
+        named: set[int] = set()
+        for part in np.split(np.arange(len(s)), steps):
+            k = int(kind[part[0]])
+            reach = np.append(part, min(part[-1] + 1, len(s) - 1))
+            word = _KIND_WORD[k] if k not in named else None
+            axis.plot(*turned[reach].T, color=_KIND_COLOUR[k], lw=3.0, solid_capstyle="butt", label=word)
+            named.add(k)
+        _name_curves(axis, track, s, turned)
+        for label, at in stops.items():
+            place = np.array([np.interp(at, s, turned[:, i]) for i in (0, 1)])
+            axis.plot(*place, marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=5)
+            axis.annotate(
+                label, place, (0, -15), textcoords="offset points", ha="center", fontsize=8.4, color=INK
+            )
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.margins(x=0.03, y=0.22)
+        axis.grid(False)
+        axis.set_xticks([])
+        axis.set_yticks([])
+        axis.spines[:].set_visible(False)
+        axis.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=3)
+        _scale_bar(axis, span[0])
+        return to_svg(figure, description=f"Plan of the track {track.name}")
+
+
+def profile_figure(track: TrackDesign) -> str:
+    """Height, curvature and cant over distance."""
+    with look():
+        s = np.linspace(track.start_m, track.end_m, 1200)
+        frame = track.frame(s)
+        figure, axes = panels([1.35, 1.2, 1.2], top_in=0.12)
+        height = frame.position[:, 2]
+        axes[0].fill_between(s, height, height.min() - 0.1 * max(np.ptp(height), 0.1), color="#e8ebf0", lw=0)
+        axes[0].plot(s, height, color=INK, lw=1.4)
+        axes[0].set_ylim(
+            height.min() - 0.1 * max(np.ptp(height), 0.1), height.max() + 0.35 * max(np.ptp(height), 0.1)
+        )
+        axes[0].set_ylabel("height, m")
+        axes[1].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
+        axes[1].set_ylabel("curvature, 1/km")
+        axes[2].plot(s, -1e3 * RAIL_BASE_M * np.sin(frame.roll_rad), color="#0072B2", lw=1.4)
+        axes[2].set_ylabel("cant, mm")
+        for axis in axes[1:]:
+            axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
+        shade_track(axes, track, limits=(track.start_m, track.end_m))
+        axes[-1].set_xlabel("distance along the track, m")
+        return to_svg(figure, description="Height, curvature and cant of the track over distance")
+
+
+def _along_the_page(xy: np.ndarray) -> np.ndarray:
+    """Turn a plan so that it runs from left to right; left stays up."""
+    chord = xy[-1] - xy[0]
+    if np.hypot(*chord) < 0.2 * np.abs(np.diff(xy, axis=0)).sum():
+        return xy - xy[0]
+    angle = np.arctan2(chord[1], chord[0])
+    c, s = np.cos(angle), np.sin(angle)
+    turned: np.ndarray = (xy - xy[0]) @ np.array([[c, -s], [s, c]])
+    return turned
+
+
+def _name_curves(axis, track: TrackDesign, s: np.ndarray, xy: np.ndarray) -> None:  # type: ignore[no-untyped-def]
+    start = track.start_m
+    for element in track.elements:
+        if isinstance(element, Curve):
+            middle = start + 0.5 * element.length_m
+            i = int(np.clip(np.searchsorted(s, middle), 1, len(s) - 2))
+            tangent = xy[i + 1] - xy[i - 1]
+            outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
+            axis.annotate(
+                f"R {abs(element.radius_m):.0f} m\ncant {1e3 * abs(element.cant_m):.0f} mm",
+                xy[i],
+                26.0 * outside,
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontsize=7.8,
+                color=MUTED,
+                linespacing=1.25,
+            )
+        start += element.length_m
+
+
+def _scale_bar(axis, length_m: float) -> None:  # type: ignore[no-untyped-def]
+    bar = 10.0 ** np.floor(np.log10(length_m / 4.0))
+    bar *= max(k for k in (1, 2, 5) if k * bar <= length_m / 4.0)
+    low, high = axis.get_xlim()
+    base = axis.get_ylim()[0]
+    axis.plot([high - bar, high], [base, base], color=INK, lw=1.6, clip_on=False)
+    axis.annotate(
+        f"{bar:.0f} m", (high - bar / 2, base), (0, 4), textcoords="offset points", ha="center", fontsize=8
+    )
+    axis.set_xlim(low, high)
