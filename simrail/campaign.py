@@ -21,6 +21,7 @@ from itertools import groupby
 from types import FrameType
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from simrail.errors import InputError
@@ -51,6 +52,9 @@ class Watcher:
 
     def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
         """The ride has been simulated so far."""
+
+    def ride_ends(self) -> None:
+        """The ride is there; its cells are measured and estimated from now on."""
 
     def estimate_made(self, number: int, count: int, name: str) -> None:
         """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
@@ -219,6 +223,7 @@ def _run_ride(
             for name in ledger.estimators:
                 ledger.failed(cell, name, error)
         return
+    watcher.ride_ends()
     said = {key: value for key, value in truth.manifest.items() if key != "versions"}
     ledger.rides.append(
         {**said, "ride": first.ride.name, "track_draw": first.track_draw, "from_cache": found, "took_s": wall}
@@ -269,6 +274,7 @@ def _run_cell(
                 figures = score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)
                 ledger.tables.append(labelled(figures, ledger.labels(cell, name)))
             estimates[name] = estimate
+            _note_not_finite(cell, name, estimate, ledger)
         except Exception as error:
             check()
             ledger.failed(cell, name, error)
@@ -279,6 +285,14 @@ def _run_cell(
         described = {**ledger.labels(cell, ""), **_cell_record(cell)}
         del described["estimator"], described["tuning"]
         ledger.examples.append(CellResult(described, recording, motion, estimates))
+
+
+def _note_not_finite(cell: Cell, name: str, estimate: Estimate, ledger: _Ledger) -> None:
+    """An estimate that is not finite has rows that say so; it is a failure of its cell as well."""
+    bad = int((~np.isfinite(estimate.states.to_numpy(dtype=np.float64))).any(axis=1).sum())
+    if bad:
+        reason = f"estimate not finite in {bad} of {len(estimate.states)} samples"
+        ledger.failures.append(Failure(cell.number, name, reason, reason + "\n"))
 
 
 def _timed_estimate(

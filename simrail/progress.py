@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Self
 
 import pandas as pd
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -76,10 +77,13 @@ class ProgressWatcher(Watcher):
         )
         self._progress.update(self._ride, total=total_s, completed=done_s, note=note)
 
-    def estimate_made(self, number: int, count: int, name: str) -> None:
+    def ride_ends(self) -> None:
         """See `Watcher`."""
         if self._ride is not None:
-            self._progress.update(self._ride, total=1.0, completed=1.0, note="")
+            self._progress.update(self._ride, total=1.0, completed=1.0, note="measuring and estimating")
+
+    def estimate_made(self, number: int, count: int, name: str) -> None:
+        """See `Watcher`."""
         if self._estimates is None:
             self._estimates = self._progress.add_task("estimates", total=count, note="")
         self._progress.update(self._estimates, completed=number, note=f"{number} of {count}, {name}")
@@ -115,27 +119,41 @@ def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodSt
     table = Table(
         title=f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, {first['imu']} on {first['mount']}, "
         f"odometry: {first['odometry']}{draws}",
-        caption="RMS errors in degrees; 'vs design' is against the design angles, as in the papers",
         title_justify="left",
+        title_style="bold",
         caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
-    table.add_column("estimator")
+    table.add_column("RMS error, deg")
     for quantity, reference, window in COLUMNS:
         against = "" if reference == "truth" else "\nvs design"
         table.add_column(f"{quantity}\n{window}{against}", justify="right")
     table.add_column("us per\nsample", justify="right")
-    table.add_column("", style="dim")
     good = rows[rows["status"] == OK]
     keys = ["estimator", "quantity", "reference", "window", "metric"]
     mean = good.groupby(keys, observed=True)["value"].mean()
-    tested = [mean.get((name, *COLUMNS[1], "rms")) for name, style in styles.items() if not style.baseline]
-    best = min((value for value in tested if value is not None), default=None)
+    marked = False
     for name, style in styles.items():
         values = [mean.get((name, *column, "rms")) for column in COLUMNS]
         time_us = mean.get((name, "roll", "truth", "whole", "us_per_sample"))
-        cells = ["-" if value is None else f"{value:.3f}" for value in values]
-        note = f"baseline: {style.baseline}" if style.baseline else ""
-        if style.baseline == "no IMU" and best is not None and values[1] is not None and values[1] < best:
-            note += "; better than every filter in curves"
-        table.add_row(name, *cells, "-" if time_us is None else f"{time_us:.2f}", note)
+        numbers = ["-" if value is None else f"{value:.3f}" for value in values]
+        marked = marked or bool(style.baseline)
+        table.add_row(
+            f"{name}{' *' if style.baseline else ''}",
+            *numbers,
+            "-" if time_us is None else f"{time_us:.2f}",
+            style="dim" if style.baseline else None,
+        )
+    notes = ["* baseline"] if marked else []
+    in_curves = {name: mean.get((name, *COLUMNS[1], "rms")) for name in styles}
+    for name, style in styles.items():
+        beaten = [
+            other
+            for other, value in in_curves.items()
+            if styles[other].uses_imu and value is not None and value > (in_curves[name] or float("inf"))
+        ]
+        if not style.uses_imu and beaten:
+            notes.append(f"{name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}")
+    table.caption = "; ".join(notes)
     return table
