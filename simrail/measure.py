@@ -6,6 +6,8 @@ odometry is asked for by name (an ablation, labelled in every table).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 
@@ -99,7 +101,7 @@ def measure(
             sheet,
             imu.index.to_numpy(),
             start_position_m=start_m,
-            radius_relative_sd=encoder.radius_error_sd,
+            radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
         )
     return Recording(
         name=name,

@@ -6,9 +6,9 @@ filter's measurement is the middle of the smallest interval that the count allow
 width^2/12. A train without pulses is put to rest exactly: its estimated speed would otherwise decay
 for ever, and drift.
 
-Of the wheel it knows the nominal radius; the error of that enters the standard deviations through
-`radius_relative_sd`. It knows nothing of slip, nor of the longer way of the outer wheel in a curve:
-those errors are not in the standard deviations. The error of a count is treated as white. That is
+Of the wheel it knows the nominal radius; how far the true rolling radius may be from that (wear, taper,
+running on the flange in a curve) enters the standard deviations through `radius_relative_sd`, as one
+constant factor. It knows nothing of slip, nor of the longer way of the outer wheel. The error of a count is treated as white. That is
 wrong in one case: at an exactly constant speed of a whole number of pulses per reading the count's
 error is a slow sawtooth, which the filter follows.
 """
@@ -56,7 +56,7 @@ def encoder_odometry(
     start_position_m : float
         Position s at the first count.
     radius_relative_sd : float
-        How well the nominal radius is known, relative: enters the standard deviations.
+        Relative standard deviation of the rolling radius about the nominal one.
     jerk_intensity_m2ps5 : float
         Intensity of the white jerk.
     still_s : float
