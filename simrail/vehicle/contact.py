@@ -83,7 +83,7 @@ def read_patch(
     out: FloatArray,
 ) -> None:
     """Penetration, slope, abscissa, radius of one patch into ``out`` (4,); poses as in `wheel_force`."""
-    u = side * (y + const[3] * phi - y_rail) - const[0]
+    u = side * (y + const[3] * phi - y_rail) - 0.5 * const[2] * phi * phi - const[0]
     i = min(max(int(u * const[1]), 0), coef.shape[1] - 1)
     x = min(max(u, 0.0), coef.shape[1] / const[1]) - i / const[1]
     height = z + 0.5 * const[3] * phi * phi - z_rail
@@ -168,7 +168,7 @@ def wheel_force(
     for k in range(8):
         out[k] = 0.0
     out[7] = -1.0
-    u = side * (y + r0 * phi - y_rail)
+    u = side * (y + r0 * phi - y_rail) - 0.5 * half * phi * phi
     height = z + 0.5 * r0 * phi * phi - z_rail
     p = side * phi
     i = min(max(int((u - u0) * inv_du), 0), coef.shape[1] - 1)

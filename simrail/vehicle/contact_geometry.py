@@ -201,9 +201,8 @@ def build_contact(
 
     derailed, split_at = _limits(pair, scale)
     step = _SHIFT_STEP_M * scale
-    u: FloatArray = -(derailed + 0.008 * scale) + step * np.arange(
-        round((2.0 * derailed + 0.009 * scale) / step)
-    )
+    count = round((2.0 * derailed + 0.009 * scale) / step)
+    u: FloatArray = np.linspace(0.0, (count - 1) * step, count) - (derailed + 0.008 * scale)
     masks = [pair.s >= (pair.s[0] if split_at is None else split_at)]
     if split_at is not None:
         masks.append(pair.s < split_at)

@@ -203,8 +203,8 @@ def rail_60e1() -> RailProfile:
 
     Arcs of 300, 80 and 13 mm, tangent to each other, then the head's side at 1:20. The arcs meet
     where they do in the UIC 60 profile of the Manchester contact benchmark (10.5 and 25.99 mm from
-    the axis), so that published contact results hold for this rail; the running surface
-    agrees to 1 um, the side to 6 um.
+    the axis), so that published contact results hold for this rail: the running surface
+    agrees to 2 um, the gauge corner to 6 um.
     """
     return rail_head(
         "60E1",
