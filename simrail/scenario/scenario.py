@@ -101,7 +101,7 @@ class EstimatorPart(Part):
 class ScorePart(Part):
     """``[score]``: what of the score table is kept; everything, unless said otherwise.
 
-    ``"curve:"`` among the windows keeps every single curve.
+    ``"curve:*"`` among the windows keeps every single curve.
     """
 
     windows: tuple[str, ...] | None = None

@@ -1,0 +1,223 @@
+"""The campaign loop: cells, seeds, shared rides, failed rows, repeatable scores."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail import campaign
+from simrail.campaign import CampaignResult, Watcher, run_campaign
+from simrail.scenario.cells import cells
+from simrail.scenario.files import shipped
+from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
+from simrail.score_table import OK, SCORE_COLUMNS
+
+SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Rides of these tests go into a cache of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("cache")
+        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
+        yield
+
+
+def short(*settings: str) -> Scenario:
+    return load_scenario("quick_kinematic", overrides=[*SHORT, *settings])
+
+
+@pytest.fixture(scope="module")
+def two_draws() -> CampaignResult:
+    return run_campaign(short())
+
+
+def without_time(scores: pd.DataFrame) -> pd.DataFrame:
+    kept = scores[scores["metric"] != "us_per_sample"].reset_index(drop=True)
+    return kept.astype({name: str for name in kept.columns if kept[name].dtype == "category"})
+
+
+def test_table_has_the_fixed_columns_and_no_failure(two_draws: CampaignResult) -> None:
+    assert list(two_draws.scores.columns) == list(SCORE_COLUMNS)
+    assert two_draws.failures == []
+    assert len(two_draws.cells) == 2
+    assert set(two_draws.scores["estimator"].astype(str)) == {
+        "odometry:encoder",
+        "ekf_compensated",
+        "ekf_uncompensated",
+        "design_angles",
+    }
+    whole = two_draws.scores.query("window == 'whole' and quantity == 'roll' and metric == 'rms'")
+    assert (whole["status"] == OK).all() and len(whole) == 2 * 3 * 2
+
+
+def test_same_seed_gives_the_same_bits(two_draws: CampaignResult) -> None:
+    again = run_campaign(short())
+    pd.testing.assert_frame_equal(without_time(two_draws.scores), without_time(again.scores), check_exact=True)
+
+
+def test_another_seed_gives_other_scores(two_draws: CampaignResult) -> None:
+    other = run_campaign(short("seed=2"))
+    chosen = "estimator == 'ekf_compensated' and metric == 'rms' and quantity == 'roll' and status == 'ok'"
+    ours, theirs = two_draws.scores.query(chosen)["value"], other.scores.query(chosen)["value"]
+    assert len(ours) == len(theirs) > 4
+    assert not np.isclose(ours.to_numpy(), theirs.to_numpy(), rtol=1e-6).any()
+
+
+def test_a_cell_does_not_depend_on_its_neighbours(two_draws: CampaignResult) -> None:
+    # The same ride among others, in another place of the order, with more draws and another estimator.
+    more = short(
+        "sensor_draws=3",
+        "ride.speed_kmh=[30.0, 50.0]",
+        "odometry=['truth', 'encoder']",
+        "estimator[0].options.rest_bias=[false, true]",
+    )
+    found = run_campaign(more)
+    assert len(found.cells) == 2 * 2 * 3
+    wanted = found.cells.query("speed_kmh == 50 and odometry == 'encoder' and sensor_draw < 2")
+    keys = ["sensor_draw", "quantity", "reference", "window", "metric"]
+    for name, theirs_name in (
+        ("ekf_compensated", "ekf_compensated[rest_bias=True]"),
+        ("ekf_uncompensated", "ekf_uncompensated"),
+        ("odometry:encoder", "odometry:encoder"),
+    ):
+        ours = without_time(two_draws.scores[two_draws.scores["estimator"] == name])
+        theirs = without_time(
+            found.scores[(found.scores["estimator"] == theirs_name) & found.scores["cell"].isin(wanted["cell"])]
+        )
+        pd.testing.assert_series_equal(
+            ours.set_index(keys)["value"], theirs.set_index(keys)["value"], check_exact=True
+        )
+
+
+def test_draws_differ_and_rides_over_one_draw_are_paired(two_draws: CampaignResult) -> None:
+    rms = two_draws.scores.query("estimator == 'ekf_compensated' and metric == 'rms' and reference == 'truth'")
+    first, second = (rms[rms["sensor_draw"] == draw]["value"].to_numpy() for draw in (0, 1))
+    assert not np.isclose(first[np.isfinite(first)], second[np.isfinite(second)], rtol=1e-6).any()
+    back = read_scenario(
+        shipped("scenario")["quick_kinematic"].read_text().replace(
+            "[[imu]]", '[[ride]]\nname = "back"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 50.0\n\n[[imu]]'
+        ),
+        name="both",
+        overrides=["track_draws=3"],
+    )
+    listed = list(cells(back))
+    seeds = {(cell.ride.name, cell.track_draw): (cell.ride_seed, cell.sensor_seed) for cell in listed}
+    assert all(seeds["out", draw] == seeds["back", draw] for draw in range(3))
+    assert len(set(seeds.values())) == 3
+    assert len({seed for pair in seeds.values() for seed in pair}) == 6
+    assert len({cell.ride_number for cell in listed}) == 6 and len({cell.case for cell in listed}) == 4
+
+
+class Counter(Watcher):
+    def __init__(self) -> None:
+        self.rides: list[str] = []
+        self.estimates = 0
+        self.last = (0, 0)
+
+    def ride_begins(self, number: int, count: int, name: str) -> None:
+        self.rides.append(f"{number}/{count} {name}")
+
+    def estimate_made(self, number: int, count: int, name: str) -> None:
+        self.estimates += 1
+        self.last = (number, count)
+
+
+FAILING = """
+from dataclasses import dataclass
+import numpy as np
+from estimators.baselines import DesignAngles
+
+@dataclass(frozen=True)
+class Failing:
+    'Fails on every second draw of its life, or gives NaN.'
+    nan: bool = False
+    causal = True
+
+    def estimate(self, recording):
+        found = DesignAngles().estimate(recording)
+        if self.nan:
+            found.states.iloc[5:, 0] = np.nan
+            return found
+        if len(recording.imu) > 100 and recording.imu['gyro_x_radps'].iloc[0] > 0:
+            raise RuntimeError('the\\nwheel came off')
+        return found
+"""
+
+
+def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
+    (tmp_path / "failing.py").write_text(FAILING)
+    text = shipped("scenario")["quick_kinematic"].read_text()
+    text += '\n[[estimator]]\nname = "failing"\nmethod = "failing.py:Failing"\n'
+    text += '\n[[estimator]]\nname = "nan"\nmethod = "failing.py:Failing"\noptions = { nan = true }\n'
+    text += '\n[[estimator]]\nname = "after"\nmethod = "DesignAngles"\n'
+    scenario = read_scenario(text, name="failing", folder=tmp_path, overrides=[*SHORT, "sensor_draws=6"])
+    counter = Counter()
+    found = run_campaign(scenario, watcher=counter)
+    raised = [failure for failure in found.failures if failure.estimator == "failing"]
+    assert 0 < len(raised) < 6
+    assert {failure.reason for failure in raised} == {"RuntimeError: the wheel came off"}
+    assert "in estimate" in raised[0].trace
+    rows = found.scores[found.scores["estimator"] == "failing"]
+    lost = rows[rows["status"] == raised[0].reason]
+    assert sorted(lost["cell"]) == [failure.cell for failure in raised] and lost["value"].isna().all()
+    not_finite = [failure for failure in found.failures if failure.estimator == "nan"]
+    assert len(not_finite) == 6 and "not finite" in not_finite[0].reason
+    bad = found.scores.query("estimator == 'nan' and quantity == 'roll' and window == 'whole'")
+    assert bad[bad["metric"] == "rms"]["value"].isna().all()
+    good = found.scores.query("estimator == 'after' and quantity == 'roll' and window == 'whole' and metric == 'rms'")
+    assert (good["status"] == OK).all() and set(good["cell"]) == set(range(6))
+    assert counter.rides == ["1/1 out"]
+    assert counter.estimates == 36 and counter.last == (36, 36)
+
+
+def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = campaign.simulate
+
+    def derail(ride, *, progress=None):  # type: ignore[no-untyped-def]
+        if ride.profile.speed_mps > 10.0:
+            raise RuntimeError("derailed: axle front left the rail at s = 100.0 m")
+        return real(ride, progress=progress)
+
+    monkeypatch.setattr(campaign, "simulate", derail)
+    found = run_campaign(short("ride.speed_kmh=[50.0, 30.0]", "sensor_draws=1"))
+    assert len(found.cells) == 2 and len(found.rides) == 1
+    statuses = found.scores.groupby("cell")["status"].agg(lambda column: sorted(set(column.astype(str))))
+    assert statuses[0] == ["RuntimeError: derailed: axle front left the rail at s = 100.0 m"]
+    assert OK in statuses[1]
+    assert len(found.failures) == 3
+    assert found.examples[0].cell["speed_kmh"] == 30.0
+
+
+def test_interrupt_ends_the_campaign_even_if_it_was_swallowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def swallow(ride, *, progress=None):  # type: ignore[no-untyped-def]
+        # What a C++ library does with an exception in its callback.
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise RuntimeError("the integrator stopped") from None
+
+    monkeypatch.setattr(campaign, "simulate", swallow)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(short("sensor_draws=1"))
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_examples_and_kept_windows() -> None:
+    found = run_campaign(
+        short("sensor_draws=2", "score.windows=['curve', 'curve:*']", "score.metrics=['rms', 'us_per_sample']")
+    )
+    assert len(found.examples) == 1
+    example = found.examples[0]
+    assert list(example.estimates) == ["ekf_compensated", "ekf_uncompensated", "design_angles"]
+    assert example.cell["sensor_draw"] == 0 and example.recording.imu.index.equals(example.motion.index)
+    rms = found.scores[found.scores["metric"] == "rms"]
+    assert {str(window) for window in rms["window"]} == {"curve", "curve:curve 3 R300"}
+    assert set(found.scores["metric"].astype(str)) == {"rms", "us_per_sample"}
