@@ -20,7 +20,7 @@ from simrail.scenario.build import Parts, estimator_of, irregularity_of, profile
 from simrail.scenario.cells import Cell, cells, count, methods
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
-from simrail.score_table import CURVE_PREFIX, EVERY_CURVE, METRICS, WINDOWS
+from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 from simrail.sensors.decimation import decimation_factor
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import SAMPLES_PER_WAVE
@@ -113,7 +113,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
 def _judge_score(scenario: Scenario) -> None:
     score = scenario.spec.score
     for field, words, known in (
-        ("windows", score.windows, (*WINDOWS, EVERY_CURVE)),
+        ("windows", score.windows, (*WINDOWS, CURVE_PREFIX + "*")),
         ("metrics", score.metrics, METRICS),
     ):
         for i, word in enumerate(words or ()):
