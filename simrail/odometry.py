@@ -8,9 +8,9 @@ for ever, and drift.
 
 Of the wheel it knows the nominal radius; how far the true rolling radius may be from that (wear, taper,
 running on the flange in a curve) enters the standard deviations through `radius_relative_sd`, as one
-constant factor. It knows nothing of slip, nor of the longer way of the outer wheel. The error of a count is treated as white. That is
-wrong in one case: at an exactly constant speed of a whole number of pulses per reading the count's
-error is a slow sawtooth, which the filter follows.
+constant factor. It knows nothing of slip, nor of the longer way of the outer wheel. The error of a
+count is treated as white. That is wrong in one case: at an exactly constant speed of a whole number
+of pulses per reading the count's error is a slow sawtooth, which the filter follows.
 """
 
 from __future__ import annotations

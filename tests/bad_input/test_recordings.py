@@ -1,0 +1,199 @@
+"""Every fault of a recording gives one message with file, field, value, limit and remedy where they exist."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD
+from simrail.errors import InputError
+from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording_io import check_recording, read_recording, write_recording
+from simrail.track.design import Straight, TrackDesign
+
+
+def sound() -> Recording:
+    """Four seconds of standstill, without any simulation."""
+    time = pd.Index(0.028 + np.arange(1000) / 250.0, name="time_s")
+    imu = pd.DataFrame(0.0, index=time, columns=list(IMU))
+    imu["accel_z_mps2"] = 9.81
+    odometry = pd.DataFrame(0.001, index=time, columns=[*ODOMETRY, *ODOMETRY_SD])
+    return Recording(
+        name="rest",
+        imu=imu,
+        imu_sheet=ImuSheet("ideal", 250.0, 0.028, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        mount="axle",
+        mount_body="front",
+        mount_position_m=(0.0, 0.0, 0.6),
+        track=TrackDesign("line", 0.0, (Straight(100.0),)),
+        encoder=pd.DataFrame(0, index=time, columns=list(ENCODER)),
+        encoder_sheet=EncoderSheet("front.left", 1024, 0.29, 250.0),
+        start_position_m=10.0,
+        odometry=odometry,
+        odometry_source="encoder",
+    )
+
+
+def with_index(frame: pd.DataFrame, change: Callable[[np.ndarray], None]) -> pd.DataFrame:
+    time = frame.index.to_numpy().copy()
+    change(time)
+    return frame.set_axis(pd.Index(time, name="time_s"))
+
+
+def with_value(frame: pd.DataFrame, column: str, row: int, value: object) -> pd.DataFrame:
+    changed = frame.copy()
+    changed[column] = changed[column].astype(object if isinstance(value, str) else float)
+    changed.iloc[row, changed.columns.get_loc(column)] = value
+    return changed
+
+
+def swap(time: np.ndarray) -> None:
+    time[[500, 501]] = time[[501, 500]]
+
+
+def repeat(time: np.ndarray) -> None:
+    time[501] = time[500]
+
+
+def lose(time: np.ndarray) -> None:
+    time[77] = np.nan
+
+
+def gap(time: np.ndarray) -> None:
+    time[600:] += 5.0
+
+
+def wrong_rate(time: np.ndarray) -> None:
+    time[:] = time[0] + (time - time[0]) * 1.001
+
+
+FAULTS: dict[str, tuple[Callable[[Recording], Recording], list[str]]] = {
+    "reversed": (
+        lambda r: replace(r, imu=with_index(r.imu, swap)),
+        ["imu.time_s", "reversed", "sample 501", "strictly increasing", "sort"],
+    ),
+    "duplicate": (
+        lambda r: replace(r, imu=with_index(r.imu, repeat)),
+        ["imu.time_s", "duplicate", "sample 501", "drop"],
+    ),
+    "nan_time": (lambda r: replace(r, imu=with_index(r.imu, lose)), ["imu.time_s", "NaN"]),
+    "gap": (
+        lambda r: replace(r, imu=with_index(r.imu, gap)),
+        ["imu.time_s", "not uniform", "sample 600", "5.004 s", "0.004 s"],
+    ),
+    "wrong_rate": (
+        lambda r: replace(r, imu=with_index(r.imu, wrong_rate)),
+        ["imu.time_s", "rate", "249.75", "250 Hz"],
+    ),
+    "encoder_reversed": (
+        lambda r: replace(r, encoder=with_index(r.encoder, swap)),
+        ["encoder.time_s", "reversed"],
+    ),
+    "nan": (
+        lambda r: replace(r, imu=with_value(r.imu, "gyro_y_radps", 123, np.nan)),
+        ["imu.gyro_y_radps", "0.52", "nan", "finite", "cut"],
+    ),
+    "infinite": (
+        lambda r: replace(r, odometry=with_value(r.odometry, "speed_mps", 3, np.inf)),
+        ["odometry.speed_mps", "inf"],
+    ),
+    "text": (
+        lambda r: replace(r, imu=with_value(r.imu, "accel_x_mps2", 3, "n/a")),
+        ["imu.accel_x_mps2", "numbers"],
+    ),
+    "missing_column": (
+        lambda r: replace(r, imu=r.imu.drop(columns="gyro_z_radps")),
+        ["imu", "missing column", "gyro_z_radps [rad/s]"],
+    ),
+    "missing_sd": (
+        lambda r: replace(r, odometry=r.odometry.drop(columns="speed_sd_mps")),
+        ["odometry", "speed_sd_mps [m/s]"],
+    ),
+    "degrees": (
+        lambda r: replace(r, imu=with_value(r.imu, "gyro_z_radps", 40, -20.5)),
+        ["imu.gyro_z_radps", "-20.5", "20 rad/s", "degrees"],
+    ),
+    "milli_g": (
+        lambda r: replace(r, imu=r.imu.assign(accel_z_mps2=1000.0)),
+        ["imu.accel_z_mps2", "1000", "500 m/s2", "mg"],
+    ),
+    "empty": (lambda r: replace(r, imu=r.imu.iloc[:1]), ["imu", "too short"]),
+    "other_times": (
+        lambda r: replace(r, odometry=r.odometry.iloc[:-1]),
+        ["odometry.time_s", "999", "1000"],
+    ),
+    "no_time": (lambda r: replace(r, imu=r.imu.reset_index(drop=True)), ["imu", "time_s", "index"]),
+    "no_sheet": (lambda r: replace(r, encoder_sheet=None), ["encoder_sheet"]),
+}
+
+
+def test_a_sound_recording_passes():
+    check_recording(sound())
+    almost = sound()
+    check_recording(replace(almost, imu=almost.imu.assign(gyro_x_radps=19.9)))
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_refused_by_name(fault):
+    damage, words = FAULTS[fault]
+    with pytest.raises(InputError) as caught:
+        check_recording(damage(sound()), file="ride_7")
+    message = str(caught.value)
+    assert message.startswith("ride_7: ")
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+def test_a_fault_on_disk_names_the_folder(tmp_path):
+    folder = tmp_path / "ride"
+    write_recording(FAULTS["degrees"][0](sound()), folder)
+    with pytest.raises(InputError, match="degrees") as caught:
+        read_recording(folder)
+    assert str(folder) in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ("imu.parquet", "odometry.parquet", "encoder.parquet", "recording.json"))
+@pytest.mark.parametrize("damage", ("missing", "garbage", "empty"))
+def test_a_damaged_file_is_refused_by_name(tmp_path, name, damage):
+    folder = tmp_path / "ride"
+    write_recording(sound(), folder)
+    path = folder / name
+    if damage == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(b"\x93 not this" if damage == "garbage" else b"")
+    with pytest.raises(InputError) as caught:
+        read_recording(folder)
+    assert name in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda plain: plain.pop("mount"), "mount"),
+        (lambda plain: plain.update(format="simrail recording 0"), "format"),
+        (lambda plain: plain.update(mount_position_m=[0.0, 0.6]), "cannot be understood"),
+        (lambda plain: plain.update(gravity_mps2="g"), "cannot be understood"),
+        (lambda plain: plain["imu_sheet"].pop("rate_hz"), "rate_hz"),
+        (lambda plain: plain["imu_sheet"].update(colour="blue"), "colour"),
+    ],
+)
+def test_a_damaged_description_is_refused(tmp_path, change, word):
+    folder = tmp_path / "ride"
+    write_recording(sound(), folder)
+    plain = json.loads((folder / "recording.json").read_text(encoding="utf-8"))
+    change(plain)
+    (folder / "recording.json").write_text(json.dumps(plain), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_recording(folder)
+    assert word in str(caught.value)
+    assert "recording.json" in str(caught.value)
+
+
+def test_a_folder_that_is_no_recording(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_recording(tmp_path / "nowhere")

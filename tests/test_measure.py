@@ -1,0 +1,153 @@
+"""Truth to recording: what the train may know is there, what it may not know is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.columns import ODOMETRY, ODOMETRY_SD
+from simrail.errors import InputError
+from simrail.measure import measure
+from simrail.profile import SpeedProfile
+from simrail.recording_io import check_recording
+from simrail.rest import GUARD_S, at_rest_initially, first_motion_s
+from simrail.scenario.imu_file import load_grade
+from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.imu import EarthRate
+from simrail.track.design import Straight, TrackDesign
+from simrail.truth import Mount
+from simrail.vehicle.kinematic_engine import kinematic_truth
+
+REST_S = 6.0
+MOUNT = Mount("axle", "body", (0.5, 0.0, 0.6))
+LORD = load_grade("lord_3dm_gx4_25")
+
+
+@pytest.fixture(scope="module")
+def truth():
+    track = TrackDesign("line", -50.0, (Straight(600.0),))
+    return kinematic_truth(
+        track, SpeedProfile(start_m=10.0, end_m=210.0, speed_mps=10.0, rest_s=REST_S), height_m=0.3
+    )
+
+
+def record(truth, **more):
+    settings = {
+        "name": "ride",
+        "mount": MOUNT,
+        "grade": LORD,
+        "encoder": EncoderSpec("wheel", radius_error_sd=1e-3),
+        "seed": 2,
+        "draw": 0,
+    } | more
+    return measure(truth, **settings)
+
+
+def test_a_recording_is_complete_and_passes_its_own_judgement(truth):
+    recording = record(truth)
+    check_recording(recording)
+    assert recording.name == "ride"
+    assert recording.mount == "axle"
+    assert recording.mount_body == "body"
+    assert recording.mount_position_m == MOUNT.position_m
+    assert recording.track == truth.track
+    assert recording.gravity_mps2 == truth.gravity_mps2
+    assert recording.odometry_source == "encoder"
+    assert recording.imu_sheet.grade == "lord_3dm_gx4_25"
+    assert recording.imu_sheet.rate_hz == 250.0
+    assert recording.imu_sheet.delay_s == pytest.approx(recording.imu.index[0])
+    assert recording.imu_sheet.gyro_noise_radpsqrts == LORD.gyro_noise_radpsqrts
+    assert recording.imu_sheet.accel_turn_on_bias_mps2 == LORD.accel_turn_on_bias_mps2
+    assert recording.encoder_sheet.pulses_per_revolution == 1024
+    assert recording.encoder_sheet.wheel_radius_m != truth.wheel_radius_m["wheel"]
+    assert recording.encoder_sheet.wheel_radius_m == pytest.approx(truth.wheel_radius_m["wheel"], rel=5e-3)
+
+
+def test_odometry_speaks_of_the_mount_and_is_honest(truth):
+    recording = record(truth)
+    true = truth.motion(MOUNT).loc[recording.imu.index]
+    assert recording.start_position_m == pytest.approx(10.5)
+    error = recording.odometry["position_m"] - true["position_m"]
+    assert np.abs(error[: round(REST_S * 250) - 10]).max() < 1e-9
+    assert (np.abs(error) < 3.0 * recording.odometry["position_sd_m"]).all()
+    assert recording.odometry["position_sd_m"].iloc[-1] == pytest.approx(
+        200.0 * np.hypot(1e-3, 4e-3), rel=0.01
+    )
+
+
+def test_true_odometry_is_exact_and_labelled(truth):
+    recording = record(truth, odometry="truth", encoder=None)
+    assert recording.odometry_source == "truth"
+    assert recording.encoder is None
+    assert recording.encoder_sheet is None
+    true = truth.motion(MOUNT).loc[recording.imu.index, list(ODOMETRY)]
+    pd.testing.assert_frame_equal(recording.odometry[list(ODOMETRY)], true, check_exact=True)
+    assert (recording.odometry[list(ODOMETRY_SD)] == 0.0).all(axis=None)
+    check_recording(recording)
+
+
+def test_one_sensor_more_changes_no_other(truth):
+    alone = record(truth)
+    record(truth, mount=replace(MOUNT, name="frame"))
+    again = record(truth, encoder=None, odometry="truth")
+    pd.testing.assert_frame_equal(alone.imu, again.imu, check_exact=True)
+    other = record(truth, mount=replace(MOUNT, name="frame"))
+    pd.testing.assert_frame_equal(alone.encoder, other.encoder, check_exact=True)
+    assert (alone.imu != other.imu).mean().min() > 0.9
+
+
+def test_a_new_draw_is_a_new_set_of_sensors(truth):
+    first, second = record(truth), record(truth, draw=1)
+    assert (first.imu != second.imu).mean().min() > 0.9
+    assert first.encoder_sheet != second.encoder_sheet
+
+
+def test_the_earth_turns_only_if_asked(truth):
+    ideal = load_grade("ideal")
+    still = record(truth, grade=ideal)
+    turning = record(truth, grade=ideal, earth_rate=EarthRate(np.radians(37.3)))
+    difference = (turning.imu - still.imu).iloc[:1000, :3].to_numpy()
+    assert np.linalg.norm(difference, axis=1) == pytest.approx(7.292115e-5, rel=1e-9)
+
+
+def test_rest_is_found_from_the_encoder(truth):
+    recording = record(truth)
+    # Jerk 0.4 m/s3: one pulse of 1.8 mm comes at most 0.3 s after the start.
+    assert REST_S < first_motion_s(recording) < REST_S + 0.31
+    count = at_rest_initially(recording)
+    times = recording.imu.index
+    assert times[count - 1] < first_motion_s(recording) - GUARD_S <= times[count]
+    resting = recording.imu["gyro_x_radps"].iloc[:count]
+    assert count == pytest.approx((REST_S - 0.35) * 250, abs=50)
+    assert abs(resting.mean()) < LORD.gyro_turn_on_bias_radps + 3e-4
+
+
+def test_rest_without_an_encoder_or_without_motion(truth):
+    blind = record(truth, odometry="truth", encoder=None)
+    assert first_motion_s(blind) == pytest.approx(REST_S + 0.22, abs=0.02)
+    short = replace(
+        record(truth),
+        imu=record(truth).imu.loc[:5.0],
+        encoder=record(truth).encoder.loc[:5.0],
+        odometry=record(truth).odometry.loc[:5.0],
+    )
+    assert first_motion_s(short) == float("inf")
+    assert at_rest_initially(short) == len(short.imu)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"odometry": "gnss"}, "odometry"),
+        ({"encoder": None}, "encoder"),
+        ({"encoder": EncoderSpec("front.left")}, "wheel"),
+        ({"mount": replace(MOUNT, body="bogie")}, "body"),
+        ({"grade": replace(LORD, rate_hz=300.0)}, "rate_hz"),
+        ({"encoder": EncoderSpec("wheel", rate_hz=301.0)}, "rate_hz"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(truth, change, word):
+    with pytest.raises(InputError) as caught:
+        record(truth, **change)
+    assert word in str(caught.value)
