@@ -23,15 +23,20 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.score_metrics import IntArray, Row, Series, figures, nis_figures
-from simrail.score_table import CURVE_PREFIX, FIGURE_COLUMNS, METRICS, OK, WINDOWS, as_score_table
+from simrail.score_table import (
+    CURVE_PREFIX,
+    EVERY_CURVE,
+    FIGURE_COLUMNS,
+    METRICS,
+    OK,
+    WINDOWS,
+    as_score_table,
+)
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION
 from simrail.truth import Mount
 
 STANDSTILL_MPS = 0.01
 """Below this true speed the vehicle counts as standing."""
-
-EVERY_CURVE = CURVE_PREFIX + "*"
-"""In a choice of windows: each single curve."""
 
 
 class HasMotion(Protocol):

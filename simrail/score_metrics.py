@@ -97,7 +97,8 @@ def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str
         return [np.nan] * len(metrics), f"estimate not finite in {bad} of {n} samples"
     mean = total / n
     centred = error - mean
-    variance = float(centred @ centred) / n
+    # Not centred @ centred: BLAS would start threads, and its sum depends on how many there are.
+    variance = float(np.square(centred).sum()) / n
     size = np.abs(error)
     known = {
         "mean": mean,
@@ -120,7 +121,7 @@ def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple
         return [np.nan] * len(metrics), f"standard deviation not positive in {n - good} of {n} samples"
     ratio = error / sd
     inside = np.count_nonzero(np.abs(ratio) <= _QUANTILE_95)
-    known = {"nees": float(ratio @ ratio) / n, "coverage95": inside / n}
+    known = {"nees": float(np.square(ratio).sum()) / n, "coverage95": inside / n}
     return [known[name] for name in metrics], OK
 
 

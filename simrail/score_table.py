@@ -77,6 +77,8 @@ METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage9
 OK = "ok"
 CURVE_PREFIX = "curve:"
 """A window of one curve is ``curve:`` and the name of its segment."""
+EVERY_CURVE = CURVE_PREFIX + "*"
+"""In a choice of windows: each single curve."""
 
 _CLOSED = {
     "quantity": tuple(QUANTITY_UNITS),

@@ -7,6 +7,7 @@ not have.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -51,19 +52,16 @@ def attitude_figure(example: CellResult, styles: Sequence[MethodStyle], *, what:
         figure, axes = panels([2.05, 2.05, 1.75])
         for column, (axis, angle, name) in enumerate(zip(axes, ATTITUDE, _NAMES, strict=True)):
             true = np.rad2deg(example.motion[angle].to_numpy())
-            lines = [np.rad2deg(design[column])]
-            for order, style in enumerate(reversed(styles)):
+            x, y = bins.line(true)
+            axis.plot(x, y, color=TRUTH, lw=2.2, label="truth", zorder=2)
+            lines = [y, np.rad2deg(design[column])]
+            axis.plot(bins.x, lines[1], color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
+            for order, style in enumerate(styles):
                 error = np.rad2deg(angle_error(example, style.name, column))
                 x, y = bins.line(true + error)
-                width = 1.0 if style.baseline else 1.35
-                axis.plot(
-                    x, y, color=style.colour, ls=style.stroke, lw=width, label=style.label, zorder=3 + order
-                )
+                depth: dict[str, Any] = {"lw": 1.05, "zorder": 12 - 0.1 * order}
+                axis.plot(x, y, color=style.colour, ls=style.stroke, label=style.label, **depth)
                 lines.append(y)
-            x, y = bins.line(true)
-            axis.plot(x, y, color=TRUTH, lw=0.75, label="truth", zorder=20)
-            axis.plot(bins.x, lines[0], color=DESIGN, lw=1.2, ls=(0, (4, 2)), label="design", zorder=21)
-            lines.append(y)
             finite = np.concatenate(lines)
             finite = finite[np.isfinite(finite)]
             pad_limits(axis, *np.percentile(finite, [0.05, 99.95]), top=0.16 if column == 0 else 0.08)
@@ -88,16 +86,23 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
         for column, axis in enumerate(axes):
             error = {style.name: _shown_error(example, style, column) for style in styles}
             reach = max(1.15 * max(_percentile(error[s.name], 99.8) for s in tested), 1e-3)
+            lowest = 1.15 * min(float(np.nanmin(error[s.name], initial=0.0)) for s in tested)
+            highest = 1.15 * max(float(np.nanmax(error[s.name], initial=0.0)) for s in tested)
             beyond = []
             for style in styles:
-                look_of = {"color": style.colour, "ls": style.stroke, "label": style.label}
+                look_of: dict[str, Any] = {"color": style.colour, "ls": style.stroke, "label": style.label}
                 if style in tested:
                     axis.plot(
                         *bins.line(error[style.name]), lw=1.2, zorder=4 - 0.1 * len(axis.lines), **look_of
                     )
                 elif not style.uses_imu:
                     found = bins.envelope(error[style.name])
-                    tint = {"color": "#b9bec7", "lw": 0, "alpha": 0.55, "label": f"{style.label}, range"}
+                    tint: dict[str, Any] = {
+                        "color": "#b9bec7",
+                        "lw": 0,
+                        "alpha": 0.55,
+                        "label": f"{style.label}, range",
+                    }
                     axis.fill_between(found.x, found.low, found.high, zorder=1.5, **tint)
                 else:
                     axis.plot(bins.x, bins.envelope(error[style.name]).mean, lw=0.9, zorder=2, **look_of)
@@ -105,7 +110,8 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
                 if largest > 1.3 * reach:
                     beyond.append((largest, style.label))
             axis.axhline(0.0, color="#98a1af", lw=0.7, zorder=-1)
-            axis.set_ylim(-reach, (1.3 if column == 0 else 1.05) * reach)
+            low, high = max(lowest, -reach), min(highest, reach)
+            axis.set_ylim(low - 0.15 * reach, high + (0.3 if column == 0 else 0.05) * reach)
             axis.set_ylabel(
                 f"{_NAMES[column]} error, \u00b0" + ("\n(without its offset)" if column == 2 else "")
             )
@@ -126,8 +132,8 @@ def _note_beyond(axis: Axes, beyond: list[tuple[float, str]]) -> None:
     if not beyond:
         return
     listed = ", ".join(f"{label} {largest:.2g}\u00b0" for largest, label in sorted(beyond, reverse=True))
-    box = {"facecolor": "white", "alpha": 0.85, "lw": 0, "pad": 1.5}
-    style = {"ha": "right", "va": "bottom", "fontsize": 7.8, "color": "#475467", "zorder": 30}
+    box: dict[str, Any] = {"facecolor": "white", "alpha": 0.85, "lw": 0, "pad": 1.5}
+    style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.8, "color": "#475467", "zorder": 30}
     axis.text(
         0.995, 0.03, f"beyond the panel, at most: {listed}", transform=axis.transAxes, bbox=box, **style
     )

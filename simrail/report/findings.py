@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor, log10
 
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
@@ -47,8 +46,10 @@ def significant(value: float, *, digits: int = 3) -> str:
     """A number with some significant digits and no exponent, at most four decimals."""
     if value == 0.0:
         return "0"
-    decimals = min(max(digits - 1 - floor(log10(abs(value))), 0), 4)
-    return f"{value:.{decimals}f}"
+    # The exponent of the rounded number: 0.09999 is 0.100, not 0.1000.
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    decimals = min(max(digits - 1 - exponent, 0), 4)
+    return f"{value:.{decimals}f}" if abs(value) >= 5e-5 else "<0.0001"
 
 
 def findings(
@@ -103,9 +104,9 @@ def _compensation(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]
 def _design_angles(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
     design = next((style for style in styles if not style.uses_imu), None)
     if design is None:
-        text = "The scenario does not run 'design angles only': whether a filter beats no IMU at all is not known."
+        text = "'Design angles only' was not run: whether a filter beats no IMU at all is not known."
         return [Finding("note", text)]
-    result, unbeaten = [], []
+    result, unbeaten, baselines = [], [], []
     for style in styles:
         if not style.uses_imu or not case.get(style.name, "roll", "rms").draws:
             continue
@@ -114,11 +115,16 @@ def _design_angles(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding
             for quantity, word in _QUANTITIES.items()
             if (loss := _loss(case, style, design, quantity, word))
         ]
-        if losses:
+        if losses and style.baseline:
+            baselines.append(f"{style.label} in {_listed(losses)}")
+        elif losses:
             text = f"'Design angles only', which uses no IMU, beats {style.label} in {_listed(losses)}."
             result.append(Finding("bad", text))
         else:
             unbeaten.append(style.label)
+    if baselines:
+        text = f"Of the baselines, 'design angles only' beats {'; '.join(baselines)}."
+        result.append(Finding("bad", text))
     if unbeaten:
         text = (
             f"{_listed(unbeaten)}: nowhere beaten by 'design angles only', neither overall nor in any window."
@@ -133,11 +139,11 @@ def _loss(case: Figures, style: MethodStyle, design: MethodStyle, quantity: str,
         window: case.get(style.name, quantity, "rms", window=window).value for window in ("whole", *_WINDOWS)
     }
     floor = {window: case.get(design.name, quantity, "rms", window=window).value for window in own}
-    lost = [name for window, name in _WINDOWS.items() if floor[window] < own[window]]
+    lost = [place for window, place in _WINDOWS.items() if floor[window] < own[window]]
     if not floor["whole"] < own["whole"]:
-        return f"{word} in {_listed(lost)}" if lost else ""
-    won = [name for window, name in _WINDOWS.items() if own[window] < floor[window]]
-    inside = f", though not in {_listed(won)}" if won else ""
+        return f"{word} {_listed(lost)}" if lost else ""
+    won = [place for window, place in _WINDOWS.items() if own[window] < floor[window]]
+    inside = f", though not {_listed(won)}" if won else ""
     return f"{word} ({degrees(floor['whole'])} against {degrees(own['whole'])} rms{inside})"
 
 

@@ -200,18 +200,19 @@ def _tracks(examples: Sequence[CellResult]) -> list[dict[str, Any]]:
 
 def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
     labels = case.labels
-    title = f"{labels['ride']} \u00b7 IMU {labels['mount']} ({labels['imu']}) \u00b7 odometry {labels['odometry']}"
-    axes = [
+    title = f"{labels['ride']} \u00b7 IMU {labels['mount']} ({labels['imu']})"
+    axes = [f"odometry {labels['odometry']}"]
+    axes += [
         f"{name} {value}"
         for name, value in labels.items()
         if "." in name and not name.startswith("imu.grade")
     ]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     said = (
-        "one draw"
-        if draws <= 1
-        else f"mean \u00b1 standard deviation of {draws} draws, {tracks} of the track"
+        "one draw" if draws <= 1 else f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     )
+    if tracks > 1:
+        said += f" over {tracks} draws of the track"
     return CaseView(
         " \u00b7 ".join([title, *axes]),
         said,
@@ -227,4 +228,5 @@ def _failures(scores: pd.DataFrame) -> list[tuple[str, str, int]]:
     if failed.empty:
         return []
     counted = failed.groupby(["estimator", "status"], observed=True).size()
-    return [(str(name), str(reason), int(rows)) for (name, reason), rows in counted.items()]
+    listed = counted.reset_index(name="rows").itertuples(index=False)
+    return [(str(name), str(reason), int(rows)) for name, reason, rows in listed]

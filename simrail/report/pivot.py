@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
 import pandas as pd
 
 from simrail.score_table import CURVE_PREFIX, SCORE_COLUMNS, aggregate
@@ -99,7 +98,7 @@ def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str], Figure]:
     names = [rows[name].astype(str) for name in ("estimator", "quantity", "reference", "window", "metric")]
     # Two levels of draws: what differs between tracks and what differs between sensors add up.
     variance = rows["sd_sensor"].fillna(0.0) ** 2 + rows["sd_track"].fillna(0.0) ** 2
-    sd = np.sqrt(variance).where(rows["draws"] > 1)
+    sd = (variance**0.5).where(rows["draws"] > 1)
     values = zip(rows["value"], sd, rows["draws"], strict=True)
     return {key: Figure(*value) for key, value in zip(zip(*names, strict=True), values, strict=True)}
 

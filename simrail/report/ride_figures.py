@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from simrail.columns import ACCEL, GYRO
 from simrail.example import CellResult
@@ -32,10 +33,9 @@ def speed_figure(example: CellResult) -> str:
         position = example.motion["position_m"].to_numpy()
         bins = Bins(position)
         figure, (axis,) = panels([1.5], top_in=0.15)
-        axis.plot(*bins.line(3.6 * np.abs(example.motion["speed_mps"].to_numpy())), color=INK, lw=1.3)
-        axis.set_ylim(bottom=0.0)
-        axis.margins(y=0.18)
-        axis.set_ylim(bottom=0.0)
+        speed = 3.6 * np.abs(example.motion["speed_mps"].to_numpy())
+        axis.plot(*bins.line(speed), color=INK, lw=1.3)
+        axis.set_ylim(0.0, 1.3 * max(float(speed.max()), 1.0))
         axis.set_ylabel("speed, km/h")
         shade_track([axis], example.recording.track, limits=limits_of(example))
         distance_axis(axis, direction=direction_of(example))
@@ -58,7 +58,7 @@ def imu_figure(example: CellResult) -> str:
             low, high = np.percentile(found.low, 0.5), np.percentile(found.high, 99.5)
             room = 0.12 * max(high - low, 1e-6)
             axis.set_ylim(low - room, high + (2.6 if i == 0 else 1.0) * room)
-            axis.yaxis.set_major_locator(_few_ticks())
+            axis.yaxis.set_major_locator(MaxNLocator(nbins=3, steps=[1, 2, 2.5, 5, 10]))
         shade_track(axes, recording.track, limits=limits_of(example))
         distance_axis(axes[-1], direction=direction_of(example))
         return to_svg(figure, description=f"Signals of the IMU {recording.mount} over distance")
@@ -85,9 +85,3 @@ def odometry_figure(example: CellResult) -> str:
         shade_track([axis], recording.track, limits=limits_of(example))
         distance_axis(axis, direction=direction_of(example))
         return to_svg(figure, description="Position error of the odometry over distance")
-
-
-def _few_ticks():  # type: ignore[no-untyped-def]
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(nbins=3, steps=[1, 2, 2.5, 5, 10])

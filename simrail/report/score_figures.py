@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.lines import Line2D
 
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
-from simrail.report.style import INK, MUTED, WIDTH_IN, look, to_svg
+from simrail.report.style import INK, MUTED, WIDTH_IN, log_ticks, look, to_svg
 
 _WINDOWS = (("straight", "o", "#8a8f98"), ("transition", "D", "#56B4E9"), ("curve", "s", "#D55E00"))
 _QUANTITIES = (("roll", "roll"), ("pitch", "pitch"), ("yaw_debiased", "yaw, initial offset removed"))
@@ -50,8 +50,7 @@ def rms_figure(figures: Figures, styles: Sequence[MethodStyle], *, reference: st
             axis.set_xscale("log")
             if reach:
                 axis.set_xlim(0.6 * min(reach), 1.6 * max(reach))
-            axis.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            axis.xaxis.set_minor_formatter(NullFormatter())
+            log_ticks(axis.xaxis)
             axis.set_ylim(len(styles) - 0.5, -0.5)
             axis.set_yticks(range(len(styles)), [_row_label(s) for s in styles] if i == 0 else [])
             axis.tick_params(axis="y", length=0)
@@ -89,7 +88,7 @@ def curves_figure(figures: Figures, styles: Sequence[MethodStyle]) -> str:
             axis.errorbar(
                 x,
                 y,
-                [low, e],
+                np.array([low, e]),
                 fmt=marker,
                 ms=5.2,
                 color=style.colour,
@@ -102,8 +101,7 @@ def curves_figure(figures: Figures, styles: Sequence[MethodStyle]) -> str:
             axis.axvline(place - 0.5, color="#d0d5dd", lw=0.7)
         axis.grid(axis="x", visible=False)
         axis.set_yscale("log")
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        axis.yaxis.set_minor_formatter(NullFormatter())
+        log_ticks(axis.yaxis)
         axis.grid(axis="y", which="minor", color="#f2f4f7", lw=0.5)
         axis.set_xlim(-0.5, len(windows) - 0.5)
         axis.set_xticks(range(len(windows)), [window.removeprefix("curve:") for window in windows])
@@ -124,8 +122,6 @@ def _row_label(style: MethodStyle) -> str:
 
 
 def _window_legend(figure: Figure, height: float) -> None:
-    from matplotlib.lines import Line2D
-
     handles = [
         Line2D([], [], marker=marker, color=colour, lw=0, ms=5.6, label=window)
         for window, marker, colour in _WINDOWS

@@ -11,11 +11,14 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from html import escape
 from io import StringIO
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
 
@@ -23,10 +26,10 @@ WIDTH_IN = 11.25
 """Width of a figure: 1080 CSS pixels."""
 
 INK, MUTED, GRID = "#1b2430", "#667085", "#e4e7ec"
-TRUTH, DESIGN = "#111111", "#8a8f98"
+TRUTH, DESIGN = "#c2c8d1", "#111111"
 CURVE_TINT, TRANSITION_TINT = "#eef1e6", "#f6f8f2"
 
-_RC = {
+_RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "simrail",
     "font.family": "DejaVu Sans",
@@ -90,10 +93,25 @@ def panels(
     return figure, axes
 
 
+def log_ticks(axis: Axis) -> None:
+    """Label a logarithmic axis at 1, 2 and 5 of each decade, without exponents."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def legend_above(axis: Axes, *, columns: int = 8) -> None:
-    """Put the legend of an axis above it, outside of the data."""
+    """Put the legend of an axis above it, outside of the data; truth and design first."""
+    handles, labels = axis.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda i: {"truth": 0, "design": 1}.get(labels[i], 2))
     axis.legend(
-        loc="lower left", bbox_to_anchor=(-0.005, 1.0), ncols=columns, borderaxespad=0.15, columnspacing=1.4
+        [handles[i] for i in order],
+        [labels[i] for i in order],
+        loc="lower left",
+        bbox_to_anchor=(-0.005, 1.0),
+        ncols=columns,
+        borderaxespad=0.15,
+        columnspacing=1.4,
     )
 
 
@@ -124,7 +142,9 @@ def shade_track(axes: Sequence[Axes], track: TrackDesign, *, limits: tuple[float
                     ha="center",
                     va="top",
                     fontsize=7.2,
-                    color="#7b8660",
+                    color="#66714a",
+                    zorder=40,
+                    bbox={"facecolor": CURVE_TINT, "alpha": 0.85, "lw": 0, "pad": 1.0},
                 )
                 last_label = middle
         start = end
@@ -133,8 +153,19 @@ def shade_track(axes: Sequence[Axes], track: TrackDesign, *, limits: tuple[float
 
 def distance_axis(axis: Axes, *, direction: int) -> None:
     """Label the x axis of a plot over distance, with the direction of travel."""
-    arrow = "direction of travel \u2192" if direction >= 0 else "\u2190 direction of travel"
-    axis.set_xlabel(f"distance along the track, m      {arrow}")
+    arrow = "travel \u2192" if direction >= 0 else "\u2190 travel"
+    axis.set_xlabel("distance along the track, m")
+    place = {"ha": "right", "x": 1.0} if direction >= 0 else {"ha": "left", "x": 0.0}
+    axis.annotate(
+        arrow,
+        (place["x"], 0.0),
+        xycoords=("axes fraction", "axes fraction"),
+        xytext=(0, -29),
+        textcoords="offset points",
+        ha=place["ha"],
+        color=INK,
+        weight="bold",
+    )
 
 
 def pad_limits(axis: Axes, low: float, high: float, *, top: float = 0.14, bottom: float = 0.08) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from simrail.jit import FloatArray
 from simrail.report.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 from simrail.track.elements import RAIL_BASE_M
@@ -43,7 +45,7 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
             named.add(k)
         _name_curves(axis, track, s, turned)
         for label, at in stops.items():
-            place = np.array([np.interp(at, s, turned[:, i]) for i in (0, 1)])
+            place = (float(np.interp(at, s, turned[:, 0])), float(np.interp(at, s, turned[:, 1])))
             axis.plot(*place, marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=5)
             axis.annotate(
                 label, place, (0, -15), textcoords="offset points", ha="center", fontsize=8.4, color=INK
@@ -83,18 +85,18 @@ def profile_figure(track: TrackDesign) -> str:
         return to_svg(figure, description="Height, curvature and cant of the track over distance")
 
 
-def _along_the_page(xy: np.ndarray) -> np.ndarray:
+def _along_the_page(xy: FloatArray) -> FloatArray:
     """Turn a plan so that it runs from left to right; left stays up."""
     chord = xy[-1] - xy[0]
     if np.hypot(*chord) < 0.2 * np.abs(np.diff(xy, axis=0)).sum():
         return xy - xy[0]
     angle = np.arctan2(chord[1], chord[0])
     c, s = np.cos(angle), np.sin(angle)
-    turned: np.ndarray = (xy - xy[0]) @ np.array([[c, -s], [s, c]])
+    turned: FloatArray = (xy - xy[0]) @ np.array([[c, -s], [s, c]])
     return turned
 
 
-def _name_curves(axis, track: TrackDesign, s: np.ndarray, xy: np.ndarray) -> None:  # type: ignore[no-untyped-def]
+def _name_curves(axis: Axes, track: TrackDesign, s: FloatArray, xy: FloatArray) -> None:
     start = track.start_m
     for element in track.elements:
         if isinstance(element, Curve):
@@ -104,8 +106,8 @@ def _name_curves(axis, track: TrackDesign, s: np.ndarray, xy: np.ndarray) -> Non
             outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
             axis.annotate(
                 f"R {abs(element.radius_m):.0f} m\ncant {1e3 * abs(element.cant_m):.0f} mm",
-                xy[i],
-                26.0 * outside,
+                (float(xy[i, 0]), float(xy[i, 1])),
+                (26.0 * outside[0], 26.0 * outside[1]),
                 textcoords="offset points",
                 ha="center",
                 va="center",
@@ -116,13 +118,12 @@ def _name_curves(axis, track: TrackDesign, s: np.ndarray, xy: np.ndarray) -> Non
         start += element.length_m
 
 
-def _scale_bar(axis, length_m: float) -> None:  # type: ignore[no-untyped-def]
+def _scale_bar(axis: Axes, length_m: float) -> None:
     bar = 10.0 ** np.floor(np.log10(length_m / 4.0))
     bar *= max(k for k in (1, 2, 5) if k * bar <= length_m / 4.0)
-    low, high = axis.get_xlim()
+    high = axis.get_xlim()[1]
     base = axis.get_ylim()[0]
-    axis.plot([high - bar, high], [base, base], color=INK, lw=1.6, clip_on=False)
+    axis.plot([high - bar, high], [base, base], color=INK, lw=1.6, clip_on=False, scalex=False, scaley=False)
     axis.annotate(
         f"{bar:.0f} m", (high - bar / 2, base), (0, 4), textcoords="offset points", ha="center", fontsize=8
     )
-    axis.set_xlim(low, high)
