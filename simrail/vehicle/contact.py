@@ -193,7 +193,7 @@ def wheel_force(
         sd = t * cd
         Y = side * (half + s)
         # A yawed wheel touches ahead of its axle, so that the normal force still meets the axle.
-        lead = r * psi * (side * t - phi)
+        lead = r * psi * (side * t - phi) * (1.0 - side * t * phi)
 
         slip_x = v_x - kappa_h * V * Y - psi_dot * Y - W * r
         slip_y = y_dot - V * dy_rail + (phi_dot - W * psi) * r + psi_dot * lead

@@ -81,8 +81,8 @@ def full_pair(**changes):
         (0.0, 2e-3, 0.1, 1e-3, 0.2),
         (3e-3, -2e-3, 0.1, 1e-3, 0.2),
         (-6e-3, 2e-3, 0.1, 1e-3, 0.2),
-        (7.5e-3, 5e-3, 4.0, 0.03, 0.3),
-        (8.5e-3, -5e-3, 4.0, 0.05, 0.3),
+        (7.5e-3, 5e-3, 8.0, 0.03, 0.3),
+        (8.5e-3, -5e-3, 8.0, 0.05, 0.3),
     ],
 )
 def test_roll_terms_equal_a_wheel_that_is_really_rolled(u, roll, limit_um, slope_limit, abscissa_limit_mm):
