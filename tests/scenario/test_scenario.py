@@ -1,0 +1,235 @@
+"""The scenario model: reading, axes, settings, cells."""
+
+from __future__ import annotations
+
+import tomllib
+from itertools import product
+
+import pytest
+
+from simrail.errors import InputError
+from simrail.scenario.axes import Axis, Listed, axes_of, expand
+from simrail.scenario.build import Parts, encoder_of, estimator_of, mount_of, profile_of
+from simrail.scenario.cells import cells, count, derived_seed, methods
+from simrail.scenario.check import judge_scenario
+from simrail.scenario.files import Part, judge, shipped
+from simrail.scenario.overrides import override
+from simrail.scenario.scenario import load_scenario, read_scenario
+
+GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
+
+
+class Inner(Part):
+    size_m: Listed[float] = 1.0
+    place_m: tuple[float, float] = (0.0, 0.0)
+
+
+class Outer(Part):
+    name: str = "x"
+    speed: Listed[float] = 1.0
+    inner: Inner = Inner()
+    options: dict[str, object] = {}
+
+
+@pytest.mark.parametrize("name", sorted(shipped("scenario")))
+def test_shipped_scenarios_are_good(name: str) -> None:
+    plan = judge_scenario(load_scenario(name))
+    assert plan.warnings == ()
+    assert "design_angles" in plan.estimators
+    grades = {cell.imu.grade for cell in cells(load_scenario(name))}
+    assert "ideal" in grades  # the floor of every estimator is in every table
+
+
+def test_go20a_is_the_ride_of_the_paper() -> None:
+    scenario = load_scenario("go20a")
+    first = next(cells(scenario))
+    profile = profile_of(first)
+    assert profile.speed_mps == pytest.approx(20.0 / 3.6)
+    assert profile.direction == 1 and profile.rest_s == 20.0
+    mount = mount_of(first)
+    assert mount.body == "front" and mount.position_m == (0.0, 0.0, 0.6)
+    encoder = encoder_of(first)
+    assert encoder is not None and encoder.wheel == "front.left"
+    ride = Parts(scenario).ride(first)
+    assert ride.engine == "exudyn" and ride.vehicle.synthetic and ride.track.synthetic
+    assert {method.name for method in methods(scenario)} >= {
+        f"{method}_{word}" for method in ("ekf", "gda") for word in ("compensated", "uncompensated")
+    }
+
+
+def test_axes_are_found_in_nested_tables_and_options_but_lists_by_nature_are_none() -> None:
+    model = judge(
+        Outer,
+        {"speed": [1, 2.5], "inner": {"size_m": [3.0, 4.0, 5.0], "place_m": [1.0, 2.0]}},
+        file="x.toml",
+    ).model_copy(update={"options": {"flag": Axis([True, False]), "gain": 3.0}})
+    assert axes_of(model) == {
+        "speed": (1.0, 2.5),
+        "inner.size_m": (3.0, 4.0, 5.0),
+        "options.flag": (True, False),
+    }
+    assert axes_of(model, prefix="ride.", fields=("speed",)) == {"ride.speed": (1.0, 2.5)}
+    found = expand(model)
+    assert [tuple(settings.values()) for settings, _ in found] == list(
+        product((1.0, 2.5), (3.0, 4.0, 5.0), (True, False))
+    )
+    for settings, concrete in found:
+        assert axes_of(concrete) == {}
+        assert concrete.speed == settings["speed"] and concrete.inner.size_m == settings["inner.size_m"]
+        assert concrete.inner.place_m == (1.0, 2.0)
+        assert concrete.options == {"flag": settings["options.flag"], "gain": 3.0}
+    assert axes_of(model)  # expanding changes nothing
+
+
+def test_a_model_without_axes_is_its_own_expansion() -> None:
+    assert expand(Outer()) == [({}, Outer())]
+
+
+def test_settings_replace_values() -> None:
+    data = tomllib.loads(GOOD)
+    for setting, value in [
+        ("seed=7", ("seed",)),
+        ("ride[0].speed_kmh=70", ("ride", 0, "speed_kmh")),
+        ("ride.speed_kmh=[20, 70]", ("ride", 0, "speed_kmh")),
+        ("ride.out.rest_s=3.5", ("ride", 0, "rest_s")),
+        ("irregularity.spectrum=fra_5", ("irregularity", "spectrum")),
+        ("estimator.ekf_uncompensated.options.compensated=true", ("estimator", 1, "options", "compensated")),
+        ("score.metrics=['rms']", ("score", "metrics")),
+        ("imu[0].position_m=[0, 0, 1]", ("imu", 0, "position_m")),
+        ("title=a = b", ("title",)),
+    ]:
+        changed = override(data, [setting])
+        place = changed
+        for step in value:
+            place = place[step]
+        text = setting.split("=", 1)[1]
+        expected = {"fra_5": "fra_5", "a = b": "a = b"}.get(text)
+        assert place == (expected if expected is not None else tomllib.loads(f"v = {text}")["v"])
+    assert data == tomllib.loads(GOOD)  # the raw data are not touched
+    assert override(data, ["seed=7", "seed=8"])["seed"] == 8
+
+
+def test_seed_argument_replaces_the_seed_and_is_told() -> None:
+    scenario = load_scenario("quick_kinematic", seed=99)
+    assert scenario.spec.seed == 99 and scenario.overrides == ("seed=99",)
+
+
+def test_cells_are_the_product_of_axes_rides_imus_and_draws() -> None:
+    text = GOOD.replace("[[imu]]", '[[ride]]\nname = "back"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 20.0\n\n[[imu]]')
+    scenario = read_scenario(
+        text,
+        name="many",
+        overrides=[
+            "ride.out.speed_kmh=[20, 30, 50]",
+            "irregularity.scale=[0.5, 1.0]",
+            "odometry=['encoder', 'truth']",
+            "track_draws=2",
+            "sensor_draws=3",
+        ],
+    )
+    listed = list(cells(scenario))
+    rides = 2 * (3 + 1) * 2
+    assert count(scenario) == (rides, rides * 2 * 2 * 3) == (rides, len(listed))
+    assert [cell.number for cell in listed] == list(range(len(listed)))
+    assert len({cell.ride_number for cell in listed}) == rides
+    assert len({cell.case for cell in listed}) == 2 * (3 + 1) * 2 * 2
+    # cells of one ride stand in a row, and cells of one case differ in nothing but draws
+    numbers = [cell.ride_number for cell in listed]
+    assert numbers == sorted(numbers)
+    by_case: dict[int, set[str]] = {}
+    for cell in listed:
+        by_case.setdefault(cell.case, set()).add(repr((cell.settings, cell.ride, cell.imu)))
+        assert cell.settings.get("ride.speed_kmh", 20.0) == cell.ride.speed_kmh
+        assert cell.settings["irregularity.scale"] == cell.spec.irregularity.scale  # type: ignore[union-attr]
+        assert cell.settings["odometry"] == cell.spec.odometry
+    assert all(len(different) == 1 for different in by_case.values())
+
+
+def test_estimator_variants_have_names_of_their_own() -> None:
+    scenario = load_scenario(
+        "quick_kinematic",
+        overrides=[
+            "estimator[0].options.rest_bias=[true, false]",
+            "estimator[0].options.tuning=['recommended', 'paper_final']",
+        ],
+    )
+    found = methods(scenario)
+    assert [method.name for method in found] == [
+        "ekf_compensated[rest_bias=True,tuning=recommended]",
+        "ekf_compensated[rest_bias=True,tuning=paper_final]",
+        "ekf_compensated[rest_bias=False,tuning=recommended]",
+        "ekf_compensated[rest_bias=False,tuning=paper_final]",
+        "ekf_uncompensated",
+        "design_angles",
+    ]
+    assert [method.tuning for method in found][:3] == ["recommended", "paper_final", "recommended"]
+    made = estimator_of(scenario, found[3])
+    assert (made.tuning, made.rest_bias, made.compensated) == ("paper_final", False, True)  # type: ignore[attr-defined]
+
+
+def test_seeds_belong_to_names() -> None:
+    assert derived_seed(1, "track_draw", 0) == derived_seed(1, "track_draw", 0)
+    names = [("track_draw", 0), ("track_draw", 1), ("track_draw", "0"), ("sensors_of_track_draw", 0)]
+    assert len({derived_seed(root, *name) for root in (1, 2) for name in names}) == 8
+    assert all(0 <= derived_seed(root, "x") < 2**63 for root in range(50))
+
+
+def test_hash_covers_content_and_parts_but_not_comments() -> None:
+    def hash_of(text: str, *settings: str) -> str:
+        return judge_scenario(read_scenario(text, name="a", overrides=settings)).content_hash
+
+    plain = hash_of(GOOD)
+    assert hash_of("# a comment\n" + GOOD) == plain
+    assert hash_of(GOOD, "seed=1") == plain
+    assert len({plain, hash_of(GOOD, "seed=2"), hash_of(GOOD, "ride.speed_kmh=51"), hash_of(GOOD, "track=level_straight")}) == 4
+
+
+def test_hash_changes_with_the_file_of_a_part(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    track = shipped("track")["smooth_curve"].read_text(encoding="utf-8")
+    found = set()
+    for cant in ("76.0", "75.0"):
+        (tmp_path / "own.toml").write_text(track.replace("76.0", cant))
+        scenario = read_scenario(GOOD.replace('"smooth_curve"', '"own.toml"'), name="a", folder=tmp_path)
+        found.add(judge_scenario(scenario).content_hash)
+    assert len(found) == 2
+
+
+def test_own_parts_are_found_beside_the_scenario(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "parts").mkdir()
+    for kind, name in (("track", "smooth_curve"), ("vehicle", "metro_irw_bogie"), ("imu", "ideal")):
+        (tmp_path / "parts" / f"{name}.toml").write_bytes(shipped(kind)[name].read_bytes())
+    text = GOOD
+    for name in ("smooth_curve", "metro_irw_bogie", "ideal"):
+        text = text.replace(f'"{name}"', f'"parts/{name}.toml"')
+    (tmp_path / "mine.toml").write_text(text)
+    scenario = load_scenario(tmp_path / "mine.toml")
+    judge_scenario(scenario)
+    assert Parts(scenario).track(next(cells(scenario))).name == "smooth_curve"
+
+
+def test_warning_between_the_two_limits_of_lateral_acceleration() -> None:
+    # 80 km/h over R300 with 76 mm cant: 22.22^2/300 - 9.81 * 76/1500 (nearly) = 1.15 m/s2.
+    settings = ["ride.speed_kmh=80", "ride.acceleration_mps2=2.5", "ride.jerk_mps3=5.0"]
+    (warning,) = judge_scenario(load_scenario("quick_kinematic", overrides=settings)).warnings
+    expected = (80 / 3.6) ** 2 / 300 - 9.81 * 76 / 1500
+    assert f"{expected:.2f} m/s2" in warning and "curve 3 R300" in warning
+    with pytest.raises(InputError, match="cannot hold"):
+        judge_scenario(load_scenario("quick_kinematic", overrides=[*settings, "ride.speed_kmh=89"]))
+    # Too much cant counts as well: standing on it is no matter, running slowly is none either.
+    slow = load_scenario("quick_kinematic", overrides=["ride.speed_kmh=5"])
+    assert judge_scenario(slow).warnings == ()
+
+
+def test_warning_where_the_speed_is_never_reached() -> None:
+    (warning,) = judge_scenario(load_scenario("quick_kinematic", overrides=["ride.end_m=100.0"])).warnings
+    assert "reaches" in warning and "of 50 km/h" in warning
+
+
+def test_dwell_and_stops_count_in_the_plan() -> None:
+    base = judge_scenario(load_scenario("quick_kinematic"))
+    stop = judge_scenario(
+        load_scenario("quick_kinematic", overrides=["ride.stops=[{position_m=300.0, dwell_s=20.0}]"])
+    )
+    assert stop.simulated_s > base.simulated_s + 20.0
+    draws = judge_scenario(load_scenario("quick_kinematic", overrides=["track_draws=3"]))
+    assert draws.simulated_s == pytest.approx(3 * base.simulated_s) and draws.rides == 3
