@@ -1,0 +1,165 @@
+"""Rides for the estimator tests: exact bodies on a curved, canted, sloped track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.interpolate import PPoly
+
+from simrail.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
+from simrail.measure import measure
+from simrail.profile import SpeedProfile
+from simrail.recording import ImuSheet, Recording
+from simrail.scenario.imu_file import load_grade
+from simrail.scenario.track_file import track_by_name
+from simrail.sensors.encoder import EncoderSpec
+from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
+from simrail.track.irregularity import Irregularity
+from simrail.track.laid import LaidTrack, lay
+from simrail.truth import Mount, Truth
+from simrail.vehicle.kinematic_engine import Channel, along, kinematic_truth, rail_following
+
+SHEET = ImuSheet(
+    grade="test",
+    rate_hz=250.0,
+    delay_s=0.0,
+    gyro_noise_radpsqrts=8.7e-5,
+    accel_noise_mpsqrts=9.8e-4,
+    gyro_bias_instability_radps=4.8e-5,
+    accel_bias_instability_mps2=3.9e-4,
+    gyro_turn_on_bias_radps=8.7e-4,
+    accel_turn_on_bias_mps2=0.0196,
+)
+
+BEND = TrackDesign(
+    name="bend",
+    start_m=0.0,
+    elements=(
+        Straight(60.0),
+        Transition(40.0),
+        Curve(60.0, 250.0, 0.08),
+        Transition(40.0),
+        Straight(30.0),
+        Transition(40.0),
+        Curve(60.0, -300.0, 0.06),
+        Transition(40.0),
+        Straight(230.0),
+    ),
+    gradients=(Gradient(20.0, 0.02), Gradient(180.0, -0.015), Gradient(330.0, 0.004)),
+    vertical_radius_m=1500.0,
+)
+"""A short line with everything: both hands of curve, cant, slope and vertical curves."""
+
+IMU_AT = Mount("axle", "body", (0.0, 0.2, 0.6))
+
+
+def record_exactly(
+    truth: Truth, mount: Mount = IMU_AT, *, step: int = 4, sheet: ImuSheet = SHEET
+) -> Recording:
+    """Every step-th sample of the true motion, without any sensor: what closed forms are tested on."""
+    motion = truth.motion(mount).iloc[::step]
+    odometry = motion[list(ODOMETRY)].copy()
+    odometry[list(ODOMETRY_SD)] = 0.0
+    return Recording(
+        name="exact",
+        imu=motion[[*GYRO, *ACCEL]].copy(),
+        imu_sheet=sheet,
+        mount=mount.name,
+        mount_body=mount.body,
+        mount_position_m=mount.position_m,
+        track=truth.track,
+        encoder=None,
+        encoder_sheet=None,
+        start_position_m=float(odometry["position_m"].iloc[0]),
+        odometry=odometry,
+        odometry_source="truth",
+        gravity_mps2=truth.gravity_mps2,
+    )
+
+
+@lru_cache
+def bend_truth(speed_mps: float = 15.0, direction: int = 1, rest_s: float = 2.0) -> Truth:
+    """A body that does not move in the track frame, over the bend."""
+    start, end = (10.0, 590.0) if direction > 0 else (590.0, 10.0)
+    profile = SpeedProfile(start, end, speed_mps, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=rest_s)
+    return kinematic_truth(BEND, profile, height_m=0.3)
+
+
+def following(laid: LaidTrack) -> dict[str, Channel]:
+    """Keeps to the irregular rails, and points along them: lateral', -vertical' as yaw and pitch."""
+    knots = laid.table_start_m + laid.table_step_m * np.arange(laid.table.shape[0] + 1)
+    rails = PPoly(laid.table[:, 6:].transpose(2, 0, 1), knots)
+    channels = rail_following(laid)
+
+    def mean_of_rails(first: int, sign: float) -> Channel:
+        return along(
+            lambda s, order: sign * 0.5 * (rails(s, order + 1)[:, first] + rails(s, order + 1)[:, first + 2])
+        )
+
+    channels["yaw"] = mean_of_rails(0, 1.0)
+    channels["pitch"] = mean_of_rails(1, -1.0)
+    return channels
+
+
+@lru_cache
+def line_truth(speed_kmh: float, direction: int) -> Truth:
+    """A ride over the 2.1 km line on irregular rails."""
+    design = track_by_name("condequinto_olivar")
+    laid = lay(design, Irregularity("erri_b176_low", (1.5, 100.0), 40.0), seed=1)
+    start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
+    profile = SpeedProfile(start, end, speed_kmh / 3.6)
+    return kinematic_truth(design, profile, channels=following(laid), height_m=0.29)
+
+
+@lru_cache
+def line_motion(speed_kmh: float, direction: int) -> pd.DataFrame:
+    """True motion of the axle IMU on that ride."""
+    return line_truth(speed_kmh, direction).motion(IMU_AT)
+
+
+def record_line(speed_kmh: float, direction: int, draw: int) -> Recording:
+    """That ride as the 3DM-GX4-25 and an encoder with a wheel that is not quite nominal record it."""
+    return measure(
+        line_truth(speed_kmh, direction),
+        name=f"{speed_kmh:g} km/h {direction:+d}",
+        mount=IMU_AT,
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("wheel", radius_error_sd=0.001),
+        seed=1,
+        draw=draw,
+    )
+
+
+@pytest.fixture
+def bend() -> Callable[..., Truth]:
+    return bend_truth
+
+
+@pytest.fixture
+def exactly() -> Callable[..., Recording]:
+    return record_exactly
+
+
+@pytest.fixture
+def line_recording() -> Callable[..., Recording]:
+    return record_line
+
+
+@pytest.fixture
+def line_true_motion() -> Callable[..., pd.DataFrame]:
+    return line_motion
+
+
+@pytest.fixture
+def true_angles() -> Callable[..., np.ndarray]:
+    """True roll, pitch and yaw at a recording's times."""
+
+    def angles(truth: Truth, recording: Recording) -> np.ndarray:
+        motion = truth.motion(Mount(recording.mount, recording.mount_body, recording.mount_position_m))
+        return motion.loc[recording.imu.index, list(ATTITUDE)].to_numpy()
+
+    return angles
