@@ -22,8 +22,9 @@ def recovered_phase(draw: int) -> float:
     return 1.0 - np.argmax(counts == 1) / (len(TIME) - 1)
 
 
-def test_counts_are_exact_for_a_ride_in_closed_form():
-    angle = 3.0 * TIME + 0.4 * TIME**2
+@pytest.mark.parametrize("direction", (1.0, -1.0))
+def test_counts_are_exact_for_a_ride_in_closed_form(direction):
+    angle = direction * (3.0 * TIME + 0.4 * TIME**2)
     frame = sample(angle)
     phase = recovered_phase(0)
     edges = angle[::4] * 1024 / (2.0 * np.pi) + phase
