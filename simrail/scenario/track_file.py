@@ -7,6 +7,7 @@ positive uphill in the direction of s.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -128,4 +129,4 @@ def track_by_name(name: str) -> TrackDesign:
     InputError
         If there is no such file, or it describes no track.
     """
-    return load(TrackFile, "track", name).design(name)
+    return load(TrackFile, "track", name).design(Path(name).stem)

@@ -1,0 +1,1 @@
+"""The track: its design, its irregularities, and the rails as they lie."""

@@ -55,6 +55,14 @@ def test_units_and_signs(tmp_path: Path) -> None:
     assert design.vertical_radius_m == (500.0,)
 
 
+def test_ramps_pass_through(tmp_path: Path) -> None:
+    default = track_by_name(write(tmp_path, GOOD))
+    chosen = track_by_name(write(tmp_path, 'cant_ramp = "linear"\nvertical_ramp_m = 0.0\n' + GOOD))
+    assert (default.cant_ramp, default.vertical_ramp_m) == ("smooth", 5.0)
+    assert (chosen.cant_ramp, chosen.vertical_ramp_m) == ("linear", 0.0)
+    assert chosen.name == "mine"
+
+
 @pytest.mark.parametrize("name", sorted(shipped("track")))
 def test_shipped_tracks_are_sound(name: str) -> None:
     design = track_by_name(name)

@@ -6,6 +6,7 @@ import functools
 import json
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -351,6 +352,18 @@ def test_plain_data_and_back(design: TrackDesign) -> None:
     assert again == design
     assert hash(again) == hash(design)
     assert pickle.loads(pickle.dumps(design)) == design
+
+
+def test_start_position_and_yaw_move_the_whole_line() -> None:
+    s = np.linspace(-30.0, 370.0, 101)
+    here = LEFT_AND_RIGHT.frame(s)
+    moved = replace(LEFT_AND_RIGHT, start_position_m=(100.0, -20.0, 7.0), start_yaw_rad=0.7).frame(s)
+    turn = np.array([[np.cos(0.7), -np.sin(0.7), 0.0], [np.sin(0.7), np.cos(0.7), 0.0], [0.0, 0.0, 1.0]])
+    assert np.abs(moved.position - (here.position @ turn.T + [100.0, -20.0, 7.0])).max() < 1e-12
+    assert np.abs(moved.yaw_rad - here.yaw_rad - 0.7).max() < 1e-15
+    assert np.array_equal(moved.k, here.k)
+    assert here.position[0].tolist() == [0.0, 0.0, 0.0]
+    assert here.yaw_rad[0] == 0.0
 
 
 def test_a_design_is_not_worked_on_before_it_is_used() -> None:

@@ -115,6 +115,16 @@ def test_design_channels_follow_the_design(laid: LaidTrack) -> None:
     assert np.abs(slopes[:, 5:2:-1] - frame.rates).max() < 1e-6
 
 
+def test_a_track_may_end_in_a_curve() -> None:
+    helix = TrackDesign("helix", 0.05, (Curve(90.0, 100.0, 0.1),), gradients=(Gradient(0.0, 0.02),))
+    track = lay(helix, Irregularity("none", fade_m=0.0), seed=0)
+    s = np.linspace(0.05, 90.05, 1001)
+    frame, table = helix.frame(s), track.channels(s)
+    assert np.abs(table[:, :3] - frame.position).max() < 0.125**4 / 384.0 / 100.0**3 + 1e-13
+    assert np.abs(table[:, 3] - frame.yaw_rad).max() < 1e-13
+    assert np.abs(track.channels(s, derivative=2)[:, 3:6]).max() < 1e-10
+
+
 def test_place_and_seed_alone_decide() -> None:
     short = lay(TrackDesign("short", -50.0, (Straight(1000.0),)), ROUGH, seed=4)
     long = lay(TrackDesign("long", 120.7, (Straight(3000.0),)), ROUGH, seed=4)
