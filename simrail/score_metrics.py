@@ -24,7 +24,7 @@ from scipy.special import ndtri
 
 from simrail.columns import INNOVATION
 from simrail.jit import FloatArray
-from simrail.score_table import OK, unit_of
+from simrail.score_table import NO_SAMPLES, OK, unit_of
 
 IntArray = npt.NDArray[np.intp]
 Row = tuple[str, str, str, str, str, float, str, int, str]
@@ -90,7 +90,7 @@ def _rows(
 def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str]:
     n = len(error)
     if n == 0:
-        return [np.nan] * len(metrics), "no samples"
+        return [np.nan] * len(metrics), NO_SAMPLES
     total = float(error.sum())
     if not np.isfinite(total):
         bad = int(n - np.isfinite(error).sum())
@@ -115,7 +115,7 @@ def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str
 def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple[list[float], str]:
     n = len(error)
     if n == 0:
-        return [np.nan] * len(metrics), "no samples"
+        return [np.nan] * len(metrics), NO_SAMPLES
     good = int(np.count_nonzero(np.isfinite(sd) & (sd > 0.0)))
     if good < n:
         return [np.nan] * len(metrics), f"standard deviation not positive in {n - good} of {n} samples"
@@ -135,7 +135,7 @@ def nis_figures(innovations: pd.DataFrame, quantity: str, windows: Mapping[str, 
     for window, samples in windows.items():
         values = nis[samples][updated[samples]]
         bad = int(len(values) - np.isfinite(values).sum())
-        status = OK if len(values) and not bad else "no samples"
+        status = OK if len(values) and not bad else NO_SAMPLES
         if bad:
             status = f"NIS not finite in {bad} of {len(values)} samples"
         value = float(values.mean()) if status == OK else np.nan

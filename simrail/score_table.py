@@ -75,6 +75,8 @@ REFERENCES = ("truth", "design")
 WINDOWS = ("whole", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 OK = "ok"
+NO_SAMPLES = "no samples"
+"""Status of a figure over a window that the ride does not have."""
 CURVE_PREFIX = "curve:"
 """A window of one curve is ``curve:`` and the name of its segment."""
 EVERY_CURVE = CURVE_PREFIX + "*"

@@ -314,7 +314,7 @@ def test_failures_are_on_the_page_and_do_not_stop_it(scenario: Scenario, tmp_pat
     )
     text = path.read_text(encoding="utf-8")
     assert "LinAlgError: singular matrix" in text
-    assert re.search(r"estimate not finite in \d+ of \d+ samples", text)
+    assert "estimate not finite" in text
     assert ">nan<" not in text
 
 
@@ -371,7 +371,7 @@ def test_a_filter_that_is_never_beaten_is_said_to_be_so(scenario: Scenario) -> N
 
 def test_coverage_decides_what_is_said_of_the_standard_deviations(scenario: Scenario) -> None:
     one = example()
-    for sd_deg, verdict in ((0.1, "not too small"), (0.04, "are too small")):
+    for sd_deg, verdict in ((0.1, "larger than its errors"), (0.04, "are too small")):
         states = one.estimates["ekf_compensated"].states.assign(roll_sd_rad=np.deg2rad(sd_deg))
         estimates = dict(one.estimates, ekf_compensated=Estimate(states=states, mount="axle"))
         text = said(scenario, *tables(CellResult(one.cell, one.recording, one.motion, estimates)))

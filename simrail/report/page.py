@@ -29,6 +29,7 @@ from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario
+from simrail.score_table import NO_SAMPLES, OK
 
 MOST_RIDES = 6
 """Rides that are drawn; the tables hold all."""
@@ -157,7 +158,7 @@ def _ride(example: CellResult, all_cases: list[Figures], styles: list[MethodStyl
 
 
 def _ride_title(example: CellResult) -> str:
-    axes = [f"{name} {value}" for name, value in example.cell.items() if "." in name]
+    axes = [f"{name} {value}" for name, value in example.cell.items() if "." in name and name != "imu.grade"]
     return " \u00b7 ".join([example.recording.name, *axes])
 
 
@@ -222,11 +223,13 @@ def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
     )
 
 
-def _failures(scores: pd.DataFrame) -> list[tuple[str, str, int]]:
-    """(estimator, reason, rows) of what has no value, expected empty windows left out."""
-    failed = scores[(scores["status"] != "ok") & (scores["status"] != "no samples")]
+def _failures(scores: pd.DataFrame) -> list[tuple[str, str, str, int]]:
+    """(method, IMU, reason, figures) of what has no value; expected empty windows are left out."""
+    failed = scores[(scores["status"] != OK) & (scores["status"] != NO_SAMPLES)]
     if failed.empty:
         return []
-    counted = failed.groupby(["estimator", "status"], observed=True).size()
-    listed = counted.reset_index(name="rows").itertuples(index=False)
-    return [(str(name), str(reason), int(rows)) for name, reason, rows in listed]
+    # One line per kind of fault: how many samples of a window it hit is in the table itself.
+    reason = failed["status"].astype(str).str.replace(r" in \d+ of \d+ samples", "", regex=True)
+    counted = failed.assign(reason=reason).groupby(["estimator", "imu", "reason"], observed=True).size()
+    listed = counted.reset_index(name="figures").itertuples(index=False)
+    return [(str(name), str(imu), str(why), int(figures)) for name, imu, why, figures in listed]

@@ -73,7 +73,7 @@ def curves_figure(figures: Figures, styles: Sequence[MethodStyle]) -> str:
     with look():
         figure = Figure(figsize=(WIDTH_IN, 3.1))
         axis = figure.add_axes((0.72 / WIDTH_IN, 0.55 / 3.1, 1.0 - 0.92 / WIDTH_IN, 2.1 / 3.1))
-        spread = 0.62 / max(len(styles), 1)
+        spread = min(0.62 / max(len(styles), 1), 0.045 * len(windows))
         for i, style in enumerate(styles):
             x, y, e = [], [], []
             for place, window in enumerate(windows):

@@ -15,6 +15,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -190,7 +191,7 @@ def to_svg(figure: Figure, *, description: str) -> str:
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r' d="[^"]*"', _shorter, text, flags=re.DOTALL)
+    text = re.sub(r' d="([^"]*)"', _shorter, text, flags=re.DOTALL)
     # Several figures share the page: an id that nothing refers to would only stand there twice.
     used = set(re.findall(r"#([\w-]+)", text))
     text = re.sub(r' id="([\w-]+)"', lambda m: m.group(0) if m.group(1) in used else "", text)
@@ -205,6 +206,29 @@ def to_svg(figure: Figure, *, description: str) -> str:
 
 
 def _shorter(match: re.Match[str]) -> str:
-    """A path with one decimal (0.13 pixel) and without line breaks."""
-    short = re.sub(r"-?\d+\.\d{2,}", lambda number: f"{float(number.group(0)):.1f}", match.group(0))
-    return re.sub(r"\s+", " ", short).replace(".0 ", " ")
+    """A path in tenths of a point (0.13 pixel); long lines as steps from point to point."""
+    path = match.group(1)
+    words = path.split()
+    if len(words) < 30 or set(words[::3]) != {"M", "L"} or words[3::3].count("M"):
+        return f' d="{" ".join(_tenths(word) for word in words)}"'
+    places = np.rint(10.0 * np.array([words[1::3], words[2::3]], dtype=np.float64)).astype(np.int64)
+    steps = np.diff(places, axis=1)
+    start = f"M{places[0, 0] / 10:g} {places[1, 0] / 10:g}l"
+    # Each coordinate with one decimal, without a leading zero: 0.5 is written .5
+    told = [_tenth_texts(row) for row in steps]
+    return f' d="{start}{" ".join(f"{x} {y}" for x, y in zip(*told, strict=True))}"'
+
+
+def _tenths(word: str) -> str:
+    try:
+        return f"{float(word):.1f}".removesuffix(".0")
+    except ValueError:
+        return word
+
+
+def _tenth_texts(tenths: npt.NDArray[np.int64]) -> list[str]:
+    known = {
+        t: f"{t / 10:g}".replace("0.", ".", 1) if abs(t) < 10 and t else f"{t / 10:g}"
+        for t in set(tenths.tolist())
+    }
+    return [known[t] for t in tenths.tolist()]

@@ -68,11 +68,11 @@ def profile_figure(track: TrackDesign) -> str:
         frame = track.frame(s)
         figure, axes = panels([1.35, 1.2, 1.2], top_in=0.12)
         height = frame.position[:, 2]
-        axes[0].fill_between(s, height, height.min() - 0.1 * max(np.ptp(height), 0.1), color="#e8ebf0", lw=0)
+        span = max(float(np.ptp(height)), 1.0)
+        floor = float(height.min()) - 0.1 * span
+        axes[0].fill_between(s, height, floor, color="#e8ebf0", lw=0)
         axes[0].plot(s, height, color=INK, lw=1.4)
-        axes[0].set_ylim(
-            height.min() - 0.1 * max(np.ptp(height), 0.1), height.max() + 0.35 * max(np.ptp(height), 0.1)
-        )
+        axes[0].set_ylim(floor, float(height.min()) + 1.35 * span)
         axes[0].set_ylabel("height, m")
         axes[1].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
         axes[1].set_ylabel("curvature, 1/km")
