@@ -10,15 +10,12 @@ Nothing is written here: see `simrail.results`.
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, fields, replace
 from itertools import groupby
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -27,6 +24,7 @@ import pandas as pd
 from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
 from simrail.example import CellResult
+from simrail.interrupts import Check, interruptible
 from simrail.measure import measure
 from simrail.recording import Recording
 from simrail.ride import is_cached, simulate
@@ -37,8 +35,6 @@ from simrail.scenario.scenario import Scenario
 from simrail.score import reference_of, score, score_odometry, truth_at_imu
 from simrail.score_table import concat_scores, failed_figures, labelled
 from simrail.truth import Mount, Truth
-
-Check = Callable[[], None]
 
 MOST_EXAMPLES = 6
 """Recordings that are kept for the report's figures, one per ride."""
@@ -187,7 +183,7 @@ def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> Campa
     chosen = {method.name: (method, plan.estimators[method.name]) for method in methods(scenario)}
     ledger = _Ledger(scenario, chosen)
     records = []
-    with _interruptible() as check:
+    with interruptible() as check:
         for ride_number, group in groupby(cells(scenario), key=lambda cell: cell.ride_number):
             ride_cells = list(group)
             records += [_cell_record(cell) for cell in ride_cells]
@@ -259,7 +255,9 @@ def _run_cell(
             motion = truth_at_imu(truth, recording)
             reference = reference_of(motion, recording)
             figures = score_odometry(recording, reference, **keep)
-            ledger.tables.append(labelled(figures, ledger.labels(cell, f"odometry:{recording.odometry_source}")))
+            ledger.tables.append(
+                labelled(figures, ledger.labels(cell, f"odometry:{recording.odometry_source}"))
+            )
     except Exception as error:
         check()
         for name in ledger.estimators:
@@ -345,32 +343,3 @@ def _reason(error: Exception) -> str:
     text = " ".join(str(error).split())
     named = text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
     return named[:300]
-
-
-@contextmanager
-def _interruptible() -> Iterator[Check]:
-    """Remember Ctrl-C, so that no library that catches exceptions can swallow it.
-
-    Yields a function that raises `KeyboardInterrupt` if there was one; it is called wherever the loop
-    has caught an exception.
-    """
-    interrupted = False
-
-    def check() -> None:
-        if interrupted:
-            raise KeyboardInterrupt
-
-    def note(number: int, frame: FrameType | None) -> None:
-        nonlocal interrupted
-        interrupted = True
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield check
-        return
-    before = signal.signal(signal.SIGINT, note)
-    try:
-        yield check
-        check()
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from simrail.errors import InputError
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 app = typer.Typer(
     name="simrail",
@@ -47,12 +44,13 @@ def call(arguments: list[str]) -> int:
         error.show()
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
-        _say("simrail: interrupted; former results and complete rides are as they were")
-        return INTERRUPTED
+        code = INTERRUPTED  # newer versions of typer return this code by themselves
     except OSError as error:
         place = f" ({Path(str(error.filename)).name})" if error.filename else ""
         _say(f"simrail: {error.strerror or error}{place}; former results are as they were")
         return CELL_FAILED
+    if code == INTERRUPTED:
+        _say("simrail: interrupted; former results and complete rides are as they were")
     return int(code or DONE)
 
 
@@ -77,10 +75,14 @@ def _options(
     pass
 
 
-Scenario = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")]
+Scenario = Annotated[
+    str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")
+]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value, e.g. --set ride.speed_kmh=70. Repeatable."),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Replace a value, e.g. --set ride.speed_kmh=70. Repeatable."
+    ),
 ]
 Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Replace the scenario's seed.")]
 
@@ -119,8 +121,9 @@ def check(scenario: Scenario, seed: Seed = None, settings: Settings = None) -> i
         _say(f"warning: {warning}")
     print(f"{read.name}: fine. {read.title}")
     print(
-        f"{_number(plan.rides, 'ride')} of {plan.simulated_s:.0f} s in all, {_number(plan.cells, 'recording')}, "
-        f"{_number(len(plan.estimators), 'estimator')} each: {', '.join(plan.estimators)}"
+        f"{_number(plan.rides, 'ride')} of {plan.simulated_s:.0f} s in all, "
+        f"{_number(plan.cells, 'recording')}, {_number(len(plan.estimators), 'estimator')} "
+        f"each: {', '.join(plan.estimators)}"
     )
     return DONE
 
@@ -173,8 +176,8 @@ def cache(
         print(f"{ride.size_bytes / 1e6:8.0f} MB  {ride.key[:12]}  {ride.name}")
     total = sum(ride.size_bytes for ride in rides)
     print(
-        f"{_number(len(rides), 'ride')}, {total / 1e6:.0f} MB of at most {ride_cache.limit_bytes() / 1e9:g} GB "
-        f"(SIMRAIL_CACHE_GB), in {ride_cache.folder()}"
+        f"{_number(len(rides), 'ride')}, {total / 1e6:.0f} MB of at most "
+        f"{ride_cache.limit_bytes() / 1e9:g} GB (SIMRAIL_CACHE_GB), in {ride_cache.folder()}"
     )
     return DONE
 

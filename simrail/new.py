@@ -21,7 +21,10 @@ SHIPPED = {
 }
 KINDS = ("estimator", *SHIPPED, "scenario")
 
-_ESTIMATOR = Template('''"""$Class: what it is for, in one line. Then what it is not for, and the source of its equations."""
+_ESTIMATOR = Template('''"""$Class: what it is for, in one line.
+
+Then what it is not for, and the source of its equations.
+"""
 
 from __future__ import annotations
 
@@ -149,7 +152,8 @@ def _estimator(name: str, path: Path) -> tuple[str, str]:
     next_step = (
         f'use it in a scenario beside it:\n\n    [[estimator]]\n    name = "{name}"\n'
         f'    method = "{path.name}:{class_name}"\n\n'
-        f"or try it at once: simrail run quick_kinematic --set estimator[0].method={label(path)}:{class_name} "
+        f"or try it at once: simrail run quick_kinematic "
+        f"--set estimator[0].method={label(path)}:{class_name} "
         f"--set estimator[0].name={name} --set 'estimator[0].options={{}}'"
     )
     return text, next_step

@@ -108,7 +108,9 @@ def print_scores(console: Console, results: Results) -> None:
     factor = results.manifest["real_time_factor"]
     speed = f", engine at {factor:.1f} x real time" if factor else ""
     console.print(
-        f"{wall['total']:.1f} s{speed}. Report: {results.folder / 'report.html'}", highlight=False, soft_wrap=True
+        f"{wall['total']:.1f} s{speed}. Report: {results.folder / 'report.html'}",
+        highlight=False,
+        soft_wrap=True,
     )
 
 
@@ -117,8 +119,8 @@ def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodSt
     first = members.iloc[0]
     draws = f", mean of {len(members)} draws" if len(members) > 1 else ""
     table = Table(
-        title=f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, {first['imu']} on {first['mount']}, "
-        f"odometry: {first['odometry']}{draws}",
+        title=f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
+        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}{draws}",
         title_justify="left",
         title_style="bold",
         caption_justify="left",
@@ -154,6 +156,8 @@ def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodSt
             if styles[other].uses_imu and value is not None and value > (in_curves[name] or float("inf"))
         ]
         if not style.uses_imu and beaten:
-            notes.append(f"{name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}")
+            notes.append(
+                f"{name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
+            )
     table.caption = "; ".join(notes)
     return table

@@ -87,7 +87,9 @@ def run(
     with draft_of(folder) as draft:
         campaign.scores.to_parquet(draft / "scores.parquet", index=False)
         campaign.cells.to_parquet(draft / "cells.parquet", index=False)
-        aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
+        aggregate(campaign.scores, campaign.cells).to_csv(
+            draft / "scores.csv", index=False, float_format="%.9g"
+        )
         drawing = time.perf_counter()
         write_report(
             draft / "report.html",
@@ -195,7 +197,9 @@ def _judge_folder(folder: Path) -> None:
     remedy = "choose another folder with --out"
     if folder.exists():
         if not folder.is_dir():
-            raise InputError("the results need a folder, this is a file", field="--out", value=str(folder), remedy=remedy)
+            raise InputError(
+                "the results need a folder, this is a file", field="--out", value=str(folder), remedy=remedy
+            )
         if any(folder.iterdir()) and not (folder / MANIFEST).is_file():
             raise InputError(
                 "the folder holds other things than results, and would be replaced",

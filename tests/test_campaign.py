@@ -59,7 +59,9 @@ def test_table_has_the_fixed_columns_and_no_failure(two_draws: CampaignResult) -
 
 def test_same_seed_gives_the_same_bits(two_draws: CampaignResult) -> None:
     again = run_campaign(short())
-    pd.testing.assert_frame_equal(without_time(two_draws.scores), without_time(again.scores), check_exact=True)
+    pd.testing.assert_frame_equal(
+        without_time(two_draws.scores), without_time(again.scores), check_exact=True
+    )
 
 
 def test_another_seed_gives_other_scores(two_draws: CampaignResult) -> None:
@@ -89,7 +91,9 @@ def test_a_cell_does_not_depend_on_its_neighbours(two_draws: CampaignResult) -> 
     ):
         ours = without_time(two_draws.scores[two_draws.scores["estimator"] == name])
         theirs = without_time(
-            found.scores[(found.scores["estimator"] == theirs_name) & found.scores["cell"].isin(wanted["cell"])]
+            found.scores[
+                (found.scores["estimator"] == theirs_name) & found.scores["cell"].isin(wanted["cell"])
+            ]
         )
         pd.testing.assert_series_equal(
             ours.set_index(keys)["value"], theirs.set_index(keys)["value"], check_exact=True
@@ -97,11 +101,15 @@ def test_a_cell_does_not_depend_on_its_neighbours(two_draws: CampaignResult) -> 
 
 
 def test_draws_differ_and_rides_over_one_draw_are_paired(two_draws: CampaignResult) -> None:
-    rms = two_draws.scores.query("estimator == 'ekf_compensated' and metric == 'rms' and reference == 'truth'")
+    rms = two_draws.scores.query(
+        "estimator == 'ekf_compensated' and metric == 'rms' and reference == 'truth'"
+    )
     first, second = (rms[rms["sensor_draw"] == draw]["value"].to_numpy() for draw in (0, 1))
     assert not np.isclose(first[np.isfinite(first)], second[np.isfinite(second)], rtol=1e-6).any()
     back = read_scenario(
-        shipped("scenario")["quick_kinematic"].read_text().replace(
+        shipped("scenario")["quick_kinematic"]
+        .read_text()
+        .replace(
             "[[imu]]", '[[ride]]\nname = "back"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 50.0\n\n[[imu]]'
         ),
         name="both",
@@ -171,7 +179,9 @@ def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
     assert len(not_finite) == 6 and "not finite" in not_finite[0].reason
     bad = found.scores.query("estimator == 'nan' and quantity == 'roll' and window == 'whole'")
     assert bad[bad["metric"] == "rms"]["value"].isna().all()
-    good = found.scores.query("estimator == 'after' and quantity == 'roll' and window == 'whole' and metric == 'rms'")
+    good = found.scores.query(
+        "estimator == 'after' and quantity == 'roll' and window == 'whole' and metric == 'rms'"
+    )
     assert (good["status"] == OK).all() and set(good["cell"]) == set(range(6))
     assert counter.rides == ["1/1 out"]
     assert counter.estimates == 36 and counter.last == (36, 36)
@@ -212,7 +222,9 @@ def test_interrupt_ends_the_campaign_even_if_it_was_swallowed(monkeypatch: pytes
 
 def test_examples_and_kept_windows() -> None:
     found = run_campaign(
-        short("sensor_draws=2", "score.windows=['curve', 'curve:*']", "score.metrics=['rms', 'us_per_sample']")
+        short(
+            "sensor_draws=2", "score.windows=['curve', 'curve:*']", "score.metrics=['rms', 'us_per_sample']"
+        )
     )
     assert len(found.examples) == 1
     example = found.examples[0]

@@ -181,7 +181,9 @@ def _class_named(name: str, folder: Path | None) -> type[Estimator]:
     candidates = [*([folder / path_name] if folder else []), Path(path_name)]
     path = next((candidate for candidate in candidates if candidate.is_file()), None)
     if path is None:
-        raise InputError("no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder")
+        raise InputError(
+            "no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder"
+        )
     # A name of its own per content: two files, or two versions of one, never share a module.
     module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
     if module_name not in sys.modules:
@@ -193,7 +195,9 @@ def _class_named(name: str, folder: Path | None) -> type[Estimator]:
             spec.loader.exec_module(module)
         except Exception as error:
             del sys.modules[module_name]
-            raise InputError(f"cannot be imported: {type(error).__name__}: {error}", value=path_name) from error
+            raise InputError(
+                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
+            ) from error
     found = getattr(sys.modules[module_name], class_name, None)
     if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
         raise InputError(
@@ -249,5 +253,8 @@ def _option(kind: Any, name: str, value: Any) -> Any:
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(
-            "has the wrong type or value", field=name, value=value, limit=first["msg"].removeprefix("Input should be ")
+            "has the wrong type or value",
+            field=name,
+            value=value,
+            limit=first["msg"].removeprefix("Input should be "),
         ) from None

@@ -237,9 +237,7 @@ def _judge_places(scenario: Scenario, cell: Cell, track: TrackDesign, ahead: tup
             )
 
 
-def _judge_dynamics(
-    scenario: Scenario, cell: Cell, track: TrackDesign, profile: SpeedProfile
-) -> list[str]:
+def _judge_dynamics(scenario: Scenario, cell: Cell, track: TrackDesign, profile: SpeedProfile) -> list[str]:
     """Refuse a speed that a curve cannot hold; warn where it is uncomfortable, or never reached."""
     field, ride = f"ride[{cell.ride_index}]", cell.ride
     times = np.arange(0.0, profile.duration_s, 0.1)
@@ -256,12 +254,14 @@ def _judge_dynamics(
         relief = -from_cant * np.sign(bend)
         allowed = np.sqrt(np.maximum(REFUSE_LATERAL_MPS2 + relief, 0.0) / np.maximum(np.abs(bend), 1e-12))
         raise InputError(
-            f"the track cannot hold this speed: {lateral[i]:.2f} m/s2 uncompensated lateral acceleration in {where}",
+            f"the track cannot hold this speed: {lateral[i]:.2f} m/s2 uncompensated lateral acceleration "
+            f"in {where}",
             file=scenario.file,
             field=f"{field}.speed_kmh",
             value=ride.speed_kmh,
             limit=f"{REFUSE_LATERAL_MPS2:g} m/s2",
-            remedy=f"ride at most at {np.floor(3.6 * np.min(allowed)):.0f} km/h, or use a wider curve or more cant",
+            remedy=f"ride at most at {np.floor(3.6 * np.min(allowed)):.0f} km/h, "
+            "or use a wider curve or more cant",
         )
     warnings = []
     if lateral[i] > WARN_LATERAL_MPS2:
@@ -272,8 +272,8 @@ def _judge_dynamics(
     reached = 3.6 * float(np.max(np.abs(v)))
     if reached < 0.99 * ride.speed_kmh:
         warnings.append(
-            f"{field} ({ride.name}): reaches {reached:.0f} of {ride.speed_kmh:g} km/h, since the way between stops "
-            "is too short for its acceleration and jerk"
+            f"{field} ({ride.name}): reaches {reached:.0f} of {ride.speed_kmh:g} km/h, since the way "
+            "between stops is too short for its acceleration and jerk"
         )
     return warnings
 
@@ -286,7 +286,8 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     for name, position in (("start_m", cell.ride.start_m), ("end_m", cell.ride.end_m)):
         if not track.start_m <= position + offset <= track.end_m:
             raise InputError(
-                f"the IMU would leave track {track.name!r} at the {name.removesuffix('_m')} of ride {cell.ride.name}",
+                f"the IMU would leave track {track.name!r} at the {name.removesuffix('_m')} "
+                f"of ride {cell.ride.name}",
                 file=scenario.file,
                 field=f"{field}.position_m",
                 value=f"s = {position + offset:g} m",
@@ -307,7 +308,9 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
                 remedy='add an [encoder], or set odometry = "truth" for an ablation',
             )
         return
-    _one_of(vehicle.wheel_names, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel")
+    _one_of(
+        vehicle.wheel_names, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel"
+    )
     with blame(scenario.file, "encoder"):
         decimation_factor(TRUTH_RATE_HZ, encoder.rate_hz)
 
@@ -315,5 +318,10 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
 def _one_of(known: Iterable[str], name: str, file: str, field: str, problem: str) -> None:
     if name not in known:
         raise InputError(
-            problem, file=file, field=field, value=name, limit="one of " + ", ".join(known), remedy="choose one of them"
+            problem,
+            file=file,
+            field=field,
+            value=name,
+            limit="one of " + ", ".join(known),
+            remedy="choose one of them",
         )

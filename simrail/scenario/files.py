@@ -70,7 +70,7 @@ def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
         f"no {kind} of this name is shipped",
         value=name,
         limit="e.g. " + ", ".join(near),
-        remedy=f"'simrail list' shows all; a file of your own needs its path, ending in .toml (./{name}.toml)",
+        remedy=f"'simrail list' shows all; a file of your own needs its path, e.g. ./{name}.toml",
     )
 
 
@@ -173,12 +173,18 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         remedy = "mind the unit, which is in the name of the field"
     elif kind in _TYPES:
         problem, limit = "has the wrong type", _TYPES[kind]
-        remedy = "write it without quotes, in the unit that the field's name says" if isinstance(value, str) else None
+        remedy = (
+            "write it without quotes, in the unit that the field's name says"
+            if isinstance(value, str)
+            else None
+        )
         remedy = "write it in quotes" if kind == "string_type" else remedy
     elif kind == "literal_error":
         expected = str(context.get("expected", ""))
         problem, limit = "is not one of the possible values", f"one of {expected}"
-        near = difflib.get_close_matches(str(value), expected.replace("'", "").replace(" or ", ", ").split(", "), n=1)
+        near = difflib.get_close_matches(
+            str(value), expected.replace("'", "").replace(" or ", ", ").split(", "), n=1
+        )
         remedy = f"did you mean {near[0]}?" if near else None
     elif kind in {"too_short", "too_long"}:
         problem, limit = "has the wrong number of items", first["msg"].split(" after ")[0]

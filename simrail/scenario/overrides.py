@@ -87,6 +87,8 @@ def _set(place: Any, steps: list[str | int], value: Any, key: str) -> None:
         if rest and isinstance(rest[0], int):
             raise InputError("the scenario has no such array", file="--set", field=key, remedy=_EXAMPLE)
         if near:
-            raise InputError("unknown key", file="--set", field=key, value=step, remedy=f"did you mean {near[0]}?")
+            raise InputError(
+                "unknown key", file="--set", field=key, value=step, remedy=f"did you mean {near[0]}?"
+            )
         place[step] = {}
     _set(place[step], rest, value, key)

@@ -77,7 +77,9 @@ class ImuPart(Part):
     @classmethod
     def _metres(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
         if max(abs(part) for part in value) > 50.0:
-            raise ValueError(f"lies more than 50 m from the vehicle's reference point: {list(value)}; it is in metres")
+            raise ValueError(
+                f"lies more than 50 m from the vehicle's reference point: {list(value)}; it is in metres"
+            )
         return value
 
 
@@ -95,7 +97,7 @@ class EstimatorPart(Part):
 
     name: Name
     method: str
-    options: dict[str, Any] = {}
+    options: dict[str, Any] = Field(default_factory=dict)
 
 
 class ScorePart(Part):
@@ -197,7 +199,9 @@ def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int 
     """
     path = find("scenario", str(name))
     settings = [*overrides, *([f"seed={seed}"] if seed is not None else [])]
-    return read_scenario(read_text(path), name=path.stem, file=label(path), folder=path.parent, overrides=settings)
+    return read_scenario(
+        read_text(path), name=path.stem, file=label(path), folder=path.parent, overrides=settings
+    )
 
 
 def read_scenario(
@@ -219,8 +223,10 @@ def read_scenario(
 
 def _options_as_axes(part: EstimatorPart) -> EstimatorPart:
     """Read lists among an estimator's options as axes; a list of lists is a list-valued option."""
-    options: dict[str, Any] = {}
+    options: dict[str, Any] = Field(default_factory=dict)
     for key, value in part.options.items():
-        is_axis = isinstance(value, list) and value and not any(isinstance(item, (list, dict)) for item in value)
+        is_axis = (
+            isinstance(value, list) and value and not any(isinstance(item, (list, dict)) for item in value)
+        )
         options[key] = Axis(value) if is_axis else value
     return part.model_copy(update={"options": options})

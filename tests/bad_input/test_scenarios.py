@@ -24,7 +24,11 @@ GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 
 # name: (text of the good scenario, what stands there instead, parts of the message)
 FAULTS: dict[str, tuple[str, str, list[str]]] = {
-    "unknown key": ("speed_kmh = 50.0", "speed_kph = 50.0", ["ride[0].speed_kph", "unknown key", "50.0", "speed_kmh?"]),
+    "unknown key": (
+        "speed_kmh = 50.0",
+        "speed_kph = 50.0",
+        ["ride[0].speed_kph", "unknown key", "50.0", "speed_kmh?"],
+    ),
     "unknown table": ("[encoder]", "[encodr]", ["encodr", "unknown key", "encoder?"]),
     "missing key": ("seed = 1\n", "", ["seed", "is required", "add it"]),
     "text for a number": (
@@ -32,10 +36,18 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         'speed_kmh = "50 km/h"',
         ["ride[0].speed_kmh", "type", "'50 km/h'", "a number", "unit"],
     ),
-    "number in quotes": ("speed_kmh = 50.0", 'speed_kmh = "50"', ["ride[0].speed_kmh", "'50'", "without quotes"]),
+    "number in quotes": (
+        "speed_kmh = 50.0",
+        'speed_kmh = "50"',
+        ["ride[0].speed_kmh", "'50'", "without quotes"],
+    ),
     "true for a number": ("speed_kmh = 50.0", "speed_kmh = true", ["ride[0].speed_kmh", "True", "a number"]),
     "number for text": ('name = "out"', "name = 3", ["ride[0].name", "3", "text", "quotes"]),
-    "not a number": ("speed_kmh = 50.0", "speed_kmh = nan", ["ride[0].speed_kmh", "nan", "finite", "replace NaN"]),
+    "not a number": (
+        "speed_kmh = 50.0",
+        "speed_kmh = nan",
+        ["ride[0].speed_kmh", "nan", "finite", "replace NaN"],
+    ),
     "infinite": ("start_m = 10.0", "start_m = -inf", ["ride[0].start_m", "finite"]),
     "zero speed": ("speed_kmh = 50.0", "speed_kmh = 0.0", ["ride[0].speed_kmh", "0.0", "> 0", "unit"]),
     "metres per second that are too many": (
@@ -43,9 +55,17 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "speed_kmh = 4000.0",
         ["ride[0].speed_kmh", "4000.0", "<= 400"],
     ),
-    "one bad value in a list": ("speed_kmh = 50.0", "speed_kmh = [50.0, -1.0]", ["ride[0].speed_kmh", "-1.0", "> 0"]),
+    "one bad value in a list": (
+        "speed_kmh = 50.0",
+        "speed_kmh = [50.0, -1.0]",
+        ["ride[0].speed_kmh", "-1.0", "> 0"],
+    ),
     "an empty list": ("speed_kmh = 50.0", "speed_kmh = []", ["ride[0].speed_kmh", "empty", "at least one"]),
-    "a value twice in a list": ("speed_kmh = 50.0", "speed_kmh = [50.0, 50.0]", ["ride[0].speed_kmh", "twice"]),
+    "a value twice in a list": (
+        "speed_kmh = 50.0",
+        "speed_kmh = [50.0, 50.0]",
+        ["ride[0].speed_kmh", "twice"],
+    ),
     "a negative seed": ("seed = 1", "seed = -1", ["seed", "-1", ">= 0"]),
     "a broken seed": ("seed = 1", "seed = 1.5", ["seed", "1.5", "whole number"]),
     "no draws": ("sensor_draws = 2", "sensor_draws = 0", ["sensor_draws", "0", ">= 1"]),
@@ -94,7 +114,11 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "wavelengths_m = [100.0, 1.5]",
         ["irregularity.wavelengths_m", "100.0, 1.5", "shortest, longest"],
     ),
-    "one wavelength": ("wavelengths_m = [1.5, 100.0]", "wavelengths_m = [1.5]", ["irregularity.wavelengths_m"]),
+    "one wavelength": (
+        "wavelengths_m = [1.5, 100.0]",
+        "wavelengths_m = [1.5]",
+        ["irregularity.wavelengths_m"],
+    ),
     "waves too short for the track's table": (
         "wavelengths_m = [1.5, 100.0]",
         "wavelengths_m = [0.6, 100.0]",
@@ -112,7 +136,11 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     ),
     "a ride before the track": ("start_m = 10.0", "start_m = 0.5", ["ride[0].start_m", "0.5", "0.9 to"]),
     "a ride of no length": ("end_m = 590.0", "end_m = 10.0", ["ride[0].end_m", "10.0", "backward"]),
-    "a ride that takes hours": ("speed_kmh = 50.0", "speed_kmh = 0.1", ["ride[0].speed_kmh", "0.1", "7200 s", "faster"]),
+    "a ride that takes hours": (
+        "speed_kmh = 50.0",
+        "speed_kmh = 0.1",
+        ["ride[0].speed_kmh", "0.1", "7200 s", "faster"],
+    ),
     "a stop off the way": (
         "final_rest_s = 2.0",
         "stops = [{ position_m = 595.0, dwell_s = 5.0 }]",
@@ -153,7 +181,11 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "position_m = [0.0, 0.0, 600.0]",
         ["imu[0].position_m", "600.0", "metres"],
     ),
-    "an IMU with two coordinates": ("position_m = [0.0, 0.0, 0.6]", "position_m = [0.0, 0.6]", ["imu[0].position_m"]),
+    "an IMU with two coordinates": (
+        "position_m = [0.0, 0.0, 0.6]",
+        "position_m = [0.0, 0.6]",
+        ["imu[0].position_m"],
+    ),
     "an IMU beyond the track": (
         "position_m = [0.0, 0.0, 0.6]",
         "position_m = [-12.0, 0.0, 0.6]",
@@ -193,7 +225,13 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "an option that the estimator lacks": (
         "compensated = true",
         "compensate = true",
-        ["estimator[0].options.compensate", "no such option", "True", "rest_bias", "did you mean compensated?"],
+        [
+            "estimator[0].options.compensate",
+            "no such option",
+            "True",
+            "rest_bias",
+            "did you mean compensated?",
+        ],
     ),
     "an option of the wrong type": (
         "compensated = true",
@@ -398,7 +436,13 @@ def test_not_text(content: bytes, place: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_usage_errors_are_bad_input_too(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in (["rum"], ["run"], ["run", "x", "--seed", "one"], ["run", "x", "--seed", "-1"], ["--wrong"]):
+    for arguments in (
+        ["rum"],
+        ["run"],
+        ["run", "x", "--seed", "one"],
+        ["run", "x", "--seed", "-1"],
+        ["--wrong"],
+    ):
         assert call(arguments) == BAD_INPUT
         assert "Traceback" not in capsys.readouterr().err
 
@@ -431,7 +475,9 @@ odd_values = st.one_of(
     st.integers(-(10**30), 10**30),
     st.floats(allow_nan=True, allow_infinity=True),
     st.text(max_size=8),
-    st.sampled_from(["ideal", "front", "exudyn", "smooth_curve", "none", "truth", "../..", "", "a.toml", "x.py:Y", "\0"]),
+    st.sampled_from(
+        ["ideal", "front", "exudyn", "smooth_curve", "none", "truth", "../..", "", "a.toml", "x.py:Y", "\0"]
+    ),
     st.lists(st.one_of(st.integers(-3, 3), st.floats(), st.text(max_size=3)), max_size=3),
     st.dictionaries(st.text(max_size=5), st.integers(-3, 3), max_size=2),
 )
@@ -480,7 +526,9 @@ def _at(content: Any, path: tuple[Any, ...]) -> Any:
 
 
 def test_no_cell_of_a_good_scenario_holds_a_list() -> None:
-    scenario = load_scenario("quick_kinematic", overrides=["ride.speed_kmh=[20, 50]", "odometry=['encoder','truth']"])
+    scenario = load_scenario(
+        "quick_kinematic", overrides=["ride.speed_kmh=[20, 50]", "odometry=['encoder','truth']"]
+    )
     for cell in cells(scenario):
         for value in (*cell.ride.model_dump().values(), cell.imu.grade, cell.spec.odometry, cell.spec.track):
             assert not isinstance(value, list)

@@ -6,6 +6,7 @@ import tomllib
 from itertools import product
 
 import pytest
+from pydantic import Field
 
 from simrail.errors import InputError
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
@@ -28,7 +29,7 @@ class Outer(Part):
     name: str = "x"
     speed: Listed[float] = 1.0
     inner: Inner = Inner()
-    options: dict[str, object] = {}
+    options: dict[str, object] = Field(default_factory=dict)
 
 
 @pytest.mark.parametrize("name", sorted(shipped("scenario")))
@@ -115,7 +116,9 @@ def test_seed_argument_replaces_the_seed_and_is_told() -> None:
 
 
 def test_cells_are_the_product_of_axes_rides_imus_and_draws() -> None:
-    text = GOOD.replace("[[imu]]", '[[ride]]\nname = "back"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 20.0\n\n[[imu]]')
+    text = GOOD.replace(
+        "[[imu]]", '[[ride]]\nname = "back"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 20.0\n\n[[imu]]'
+    )
     scenario = read_scenario(
         text,
         name="many",
@@ -181,7 +184,17 @@ def test_hash_covers_content_and_parts_but_not_comments() -> None:
     plain = hash_of(GOOD)
     assert hash_of("# a comment\n" + GOOD) == plain
     assert hash_of(GOOD, "seed=1") == plain
-    assert len({plain, hash_of(GOOD, "seed=2"), hash_of(GOOD, "ride.speed_kmh=51"), hash_of(GOOD, "track=level_straight")}) == 4
+    assert (
+        len(
+            {
+                plain,
+                hash_of(GOOD, "seed=2"),
+                hash_of(GOOD, "ride.speed_kmh=51"),
+                hash_of(GOOD, "track=level_straight"),
+            }
+        )
+        == 4
+    )
 
 
 def test_hash_changes_with_the_file_of_a_part(tmp_path) -> None:  # type: ignore[no-untyped-def]
