@@ -223,7 +223,7 @@ def read_scenario(
 
 def _options_as_axes(part: EstimatorPart) -> EstimatorPart:
     """Read lists among an estimator's options as axes; a list of lists is a list-valued option."""
-    options: dict[str, Any] = Field(default_factory=dict)
+    options: dict[str, Any] = {}
     for key, value in part.options.items():
         is_axis = (
             isinstance(value, list) and value and not any(isinstance(item, (list, dict)) for item in value)
