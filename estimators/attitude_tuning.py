@@ -187,8 +187,8 @@ def time_constant(
     # it, and there the left-hand side is convex: Newton falls towards the root and never below. The
     # number of steps is fixed, so that a sample's value does not depend on the others.
     third, fourth = white * gravity**2, 4.0 * bias * gravity**2
-    with np.errstate(divide="ignore"):
-        tau = np.minimum(
+    with np.errstate(divide="ignore", invalid="ignore"):  # without bias the second start is not there
+        tau = np.fmin(
             np.maximum(np.sqrt(2.0 * sensor / third), np.cbrt(4.0 * swing / third)),
             np.maximum(np.cbrt(2.0 * sensor / fourth), np.sqrt(np.sqrt(4.0 * swing / fourth))),
         )
