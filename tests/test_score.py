@@ -213,6 +213,17 @@ def test_windows_follow_the_track_and_the_true_speed() -> None:
         assert row["value"] == pytest.approx(np.sqrt(np.mean(error[mask] ** 2)), rel=1e-12)
 
 
+def test_a_stop_in_a_curve_counts_as_standstill_only() -> None:
+    motion = ride()
+    position = motion["position_m"].to_numpy(copy=True)
+    at = int(np.searchsorted(position, 200.0))
+    motion.iloc[at : at + 300, list(motion.columns).index("speed_mps")] = 0.0
+    table = score(estimated(motion, {}), motion, recorded(motion))
+    expected = np.count_nonzero((position >= 150.0) & (position < 250.0)) - 300
+    assert pick(table, quantity="roll", metric="rms", window="curve:part 2")["n_samples"] == expected
+    assert pick(table, quantity="roll", metric="rms", window="standstill")["n_samples"] == 1300
+
+
 def test_empty_window_is_a_row_that_says_so() -> None:
     motion = ride(500, rest=500)
     table = score(estimated(motion, {}, roll_sd_rad=np.full(500, 0.1)), motion, recorded(motion))
