@@ -61,6 +61,8 @@ _FULL_SCALE_RADIUS_M = 0.46
 """Grids and lengths below are those of a wheel of this radius and scale with the wheel's."""
 _SHIFT_STEP_M = 5e-5
 _ABSCISSA_STEP_M = 5e-5
+_SHIFT_STEPS_PER_SMOOTHING = 3.4
+"""A table coarser than this many eps would smooth the contact by itself, and differently per step."""
 _K0_1PM = 3.0
 """Relative lateral curvature of a typical tread contact: the datum of penetration and Hertz constant."""
 _FLANGE_SMOOTHING = 2.5
@@ -200,7 +202,7 @@ def build_contact(
     eps = smoothing * (static_load_n / hertz) ** (2.0 / 3.0)
 
     derailed, split_at = _limits(pair, scale)
-    step = _SHIFT_STEP_M * scale
+    step = min(_SHIFT_STEP_M * scale, _SHIFT_STEPS_PER_SMOOTHING * eps)
     count = round((2.0 * derailed + 0.009 * scale) / step)
     u: FloatArray = np.linspace(0.0, (count - 1) * step, count) - (derailed + 0.008 * scale)
     masks = [pair.s >= (pair.s[0] if split_at is None else split_at)]
@@ -250,7 +252,7 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
     A wheel that climbs lives on the steep face of its flange; past it the slope falls and nothing
     holds the wheel any more. Half the greatest slope marks that (12 mm for S1002 on 60E1 at 1435).
     """
-    u = scale * np.arange(0.0, 0.060, 2e-5)
+    u = scale * np.arange(0.0, 0.060, 1e-4)
     _, _, slope = pair.rigid(u)
     steepest = int(np.argmax(slope))
     if slope[steepest] < 0.5:
@@ -259,7 +261,7 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
             field="gauge_m",
             remedy="check gauge, tape circles and profiles against each other",
         )
-    if pair.rigid(np.zeros(1))[2][0] > 0.5:
+    if slope[0] > 0.5:
         raise InputError(
             "the centred wheelset already stands on its flanges",
             field="gauge_m",
@@ -267,7 +269,7 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
         )
     past = np.flatnonzero(slope[steepest:] < 0.5 * slope[steepest])
     last = steepest + int(past[0]) if past.size else u.size - 1
-    return float(u[last]), pair.split(u[: steepest + 1])
+    return float(u[last]), pair.split(np.arange(0.0, u[steepest] + 1e-4 * scale, 2e-5 * scale))
 
 
 def _creep_factors(

@@ -24,6 +24,8 @@ _STEEPEST = 30.0
 """A rail head goes on in a straight line beyond this slope: no wheel rests there."""
 _PROBE_YAW_RAD = 8e-3
 """Yaw at which the exact silhouette of the wheel is taken for the second derivative in yaw."""
+_YAW_MARGIN = 2e-3
+"""Of the wheel radius: no point of the wheel rises by more at the probe yaw while it can touch."""
 _SPLIT_SLOPE = 0.5
 """A jump of the rigid contact by more than this slope makes a flange patch of its own."""
 
@@ -200,21 +202,23 @@ class ContactPair:
         turned_z = radius * np.sqrt(np.maximum(1.0 - (wheel_slope * tan) ** 2, 0.0)) - self.radius_m
         out = SoftContact(*np.empty((len(SoftContact._fields), u.size)))
         for i, shift in enumerate(u + self.offset_m):
-            rail_slope = self.head.slope(s + shift)
             gap = wheel - self.head.depth(s + shift)
             top = gap.max()
-            w = np.exp((gap - top) / eps_m)
+            # All else is below exp(-60), upright or turned.
+            near = np.flatnonzero(gap > top - 60.0 * eps_m - _YAW_MARGIN * self.radius_m)
+            at, rail_slope = s[near], self.head.slope(s[near] + shift)
+            w = np.exp((gap[near] - top) / eps_m)
             total = w.sum()
             w /= total
             out.penetration[i] = top + eps_m * np.log(total) + level
-            out.abscissa[i] = w @ s
-            out.depth[i] = w @ wheel
-            out.spread[i] = w @ (s - out.abscissa[i]) ** 2 / eps_m
+            out.abscissa[i] = w @ at
+            out.depth[i] = w @ wheel[near]
+            out.spread[i] = w @ (at - out.abscissa[i]) ** 2 / eps_m
             out.slope[i] = -(w @ rail_slope)
-            out.curvature[i] = w @ (wheel_slope - rail_slope) ** 2 / eps_m
-            gap = turned_z - self.head.depth(turned_e + shift)
+            out.curvature[i] = w @ (wheel_slope[near] - rail_slope) ** 2 / eps_m
+            out.roll_rise[i] = out.depth[i] * out.slope[i] - out.abscissa[i]
+            gap = turned_z[near] - self.head.depth(turned_e[near] + shift)
             top = gap.max()
             turned = top + eps_m * np.log(np.exp((gap - top) / eps_m).sum()) + level
-            out.roll_rise[i] = out.depth[i] * out.slope[i] - out.abscissa[i]
             out.yaw_rise[i] = (turned - out.penetration[i]) / (0.5 * _PROBE_YAW_RAD**2)
         return out

@@ -306,7 +306,7 @@ def axle_forces(axle, wheels, spin, zeta, spins, grid, table, coef, const, pose,
         wr[3] += mx - about * ex - h * (b[16] * ez - b[17] * ey)
         wr[4] += my - about * ey - h * (b[17] * ex - b[15] * ez)
         wr[5] += mz - about * ez - h * (b[15] * ey - b[16] * ex)
-        memo[3 + n] = o[6]
+        memo[3 + n] = o[2]
 
 
 @njit
