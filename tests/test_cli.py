@@ -40,6 +40,17 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture
+def no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare the figures of the report, where it does not matter what is drawn."""
+
+    def write(path: Path, **keywords: object) -> None:
+        assert set(keywords) == {"scenario", "scores", "cells", "examples", "manifest"}
+        path.write_text("<html></html>")
+
+    monkeypatch.setattr(results, "write_report", write)
+
+
 def names_in(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
@@ -91,11 +102,13 @@ def test_run_writes_everything_and_replaces_former_results(
         assert path not in text or path == "/"
 
 
+@pytest.mark.usefixtures("no_drawing")
 def test_run_into_a_folder_of_choice(here: Path) -> None:
     assert call(["run", "quick_kinematic", *QUICK, "--out", "a/b"]) == DONE
     assert names_in(here / "a" / "b") == FILES and names_in(here) == {"a"}
 
 
+@pytest.mark.usefixtures("no_drawing")
 def test_failed_cell_gives_code_1_and_its_reason(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "bad.py").write_text(
         "from dataclasses import dataclass\n\n\n@dataclass(frozen=True)\nclass Bad:\n    causal = True\n\n"
@@ -117,6 +130,7 @@ def test_failed_cell_gives_code_1_and_its_reason(here: Path, capsys: pytest.Capt
     ("fault", "code"),
     [(KeyboardInterrupt(), INTERRUPTED), (OSError(28, "No space left on device"), CELL_FAILED)],
 )
+@pytest.mark.usefixtures("no_drawing")
 def test_former_results_survive_a_fault_while_writing(
     fault: BaseException,
     code: int,
@@ -182,6 +196,7 @@ def test_check_says_what_will_be_run(capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.parametrize("kind", ["estimator", "track", "vehicle", "imu", "scenario"])
+@pytest.mark.usefixtures("no_drawing")
 def test_templates_work_as_written(kind: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["new", kind, "my_part"]) == DONE
     said = capsys.readouterr().out
@@ -217,12 +232,8 @@ def test_estimator_template_is_a_good_estimator(here: Path) -> None:
     from simrail.testing import check_estimator
 
     assert call(["new", "estimator", "my_filter"]) == DONE
-    assert (
-        subprocess.run(
-            [sys.executable, "-m", "ruff", "check", "--line-length=100", "my_filter.py"]
-        ).returncode
-        == 0
-    )
+    options = ["--line-length=100", "--config", 'lint.isort.known-first-party=["simrail"]']
+    subprocess.run([sys.executable, "-m", "ruff", "check", *options, "my_filter.py"], check=True)
     spec = spec_from_file_location("my_filter", here / "my_filter.py")
     assert spec is not None and spec.loader is not None
     module = module_from_spec(spec)
@@ -233,6 +244,7 @@ def test_estimator_template_is_a_good_estimator(here: Path) -> None:
     check_estimator(module.MyFilter(), example.recording)
 
 
+@pytest.mark.usefixtures("no_drawing")
 def test_cache_is_shown_and_cleared(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["run", "quick_kinematic", *QUICK, "--set", "ride.speed_kmh=33"]) == DONE
     capsys.readouterr()
