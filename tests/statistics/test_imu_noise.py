@@ -200,8 +200,8 @@ def white_part(frame: pd.DataFrame, grade: ImuGrade) -> np.ndarray:
     """Innovations of a Gauss-Markov sequence (of a white one: itself), so that 4/sqrt(n) applies."""
     values = frame.to_numpy()
     if grade.gyro_bias_instability_radps > 0.0:
-        values = values[1:] - np.exp(-1.0 / (grade.gyro_bias_correlation_s * grade.rate_hz)) * values[:-1]
-    return values[: len(frame) - 1]
+        return values[1:] - np.exp(-1.0 / (grade.gyro_bias_correlation_s * grade.rate_hz)) * values[:-1]
+    return values[1:]
 
 
 def correlations(grades: tuple[ImuGrade, ...], seeds: tuple[int, ...]) -> np.ndarray:
