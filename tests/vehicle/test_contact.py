@@ -32,9 +32,8 @@ BENCHMARK = [
     (-1, 4.0, 0.0676, -0.0002557, 0.0096, -4.344093, -15.3505, -0.1078, 9745, -379.6, -1833.0, 664),
     (-1, 5.0, 0.0015, -0.0003554, 0.012, -4.3353637, -28.0471, -0.2905, 9619, -763.3, 131.6, 1556),
 ]
-ARGUMENTS = (
-    "side y z phi psi y_rail z_rail V v_x y_dot z_dot phi_dot psi_dot W kappa_h dy_rail dz_rail".split()
-)
+ARGUMENTS = ("side", "y", "z", "phi", "psi", "y_rail", "z_rail", "V", "v_x", "y_dot", "z_dot", "phi_dot")
+ARGUMENTS += ("psi_dot", "W", "kappa_h", "dy_rail", "dz_rail")
 
 
 @cache
