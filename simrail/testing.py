@@ -44,7 +44,8 @@ def check_estimator(estimator: Estimator, recording: Recording) -> None:
     failures = []
     for check in CHECKS:
         try:
-            check(estimator, recording)
+            # Its own copy, so that an estimator that spoils one recording does not spoil the others.
+            check(estimator, copy.deepcopy(recording))
         except Exception as error:
             failures.append(f"{check.__name__}: {type(error).__name__}: {error}")
     assert not failures, f"{type(estimator).__name__} breaks the contract:\n" + "\n".join(failures)

@@ -121,6 +121,7 @@ def line_motion(speed_kmh: float, direction: int) -> pd.DataFrame:
     return line_truth(speed_kmh, direction).motion(IMU_AT)
 
 
+@lru_cache(maxsize=8)
 def record_line(speed_kmh: float, direction: int, draw: int) -> Recording:
     """That ride as the 3DM-GX4-25 and an encoder with a wheel that is not quite nominal record it."""
     return measure(

@@ -1,0 +1,294 @@
+"""The battery passes what it should, and each of its checks fails on a fault planted for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from estimators.ahrs import Vqf
+from estimators.attitude_ekf import AttitudeEkf
+from estimators.attitude_gda import AttitudeGda
+from estimators.baselines import DesignAngles
+from simrail.columns import ATTITUDE
+from simrail.estimate import Estimate, Estimator
+from simrail.measure import measure
+from simrail.profile import SpeedProfile
+from simrail.recording import Recording
+from simrail.scenario.imu_file import load_grade
+from simrail.scenario.track_file import track_by_name
+from simrail.sensors.encoder import EncoderSpec
+from simrail.testing import check_estimator
+from simrail.truth import Mount
+from simrail.vehicle.kinematic_engine import harmonic, kinematic_truth
+
+
+@lru_cache
+def ride(direction: int = 1, imu: str = "lord_3dm_gx4_25") -> Recording:
+    """A short ride with a rest of 3 s, through a curve."""
+    start, end = (430.0, 560.0) if direction > 0 else (560.0, 430.0)
+    truth = kinematic_truth(
+        track_by_name("condequinto_olivar"),
+        SpeedProfile(start, end, 10.0, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=3.0),
+        channels={"roll": harmonic(0.005, frequency_hz=1.1), "lateral": harmonic(0.003, frequency_hz=0.7)},
+    )
+    return measure(
+        truth,
+        name="short",
+        mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
+        grade=load_grade(imu),
+        encoder=EncoderSpec("wheel", radius_error_sd=0.001),
+        seed=1,
+        draw=0,
+    )
+
+
+OURS = [
+    AttitudeEkf(),
+    AttitudeEkf(compensated=False),
+    AttitudeEkf(tuning="paper_final"),
+    AttitudeEkf(tuning="paper_initial", process_noise="per_step", rest_bias=False),
+    AttitudeEkf(printed=True),
+    AttitudeGda(),
+    AttitudeGda(compensated=False),
+    DesignAngles(),
+    Vqf(),
+    Vqf(compensated=True),
+]
+
+
+@pytest.mark.parametrize("estimator", OURS, ids=str)
+def test_ours_pass(estimator: Estimator) -> None:
+    check_estimator(estimator, ride())
+
+
+@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda(), Vqf()], ids=str)
+def test_ours_pass_backwards_and_with_a_perfect_imu(estimator: Estimator) -> None:
+    check_estimator(estimator, ride(-1, "ideal"))
+
+
+def test_ours_pass_without_an_encoder() -> None:
+    check_estimator(AttitudeEkf(), replace(ride(), encoder=None, encoder_sheet=None))
+
+
+def angles(recording: Recording) -> pd.DataFrame:
+    """A harmless estimate to put faults into."""
+    gyro = recording.imu.to_numpy()[:, :3]
+    return pd.DataFrame(np.cumsum(gyro, axis=0) * 0.004, index=recording.imu.index, columns=list(ATTITUDE))
+
+
+@dataclass(frozen=True)
+class Sound:
+    """What the faulty ones would be without their fault."""
+
+    causal = True
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return Estimate(states=self.spoil(angles(recording), recording), mount=recording.mount)
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states
+
+
+def test_the_sound_one_passes() -> None:
+    check_estimator(Sound(), ride())
+
+
+class LookAhead(Sound):
+    """Uses the next sample."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.shift(-1).ffill()
+
+
+class MeanOfAll(Sound):
+    """Takes off the mean of the whole ride: the commonest look-ahead."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states - states.mean()
+
+
+class BiasFromTheWholeRest(Sound):
+    """Subtracts the mean over the whole rest, also at the rest's start: shows in the rest only."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        speed = recording.odometry["speed_mps"].to_numpy()
+        rest = int(np.argmax(speed != 0.0)) or len(speed)
+        return states - recording.imu.to_numpy()[:rest, :3].mean(axis=0)
+
+
+class Mutating(Sound):
+    """Takes the bias off in place."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        recording.imu["gyro_x_radps"] -= 0.001
+        return states
+
+
+class AddsOdometryColumn(Sound):
+    """Leaves something behind in the odometry."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        recording.odometry["curvature_1pm"] = 0.0
+        return states
+
+
+class WrongColumn(Sound):
+    """Degrees, under a name of its own."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return np.degrees(states).rename(columns={"roll_rad": "roll_deg"})
+
+
+class NotANumber(Sound):
+    """One NaN in the middle."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        states.iloc[len(states) // 2, 1] = np.nan
+        return states
+
+
+class Shorter(Sound):
+    """Drops the first sample."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.iloc[1:]
+
+
+class NegativeSd(Sound):
+    """States a negative standard deviation."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.assign(roll_sd_rad=-1.0)
+
+
+class Random(Sound):
+    """Jitters by itself."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states + 1e-12 * np.random.default_rng().standard_normal(states.shape)
+
+
+MEMORY: list[float] = [0.0]
+
+
+class Remembers(Sound):
+    """Carries the last ride's end into the next."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        states = states + MEMORY[0]
+        MEMORY[0] = float(states.iloc[-1, 0])
+        return states
+
+
+class DividesBySpeed(Sound):
+    """Cannot stand: 0/0 at rest."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        speed = np.abs(recording.odometry["speed_mps"]).cummax()
+        with np.errstate(invalid="ignore"):
+            return states.mul(speed.iloc[-1] / speed.iloc[-1], axis=0)
+
+
+class ForwardOnly(Sound):
+    """Cannot run backwards: a square root of the way made."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        way = recording.odometry["position_m"].iloc[-1] - recording.start_position_m
+        with np.errstate(invalid="ignore"):
+            return states + 0.0 * np.sqrt(way + 1e-6)
+
+
+class OtherMount(Sound):
+    """Speaks of another IMU."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return replace(super().estimate(recording), mount="roof")
+
+
+class CrookedCovariance(Sound):
+    """A covariance that is not symmetric."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        covariance = np.tile(np.eye(3), (len(recording.imu), 1, 1))
+        covariance[:, 0, 1] = 0.1
+        return replace(super().estimate(recording), covariance=covariance, covariance_of=ATTITUDE)
+
+
+class IndefiniteCovariance(Sound):
+    """A correlation of 2."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        covariance = np.tile(np.eye(3), (len(recording.imu), 1, 1))
+        covariance[:, 0, 1] = covariance[:, 1, 0] = 2.0
+        return replace(super().estimate(recording), covariance=covariance, covariance_of=ATTITUDE)
+
+
+class UnsaidCausal(Sound):
+    """Does not say whether it is causal."""
+
+    causal = None
+
+
+class NoDataclass:
+    """Has no parameters that could be written down."""
+
+    causal = True
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return Sound().estimate(recording)
+
+
+@dataclass
+class Thawed:
+    """Parameters that can be changed behind one's back."""
+
+    causal = True
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return Sound().estimate(recording)
+
+
+class SmootherThatSaysSo(MeanOfAll):
+    """Looks ahead, and says so: allowed."""
+
+    causal = False
+
+
+@pytest.mark.parametrize(
+    ("faulty", "check", "words"),
+    [
+        (LookAhead, "sees_no_future", "differs from sample"),
+        (MeanOfAll, "sees_no_future", "differs from sample"),
+        (BiasFromTheWholeRest, "sees_no_future", "differs from sample 0"),
+        (Mutating, "leaves_the_recording_alone", "changed imu"),
+        (AddsOdometryColumn, "leaves_the_recording_alone", "changed odometry"),
+        (WrongColumn, "estimate_is_well_formed", "roll_deg"),
+        (NotANumber, "estimate_is_well_formed", "not finite in pitch_rad"),
+        (Shorter, "estimate_is_well_formed", "not at the IMU's times"),
+        (NegativeSd, "estimate_is_well_formed", "negative"),
+        (Random, "is_deterministic", "run again"),
+        (Remembers, "is_deterministic", "run again"),
+        (DividesBySpeed, "works_at_standstill", "not finite"),
+        (ForwardOnly, "works_backwards", "not finite"),
+        (OtherMount, "estimate_is_well_formed", "roof"),
+        (CrookedCovariance, "estimate_is_well_formed", "not symmetric"),
+        (IndefiniteCovariance, "estimate_is_well_formed", "positive semidefinite"),
+        (UnsaidCausal, "says_whether_causal", "causal"),
+        (NoDataclass, "frozen_dataclass", "no dataclass"),
+        (Thawed, "frozen_dataclass", "not frozen"),
+    ],
+)
+def test_a_planted_fault_is_caught_by_its_check(faulty: Callable, check: str, words: str) -> None:
+    with pytest.raises(AssertionError) as caught:
+        check_estimator(faulty(), ride())
+    lines = [line for line in str(caught.value).splitlines() if line.startswith(check)]
+    assert lines and words in lines[0]
+
+
+def test_a_smoother_may_look_ahead() -> None:
+    check_estimator(SmootherThatSaysSo(), ride())

@@ -1,0 +1,76 @@
+"""Design angles, the quaternion helpers, and the VQF wrapper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from estimators.ahrs import Vqf
+from estimators.baselines import DesignAngles
+from estimators.quaternions import from_euler, level, to_euler
+from simrail.columns import ATTITUDE
+from simrail.testing import standing
+
+
+def test_design_angles_are_the_tracks(bend: Callable, exactly: Callable) -> None:
+    recording = exactly(bend())
+    states = DesignAngles().estimate(recording).states
+    frame = recording.track.frame(recording.odometry["position_m"].to_numpy())
+    np.testing.assert_array_equal(states["roll_rad"], frame.roll_rad)
+    np.testing.assert_array_equal(states["pitch_rad"], frame.pitch_rad)
+    np.testing.assert_array_equal(states["yaw_rad"], frame.yaw_rad)
+
+
+def test_design_angles_use_no_imu(bend: Callable, exactly: Callable) -> None:
+    recording = exactly(bend())
+    before = DesignAngles().estimate(recording).states
+    recording.imu.iloc[:, :] = 0.0
+    np.testing.assert_array_equal(DesignAngles().estimate(recording).states, before)
+
+
+def test_quaternions_agree_with_scipy() -> None:
+    rng = np.random.default_rng(4)
+    for roll, pitch, yaw in rng.uniform([-3, -1.5, -3], [3, 1.5, 3], (20, 3)):
+        ours = from_euler(roll, pitch, yaw)
+        x, y, z, w = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat()
+        # A quaternion and its negative are the same attitude.
+        assert abs(ours @ [w, x, y, z]) == pytest.approx(1.0, abs=1e-14)
+        np.testing.assert_allclose(
+            to_euler(ours[None], start_yaw_rad=0.0)[0], [roll, pitch, yaw], rtol=0, atol=1e-12
+        )
+
+
+def test_yaw_is_unwrapped_from_the_turn_of_its_start() -> None:
+    yaw = np.linspace(6.0, 14.0, 50)
+    quaternions = np.array([from_euler(0.0, 0.0, angle) for angle in yaw])
+    np.testing.assert_allclose(to_euler(quaternions, start_yaw_rad=6.1)[:, 2], yaw, rtol=0, atol=1e-12)
+
+
+def test_level_inverts_gravity() -> None:
+    roll, pitch = 0.2, -0.3
+    up = Rotation.from_euler("ZYX", [1.0, pitch, roll]).inv().apply([0.0, 0.0, 9.81])
+    np.testing.assert_allclose(level(up), (roll, pitch), rtol=1e-12)
+
+
+def test_vqf_finds_attitude_and_heading_in_our_convention(
+    bend: Callable, exactly: Callable, true_angles: Callable
+) -> None:
+    truth = bend()
+    recording = exactly(truth)
+    true = true_angles(truth, recording)
+    error = Vqf(compensated=True).estimate(recording).states[list(ATTITUDE)].to_numpy() - true
+    # VQF takes part of the turning for gyro bias; an axis or a sign wrong would cost far more.
+    assert np.degrees(np.abs(error[:, :2])).max() < 1.0
+    assert np.degrees(np.abs(error[:, 2])).max() < 4.0
+    assert np.degrees(np.ptp(true[:, 2])) > 20.0  # and that was no small turn
+    plain = Vqf().estimate(recording).states["roll_rad"].to_numpy() - true[:, 0]
+    assert np.degrees(np.abs(plain)).max() > 1.0
+
+
+def test_vqf_starts_at_the_designs_yaw(bend: Callable, exactly: Callable) -> None:
+    recording = standing(exactly(bend(direction=-1)))
+    frame = recording.track.frame(recording.odometry["position_m"].iloc[:1])
+    assert Vqf().estimate(recording).states["yaw_rad"].iloc[0] == frame.yaw_rad[0]
