@@ -90,9 +90,9 @@ class AttitudeEkf:
 
     def __post_init__(self) -> None:
         check_tuning(self.tuning, self.process_noise)
-        if self.backend not in _BACKENDS:
+        if self.backend not in BACKENDS:
             raise InputError(
-                "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(_BACKENDS)
+                "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
             )
         for name in (
             "gyro_intensity_rad2ps",
@@ -113,7 +113,7 @@ class AttitudeEkf:
         arrays, considered = self._arrays(recording)
         n = arrays.rate.shape[0]
         states, covariance, innovations = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 4))
-        _BACKENDS[self.backend](*arrays, states, covariance, innovations)
+        BACKENDS[self.backend](*arrays, states, covariance, innovations)
         for axis in range(3):
             covariance[:, axis, axis] += considered[:, axis]
         sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
@@ -216,4 +216,5 @@ def _filterpy_ekf(
         innovations[k, :3], innovations[k, 3] = ekf.y, ekf.y @ ekf.SI @ ekf.y
 
 
-_BACKENDS = {"compiled": attitude_ekf, "filterpy": _filterpy_ekf}
+BACKENDS = {"compiled": attitude_ekf, "filterpy": _filterpy_ekf}
+"""Loops that can run the filter, by name; all take the arguments of the kernel."""

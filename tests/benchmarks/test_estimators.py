@@ -1,0 +1,174 @@
+"""Time per sample of the attitude estimators, beside those that others wrote, on one and the same signal.
+
+    pytest tests/benchmarks/test_estimators.py --benchmark-only
+
+Every kernel gets arrays that are ready; `estimate` is timed too, from recording to data frame. The
+estimators of `ahrs` and `imufusion` are timed where these packages are installed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from vqf import VQF
+
+from estimators.attitude_ekf import BACKENDS, AttitudeEkf
+from estimators.attitude_gda import AttitudeGda
+from estimators.compensation import gravity_force, track_acceleration
+from estimators.kernels.attitude import attitude_gda
+from estimators.rest_bias import rest_bias, step_rates
+from simrail.measure import measure
+from simrail.profile import SpeedProfile
+from simrail.recording import Recording
+from simrail.scenario.imu_file import load_grade
+from simrail.scenario.track_file import track_by_name
+from simrail.sensors.encoder import EncoderSpec
+from simrail.truth import Mount
+from simrail.vehicle.kinematic_engine import harmonic, kinematic_truth
+
+SLOW = 4000
+"""Samples for those that run in Python."""
+
+
+@lru_cache
+def ride() -> Recording:
+    """Some 100 s over the line at 70 km/h."""
+    truth = kinematic_truth(
+        track_by_name("condequinto_olivar"),
+        SpeedProfile(10.0, 1500.0, 70.0 / 3.6),
+        channels={"roll": harmonic(0.005, frequency_hz=1.1), "lateral": harmonic(0.003, frequency_hz=1.7)},
+    )
+    return measure(
+        truth,
+        name="benchmark",
+        mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("wheel"),
+        seed=1,
+        draw=0,
+    )
+
+
+@lru_cache
+def ekf_arguments(n: int | None = None) -> tuple:
+    """What both backends of the EKF take, outputs included."""
+    arrays, _ = AttitudeEkf()._arrays(ride())
+    rate, force, process, noise, *rest = arrays
+    rows = len(rate[:n])
+    outputs = np.empty((rows, 3)), np.empty((rows, 3, 3)), np.empty((rows, 4))
+    return (rate[:n], force[:n], process[:n], noise[:n], *rest, *outputs)
+
+
+@lru_cache
+def signals() -> tuple[np.ndarray, np.ndarray]:
+    """Rate and compensated force, (n, 3) each."""
+    recording = ride()
+    rate = step_rates(recording, rest_bias(recording).bias)
+    return rate, gravity_force(recording, compensated=True)
+
+
+def best_us(function: Callable[[], object], samples: int, *, rounds: int = 5) -> float:
+    """Least time of some rounds, us per sample: what the machine can do when nothing disturbs it."""
+    function()
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - start)
+    return 1e6 * min(times) / samples
+
+
+def report(benchmark: Callable, function: Callable[[], object], samples: int, **extra: float) -> float:
+    """Run the benchmark and store its figures under plain names; returns us per sample."""
+    function()
+    benchmark.pedantic(function, rounds=10, iterations=1, warmup_rounds=1)
+    us = 1e6 * benchmark.stats.stats.min / samples
+    benchmark.extra_info["us_per_sample"] = us
+    for name, other in extra.items():
+        benchmark.extra_info[name] = other / us
+    return us
+
+
+def filterpy_us() -> float:
+    arguments = ekf_arguments(SLOW)
+    return best_us(lambda: BACKENDS["filterpy"](*arguments), SLOW, rounds=2)
+
+
+def vqf_us() -> float:
+    rate, force = signals()
+    return best_us(lambda: VQF(0.004).updateBatch(rate, force), len(rate))
+
+
+def ahrs_madgwick_us() -> float:
+    filters = pytest.importorskip("ahrs.filters", reason="ahrs is not installed")
+    rate, force = signals()
+    return best_us(
+        lambda: filters.Madgwick(gyr=rate[:SLOW], acc=force[:SLOW], frequency=250.0), SLOW, rounds=2
+    )
+
+
+def imufusion_us() -> float:
+    imufusion = pytest.importorskip("imufusion", reason="imufusion is not installed")
+    rate, force = signals()
+    degrees, g = np.degrees(rate[:SLOW]), force[:SLOW] / 9.81
+
+    def run() -> None:
+        ahrs = imufusion.Ahrs()
+        ahrs.set_sample_period(0.004)  # since imufusion 1.3
+        for w, z in zip(degrees, g, strict=True):
+            ahrs.update_no_magnetometer(w, z)
+
+    return best_us(run, SLOW, rounds=2)
+
+
+def gda_arguments() -> tuple:
+    rate, force = signals()
+    return rate, force, np.array([1.0, 0.0, 0.0, 0.0]), 7.56e-3, 0.004, np.empty((len(rate), 4))
+
+
+def test_ekf_kernel(benchmark: Callable) -> None:
+    arguments = ekf_arguments()
+    kernel = BACKENDS["compiled"]
+    us = report(
+        benchmark,
+        lambda: kernel(*arguments),
+        len(arguments[0]),
+        ratio_to_filterpy=filterpy_us(),
+        ratio_to_vqf=vqf_us(),
+    )
+    assert us < 0.5
+
+
+def test_gda_kernel(benchmark: Callable) -> None:
+    arguments = gda_arguments()
+    us = report(
+        benchmark,
+        lambda: attitude_gda(*arguments),
+        len(arguments[0]),
+        ratio_to_filterpy=filterpy_us(),
+        ratio_to_vqf=vqf_us(),
+    )
+    assert us < 0.3
+
+
+def test_gda_beside_ahrs_madgwick(benchmark: Callable) -> None:
+    arguments = gda_arguments()
+    report(benchmark, lambda: attitude_gda(*arguments), len(arguments[0]), ratio_to_ahrs=ahrs_madgwick_us())
+
+
+def test_gda_beside_imufusion(benchmark: Callable) -> None:
+    arguments = gda_arguments()
+    report(benchmark, lambda: attitude_gda(*arguments), len(arguments[0]), ratio_to_imufusion=imufusion_us())
+
+
+@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda()], ids=["ekf", "gda"])
+def test_whole_estimate(benchmark: Callable, estimator: AttitudeEkf | AttitudeGda) -> None:
+    report(benchmark, lambda: estimator.estimate(ride()), len(ride().imu), ratio_to_filterpy=filterpy_us())
+
+
+def test_compensation(benchmark: Callable) -> None:
+    report(benchmark, lambda: track_acceleration(ride()), len(ride().imu))
