@@ -216,8 +216,9 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         frame = frame.merge(cells[["cell", *axes]], on="cell", how="left")
     # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
     frame["failed"] = (frame["status"] != OK).astype(np.int64)
-    text = [n for n in SCORE_COLUMNS if n not in (*INTEGER_COLUMNS, "value", "status")]
-    keys = [*text[:-5], *axes, *text[-5:]]
+    labels = [name for name in LABEL_COLUMNS if name not in INTEGER_COLUMNS]
+    figure = [name for name in FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
+    keys = [*labels, *axes, *figure]
     per_track = (
         frame.groupby([*keys, "track_draw"], observed=True, dropna=False, sort=False)
         .agg(mean=("value", "mean"), var=("value", "var"), draws=("value", "count"), failed=("failed", "sum"))

@@ -118,6 +118,7 @@ def write_report(
         odometry=odometry_table(all_cases[:MOST_TABLES]),
         failures=_failures(scores),
         rows=len(scores),
+        imus=len(scores[["mount", "imu"]].drop_duplicates()),
     )
     path.write_text(text, encoding="utf-8")
 

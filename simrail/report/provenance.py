@@ -64,9 +64,7 @@ def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult
         except InputError:
             continue
         assumed = f" Assumed: {imu.assumed}" if imu.assumed else ""
-        result["imu", name] = Part(
-            "IMU", name, "simulated from its data sheet", f"{imu.title}. {imu.source}.{assumed}"
-        )
+        result["imu", name] = Part("IMU", name, "simulated", f"{imu.title} ({imu.source}).{assumed}")
     return list(result.values())
 
 

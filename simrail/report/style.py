@@ -86,17 +86,19 @@ def panels(
             tall / height,
         )
         axis = figure.add_axes(box, sharex=axes[0] if axes else None)
+        # A fixed place, so that no label depends on the width of its tick labels.
+        axis.yaxis.set_label_coords(-0.46 / (WIDTH_IN - left_in - right_in), 0.5)
         axes.append(axis)
         edge -= tall + gap
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
-    figure.align_ylabels(axes)
     return figure, axes
 
 
 def log_ticks(axis: Axis) -> None:
-    """Label a logarithmic axis at 1, 2 and 5 of each decade, without exponents."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    """Label a logarithmic axis without exponents: at 1, 2 and 5 of each decade, or at 1 of many."""
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60.0 * low else (1.0,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
