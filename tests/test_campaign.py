@@ -205,9 +205,14 @@ def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch)
     assert found.examples[0].cell["speed_kmh"] == 30.0
 
 
-def test_interrupt_ends_the_campaign_even_if_it_was_swallowed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls = []
+
     def swallow(ride, *, progress=None):  # type: ignore[no-untyped-def]
         # What a C++ library does with an exception in its callback.
+        calls.append(ride.name)
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
@@ -216,7 +221,8 @@ def test_interrupt_ends_the_campaign_even_if_it_was_swallowed(monkeypatch: pytes
     monkeypatch.setattr(campaign, "simulate", swallow)
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(short("sensor_draws=1"))
+        run_campaign(short("sensor_draws=1", "ride.speed_kmh=[30.0, 50.0]"))
+    assert calls == ["out"]
     assert signal.getsignal(signal.SIGINT) is before
 
 
