@@ -16,7 +16,9 @@ from simrail.jit import FloatArray, njit
 
 
 @njit
-def _derivative(q, w, f, gravity, dq, dv):
+def _derivative(
+    q: FloatArray, w: FloatArray, f: FloatArray, gravity: float, dq: FloatArray, dv: FloatArray
+) -> None:
     """dq = q (0, w) / 2 and dv = C(q) f - g e_z, for a quaternion (scalar first) body to global."""
     a, b, c, d = q[0], q[1], q[2], q[3]
     dq[0] = 0.5 * (-b * w[0] - c * w[1] - d * w[2])
@@ -31,14 +33,13 @@ def _derivative(q, w, f, gravity, dq, dv):
         2 * (b * c + a * d) * f[0] + (a * a - b * b + c * c - d * d) * f[1] + 2 * (c * d - a * b) * f[2]
     )
     dv[2] = (
-        s
-        * (2 * (b * d - a * c) * f[0] + 2 * (c * d + a * b) * f[1] + (a * a - b * b - c * c + d * d) * f[2])
+        s * (2 * (b * d - a * c) * f[0] + 2 * (c * d + a * b) * f[1] + (a * a - b * b - c * c + d * d) * f[2])
         - gravity
     )
 
 
 @njit
-def _integrate(gyro, accel, step, gravity, out):
+def _integrate(gyro: FloatArray, accel: FloatArray, step: float, gravity: float, out: FloatArray) -> None:
     """Classical Runge-Kutta from sample to sample; gyro, accel (2 n - 1, 3) hold the midpoints, too."""
     q, v, p = out[0, :4].copy(), out[0, 4:7].copy(), out[0, 7:].copy()
     h = step

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numba
 import numpy as np
@@ -40,10 +40,10 @@ def kernel_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-numba.config.CACHE_DIR = str(cache_folder() / "kernels" / kernel_hash())
+_KERNELS = str(cache_folder() / "kernels" / kernel_hash())
+numba.config.CACHE_DIR = _KERNELS  # type: ignore[attr-defined]
 
 
 def njit(function: _Function) -> _Function:
     """Compile a function for float64 arrays: cached on disk, without the GIL, IEEE division."""
-    compiled: _Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    return cast("_Function", numba.njit(cache=True, nogil=True, error_model="numpy")(function))

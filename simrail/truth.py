@@ -158,7 +158,10 @@ class Truth:
         """
         if mount.body not in self.bodies:
             raise InputError(
-                "the vehicle has no such body", field="body", value=mount.body, limit=", ".join(self.body_names)
+                "the vehicle has no such body",
+                field="body",
+                value=mount.body,
+                limit=", ".join(self.body_names),
             )
         body = self.bodies[mount.body]
         rotation = rotation_matrix(body.angles)
@@ -223,7 +226,11 @@ def _track_rotation(frame: TrackFrame) -> FloatArray:
 
 
 def _along_track(
-    track: TrackDesign, guess: FloatArray, position: FloatArray, velocity: FloatArray, acceleration: FloatArray
+    track: TrackDesign,
+    guess: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
 ) -> tuple[TrackFrame, FloatArray, FloatArray, FloatArray]:
     """Track frame abeam of points, with ds/dt, d2s/dt2 and the (lateral, vertical) place in it.
 
@@ -263,7 +270,9 @@ BODY_ARRAYS = ("position", "velocity", "acceleration", "angles", "rate", "angula
 """Columns of a body on disk: six triples, in this order."""
 
 
-def create_arrays(folder: Path, rows: int, *, bodies: int, wheels: int, wheel_states: int) -> dict[str, FloatArray]:
+def create_arrays(
+    folder: Path, rows: int, *, bodies: int, wheels: int, wheel_states: int
+) -> dict[str, FloatArray]:
     """Create the arrays of a truth on disk, to be filled piece by piece in bounded memory.
 
     Returns
@@ -311,7 +320,11 @@ def save_truth(truth: Truth, folder: Path) -> None:
     """Write a truth into a folder, losslessly."""
     states = max((state.shape[1] for state in truth.wheel_states.values()), default=0)
     arrays = create_arrays(
-        folder, len(truth.time_s), bodies=len(truth.bodies), wheels=len(truth.wheel_angles), wheel_states=states
+        folder,
+        len(truth.time_s),
+        bodies=len(truth.bodies),
+        wheels=len(truth.wheel_angles),
+        wheel_states=states,
     )
     arrays["time_s"][:] = truth.time_s
     arrays["reference_position_m"][:] = truth.reference_position_m
@@ -361,7 +374,9 @@ def load_truth(folder: Path) -> Truth:
         reference_position_m=np.array(read("reference_position_m")),
         bodies=bodies,
         wheel_angles={wheel: read(f"wheel_{i}") for i, wheel in enumerate(wheels)},
-        wheel_states={wheel: read(f"wheel_state_{i}") for i, wheel in enumerate(wheels)} if has_states else {},
+        wheel_states={wheel: read(f"wheel_state_{i}") for i, wheel in enumerate(wheels)}
+        if has_states
+        else {},
         wheel_radius_m=wheels,
         gravity_mps2=plain["gravity_mps2"],
         manifest=plain["manifest"],

@@ -74,8 +74,8 @@ class VehicleFile(Part):
     rail_profile: Literal["60E1"]
     friction: Annotated[float, Field(gt=0, le=1.0)]
     axle: Annotated[list[AxleEntry], Field(min_length=1)]
-    body: list[BodyEntry] = []
-    suspension: list[SuspensionEntry] = []
+    body: tuple[BodyEntry, ...] = ()
+    suspension: tuple[SuspensionEntry, ...] = ()
     guide: GuideEntry
 
     @model_validator(mode="after")
@@ -83,15 +83,21 @@ class VehicleFile(Part):
         names = [axle.name for axle in self.axle] + [body.name for body in self.body]
         twice = {name for name in names if names.count(name) > 1}
         if twice:
-            raise InputError("two bodies share a name", field="name", value=sorted(twice)[0], remedy="rename one")
+            raise InputError(
+                "two bodies share a name", field="name", value=sorted(twice)[0], remedy="rename one"
+            )
         asked = [
-            (f"suspension[{i}].between", name) for i, entry in enumerate(self.suspension) for name in entry.between
+            (f"suspension[{i}].between", name)
+            for i, entry in enumerate(self.suspension)
+            for name in entry.between
         ]
         for field, name in [*asked, ("guide.body", self.guide.body)]:
             if name not in names:
                 raise InputError("no such body", field=field, value=name, limit="one of " + ", ".join(names))
         solids = [(f"body[{i}].inertia_kgm2", entry.inertia_kgm2) for i, entry in enumerate(self.body)]
-        solids += [(f"axle[{i}].bridge_inertia_kgm2", entry.bridge_inertia_kgm2) for i, entry in enumerate(self.axle)]
+        solids += [
+            (f"axle[{i}].bridge_inertia_kgm2", entry.bridge_inertia_kgm2) for i, entry in enumerate(self.axle)
+        ]
         for field, inertia in solids:
             if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
                 raise InputError(
@@ -104,7 +110,9 @@ class VehicleFile(Part):
 
     def model(self, name: str) -> VehicleModel:
         """Build the vehicle that the file describes."""
-        bodies, wheels, spins = [], [], {}
+        bodies: list[Body] = []
+        wheels: list[Wheel] = []
+        spins: dict[str, float] = {}
         for axle in self.axle:
             # The wheels ride on the bridge at the tape circles: their mass and transverse inertia count.
             carried = 2.0 * (axle.wheel_mass_kg * 0.75**2 + axle.wheel_transverse_inertia_kgm2)

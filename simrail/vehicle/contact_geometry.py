@@ -250,7 +250,7 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
     """Shift beyond which the flange has climbed the rail, and the place to split the wheel at.
 
     A wheel that climbs lives on the steep face of its flange; past it the slope falls and nothing
-    holds the wheel any more. Half the greatest slope marks that (12 mm for S1002 on 60E1 at 1435).
+    holds the wheel any more. Half the greatest slope marks that (12.4 mm for S1002 on 60E1 at 1435).
     """
     u = scale * np.arange(0.0, 0.060, 1e-4)
     _, _, slope = pair.rigid(u)

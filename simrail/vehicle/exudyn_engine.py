@@ -21,7 +21,7 @@ reckoning); the velocities are three orders better, and one evaluation in five i
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,8 +65,9 @@ class Segment:
     time_s : ndarray (n,)
         Times, uniform.
     coordinates, rates, accelerations : ndarray (n, 6 b + p + 4 w)
-        Accelerations are the slopes of the rates (see the module). Per body the position and the rotation vector of its node (rates: velocity and node rates);
+        Per body the position and the rotation vector of its node (rates: velocity and node rates);
         then the spin angles; then the integrals of the creep states (whose rates are the creep states).
+        Accelerations are the slopes of the rates (see the module).
     """
 
     time_s: FloatArray
@@ -92,8 +93,24 @@ class Segment:
 
 @njit
 def generalized_forces(
-    t, state, bodies, springs, wheels, spins, axles, guide, drive, grid, table, coef, const, pose, wrench, memo, work
-):
+    t: float,
+    state: FloatArray,
+    bodies: FloatArray,
+    springs: FloatArray,
+    wheels: FloatArray,
+    spins: FloatArray,
+    axles: FloatArray,
+    guide: FloatArray,
+    drive: FloatArray,
+    grid: FloatArray,
+    table: FloatArray,
+    coef: FloatArray,
+    const: FloatArray,
+    pose: FloatArray,
+    wrench: FloatArray,
+    memo: FloatArray,
+    work: FloatArray,
+) -> None:
     """Forces in Exudyn's coordinates.
 
     ``state`` (3 n,) holds coordinates, rates and, as the output, generalised forces, each n = 6 b + p +
@@ -196,9 +213,10 @@ class ExudynEngine:
             rows = np.arange(done, min(until - _REACH, total) + 1, every)
             here = rows - first
             rates = steps[:, 1]
-            weights = zip(range(1, _REACH + 1), _DIFFERENCE, strict=True)
-            slope = sum(w * (rates[here + k] - rates[here - k]) for k, w in weights) / self.step_s
-            yield Segment(rows * self.step_s, steps[here, 0], rates[here], slope)
+            slope = np.zeros_like(rates[here])
+            for k, weight in enumerate(_DIFFERENCE, start=1):
+                slope += weight / self.step_s * (rates[here + k] - rates[here - k])
+            yield Segment(np.multiply(rows, self.step_s), steps[here, 0], rates[here], slope)
             done = int(rows[-1]) + every
             keep = done - _REACH - first
             steps, first = steps[keep:], first + keep
@@ -244,9 +262,7 @@ class ExudynEngine:
         mass = np.concatenate([self.data.spins, np.ones(4 * len(model.wheels))])
         self.mbs.AddObject(ObjectGenericODE2(nodeNumbers=[lumped], massMatrix=np.diag(mass)))
         self._nodes.append(lumped)
-        self.mbs.AddObject(
-            ObjectGenericODE2(nodeNumbers=self._nodes, forceUserFunction=self._callback())
-        )
+        self.mbs.AddObject(ObjectGenericODE2(nodeNumbers=self._nodes, forceUserFunction=self._callback()))
         self.mbs.AddSensor(
             SensorUserFunction(
                 sensorNumbers=[], factors=[], writeToFile=False, sensorUserFunction=self._sensor()
@@ -263,7 +279,7 @@ class ExudynEngine:
         # At every step: half a step, lest rounding lets one slip.
         self._settings.solution.sensors.writePeriod = self.step_s / 2.0
 
-    def _callback(self) -> Callable[..., list[float]]:
+    def _callback(self) -> Any:
         """The force user function: everything bound in a closure, lists packed by struct.
 
         Exudyn hands over Python lists; packing them by struct and calling a compiled function with
@@ -271,7 +287,7 @@ class ExudynEngine:
         """
         n = self.size
         state = np.zeros(3 * n)
-        view = memoryview(state).cast("B")
+        view = memoryview(state.data).cast("B")
         put = struct.Struct(f"{2 * n}d").pack_into
         out = state[2 * n :]
         get = out.tolist
@@ -282,13 +298,13 @@ class ExudynEngine:
 
         def user_function(mbs: Any, t: float, item: int, q: list[float], v: list[float]) -> list[float]:
             put(view, 0, *q, *v)
-            generalized_forces(t - settle, state, *data, pose, wrench, memo, work)
+            generalized_forces(t - settle, state, *data, pose, wrench, memo, work)  # type: ignore[call-arg]
             forces_now: list[float] = get()
             return forces_now
 
         return user_function
 
-    def _sensor(self) -> Callable[..., list[float]]:
+    def _sensor(self) -> Any:
         """Copies coordinates and rates into the rows of the present solution, step by step."""
         system = self.mbs.systemData
 

@@ -117,7 +117,7 @@ def rest_drop_m(model: VehicleModel, *, gravity_mps2: float) -> float:
 
 
 @njit
-def track_at(table, grid, s, f):
+def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> None:
     """Track frame and rails at s into f (34,), from the C2 splines of the laid track.
 
     f: position 0-2, rotation (rows) 3-11, k 12-14, stretch of the centreline 1/cos(pitch) 15,
@@ -155,7 +155,7 @@ def track_at(table, grid, s, f):
 
 
 @njit
-def driven(t, drive, memo):
+def driven(t: float, drive: FloatArray, memo: FloatArray) -> tuple[float, float]:
     """Position and speed that the profile asks for at t; memo[0] remembers the piece."""
     n = drive.shape[0]
     i = int(memo[0])
@@ -173,7 +173,7 @@ def driven(t, drive, memo):
 
 
 @njit
-def spring_forces(springs, pose, wrench):
+def spring_forces(springs: FloatArray, pose: FloatArray, wrench: FloatArray) -> None:
     """Add every suspension's force and moment (about the centres of gravity, global axes) to wrench."""
     for m in range(springs.shape[0]):
         p = springs[m]
@@ -191,9 +191,15 @@ def spring_forces(springs, pose, wrench):
         ey = b[4] + b[17] * bx - b[15] * bz - a[4] - a[17] * ax + a[15] * az
         ez = b[5] + b[15] * by - b[16] * bx - a[5] - a[15] * ay + a[16] * ax
         # In the axes of the inner body.
-        fx = p[8] * (a[6] * dx + a[9] * dy + a[12] * dz - p[14]) + p[11] * (a[6] * ex + a[9] * ey + a[12] * ez)
-        fy = p[9] * (a[7] * dx + a[10] * dy + a[13] * dz - p[15]) + p[12] * (a[7] * ex + a[10] * ey + a[13] * ez)
-        fz = p[10] * (a[8] * dx + a[11] * dy + a[14] * dz - p[16]) + p[13] * (a[8] * ex + a[11] * ey + a[14] * ez)
+        fx = p[8] * (a[6] * dx + a[9] * dy + a[12] * dz - p[14]) + p[11] * (
+            a[6] * ex + a[9] * ey + a[12] * ez
+        )
+        fy = p[9] * (a[7] * dx + a[10] * dy + a[13] * dz - p[15]) + p[12] * (
+            a[7] * ex + a[10] * ey + a[13] * ez
+        )
+        fz = p[10] * (a[8] * dx + a[11] * dy + a[14] * dz - p[16]) + p[13] * (
+            a[8] * ex + a[11] * ey + a[14] * ez
+        )
         gx = a[6] * fx + a[7] * fy + a[8] * fz
         gy = a[9] * fx + a[10] * fy + a[11] * fz
         gz = a[12] * fx + a[13] * fy + a[14] * fz
@@ -213,7 +219,17 @@ def spring_forces(springs, pose, wrench):
 
 
 @njit
-def guide_force(t, guide, drive, grid, table, pose, wrench, memo, f):
+def guide_force(
+    t: float,
+    guide: FloatArray,
+    drive: FloatArray,
+    grid: FloatArray,
+    table: FloatArray,
+    pose: FloatArray,
+    wrench: FloatArray,
+    memo: FloatArray,
+    f: FloatArray,
+) -> None:
     """Add the guide's force along the track and its pitch and yaw moments."""
     s, speed = driven(t, drive, memo)
     track_at(table, grid, s + guide[1], f)
@@ -240,7 +256,24 @@ def guide_force(t, guide, drive, grid, table, pose, wrench, memo, f):
 
 
 @njit
-def axle_forces(axle, wheels, spin, zeta, spins, grid, table, coef, const, pose, wrench, torque, zeta_rate, memo, f, o):
+def axle_forces(
+    axle: FloatArray,
+    wheels: FloatArray,
+    spin: FloatArray,
+    zeta: FloatArray,
+    spins: FloatArray,
+    grid: FloatArray,
+    table: FloatArray,
+    coef: FloatArray,
+    const: FloatArray,
+    pose: FloatArray,
+    wrench: FloatArray,
+    torque: FloatArray,
+    zeta_rate: FloatArray,
+    memo: FloatArray,
+    f: FloatArray,
+    o: FloatArray,
+) -> None:
     """Add the contact forces of one axle's two wheels, and their gyroscopic moment.
 
     ``memo`` (3,): s of the axle at the last call (where the search for s starts), derailed flag, s of
@@ -311,9 +344,27 @@ def axle_forces(axle, wheels, spin, zeta, spins, grid, table, coef, const, pose,
 
 @njit
 def forces(
-    t, pose, spin, zeta, bodies, springs, wheels, spins, axles, guide, drive, grid, table, coef, const,
-    wrench, torque, zeta_rate, memo, work,
-):  # fmt: skip
+    t: float,
+    pose: FloatArray,
+    spin: FloatArray,
+    zeta: FloatArray,
+    bodies: FloatArray,
+    springs: FloatArray,
+    wheels: FloatArray,
+    spins: FloatArray,
+    axles: FloatArray,
+    guide: FloatArray,
+    drive: FloatArray,
+    grid: FloatArray,
+    table: FloatArray,
+    coef: FloatArray,
+    const: FloatArray,
+    wrench: FloatArray,
+    torque: FloatArray,
+    zeta_rate: FloatArray,
+    memo: FloatArray,
+    work: FloatArray,
+) -> None:
     """All forces at one instant.
 
     Parameters

@@ -19,7 +19,9 @@ from simrail.track.design import TrackDesign
 from simrail.track.laid import LaidTrack
 from simrail.truth import BodyMotion, Truth, euler_angles, rotation_matrix
 
-Channel = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+Channel = Callable[
+    [FloatArray, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
+]
 """Maps (t, s, V, dV/dt), each (n,), to value, first and second time derivative, each (n,)."""
 
 CHANNELS = ("lateral", "vertical", "roll", "pitch", "yaw")
@@ -114,7 +116,8 @@ def kinematic_truth(
     frame = track.frame(s)
     zero = np.zeros((3, n))
     value = {
-        name: np.array(channels[name](t, s, v, a)) if channels and name in channels else zero for name in CHANNELS
+        name: np.array(channels[name](t, s, v, a)) if channels and name in channels else zero
+        for name in CHANNELS
     }
     design = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
     k, dk = frame.k, frame.dk
@@ -130,7 +133,8 @@ def kinematic_truth(
         ]
     )
     rho, rho_rate, rho_rate2 = (
-        np.column_stack([np.zeros(n), value["lateral"][order], value["vertical"][order]]) for order in range(3)
+        np.column_stack([np.zeros(n), value["lateral"][order], value["vertical"][order]])
+        for order in range(3)
     )
     rho[:, 2] += height_m
     turn = np.cross(omega_t, rho)
@@ -143,7 +147,8 @@ def kinematic_truth(
         + np.cross(omega_t, turn)
     )
     angles, rates, rates2 = (
-        np.column_stack([value["roll"][order], value["pitch"][order], value["yaw"][order]]) for order in range(3)
+        np.column_stack([value["roll"][order], value["pitch"][order], value["yaw"][order]])
+        for order in range(3)
     )
     relative = rotation_matrix(angles)
     omega_r, alpha_r = _body_rates(angles, rates, rates2)

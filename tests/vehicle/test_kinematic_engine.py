@@ -41,7 +41,7 @@ def test_velocity_is_the_derivative_of_position(motion):
 def test_specific_force_is_acceleration_less_gravity_in_body_axes(motion):
     velocity = motion[["velocity_x_mps", "velocity_y_mps", "velocity_z_mps"]].to_numpy()
     angles = motion[["roll_rad", "pitch_rad", "yaw_rad"]].to_numpy()
-    acceleration = central(velocity, 1 / 4000) + [0.0, 0.0, 9.81]
+    acceleration = central(velocity, 1 / 4000) + np.array([0.0, 0.0, 9.81])
     felt = np.einsum("nji,nj->ni", rotation_matrix(angles[2:-2]), acceleration)
     given = motion[["accel_x_mps2", "accel_y_mps2", "accel_z_mps2"]].to_numpy()[2:-2]
     # The rails' splines have steps in their third derivative: a second derivative of a pose sees them.
