@@ -112,9 +112,7 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
             axis.axhline(0.0, color="#98a1af", lw=0.7, zorder=-1)
             low, high = max(lowest, -reach), min(highest, reach)
             axis.set_ylim(low - 0.15 * reach, high + (0.3 if column == 0 else 0.05) * reach)
-            axis.set_ylabel(
-                f"{_NAMES[column]} error, \u00b0" + ("\n(without its offset)" if column == 2 else "")
-            )
+            axis.set_ylabel("yaw drift, \u00b0" if column == 2 else f"{_NAMES[column]} error, \u00b0")
             _note_beyond(axis, beyond)
         legend_above(axes[0])
         shade_track(axes, example.recording.track, limits=limits_of(example))

@@ -143,7 +143,8 @@ def _cell(found: Figure, *, decimals: int, mark: str = "", scale: float = 1.0) -
     if found.draws == 0 or found.value != found.value:
         return Cell("\u2013", mark="none")
     spread = f"{scale * found.sd:.{decimals}f}" if found.sd > 0.0 else ""
-    return Cell(f"{scale * found.value:.{decimals}f}".replace("-", "\u2212"), spread, mark)
+    value = round(scale * found.value, decimals) + 0.0  # no negative zero
+    return Cell(f"{value:.{decimals}f}".replace("-", "\u2212"), spread, mark)
 
 
 def _is_there(
