@@ -36,7 +36,7 @@ class ProgressWatcher(Watcher):
         self._console = console
         self._progress = Progress(
             TextColumn("{task.description}"),
-            BarColumn(),
+            BarColumn(bar_width=20),
             TextColumn("{task.fields[note]}"),
             TimeElapsedColumn(),
             console=console,
@@ -72,7 +72,7 @@ class ProgressWatcher(Watcher):
         wall = max(time.perf_counter() - self._begun, 1e-6)
         left = (total_s - done_s) * wall / max(done_s, 1e-6)
         note = (
-            f"{done_s:5.0f} of {total_s:.0f} s simulated at {done_s / wall:.1f} x real time, "
+            f"{done_s:.0f} of {total_s:.0f} s, {done_s / wall:.1f} x real time, "
             f"{3.6 * abs(speed_mps):3.0f} km/h, {left:.0f} s left"
         )
         self._progress.update(self._ride, total=total_s, completed=done_s, note=note)
