@@ -56,8 +56,8 @@ TUNINGS = ("recommended", *PAPER)
 
 SWING_PER_SPEED = 2e-3
 """Velocity sd of the body's swing in the track frame over train speed: 11 mm/s at 20 km/h and 39 mm/s
-at 70 km/h, about twice that of a body which follows ERRI B176 low rails. The optimum is flat: a factor of
-two either way changes the roll error by less than a tenth."""
+at 70 km/h, two to three times what the axle of the simulated bogie does on ERRI B176 low rails. The
+optimum is flat: a factor of two either way changes the roll error in curves by a tenth at most."""
 
 MODEL_RATE_INTENSITY = 1e-10
 """rad2/s: what sampling and first-order integration leave; a perfect IMU still gets a finite tau."""

@@ -54,19 +54,19 @@ OURS = [
     AttitudeEkf(tuning="paper_initial", process_noise="per_step", rest_bias=False),
     AttitudeEkf(printed=True),
     AttitudeGda(),
-    AttitudeGda(compensated=False),
+    AttitudeGda(compensated=False, tuning="paper"),
     DesignAngles(),
     Vqf(),
     Vqf(compensated=True),
 ]
 
 
-@pytest.mark.parametrize("estimator", OURS, ids=str)
+@pytest.mark.parametrize("estimator", OURS, ids=lambda estimator: type(estimator).__name__)
 def test_ours_pass(estimator: Estimator) -> None:
     check_estimator(estimator, ride())
 
 
-@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda(), Vqf()], ids=str)
+@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda(), Vqf()], ids=["ekf", "gda", "vqf"])
 def test_ours_pass_backwards_and_with_a_perfect_imu(estimator: Estimator) -> None:
     check_estimator(estimator, ride(-1, "ideal"))
 

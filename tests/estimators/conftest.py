@@ -14,8 +14,11 @@ from simrail.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
 from simrail.recording import ImuSheet, Recording
+from simrail.ride import Ride, simulate
+from simrail.scenario.files import load
 from simrail.scenario.imu_file import load_grade
 from simrail.scenario.track_file import track_by_name
+from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
 from simrail.track.irregularity import Irregularity
@@ -133,6 +136,55 @@ def record_line(speed_kmh: float, direction: int, draw: int) -> Recording:
         seed=1,
         draw=draw,
     )
+
+
+AXLE_AT = Mount("axle", "front", (0.0, 0.0, 0.6))
+
+
+@lru_cache
+def bogie_truth(speed_kmh: float, direction: int) -> Truth:
+    """The same line, rails and speed profile, by the light-metro bogie in Exudyn."""
+    start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
+    return simulate(
+        Ride(
+            name="accuracy",
+            track=track_by_name("condequinto_olivar"),
+            irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 40.0),
+            track_seed=1,
+            vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
+            profile=SpeedProfile(start, end, speed_kmh / 3.6),
+        )
+    )
+
+
+@lru_cache
+def bogie_motion(speed_kmh: float, direction: int) -> pd.DataFrame:
+    """True motion of the axle IMU on that ride."""
+    return bogie_truth(speed_kmh, direction).motion(AXLE_AT)
+
+
+@lru_cache(maxsize=2)
+def record_bogie(speed_kmh: float, direction: int, draw: int) -> Recording:
+    """That ride as recorded."""
+    return measure(
+        bogie_truth(speed_kmh, direction),
+        name=f"bogie {speed_kmh:g} km/h {direction:+d}",
+        mount=AXLE_AT,
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("front.left", radius_error_sd=0.001),
+        seed=1,
+        draw=draw,
+    )
+
+
+@pytest.fixture
+def bogie_recording() -> Callable[..., Recording]:
+    return record_bogie
+
+
+@pytest.fixture
+def bogie_true_motion() -> Callable[..., pd.DataFrame]:
+    return bogie_motion
 
 
 @pytest.fixture

@@ -79,7 +79,12 @@ def test_equals_a_plain_loop(turn: Callable, compensated: bool, noisy: Recording
         turned[0], turned[1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
         start = product(start, turned)
     expected = plain_angles(plain_gda(rate, force, start, BETA))
-    found = AttitudeGda(compensated=compensated).estimate(recording).states[list(ATTITUDE)].to_numpy()
+    found = (
+        AttitudeGda(compensated=compensated, tuning="paper")
+        .estimate(recording)
+        .states[list(ATTITUDE)]
+        .to_numpy()
+    )
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
 
 
@@ -113,7 +118,7 @@ def test_an_exact_minimum_is_left_alone() -> None:
 def test_standstill_settles_on_gravity(noisy: Recording) -> None:
     recording = standing(noisy)
     recording.imu.iloc[:, 3:] = 9.81 * np.array([np.sin(0.02), 0.0, np.cos(0.02)])
-    states = AttitudeGda().estimate(recording).states
+    states = AttitudeGda(tuning="paper").estimate(recording).states
     # The first sample sets it; afterwards it chatters by about one step of 2 beta Ts = 0.0035 deg.
     np.testing.assert_allclose(states["pitch_rad"], -0.02, rtol=0, atol=1.5 * 2 * BETA * STEP)
 
@@ -122,3 +127,15 @@ def test_standstill_settles_on_gravity(noisy: Recording) -> None:
 def test_bad_gyro_error_is_refused(error: float) -> None:
     with pytest.raises(InputError, match="gyro_error_radps"):
         AttitudeGda(gyro_error_radps=error)
+
+
+def test_given_gyro_error_replaces_the_tunings(noisy: Recording) -> None:
+    paper = AttitudeGda(tuning="paper").estimate(noisy).states
+    given = AttitudeGda(gyro_error_radps=np.radians(0.5)).estimate(noisy).states
+    np.testing.assert_array_equal(paper, given)
+    assert not np.array_equal(paper, AttitudeGda().estimate(noisy).states)
+
+
+def test_unknown_tuning_is_refused() -> None:
+    with pytest.raises(InputError, match="recommended, paper"):
+        AttitudeGda(tuning="best")
