@@ -69,8 +69,14 @@ def measure(
     start_m = float(motion["position_m"].iloc[0])
     counts, sheet = None, None
     if encoder is not None:
+        wheel = truth.wheel_at(encoder.wheel)
+        angle = truth.wheel_angle(wheel)
+        radius = truth.wheel_radius_m[wheel]
+        if encoder.radius == "calibrated":
+            position = motion["position_m"].to_numpy()
+            radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
         counts = sample_encoder(
-            truth.wheel_angle(encoder.wheel),
+            angle,
             truth.time_s,
             pulses_per_revolution=encoder.pulses_per_revolution,
             rate_hz=encoder.rate_hz,
@@ -79,9 +85,9 @@ def measure(
             name=encoder.wheel,
         )
         sheet = EncoderSheet(
-            wheel=encoder.wheel,
+            wheel=wheel,
             pulses_per_revolution=encoder.pulses_per_revolution,
-            wheel_radius_m=nominal_radius(truth.wheel_radius_m[encoder.wheel], encoder, seed=seed, draw=draw),
+            wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
             rate_hz=encoder.rate_hz,
         )
     if odometry == "truth":

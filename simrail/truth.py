@@ -135,6 +135,20 @@ class Truth:
             )
         return self.wheel_angles[wheel]
 
+    def wheel_at(self, place: str) -> str:
+        """Name of a wheel from its place in the direction of travel, e.g. ``"trailing.left"``.
+
+        Names of wheels are returned as they are. Left and right stay those of increasing s.
+        """
+        where, _, side = place.partition(".")
+        if where not in ("leading", "trailing"):
+            return place
+        axles = {wheel.split(".")[0] for wheel in self.wheel_angles if wheel.endswith("." + side)}
+        forward = self.reference_position_m[-1] >= self.reference_position_m[0]
+        pick = max if (where == "leading") == bool(forward) else min
+        axle = pick(axles, key=lambda name: self.bodies[name].offset_m, default=where)
+        return f"{axle}.{side}"
+
     def motion(self, mount: Mount) -> pd.DataFrame:
         """Motion of a mount by rigid-body kinematics.
 

@@ -308,9 +308,10 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
                 remedy='add an [encoder], or set odometry = "truth" for an ablation',
             )
         return
-    _one_of(
-        vehicle.wheel_names, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel"
-    )
+    sides = {name.partition(".")[2] for name in vehicle.wheel_names}
+    places = [f"{where}.{side}" for where in ("leading", "trailing") for side in sorted(sides)]
+    wheels = [*vehicle.wheel_names, *places]
+    _one_of(wheels, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel")
     with blame(scenario.file, "encoder"):
         decimation_factor(TRUTH_RATE_HZ, encoder.rate_hz)
 

@@ -84,9 +84,13 @@ class ImuPart(Part):
 
 
 class EncoderPart(Part):
-    """``[encoder]``: pulses of one wheel, whose radius is known up to a relative error."""
+    """``[encoder]``: pulses of one wheel, whose radius is known up to a relative error.
+
+    See `simrail.sensors.encoder.EncoderSpec` for the words that ``wheel`` and ``radius`` take.
+    """
 
     wheel: Listed[str]
+    radius: Listed[Literal["drawing", "calibrated"]] = "drawing"
     pulses_per_revolution: Listed[Annotated[int, Field(ge=1, le=1_000_000)]] = 1024
     rate_hz: Listed[Annotated[float, Field(gt=0.0, le=1000.0)]] = 250.0
     radius_error_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.0

@@ -8,6 +8,7 @@ quite true; that belief is made here too, since it belongs to the device as much
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -25,13 +26,18 @@ class EncoderSpec:
     Attributes
     ----------
     wheel : str
-        Name of the wheel in the truth.
+        Name of the wheel in the truth, or its place in the direction of travel: ``leading.left``,
+        ``trailing.right`` and so on. The wheels of a leading axle run on their flange in curves, where
+        they roll on a larger radius; those of the trailing one hardly do.
     pulses_per_revolution : int
         Pulses per turn, > 0.
     rate_hz : float
         Rate at which the logger reads the counter.
+    radius : {"drawing", "calibrated"}
+        What the nominal radius is near to: the wheel's own at the tape circle, or the mean radius on
+        which it rolled over the line, as an operator calibrates it from the pulses between two stations.
     radius_error_sd : float
-        Relative standard deviation of the nominal radius about the true one; one draw per sensor draw.
+        Relative standard deviation of the nominal radius about that; one draw per sensor draw.
     radius_error : float, optional
         Fixed relative error (nominal / true - 1) instead of a draw.
     rolling_sd : float
@@ -44,6 +50,7 @@ class EncoderSpec:
     wheel: str
     pulses_per_revolution: int = 1024
     rate_hz: float = 250.0
+    radius: Literal["drawing", "calibrated"] = "drawing"
     radius_error_sd: float = 0.0
     radius_error: float | None = None
     rolling_sd: float = 0.004
@@ -102,9 +109,9 @@ def sample_encoder(
     return pd.DataFrame({"pulse_count": count}, index=index)
 
 
-def nominal_radius(true_radius_m: float, spec: EncoderSpec, *, seed: int, draw: int) -> float:
-    """Wheel radius that the train believes in: the true one times 1 + error, fixed or N(0, sd)."""
+def nominal_radius(near_m: float, spec: EncoderSpec, *, seed: int, draw: int) -> float:
+    """Wheel radius that the train believes in: near_m times 1 + error, fixed or N(0, sd)."""
     error = spec.radius_error
     if error is None:
         error = spec.radius_error_sd * stream(seed, "sensor", draw, "encoder", spec.wheel, "radius").normal()
-    return true_radius_m * (1.0 + error)
+    return near_m * (1.0 + error)
