@@ -21,14 +21,15 @@ from simrail.profile import SpeedProfile
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.truth import Truth, create_arrays, load_truth, save_truth, write_header
+from simrail.truth import Truth
+from simrail.truth_files import create_arrays, load_truth, save_truth, write_header
 from simrail.vehicle.kinematic_engine import kinematic_truth, rail_following
 from simrail.vehicle.model import VehicleModel
 
 Progress = Callable[[float, float, float], None]
 """Called with (simulated seconds done, seconds in all, present speed in m/s)."""
 
-_SOURCES = ("track", "vehicle", "profile.py", "truth.py", "seeds.py", "jit.py", "ride.py")
+_SOURCES = ("track", "vehicle", "profile.py", "truth.py", "truth_files.py", "seeds.py", "jit.py", "ride.py")
 
 
 @dataclass(frozen=True)

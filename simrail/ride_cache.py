@@ -62,9 +62,12 @@ def source_hash(*names: str) -> str:
 def rides() -> list[CachedRide]:
     """Every complete ride in the cache, the most recently used first."""
     found = []
-    for place in folder().glob("*/truth.json"):
+    for place in folder().glob("[!.]*/truth.json"):
         size = sum(file.stat().st_size for file in place.parent.iterdir())
-        name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
+        try:
+            name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
+        except (ValueError, KeyError):
+            name = "damaged"
         found.append(CachedRide(place.parent.name, name, size, place.stat().st_mtime))
     return sorted(found, key=lambda ride: -ride.last_used_s)
 

@@ -40,7 +40,8 @@ from simrail.jit import FloatArray, njit
 from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.truth import euler_angles, rotation_matrix
-from simrail.vehicle.forces import ForceData, forces, pack, rest_drop_m
+from simrail.vehicle.force_data import ForceData, pack, rest_drop_m
+from simrail.vehicle.forces import forces
 from simrail.vehicle.model import VehicleModel
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])
@@ -76,7 +77,7 @@ class Segment:
     accelerations: FloatArray
 
     def body(self, index: int) -> FloatArray:
-        """Motion (n, 18) of one body: the columns of `simrail.truth.BODY_ARRAYS`."""
+        """Motion (n, 18) of one body: the columns of `simrail.truth_files.BODY_ARRAYS`."""
         place, turn = slice(6 * index, 6 * index + 3), slice(6 * index + 3, 6 * index + 6)
         rotation = Rotation.from_rotvec(self.coordinates[:, turn]).as_matrix() * HALF_TURN
         return np.hstack(

@@ -61,7 +61,9 @@ def test_body_rates_follow_from_the_angles(motion):
         ]
     )
     given = motion[["gyro_x_radps", "gyro_y_radps", "gyro_z_radps"]].to_numpy()[2:-2]
-    np.testing.assert_allclose(given, expected, atol=2e-8)
+    # The difference sees the steps in the third derivative of the rails' splines, at single knots.
+    assert np.abs(given - expected).max() < 1e-6
+    assert np.sqrt(np.mean((given - expected) ** 2)) < 1e-8
 
 
 def test_odometry_columns_are_consistent(motion):
@@ -71,7 +73,14 @@ def test_odometry_columns_are_consistent(motion):
     assert np.sqrt(np.mean((central(v, 1 / 4000) - a[2:-2]) ** 2)) < 1e-4
 
 
-def test_mount_stands_where_it_was_put_at_rest(motion):
-    # The ride starts on straight, level track with faded irregularity: only the harmonics move it.
-    assert motion["vertical_m"].iloc[0] == pytest.approx(0.6, abs=1e-3)
-    assert motion["lateral_m"].iloc[0] == pytest.approx(-0.2, abs=2e-3)
+def test_mount_stands_where_it_was_put():
+    track = load(TrackFile, "track", "smooth_curve").design("smooth_curve")
+    truth = kinematic_truth(track, SpeedProfile(20.0, 440.0, 15.0), height_m=0.3)
+    motion = truth.motion(MOUNT)
+    # The body keeps to the track, so the mount keeps its place in the track frame: exactly on straights,
+    # and in curves but for the angle between the frames abeam of the body and of the mount.
+    straight = motion["position_m"] < 149.0
+    np.testing.assert_allclose(motion.loc[straight, "vertical_m"], 0.6, atol=1e-9)
+    np.testing.assert_allclose(motion.loc[straight, "lateral_m"], -0.2, atol=1e-9)
+    np.testing.assert_allclose(motion["vertical_m"], 0.6, atol=1e-3)
+    np.testing.assert_allclose(motion["lateral_m"], -0.2, atol=1e-3)
