@@ -3,7 +3,7 @@
 Frames: *body* is the mount (X forward, Y left, Z up, fixed to the body, never turned when the train
 runs backwards); *track* is the design track frame at the mount's own position; *global* is the flat,
 non-rotating Earth. Euler angles are ZYX (yaw, pitch, roll), pitch positive nose down, roll positive
-left side up (EQUATIONS section 0 of the design papers; Briales et al. 2021, Eq. 2).
+left side up (`estimators/EQUATIONS.md`, section 0; Briales et al. 2021, Eq. 2).
 
 This module knows names only. It holds no data and reads no files.
 """

@@ -4,7 +4,7 @@ A `TrackDesign` is what the track's drawing says: straights, clothoids and arcs 
 joined by vertical curves. An estimator may know it. Irregularities are not part of it: see
 `simrail.track.irregularity` and `simrail.track.laid`.
 
-Conventions (EQUATIONS section 0 of the design papers): X forward in the direction of increasing s,
+Conventions (`estimators/EQUATIONS.md`, section 0): X forward in the direction of increasing s,
 Y left, Z up; ZYX Euler angles, pitch positive nose down, roll positive left side up; s is the arc
 length of the horizontal projection of the centreline.
 """
