@@ -50,7 +50,7 @@ def test_go20a_is_the_ride_of_the_paper() -> None:
     mount = mount_of(first)
     assert mount.body == "front" and mount.position_m == (0.0, 0.0, 0.6)
     encoder = encoder_of(first)
-    assert encoder is not None and encoder.wheel == "front.left"
+    assert encoder is not None and encoder.wheel == "trailing.left"
     ride = Parts(scenario).ride(first)
     assert ride.engine == "exudyn" and ride.vehicle.synthetic and ride.track.synthetic
     assert {method.name for method in methods(scenario)} >= {
