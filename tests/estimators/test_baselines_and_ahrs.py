@@ -72,5 +72,7 @@ def test_vqf_finds_attitude_and_heading_in_our_convention(
 
 def test_vqf_starts_at_the_designs_yaw(bend: Callable, exactly: Callable) -> None:
     recording = standing(exactly(bend(direction=-1)))
+    # Leaning both ways, so that VQF's own heading does not start at zero.
+    recording.imu.iloc[:, 3:] = np.array([2.0, -3.0, 9.0])
     frame = recording.track.frame(recording.odometry["position_m"].iloc[:1])
     assert Vqf().estimate(recording).states["yaw_rad"].iloc[0] == frame.yaw_rad[0]
