@@ -40,7 +40,7 @@ from simrail.jit import FloatArray, njit
 from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.truth import euler_angles, rotation_matrix
-from simrail.vehicle.force_data import ForceData, pack, rest_drop_m
+from simrail.vehicle.force_data import pack, rest_drop_m, spread
 from simrail.vehicle.forces import forces
 from simrail.vehicle.model import VehicleModel
 
@@ -151,6 +151,40 @@ def generalized_forces(
         out[j + 5] = -(p[8] * w[3] + p[11] * w[4] + p[14] * w[5])
 
 
+@njit
+def part_of(arena: FloatArray, i: int) -> FloatArray:
+    """The i-th part of an arena (see `simrail.vehicle.force_data.spread`), flat."""
+    at = int(arena[5 * i])
+    n = int(arena[5 * i + 1] * arena[5 * i + 2] * arena[5 * i + 3] * arena[5 * i + 4])
+    return arena[at : at + n]
+
+
+@njit
+def generalized_forces_of(t: float, arena: FloatArray) -> None:
+    """`generalized_forces` of an arena that holds its arguments after t, in their order."""
+    table = part_of(arena, 9)
+    coef = part_of(arena, 10)
+    generalized_forces(
+        t,
+        part_of(arena, 0),
+        part_of(arena, 1).reshape(-1, 1),
+        part_of(arena, 2).reshape(-1, 17),
+        part_of(arena, 3).reshape(-1, 4),
+        part_of(arena, 4),
+        part_of(arena, 5).reshape(-1, 2),
+        part_of(arena, 6),
+        part_of(arena, 7).reshape(-1, 5),
+        part_of(arena, 8),
+        table.reshape(-1, 10, 4),
+        coef.reshape(2, int(arena[52]), int(arena[53]), 4),
+        part_of(arena, 11),
+        part_of(arena, 12).reshape(-1, 18),
+        part_of(arena, 13).reshape(-1, 6),
+        part_of(arena, 14),
+        part_of(arena, 15),
+    )
+
+
 class ExudynEngine:
     """One vehicle on one laid track, ready to run.
 
@@ -186,9 +220,14 @@ class ExudynEngine:
         self.model, self.track, self.profile = model, track, profile
         self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
         self.gravity_mps2 = gravity_mps2
-        self.data: ForceData = pack(model, track, profile, gravity_mps2=gravity_mps2)
-        self.size = 6 * len(model.bodies) + len(self.data.spins) + 4 * len(model.wheels)
-        self.memo = np.zeros(1 + 5 * len(self.data.axles))
+        data = pack(model, track, profile, gravity_mps2=gravity_mps2)
+        bodies, axles = len(model.bodies), len(data.axles)
+        self.size = 6 * bodies + len(data.spins) + 4 * len(model.wheels)
+        scratch = (np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(1 + 5 * axles), np.zeros(42))
+        self._arena, views = spread([np.zeros(3 * self.size), *data, *scratch])
+        self._state, self.memo, self._spins = views[0], views[-2], data.spins
+        # Compiled now, so that no clock of a ride counts it.
+        generalized_forces_of.compile("void(float64, float64[::1])")  # type: ignore[attr-defined]
         self._build()
 
     def run(self, duration_s: float, *, segment_s: float = 10.0) -> Iterator[Segment]:
@@ -224,7 +263,7 @@ class ExudynEngine:
 
     def wheel_loads_n(self) -> FloatArray:
         """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-        loads = [self.memo[4 + 5 * a : 6 + 5 * a] for a in range(len(self.data.axles))]
+        loads = [self.memo[4 + 5 * a : 6 + 5 * a] for a in range(len(self.model.axle_names))]
         return np.concatenate(loads)
 
     def _build(self) -> None:
@@ -251,7 +290,7 @@ class ExudynEngine:
             self._nodes.append(node)
         for i, axle in enumerate(model.axle_names):
             self.memo[1 + 5 * i] = s0 + model.body(axle).position_m[0]
-        aux = len(self.data.spins) + 4 * len(model.wheels)
+        aux = len(self._spins) + 4 * len(model.wheels)
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
                 referenceCoordinates=[0.0] * aux,
@@ -260,7 +299,7 @@ class ExudynEngine:
                 numberOfODE2Coordinates=aux,
             )
         )
-        mass = np.concatenate([self.data.spins, np.ones(4 * len(model.wheels))])
+        mass = np.concatenate([self._spins, np.ones(4 * len(model.wheels))])
         self.mbs.AddObject(ObjectGenericODE2(nodeNumbers=[lumped], massMatrix=np.diag(mass)))
         self._nodes.append(lumped)
         self.mbs.AddObject(ObjectGenericODE2(nodeNumbers=self._nodes, forceUserFunction=self._callback()))
@@ -275,7 +314,7 @@ class ExudynEngine:
         integration.automaticStepSize = False
         integration.verboseMode = 0
         integration.reuseConstantMassMatrix = True
-        self._settings.linearSolver.solverType = exu.LinearSolverType.EXUdense
+        self._settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
         self._settings.solution.file.write = False
         # At every step: half a step, lest rounding lets one slip.
         self._settings.solution.sensors.writePeriod = self.step_s / 2.0
@@ -287,19 +326,14 @@ class ExudynEngine:
         ready arrays is the cheapest plain-Python way found (2 us a call instead of 5).
         """
         n = self.size
-        state = np.zeros(3 * n)
-        view = memoryview(state.data).cast("B")
+        view = memoryview(self._state.data).cast("B")
         put = struct.Struct(f"{2 * n}d").pack_into
-        out = state[2 * n :]
-        get = out.tolist
-        pose = np.zeros((len(self.model.bodies), 18))
-        wrench = np.zeros((len(self.model.bodies), 6))
-        work = np.zeros(42)
-        memo, data, settle = self.memo, tuple(self.data), self.settle_s
+        get = self._state[2 * n :].tolist
+        arena, settle = self._arena, self.settle_s
 
         def user_function(mbs: Any, t: float, item: int, q: list[float], v: list[float]) -> list[float]:
             put(view, 0, *q, *v)
-            generalized_forces(t - settle, state, *data, pose, wrench, memo, work)  # type: ignore[call-arg]
+            generalized_forces_of(t - settle, arena)
             forces_now: list[float] = get()
             return forces_now
 

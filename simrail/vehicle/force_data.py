@@ -6,6 +6,7 @@ when a global changes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -112,3 +113,28 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
 def rest_drop_m(model: VehicleModel, *, gravity_mps2: float) -> float:
     """How much lower (negative) the wheels stand at rest than their nominal radius says."""
     return static_height(contact_of(model, gravity_mps2=gravity_mps2))
+
+
+def spread(parts: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
+    """Lay arrays into one, with a header that says where each begins and what shape it has.
+
+    A compiled function takes some 0.15 us per array that it is handed; at 8,000 calls a simulated second
+    one array instead of sixteen is worth it. `simrail.vehicle.exudyn_engine` takes them out again.
+
+    Returns
+    -------
+    arena : ndarray (m,)
+        Header of five numbers per part (offset, then the shape padded with ones to four), then the parts.
+    views : list of ndarray
+        The parts, as views into the arena.
+    """
+    head = 5 * len(parts)
+    arena = np.zeros(head + sum(part.size for part in parts))
+    views = []
+    at = head
+    for i, part in enumerate(parts):
+        arena[5 * i : 5 * i + 5] = at, *part.shape, *(1,) * (4 - part.ndim)
+        views.append(arena[at : at + part.size].reshape(part.shape))
+        views[-1][...] = part
+        at += part.size
+    return arena, views
