@@ -8,8 +8,10 @@ from simrail.dead_reckoning import dead_reckon
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, simulate
 from simrail.scenario.files import load
+from simrail.scenario.imu_file import load_grade
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
+from simrail.sensors.imu import sample_imu
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.truth import Mount
@@ -64,6 +66,18 @@ def test_truth_integrates_to_itself_restarted_every_second(rough_ride, mount):
         reckoned = dead_reckon(second, second.iloc[0])
         error = reckoned - second.loc[reckoned.index, reckoned.columns]
         assert error[list(POSITION)].abs().to_numpy().max() < 0.05e-3
+
+
+@pytest.mark.parametrize("mount", MOUNTS, ids=lambda mount: mount.name)
+def test_sampled_ideal_imu_keeps_the_attitude_over_60_s(rough_ride, mount):
+    """0.01 deg from the 250 Hz samples of an IMU without errors, filter and decimation included."""
+    motion = rough_ride.motion(mount)
+    samples, _ = sample_imu(motion, load_grade("ideal"), seed=0, draw=0, name=mount.name)
+    samples = samples.loc[2.0:62.0]
+    reckoned = dead_reckon(samples, motion.loc[samples.index[0]])
+    error = reckoned[list(ATTITUDE)] - motion.loc[reckoned.index, list(ATTITUDE)]
+    assert len(samples) == 15001
+    assert np.rad2deg(error.abs().to_numpy().max()) < 0.01
 
 
 def test_acceleration_is_the_second_difference_of_position(smooth_curve_ride):
