@@ -19,6 +19,7 @@ from simrail.report import write_report
 from simrail.report.decimate import Bins
 from simrail.report.findings import findings, significant
 from simrail.report.methods import method_styles
+from simrail.report.page import axis_words
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.tables import error_table
 from simrail.scenario.cells import methods
@@ -494,3 +495,16 @@ def test_decimation_of_a_short_or_standing_signal() -> None:
 
 def test_columns_used_by_the_figures_are_the_vocabulary() -> None:
     assert set(GYRO) | set(ACCEL) == set(IMU)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("ride.speed_kmh", 20.0, "speed 20 km/h"),
+        ("irregularity.spectrum", "erri_b176_low", "spectrum erri_b176_low"),
+        ("encoder.pulses_per_revolution", 1024, "pulses per revolution 1024"),
+        ("irregularity.fade_m", 40.0, "fade 40 m"),
+    ],
+)
+def test_axes_are_said_as_people_say_them(name, value, words):
+    assert axis_words(name, value) == words

@@ -158,8 +158,22 @@ def _ride(example: CellResult, all_cases: list[Figures], styles: list[MethodStyl
     )
 
 
+_UNITS = {"kmh": "km/h", "mps2": "m/s\u00b2", "mps3": "m/s\u00b3", "m": "m", "s": "s", "hz": "Hz"}
+
+
+def axis_words(name: str, value: object) -> str:
+    """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
+    *words, last = name.rpartition(".")[2].split("_")
+    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    if words and last in _UNITS:
+        return f"{' '.join(words)} {shown} {_UNITS[last]}"
+    return f"{' '.join([*words, last])} {shown}"
+
+
 def _ride_title(example: CellResult) -> str:
-    axes = [f"{name} {value}" for name, value in example.cell.items() if "." in name and name != "imu.grade"]
+    axes = [
+        axis_words(name, value) for name, value in example.cell.items() if "." in name and name != "imu.grade"
+    ]
     return " \u00b7 ".join([example.recording.name, *axes])
 
 
@@ -205,7 +219,7 @@ def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
     title = f"{labels['ride']} \u00b7 IMU {labels['mount']} ({labels['imu']})"
     axes = [f"odometry {labels['odometry']}"]
     axes += [
-        f"{name} {value}"
+        axis_words(name, value)
         for name, value in labels.items()
         if "." in name and not name.startswith("imu.grade")
     ]
