@@ -111,7 +111,7 @@ def simulate(ride: Ride, *, progress: Progress | None = None) -> Truth:
 
     Raises
     ------
-    simrail.vehicle.exudyn_engine.DerailedError
+    simrail.vehicle.engine.DerailedError
         If a wheel leaves the rail.
     """
     key = ride_cache.key_of(ride.describe())
@@ -196,14 +196,13 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
             arrays[f"body_{b}"][here] = motion
         for w, wheel in enumerate(model.wheels):
             axle = arrays[f"body_{model.body_names.index(wheel.axle)}"]
-            spin = 6 * bodies + spins.index(wheel.spin)
+            spin = spins.index(wheel.spin)
             begin = max(done - 1, 0)
             pitch_rate, pitch_acceleration = axle[begin : here.stop, 13], axle[begin : here.stop, 16]
             box = turned[w] + _integral(pitch_rate, pitch_acceleration, 1.0 / ride.rate_hz)
             turned[w] = box[-1]
-            arrays[f"wheel_{w}"][here] = segment.coordinates[:, spin] - box[here.start - begin :]
-            creep = 6 * bodies + len(spins) + 4 * w
-            arrays[f"wheel_state_{w}"][here] = segment.rates[:, creep : creep + 4]
+            arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
+            arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
         done = here.stop
         if progress is not None:
             at = float(segment.time_s[-1])

@@ -11,18 +11,12 @@ matrix is factorised at every evaluation). And the nodes' axes are the body's ax
 about X: for any heading the rotation vector then has a length near pi, where Exudyn's composition of
 rotation vectors is exact to rounding; near zero it loses ten digits, which a stiff contact would turn
 into noise.
-
-Accelerations are the sixth-order central differences of the engine's own velocities at its steps. The
-accelerations of the states themselves differ from the motion by the integrator's error, which the
-stiff contact makes systematic (2e-4 m/s2 in a sharp curve at 0.5 ms: 0.4 m in a minute of dead
-reckoning); the velocities are three orders better, and one evaluation in five is saved.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
@@ -39,8 +33,15 @@ from scipy.spatial.transform import Rotation
 from simrail.jit import FloatArray, njit
 from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
-from simrail.truth import euler_angles, rotation_matrix
-from simrail.vehicle.force_data import pack, rest_drop_m, spread
+from simrail.vehicle.engine import (
+    Segment,
+    refuse_derailed,
+    start_memo,
+    start_poses,
+    stretches,
+    wheel_loads_n,
+)
+from simrail.vehicle.force_data import pack, spread
 from simrail.vehicle.forces import forces
 from simrail.vehicle.model import VehicleModel
 
@@ -48,48 +49,7 @@ HALF_TURN = np.array([1.0, -1.0, -1.0])
 """Diagonal of the half turn about X between the axes of a body and those of its node."""
 
 
-_DIFFERENCE = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
-_REACH = len(_DIFFERENCE)
 _NOTHING = [0.0]
-
-
-class DerailedError(RuntimeError):
-    """A wheel climbed beyond its flange tip: the ride ends there."""
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Output of one stretch of the simulation; n rows at the output rate.
-
-    Attributes
-    ----------
-    time_s : ndarray (n,)
-        Times, uniform.
-    coordinates, rates, accelerations : ndarray (n, 6 b + p + 4 w)
-        Per body the position and the rotation vector of its node (rates: velocity and node rates);
-        then the spin angles; then the integrals of the creep states (whose rates are the creep states).
-        Accelerations are the slopes of the rates (see the module).
-    """
-
-    time_s: FloatArray
-    coordinates: FloatArray
-    rates: FloatArray
-    accelerations: FloatArray
-
-    def body(self, index: int) -> FloatArray:
-        """Motion (n, 18) of one body: the columns of `simrail.truth_files.BODY_ARRAYS`."""
-        place, turn = slice(6 * index, 6 * index + 3), slice(6 * index + 3, 6 * index + 6)
-        rotation = Rotation.from_rotvec(self.coordinates[:, turn]).as_matrix() * HALF_TURN
-        return np.hstack(
-            [
-                self.coordinates[:, place],
-                self.rates[:, place],
-                self.accelerations[:, place],
-                euler_angles(rotation),
-                self.rates[:, turn] * HALF_TURN,
-                self.accelerations[:, turn] * HALF_TURN,
-            ]
-        )
 
 
 @njit
@@ -238,46 +198,43 @@ class ExudynEngine:
         DerailedError
             If a wheel leaves the rail beyond its flange tip.
         """
-        every = round(1.0 / (self.rate_hz * self.step_s))
-        total = round(duration_s / self.step_s)
-        per_segment = max(every, round(segment_s / self.step_s) // every * every)
-        # Steps at hand, from `first` on (step 0 is the start of the ride); differences reach 3 steps, so
-        # rows lag behind the solution, and a few steps are solved beyond the end.
-        steps = self._solve(-self.settle_s, 0.0)[-7:]
-        first = 1 - len(steps)
-        done = 0
-        while done <= total:
-            solved = first + len(steps) - 1
-            until = min(solved + per_segment, total + every * _REACH)
-            steps = np.concatenate([steps, self._solve(solved * self.step_s, until * self.step_s)[1:]])
-            rows = np.arange(done, min(until - _REACH, total) + 1, every)
-            here = rows - first
-            rates = steps[:, 1]
-            slope = np.zeros_like(rates[here])
-            for k, weight in enumerate(_DIFFERENCE, start=1):
-                slope += weight / self.step_s * (rates[here + k] - rates[here - k])
-            yield Segment(np.multiply(rows, self.step_s), steps[here, 0], rates[here], slope)
-            done = int(rows[-1]) + every
-            keep = done - _REACH - first
-            steps, first = steps[keep:], first + keep
+        bodies, spins = len(self.model.bodies), len(self._spins)
+        for time_s, rows, slopes in stretches(
+            self._solve,
+            lambda steps: steps[:, 1, : 6 * bodies].reshape(-1, bodies, 6),
+            duration_s=duration_s,
+            settle_s=self.settle_s,
+            step_s=self.step_s,
+            rate_hz=self.rate_hz,
+            segment_s=segment_s,
+        ):
+            places = rows[:, 0, : 6 * bodies].reshape(-1, bodies, 6)
+            rates = rows[:, 1, : 6 * bodies].reshape(-1, bodies, 6)
+            turn = Rotation.from_rotvec(places[:, :, 3:].reshape(-1, 3)).as_matrix()
+            yield Segment(
+                time_s=time_s,
+                position=places[:, :, :3],
+                velocity=rates[:, :, :3],
+                acceleration=slopes[:, :, :3],
+                rotation=turn.reshape(-1, bodies, 3, 3) * HALF_TURN,
+                rate=rates[:, :, 3:] * HALF_TURN,
+                angular_acceleration=slopes[:, :, 3:] * HALF_TURN,
+                spin_rad=rows[:, 0, 6 * bodies : 6 * bodies + spins],
+                states=rows[:, 1, 6 * bodies + spins :],
+            )
 
     def wheel_loads_n(self) -> FloatArray:
         """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-        loads = [self.memo[4 + 5 * a : 6 + 5 * a] for a in range(len(self.model.axle_names))]
-        return np.concatenate(loads)
+        return wheel_loads_n(self.memo)
 
     def _build(self) -> None:
         model = self.model
-        s0 = float(self.profile.start_m)
         exu.config.printToConsole = False  # its hints (lists allocated by callbacks) are no news here
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._nodes = []
-        drop = rest_drop_m(model, gravity_mps2=self.gravity_mps2)
-        for body in model.bodies:
-            frame = self.track.design.frame(np.array([s0 + body.position_m[0]]))
-            rotation = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))[0]
-            position = frame.position[0] + rotation @ [0.0, body.position_m[1], body.position_m[2] + drop]
+        poses = start_poses(model, self.track, self.profile, gravity_mps2=self.gravity_mps2)
+        for body, (position, rotation) in zip(model.bodies, poses, strict=True):
             turn = Rotation.from_matrix(rotation * HALF_TURN).as_rotvec()
             node = self.mbs.AddNode(
                 NodeRigidBodyRotVecLG(initialCoordinates=[*position, *turn], initialVelocities=[0.0] * 6)
@@ -288,8 +245,7 @@ class ExudynEngine:
                 )
             )
             self._nodes.append(node)
-        for i, axle in enumerate(model.axle_names):
-            self.memo[1 + 5 * i] = s0 + model.body(axle).position_m[0]
+        self.memo[:] = start_memo(model, self.profile)
         aux = len(self._spins) + 4 * len(model.wheels)
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
@@ -351,23 +307,20 @@ class ExudynEngine:
 
         return user_function
 
-    def _solve(self, start_s: float, end_s: float) -> FloatArray:
+    def _solve(self, first: int, last: int) -> FloatArray:
         """Integrate from the present state; coordinates and rates (steps + 1, 2, n) at every step."""
         integration = self._settings.timeIntegration
         # Exudyn knows no negative times: its clock starts with the settling.
-        integration.startTime, integration.endTime = start_s + self.settle_s, end_s + self.settle_s
-        steps = round((end_s - start_s) / self.step_s)
-        integration.numberOfSteps = steps
-        self._rows = np.full((steps + 1, 2, self.size), np.nan)
+        integration.startTime = first * self.step_s + self.settle_s
+        integration.endTime = last * self.step_s + self.settle_s
+        integration.numberOfSteps = last - first
+        self._rows = np.full((last - first + 1, 2, self.size), np.nan)
         self._rows_start_s = integration.startTime
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
         )
-        derailed = np.flatnonzero(self.memo[2::5])
-        if derailed.size:
-            place = self.memo[3 + 5 * derailed[0]]
-            axle = self.model.axle_names[int(derailed[0])]
-            raise DerailedError(f"derailed: axle {axle} left the rail at s = {place:.1f} m")
+        refuse_derailed(self.memo, self.model)
         if not solved or np.isnan(self._rows).any():
-            raise RuntimeError(f"the integrator stopped between {start_s:g} and {end_s:g} s")
+            begin, end = first * self.step_s, last * self.step_s
+            raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")
         return self._rows

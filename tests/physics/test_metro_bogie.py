@@ -15,6 +15,7 @@ from simrail.sensors.imu import sample_imu
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.truth import Mount
+from simrail.vehicle.engine import DerailedError
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
@@ -138,8 +139,6 @@ def test_halving_the_step_changes_little():
 
 def test_derailment_is_said():
     """A curve far too fast for its cant throws the bogie out: one clear error, not a wrong ride."""
-    from simrail.vehicle.exudyn_engine import DerailedError
-
     profile = SpeedProfile(20.0, 560.0, 75.0, rest_s=0.5, acceleration_mps2=30.0, jerk_mps3=200.0)
     with pytest.raises(DerailedError, match=r"axle (front|rear) left the rail at s = "):
         simulate(Ride("derailed", track("smooth_curve"), SMOOTH, 0, vehicle(), profile))
