@@ -41,7 +41,7 @@ from simrail.vehicle.engine import (
     stretches,
     wheel_loads_n,
 )
-from simrail.vehicle.force_data import pack, spread
+from simrail.vehicle.force_data import pack, spread, states_of
 from simrail.vehicle.forces import forces
 from simrail.vehicle.model import VehicleModel
 
@@ -58,10 +58,15 @@ def generalized_forces(
     state: FloatArray,
     bodies: FloatArray,
     springs: FloatArray,
+    series: FloatArray,
+    turns: FloatArray,
+    stops: FloatArray,
+    laws: FloatArray,
     wheels: FloatArray,
     spins: FloatArray,
     axles: FloatArray,
     guide: FloatArray,
+    switches: FloatArray,
     drive: FloatArray,
     grid: FloatArray,
     table: FloatArray,
@@ -75,7 +80,7 @@ def generalized_forces(
     """Forces in Exudyn's coordinates.
 
     ``state`` (3 n,) holds coordinates, rates and, as the output, generalised forces, each n = 6 b + p +
-    4 w long. Rates and moments of a node are in its own axes: the body's, half a turn about X.
+    4 w + d long. Rates and moments of a node are in its own axes: the body's, half a turn about X.
     """
     nb = bodies.shape[0]
     n = state.shape[0] // 3
@@ -100,8 +105,8 @@ def generalized_forces(
     first = 6 * nb
     creep = first + spins.shape[0]
     forces(
-        t, pose, v[first:creep], v[creep:], bodies, springs, wheels, spins, axles, guide, drive, grid, table,
-        coef, const, wrench, out[first:creep], out[creep:], memo, work,
+        t, pose, v[first:creep], v[creep:], bodies, springs, series, turns, stops, laws, wheels, spins, axles,
+        guide, switches, drive, grid, table, coef, const, wrench, out[first:creep], out[creep:], memo, work,
     )  # fmt: skip
     for b in range(nb):
         w, p, j = wrench[b], pose[b], 6 * b
@@ -122,26 +127,30 @@ def part_of(arena: FloatArray, i: int) -> FloatArray:
 @njit
 def generalized_forces_of(t: float, arena: FloatArray) -> None:
     """`generalized_forces` of an arena that holds its arguments after t, in their order."""
-    table = part_of(arena, 9)
-    coef = part_of(arena, 10)
+    coef = part_of(arena, 15)
     generalized_forces(
         t,
         part_of(arena, 0),
         part_of(arena, 1).reshape(-1, 1),
-        part_of(arena, 2).reshape(-1, 17),
-        part_of(arena, 3).reshape(-1, 4),
-        part_of(arena, 4),
-        part_of(arena, 5).reshape(-1, 2),
-        part_of(arena, 6),
-        part_of(arena, 7).reshape(-1, 5),
+        part_of(arena, 2).reshape(int(arena[11]), 17),
+        part_of(arena, 3).reshape(int(arena[16]), 11),
+        part_of(arena, 4).reshape(int(arena[21]), 8),
+        part_of(arena, 5).reshape(int(arena[26]), 12),
+        part_of(arena, 6).reshape(int(arena[31]), 5),
+        part_of(arena, 7).reshape(-1, 4),
         part_of(arena, 8),
-        table.reshape(-1, 10, 4),
-        coef.reshape(2, int(arena[52]), int(arena[53]), 4),
+        part_of(arena, 9).reshape(-1, 2),
+        part_of(arena, 10),
         part_of(arena, 11),
-        part_of(arena, 12).reshape(-1, 18),
-        part_of(arena, 13).reshape(-1, 6),
-        part_of(arena, 14),
-        part_of(arena, 15),
+        part_of(arena, 12).reshape(-1, 5),
+        part_of(arena, 13),
+        part_of(arena, 14).reshape(-1, 10, 4),
+        coef.reshape(2, int(arena[77]), int(arena[78]), 4),
+        part_of(arena, 16),
+        part_of(arena, 17).reshape(-1, 18),
+        part_of(arena, 18).reshape(-1, 6),
+        part_of(arena, 19),
+        part_of(arena, 20),
     )
 
 
@@ -182,7 +191,8 @@ class ExudynEngine:
         self.gravity_mps2 = gravity_mps2
         data = pack(model, track, profile, gravity_mps2=gravity_mps2)
         bodies, axles = len(model.bodies), len(data.axles)
-        self.size = 6 * bodies + len(data.spins) + 4 * len(model.wheels)
+        self._states = states_of(data)
+        self.size = 6 * bodies + len(data.spins) + self._states
         scratch = (np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(1 + 5 * axles), np.zeros(42))
         self._arena, views = spread([np.zeros(3 * self.size), *data, *scratch])
         self._state, self.memo, self._spins = views[0], views[-2], data.spins
@@ -246,7 +256,7 @@ class ExudynEngine:
             )
             self._nodes.append(node)
         self.memo[:] = start_memo(model, self.profile)
-        aux = len(self._spins) + 4 * len(model.wheels)
+        aux = len(self._spins) + self._states
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
                 referenceCoordinates=[0.0] * aux,
@@ -255,7 +265,7 @@ class ExudynEngine:
                 numberOfODE2Coordinates=aux,
             )
         )
-        mass = np.concatenate([self._spins, np.ones(4 * len(model.wheels))])
+        mass = np.concatenate([self._spins, np.ones(self._states)])
         self.mbs.AddObject(ObjectGenericODE2(nodeNumbers=[lumped], massMatrix=np.diag(mass)))
         self._nodes.append(lumped)
         self.mbs.AddObject(ObjectGenericODE2(nodeNumbers=self._nodes, forceUserFunction=self._callback()))

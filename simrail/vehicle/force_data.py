@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from simrail.jit import FloatArray
 from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.vehicle.contact import ContactTable, build_contact, static_height
-from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.model import SeriesDamper, Tabled, VehicleModel
 from simrail.vehicle.profiles import rail_60e1, s1002
 
 WHEEL_PROFILES = {"S1002": s1002}
@@ -26,23 +27,39 @@ class ForceData(NamedTuple):
     """Constants of `forces`, as contiguous float64 arrays (b bodies, m springs, w wheels, p spins).
 
     bodies (b, 1): mass. springs (m, 17): inner, outer, inner arm (3), outer arm (3), stiffness (3),
-    damping (3), rest deflection (3). wheels (w, 4): axle, side, spin, radius. spins (p,): inertia.
-    axles (a, 2): body, first wheel. guide (10,): body, offset, stiffness and damping along, pitch, yaw,
-    gravity, profile pieces. drive (n, 5): start time and cubic of s(t), highest power first.
+    damping (3), rest deflection (3). series (d, 11): inner, outer, inner arm (3), outer arm (3), axis,
+    stiffness, damping. turns (r, 8): inner, outer, stiffness (3), damping (3). stops (q, 12): inner,
+    outer, inner arm (3), outer arm (3), axis, 1 if over the rate, first row in laws, rows. laws (l, 5):
+    start and cubic, highest power first. wheels (w, 4): axle, side, spin, radius. spins (p,): inertia.
+    axles (a, 2): body, first wheel. guide (18,): body, offset, stiffness and damping along, pitch, yaw,
+    gravity, profile pieces, stiffness and damping lateral, vertical, roll, height at rest, weight
+    carried. switches (12,): 1 if spins are gyroscopic, 1 if the contact is prescribed, then f11, f22,
+    f23, f33, conicity, vertical stiffness and damping, lateral and yaw gravitational stiffness per
+    wheel, static load. drive (n, 5): start time and cubic of s(t), highest power first.
     grid (2,): start and step of `table`, the laid track. coef, const: the contact table.
     """
 
     bodies: FloatArray
     springs: FloatArray
+    series: FloatArray
+    turns: FloatArray
+    stops: FloatArray
+    laws: FloatArray
     wheels: FloatArray
     spins: FloatArray
     axles: FloatArray
     guide: FloatArray
+    switches: FloatArray
     drive: FloatArray
     grid: FloatArray
     table: FloatArray
     coef: FloatArray
     const: FloatArray
+
+
+def states_of(data: ForceData) -> int:
+    """Number of first-order states: four creep states per wheel, then one per series damper."""
+    return int(4 * data.wheels.shape[0] + data.series.shape[0])
 
 
 def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTable:
@@ -54,6 +71,7 @@ def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTab
         gauge_m=pair.gauge_m,
         rail_inclination=pair.rail_inclination,
         wheel_radius_m=model.wheels[0].radius_m,
+        tape_circle_half_m=pair.tape_circle_half_m,
         static_load_n=float(np.mean(model.wheel_load_n(gravity_mps2))),
         friction=pair.friction,
     )
@@ -81,10 +99,15 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
     times, cubics = profile.pieces
     guide = model.guide
     held = model.body(guide.body)
+    stops, laws = _stops(model)
     contact = contact_of(model, gravity_mps2=gravity_mps2)
     return ForceData(
         bodies=np.array([[body.mass_kg] for body in model.bodies]),
         springs=springs,
+        series=_series(model),
+        turns=_turns(model),
+        stops=stops,
+        laws=laws,
         wheels=np.ascontiguousarray(wheels, dtype=float),
         spins=np.array(list(model.spin_inertia_kgm2.values())),
         axles=axles,
@@ -100,8 +123,17 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
                 guide.yaw_damping_nmsprad,
                 gravity_mps2,
                 float(len(cubics)),
+                guide.lateral_stiffness_npm,
+                guide.lateral_damping_nspm,
+                guide.vertical_stiffness_npm,
+                guide.vertical_damping_nspm,
+                guide.roll_stiffness_nmprad,
+                guide.roll_damping_nmsprad,
+                held.position_m[2] + _drop(model, contact),
+                model.guide_load_n(gravity_mps2),
             ]
         ),
+        switches=_switches(model, contact.static_load_n),
         drive=np.ascontiguousarray(np.column_stack([times[:-1], cubics])),
         grid=np.array([track.table_start_m, track.table_step_m]),
         table=track.table,
@@ -112,7 +144,75 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
 
 def rest_drop_m(model: VehicleModel, *, gravity_mps2: float) -> float:
     """How much lower (negative) the wheels stand at rest than their nominal radius says."""
+    if model.wheel_rail.linear is not None:
+        return 0.0
     return static_height(contact_of(model, gravity_mps2=gravity_mps2))
+
+
+def _drop(model: VehicleModel, contact: ContactTable) -> float:
+    return 0.0 if model.wheel_rail.linear is not None else static_height(contact)
+
+
+def _ends(model: VehicleModel, element: SeriesDamper | Tabled) -> list[float]:
+    """Inner and outer body, both arms and the axis of a one-axis element."""
+    inner, outer = model.body(element.inner), model.body(element.outer)
+    return [
+        float(model.body_names.index(element.inner)),
+        float(model.body_names.index(element.outer)),
+        *np.subtract(element.position_m, inner.position_m),
+        *np.subtract(element.position_m, outer.position_m),
+        float(element.axis),
+    ]
+
+
+def _series(model: VehicleModel) -> FloatArray:
+    rows = [[*_ends(model, e), e.stiffness_npm, e.damping_nspm] for e in model.series]
+    return np.array(rows, dtype=float).reshape(-1, 11)
+
+
+def _turns(model: VehicleModel) -> FloatArray:
+    index = model.body_names.index
+    rows = [
+        [index(e.inner), index(e.outer), *e.stiffness_nmprad, *e.damping_nmsprad] for e in model.rotations
+    ]
+    return np.array(rows, dtype=float).reshape(-1, 8)
+
+
+def _stops(model: VehicleModel) -> tuple[FloatArray, FloatArray]:
+    """Tabled elements and the pieces of their laws."""
+    rows: list[list[float]] = []
+    laws: list[FloatArray] = []
+    count = 0
+    for element in model.tabled:
+        x, force = np.array([(0.0, 0.0), *element.points]).T
+        curve = PchipInterpolator(x, force)
+        last = (force[-1] - force[-2]) / (x[-1] - x[-2])
+        pieces = np.vstack([np.column_stack([x[:-1], curve.c.T]), [x[-1], 0.0, 0.0, last, force[-1]]])
+        rows.append([*_ends(model, element), float(element.over == "speed"), count, len(pieces)])
+        laws.append(pieces)
+        count += len(pieces)
+    return np.array(rows, dtype=float).reshape(-1, 12), np.vstack([np.zeros((0, 5)), *laws])
+
+
+def _switches(model: VehicleModel, static_load_n: float) -> FloatArray:
+    linear = model.wheel_rail.linear
+    switches = np.zeros(12)
+    switches[0] = float(model.gyroscopic)
+    if linear is not None:
+        switches[1:] = (
+            1.0,
+            linear.f11_n,
+            linear.f22_n,
+            linear.f23_nm,
+            linear.f33_nm2,
+            linear.conicity,
+            linear.vertical_stiffness_npm,
+            linear.vertical_damping_nspm,
+            0.5 * linear.gravitational_stiffness_npm,
+            0.5 * linear.gravitational_yaw_stiffness_nmprad,
+            static_load_n,
+        )
+    return switches
 
 
 def spread(parts: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:

@@ -48,6 +48,47 @@ class Suspension:
 
 
 @dataclass(frozen=True)
+class SeriesDamper:
+    """A damper along one axis (0 x, 1 y, 2 z) of `inner`, in series with the stiffness of its mounts."""
+
+    name: str
+    inner: str
+    outer: str
+    position_m: tuple[float, float, float]
+    axis: int
+    stiffness_npm: float
+    damping_nspm: float
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """Springs and dampers of the small rotation between two bodies: anti-roll bars, bending springs."""
+
+    name: str
+    inner: str
+    outer: str
+    stiffness_nmprad: tuple[float, float, float]
+    damping_nmsprad: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """A force that is an odd tabled law of a deflection (bump stop) or of its rate (damper).
+
+    Between its points the law is the monotone cubic of Fritsch and Carlson (PCHIP), so that it is C1 and
+    does not overshoot; beyond its last point it goes on with the slope of its last two points.
+    """
+
+    name: str
+    inner: str
+    outer: str
+    position_m: tuple[float, float, float]
+    axis: int
+    over: str
+    points: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
 class Wheel:
     """A wheel on an axle. Wheels that share a spin name turn as one (a conventional wheelset)."""
 
@@ -60,7 +101,11 @@ class Wheel:
 
 @dataclass(frozen=True)
 class Guide:
-    """What drives one body along the track: springs to a point that follows the speed profile."""
+    """What drives one body along the track: springs to a point that follows the speed profile.
+
+    A guide with lateral, vertical and roll stiffness as well holds its body to the design track: a
+    carrier that a single wheelset hangs on. With vertical stiffness it also carries weight.
+    """
 
     body: str
     stiffness_npm: float
@@ -69,6 +114,32 @@ class Guide:
     pitch_damping_nmsprad: float
     yaw_stiffness_nmprad: float
     yaw_damping_nmsprad: float
+    lateral_stiffness_npm: float = 0.0
+    lateral_damping_nspm: float = 0.0
+    vertical_stiffness_npm: float = 0.0
+    vertical_damping_nspm: float = 0.0
+    roll_stiffness_nmprad: float = 0.0
+    roll_damping_nmsprad: float = 0.0
+
+
+@dataclass(frozen=True)
+class LinearContact:
+    """Prescribed linear wheel-rail contact of the textbooks, per wheel, in place of the profiles.
+
+    Kalker's coefficients f11, f22 (N), f23 (N m), f33 (N m2), no saturation; the radius of a wheel that
+    is displaced by y outward is ``r0 + conicity y``; a linear vertical spring carries it. The gravitational
+    stiffnesses are those of a whole wheelset (lateral N/m, yaw N m/rad), half of them at each wheel.
+    """
+
+    f11_n: float
+    f22_n: float
+    f23_nm: float
+    f33_nm2: float
+    conicity: float
+    vertical_stiffness_npm: float
+    vertical_damping_nspm: float
+    gravitational_stiffness_npm: float
+    gravitational_yaw_stiffness_nmprad: float
 
 
 @dataclass(frozen=True)
@@ -80,6 +151,8 @@ class WheelRail:
     gauge_m: float
     rail_inclination: float
     friction: float
+    tape_circle_half_m: float = 0.75
+    linear: LinearContact | None = None
 
 
 @dataclass(frozen=True)
@@ -104,6 +177,14 @@ class VehicleModel:
         The driver.
     wheel_rail : WheelRail
         The contact.
+    series : tuple of SeriesDamper
+        Dampers with the stiffness of their mounts.
+    rotations : tuple of Rotation
+        Springs and dampers of rotations.
+    tabled : tuple of Tabled
+        Bump stops and nonlinear dampers.
+    gyroscopic : bool
+        Whether the spinning wheels resist being turned.
     """
 
     name: str
@@ -116,6 +197,10 @@ class VehicleModel:
     spin_inertia_kgm2: dict[str, float]
     guide: Guide
     wheel_rail: WheelRail
+    series: tuple[SeriesDamper, ...] = ()
+    rotations: tuple[Rotation, ...] = ()
+    tabled: tuple[Tabled, ...] = ()
+    gyroscopic: bool = True
 
     @property
     def body_names(self) -> list[str]:
@@ -148,20 +233,25 @@ class VehicleModel:
 
     def wheel_load_n(self, gravity_mps2: float) -> FloatArray:
         """Static vertical load (w,) of each wheel."""
-        return self._statics[len(self.suspensions) :] * gravity_mps2
+        return self._statics[len(self.suspensions) : -1] * gravity_mps2
+
+    def guide_load_n(self, gravity_mps2: float) -> float:
+        """Weight that the guide carries at rest, N."""
+        return float(self._statics[-1]) * gravity_mps2
 
     @cached_property
     def _statics(self) -> FloatArray:
-        """Vertical spring and wheel forces per unit of gravity, from the balance of every body.
+        """Vertical forces of springs, wheels and guide per unit of gravity: every body balances.
 
         Vertical force, roll moment and pitch moment of each body balance; where that leaves a choice
         (several springs side by side), springs share in proportion to their stiffness, which is what
-        equal deflections do, and the guide may take the pitch moment of its own body.
+        equal deflections do. The guide may take the pitch moment of its own body, and its roll moment
+        and weight if it has the stiffness.
         """
         springs, wheels = len(self.suspensions), len(self.wheels)
-        balance = np.zeros((3 * len(self.bodies), springs + wheels))
+        balance = np.zeros((3 * len(self.bodies), springs + wheels + 1))
         weight = np.zeros(3 * len(self.bodies))
-        scale = np.ones(springs + wheels)
+        scale = np.ones(springs + wheels + 1)
         for i, body in enumerate(self.bodies):
             weight[3 * i] = body.mass_kg
         for j, spring in enumerate(self.suspensions):
@@ -173,11 +263,15 @@ class VehicleModel:
         for j, wheel in enumerate(self.wheels, start=springs):
             i = self.body_names.index(wheel.axle)
             scale[j] = 1e6  # a wheel is far stiffer than a spring
-            balance[3 * i : 3 * i + 2, j] = 1.0, 0.75 * wheel.side
+            balance[3 * i : 3 * i + 2, j] = 1.0, self.wheel_rail.tape_circle_half_m * wheel.side
+        held = 3 * self.body_names.index(self.guide.body)
+        scale[-1] = np.sqrt(self.guide.vertical_stiffness_npm)
+        balance[held, -1] = 1.0
         forces = scale * np.linalg.lstsq(balance * scale, weight, rcond=1e-12)[0]
-        held = 3 * self.body_names.index(self.guide.body) + 2
         error = np.abs(balance @ forces - weight)
-        error[held] = 0.0
+        error[held + 2] = 0.0
+        if self.guide.roll_stiffness_nmprad > 0.0:
+            error[held + 1] = 0.0
         if np.max(error) > 1e-6 * np.sum(weight):
             name = self.body_names[int(np.argmax(error)) // 3]
             raise InputError(
