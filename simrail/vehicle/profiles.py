@@ -198,6 +198,41 @@ def conical_wheel(
     return WheelProfile(f"cone {conicity:g}", s, depth, "formula: cone, root arc, straight flange, tip arc")
 
 
+def worn(
+    wheel: WheelProfile, *, wear_m: float, centre_m: float = -0.002, width_m: float = 0.015
+) -> WheelProfile:
+    """A wheel with a hollow worn into its tread: a *synthetic* shape, no measured one.
+
+    Parameters
+    ----------
+    wheel : WheelProfile
+        The wheel when new.
+    wear_m : float
+        Depth of metal worn away where it is most, 0 to 0.6 mm.
+    centre_m, width_m : float
+        Where that is, outward from the tape circle, and the standard deviation of the hollow.
+
+    Returns
+    -------
+    WheelProfile
+
+    Notes
+    -----
+    ``depth(s) = depth0(s) - wear (h(s) - h(0)),  h(s) = exp(-((s - centre)/width)^2 / 2)``: the tape
+    circle stays the datum, so that the wheel's radius is that of the worn wheel.
+    """
+    if not 0.0 <= wear_m <= 6e-4:
+        raise InputError("wear out of range", field="wear_m", value=wear_m, limit="0 to 0.6 mm (6e-4 m)")
+    hollow = np.exp(-0.5 * ((wheel.lateral_m - centre_m) / width_m) ** 2)
+    datum = np.exp(-0.5 * (centre_m / width_m) ** 2)
+    return WheelProfile(
+        f"{wheel.name} worn {wear_m * 1e3:g} mm",
+        wheel.lateral_m,
+        wheel.depth_m - wear_m * (hollow - datum),
+        f"synthetic: {wheel.name} less a Gaussian hollow of {wear_m * 1e3:g} mm, no measured profile",
+    )
+
+
 def rail_60e1() -> RailProfile:
     """The head of the 60E1 (UIC 60) rail of EN 13674-1, upright, from its radii.
 
