@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -23,8 +23,12 @@ from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.truth import Truth
 from simrail.truth_files import create_arrays, load_truth, save_truth, write_header
+from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.kinematic_engine import kinematic_truth, rail_following
 from simrail.vehicle.model import VehicleModel
+
+if TYPE_CHECKING:
+    from simrail.vehicle.exudyn_engine import ExudynEngine
 
 Progress = Callable[[float, float, float], None]
 """Called with (simulated seconds done, seconds in all, present speed in m/s)."""
@@ -50,7 +54,7 @@ class Ride:
         What runs.
     profile : SpeedProfile
         How it is driven.
-    engine : {"exudyn", "kinematic"}
+    engine : {"exudyn", "compiled", "kinematic"}
         Who computes the motion.
     step_s : float
         Step of the integrator.
@@ -66,7 +70,7 @@ class Ride:
     track_seed: int
     vehicle: VehicleModel
     profile: SpeedProfile
-    engine: Literal["exudyn", "kinematic"] = "exudyn"
+    engine: Literal["exudyn", "compiled", "kinematic"] = "exudyn"
     step_s: float = 0.5e-3
     rate_hz: float = 1000.0
     gravity_mps2: float = 9.81
@@ -159,17 +163,24 @@ def _follow(ride: Ride) -> Truth:
     )
 
 
-def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
-    """Run the Exudyn engine segment by segment into arrays on disk."""
-    # Exudyn takes long to import, and a cached ride does not need it.
+def _engine_of(name: str) -> type[ExudynEngine] | type[CompiledEngine]:
+    """The engine of a name."""
+    if name == "compiled":
+        return CompiledEngine
+    # Exudyn takes long to import; neither a cached ride nor the compiled engine needs it.
     from simrail.vehicle.exudyn_engine import ExudynEngine
 
+    return ExudynEngine
+
+
+def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
+    """Run an engine segment by segment into arrays on disk."""
     started = time.perf_counter()
     model, profile = ride.vehicle, ride.profile
     duration = np.floor(profile.duration_s * ride.rate_hz) / ride.rate_hz
     rows = round(duration * ride.rate_hz) + 1
     laid = lay(ride.track, ride.irregularity, seed=ride.track_seed)
-    engine = ExudynEngine(
+    engine = _engine_of(ride.engine)(
         model,
         laid,
         profile=profile,
@@ -220,7 +231,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         gravity_mps2=ride.gravity_mps2,
         manifest={
             "ride": ride.name,
-            "engine": "exudyn",
+            "engine": ride.engine,
             "vehicle": model.name,
             "step_s": ride.step_s,
             "rate_hz": ride.rate_hz,

@@ -67,6 +67,7 @@ def test_simulated_once_then_found(ride, monkeypatch):
         {"rate_hz": 500.0},
         {"gravity_mps2": 9.80665},
         {"engine": "exudyn"},
+        {"engine": "compiled"},
         {"irregularity": Irregularity("erri_b176_high", (3.0, 100.0), 20.0)},
         {"profile": SpeedProfile(30.0, 90.0, 11.0, rest_s=1.0, final_rest_s=0.5)},
     ],

@@ -121,7 +121,7 @@ class ScenarioFile(Part):
     seed: Annotated[int, Field(ge=0, lt=2**63)]
     track: Listed[str]
     vehicle: Listed[str]
-    engine: Listed[Literal["exudyn", "kinematic"]] = "exudyn"
+    engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
     step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
     track_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     sensor_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1

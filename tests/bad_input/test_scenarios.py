@@ -77,7 +77,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "an engine that is none": (
         'engine = "kinematic"',
         'engine = "kinematik"',
-        ["engine", "'kinematik'", "'exudyn' or 'kinematic'", "did you mean kinematic?"],
+        ["engine", "'kinematik'", "'exudyn', 'compiled' or 'kinematic'", "did you mean kinematic?"],
     ),
     "a step that does not divide": (
         "sensor_draws = 2",
