@@ -65,10 +65,13 @@ class CompiledEngine:
         self.data = pack(model, track, profile, gravity_mps2=gravity_mps2)
         self.memo = start_memo(model, profile)
         self._inertia = np.array([[body.mass_kg, *body.inertia_kgm2] for body in model.bodies])
-        self._work = np.zeros(42)
         self._turned = BODY * len(model.bodies)
         self._first_state = self._turned + 2 * len(self.data.spins)
         self.state = np.zeros(self._first_state + states_of(self.data))
+        bodies = len(model.bodies)
+        self._scratch = (
+            np.zeros((3, len(self.state))), np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(42)
+        )  # fmt: skip
         poses = start_poses(model, track, profile, gravity_mps2=gravity_mps2)
         for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
             body[:3] = position
@@ -117,8 +120,8 @@ class CompiledEngine:
 
     def _march(self, first: int, rows: FloatArray) -> int:
         return march(
-            first, self.step_s, self.state, rows, self._inertia, self.data.spins, self.memo, self._work,
-            tuple(self.data),
+            first, self.step_s, self.state, rows, self._inertia, self.data.spins, self.memo,
+            *self._scratch, tuple(self.data),
         )  # fmt: skip
 
     def _solve(self, first: int, last: int) -> FloatArray:

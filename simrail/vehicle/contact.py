@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.jit import FloatArray, njit
+from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.contact_geometry import COLUMNS, CONSTANTS, ContactTable, build_contact
 
 __all__ = [
@@ -40,7 +40,7 @@ def static_height(table: ContactTable) -> float:
     return float(np.polyval(piece, x) - pressed)
 
 
-@njit
+@njit_borrowed
 def _touch(
     c: FloatArray, x: float, half: float, r0: float, height: float, p: float, psi: float
 ) -> tuple[float, float, float, float]:
@@ -68,7 +68,7 @@ def _touch(
     return pen, t, s - p * C, r0 + F + t * p * C
 
 
-@njit
+@njit_borrowed
 def read_patch(
     coef: FloatArray,
     const: FloatArray,
@@ -90,7 +90,7 @@ def read_patch(
     out[0], out[1], out[2], out[3] = _touch(coef[patch, i], x, const[2], const[3], height, side * phi, psi)
 
 
-@njit
+@njit_borrowed
 def wheel_force(
     coef: FloatArray,
     const: FloatArray,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.jit import FloatArray, njit
+from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.contact import wheel_force
 from simrail.vehicle.linear_contact import linear_wheel_force
 from simrail.vehicle.lookup import track_at
@@ -22,7 +22,7 @@ from simrail.vehicle.suspension_forces import (
 )
 
 
-@njit
+@njit_borrowed
 def axle_forces(
     axle: FloatArray,
     wheels: FloatArray,
@@ -119,7 +119,7 @@ def axle_forces(
         memo[3 + n] = o[2]
 
 
-@njit
+@njit_borrowed
 def forces(
     t: float,
     pose: FloatArray,

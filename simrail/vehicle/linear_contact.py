@@ -7,10 +7,10 @@ angle, the axle's roll in the creepages. Creep forces build up over the same rel
 
 from __future__ import annotations
 
-from simrail.jit import FloatArray, njit
+from simrail.jit import FloatArray, njit_borrowed
 
 
-@njit
+@njit_borrowed
 def linear_wheel_force(
     switches: FloatArray,
     const: FloatArray,

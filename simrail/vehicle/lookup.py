@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.jit import FloatArray, njit
+from simrail.jit import FloatArray, njit_borrowed
 
 
-@njit
+@njit_borrowed
 def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> None:
     """Track frame and rails at s into f (34,), from the C2 splines of the laid track.
 
@@ -48,7 +48,7 @@ def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> No
     f[15] = 1.0 / cp
 
 
-@njit
+@njit_borrowed
 def driven(t: float, drive: FloatArray, memo: FloatArray) -> tuple[float, float]:
     """Position and speed that the profile asks for at t; memo[0] remembers the piece."""
     n = drive.shape[0]

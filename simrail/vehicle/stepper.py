@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.jit import FloatArray, njit
+from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.forces import forces
 
 BODY = 13
 """Numbers of a body in the state."""
 
 
-@njit
+@njit_borrowed
 def pose_of(state: FloatArray, bodies: int, pose: FloatArray) -> None:
     """Position, velocity, rotation matrix (rows) and global angular rate of each body into (b, 18)."""
     for b in range(bodies):
@@ -39,7 +39,7 @@ def pose_of(state: FloatArray, bodies: int, pose: FloatArray) -> None:
         pose[b, 17] = r20 * p + r21 * q + r22 * r
 
 
-@njit
+@njit_borrowed
 def body_rates(
     state: FloatArray, inertia: FloatArray, pose: FloatArray, wrench: FloatArray, slope: FloatArray
 ) -> None:
@@ -68,7 +68,7 @@ def body_rates(
         slope[j + 12] = (about_z - (iy - ix) * p * q) / iz
 
 
-@njit
+@njit_borrowed
 def normalise(state: FloatArray, bodies: int) -> None:
     """Make every quaternion one of length 1 again."""
     for b in range(bodies):
@@ -80,7 +80,7 @@ def normalise(state: FloatArray, bodies: int) -> None:
             state[j + k] /= np.sqrt(square)
 
 
-@njit
+@njit_borrowed
 def march(
     first: int,
     step_s: float,
@@ -89,22 +89,50 @@ def march(
     inertia: FloatArray,
     spin_inertia: FloatArray,
     memo: FloatArray,
+    scratch: FloatArray,
+    pose: FloatArray,
+    wrench: FloatArray,
     work: FloatArray,
     data: tuple[FloatArray, ...],
 ) -> int:
-    """Integrate one step per row, from the time ``first`` step_s on; ``rows`` takes the state at each.
+    """Integrate one step per row.
 
-    ``memo``, ``work`` and ``data`` (a tuple of arrays) are those of `simrail.vehicle.forces.forces`.
-    Returns the number of steps made: fewer than rows if a wheel left its rail, whose flag is in ``memo``.
+    Parameters
+    ----------
+    first : int
+        Number of the step that begins here; step 0 begins at t = 0.
+    step_s : float
+        Step.
+    state : ndarray (n,)
+        State (see the module); replaced by the last one.
+    rows : ndarray (m, n), output
+        State after each step.
+    inertia : ndarray (b, 4)
+        Mass and principal inertias of each body.
+    spin_inertia : ndarray (p,)
+        Of each spin.
+    memo : ndarray
+        Memory of `simrail.vehicle.forces.forces`.
+    scratch : ndarray (3, n)
+        Scratch of this function.
+    pose, wrench, work : ndarray (b, 18), (b, 6), (42,)
+        Scratch of `simrail.vehicle.forces.forces`.
+    data : tuple of ndarray
+        `simrail.vehicle.force_data.ForceData`.
+
+    Returns
+    -------
+    int
+        Steps made: fewer than rows if a wheel left its rail, whose flag is in ``memo``.
     """
     nb, np_, n = inertia.shape[0], spin_inertia.shape[0], state.shape[0]
     turned = BODY * nb
     spin_at, zeta_at = turned + np_, turned + 2 * np_
-    stage, total, slope = state.copy(), np.zeros(n), np.zeros(n)
-    pose, wrench = np.zeros((nb, 18)), np.zeros((nb, 6))
-    # Made once: every view in the loop would count references.
+    stage, total, slope = scratch[0], scratch[1], scratch[2]
     spin, zeta = stage[spin_at:zeta_at], stage[zeta_at:]
     torque, zeta_rate = slope[spin_at:zeta_at], slope[zeta_at:]
+    for k in range(n):
+        stage[k] = state[k]
     for row in range(rows.shape[0]):
         start = (first + row) * step_s
         for part in range(4):
@@ -136,4 +164,4 @@ def march(
         for k in range(2, memo.shape[0], 5):
             if memo[k] != 0.0:
                 return row
-    return int(rows.shape[0])
+    return rows.shape[0]

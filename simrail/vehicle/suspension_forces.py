@@ -7,11 +7,11 @@ pushes each at that body's own attachment point. The rows are those of
 
 from __future__ import annotations
 
-from simrail.jit import FloatArray, njit
+from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.lookup import driven, track_at
 
 
-@njit
+@njit_borrowed
 def spring_forces(springs: FloatArray, pose: FloatArray, wrench: FloatArray) -> None:
     """Add every suspension's force and moment (about the centres of gravity, global axes) to wrench."""
     for m in range(springs.shape[0]):
@@ -57,7 +57,7 @@ def spring_forces(springs: FloatArray, pose: FloatArray, wrench: FloatArray) -> 
         wj[5] -= bx * gy - by * gx
 
 
-@njit
+@njit_borrowed
 def guide_force(
     t: float,
     guide: FloatArray,
@@ -106,7 +106,7 @@ def guide_force(
             w[3 + j] += f[3 + 3 * j] * roll
 
 
-@njit
+@njit_borrowed
 def _stretch(p: FloatArray, a: FloatArray, b: FloatArray) -> tuple[float, float]:
     """Deflection and its rate of a one-axis element: row p, poses a (inner) and b (outer)."""
     k = int(p[8])
@@ -127,7 +127,7 @@ def _stretch(p: FloatArray, a: FloatArray, b: FloatArray) -> tuple[float, float]
     return d, e
 
 
-@njit
+@njit_borrowed
 def _push(p: FloatArray, a: FloatArray, b: FloatArray, wa: FloatArray, wb: FloatArray, force: float) -> None:
     """Pull the two bodies of a one-axis element together with a force."""
     k = int(p[8])
@@ -144,7 +144,7 @@ def _push(p: FloatArray, a: FloatArray, b: FloatArray, wa: FloatArray, wb: Float
         wb[3 + n] -= bq * fu - bu * fq
 
 
-@njit
+@njit_borrowed
 def series_forces(
     series: FloatArray, pose: FloatArray, inner: FloatArray, wrench: FloatArray, inner_rate: FloatArray
 ) -> None:
@@ -157,7 +157,7 @@ def series_forces(
         _push(p, pose[i], pose[j], wrench[i], wrench[j], inner[m])
 
 
-@njit
+@njit_borrowed
 def stop_forces(stops: FloatArray, laws: FloatArray, pose: FloatArray, wrench: FloatArray) -> None:
     """Add elements whose force is an odd tabled law of their deflection or of its rate.
 
@@ -178,7 +178,7 @@ def stop_forces(stops: FloatArray, laws: FloatArray, pose: FloatArray, wrench: F
         _push(p, pose[i], pose[j], wrench[i], wrench[j], force if x > 0.0 else -force)
 
 
-@njit
+@njit_borrowed
 def turn_forces(turns: FloatArray, pose: FloatArray, wrench: FloatArray) -> None:
     """Add springs and dampers of the small rotation of the outer body in the inner body's axes."""
     for m in range(turns.shape[0]):
