@@ -2,64 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from itertools import pairwise
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from simrail.errors import InputError
 from simrail.scenario.files import Part
-from simrail.vehicle.model import Body, Guide, Suspension, VehicleModel, Wheel, WheelRail
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Point = tuple[float, float, float]
-Triple = tuple[NotNegative, NotNegative, NotNegative]
-Inertia = tuple[Positive, Positive, Positive]
-
-
-class AxleEntry(Part):
-    """An axle with its two wheels; the bridge is what does not turn."""
-
-    name: str
-    x_m: float
-    wheels: Literal["independent", "fixed"]
-    wheel_radius_m: Annotated[float, Field(ge=0.01, le=1.0)]
-    bridge_mass_kg: Positive
-    bridge_inertia_kgm2: Inertia
-    wheel_mass_kg: Positive
-    wheel_spin_inertia_kgm2: Positive
-    wheel_transverse_inertia_kgm2: Positive
-
-
-class BodyEntry(Part):
-    """A body above the axles."""
-
-    name: str
-    mass_kg: Positive
-    inertia_kgm2: Inertia
-    position_m: Point
-
-
-class SuspensionEntry(Part):
-    """Equal springs at one or several points between two bodies."""
-
-    name: str
-    between: tuple[str, str]
-    positions_m: Annotated[list[Point], Field(min_length=1)]
-    stiffness_npm: Triple
-    damping_nspm: Triple
-
-
-class GuideEntry(Part):
-    """The driver of the ride."""
-
-    body: str
-    stiffness_npm: Positive
-    damping_nspm: NotNegative
-    pitch_stiffness_nmprad: NotNegative
-    pitch_damping_nmsprad: NotNegative
-    yaw_stiffness_nmprad: NotNegative
-    yaw_damping_nmsprad: NotNegative
+from simrail.scenario.vehicle_parts import (
+    AxleEntry,
+    BodyEntry,
+    GuideEntry,
+    LinearContactEntry,
+    RotationEntry,
+    SuspensionEntry,
+    TabledEntry,
+    ends_of,
+)
+from simrail.vehicle.model import (
+    Body,
+    Guide,
+    LinearContact,
+    Rotation,
+    SeriesDamper,
+    Suspension,
+    Tabled,
+    VehicleModel,
+    Wheel,
+    WheelRail,
+)
+from simrail.vehicle.profile_files import rail_profile, wheel_profile
 
 
 class VehicleFile(Part):
@@ -70,12 +42,16 @@ class VehicleFile(Part):
     synthetic: bool
     gauge_m: Annotated[float, Field(gt=0.1, lt=2.0)]
     rail_inclination: Annotated[float, Field(ge=0, le=0.1)]
-    wheel_profile: Literal["S1002"]
-    rail_profile: Literal["60E1"]
+    wheel_profile: str
+    rail_profile: str
     friction: Annotated[float, Field(gt=0, le=1.0)]
     axle: Annotated[list[AxleEntry], Field(min_length=1)]
     body: tuple[BodyEntry, ...] = ()
     suspension: tuple[SuspensionEntry, ...] = ()
+    rotation: tuple[RotationEntry, ...] = ()
+    tabled: tuple[TabledEntry, ...] = ()
+    linear_contact: LinearContactEntry | None = None
+    gyroscopic: bool = True
     guide: GuideEntry
 
     @model_validator(mode="after")
@@ -87,8 +63,9 @@ class VehicleFile(Part):
                 "two bodies share a name", field="name", value=sorted(twice)[0], remedy="rename one"
             )
         asked = [
-            (f"suspension[{i}].between", name)
-            for i, entry in enumerate(self.suspension)
+            (f"{kind}[{i}].between", name)
+            for kind in ("suspension", "rotation", "tabled")
+            for i, entry in enumerate(getattr(self, kind))
             for name in entry.between
         ]
         for field, name in [*asked, ("guide.body", self.guide.body)]:
@@ -106,7 +83,71 @@ class VehicleFile(Part):
                     value=inertia,
                     limit="the largest at most the sum of the other two",
                 )
+        self._check_elements()
+        self._check_wheels()
+        self._check_held(names)
         return self
+
+    def _check_elements(self) -> None:
+        for i, spring in enumerate(self.suspension):
+            for stiffness, damping in zip(spring.series_stiffness_npm, spring.damping_nspm, strict=True):
+                if stiffness > 0.0 and damping == 0.0:
+                    raise InputError(
+                        "a series stiffness without a damper",
+                        field=f"suspension[{i}].series_stiffness_npm",
+                        value=spring.series_stiffness_npm,
+                        remedy="give that axis damping, or 0 in series",
+                    )
+        for i, entry in enumerate(self.tabled):
+            x, force = zip(*entry.points, strict=True)
+            if any(b <= a for a, b in pairwise(x)) or any(b < a for a, b in pairwise(force)):
+                raise InputError(
+                    "the points of a law must rise",
+                    field=f"tabled[{i}].points",
+                    value=entry.points,
+                    limit="first column rising, second not falling",
+                )
+        # Each says itself what it cannot read.
+        wheel_profile(self.wheel_profile)
+        rail_profile(self.rail_profile)
+
+    def _check_wheels(self) -> None:
+        """Wheels must stand on the rails, all alike: one contact table serves them."""
+        first = self.axle[0]
+        for i, axle in enumerate(self.axle):
+            left, right = axle.wheel_y_m
+            excess = (left - 0.5 * self.gauge_m) / self.gauge_m
+            if left != -right or not 0.0 < excess < 0.05:
+                raise InputError(
+                    "a wheel off the axle's place over its rail",
+                    field=f"axle[{i}].wheel_y_m",
+                    value=axle.wheel_y_m,
+                    limit=f"y and -y, {0.5 * self.gauge_m:.4g} < y < {0.55 * self.gauge_m:.4g} m",
+                )
+            for field in ("wheel_y_m", "wheel_radius_m"):
+                if getattr(axle, field) != getattr(first, field):
+                    raise InputError(
+                        "the wheels of a vehicle are alike",
+                        field=f"axle[{i}].{field}",
+                        value=getattr(axle, field),
+                        limit=f"{getattr(first, field)}, as axle[0] has it",
+                    )
+
+    def _check_held(self, names: list[str]) -> None:
+        """Every body must hang together with the guide's body by springs."""
+        held = {self.guide.body}
+        pairs = [set(entry.between) for entry in self.suspension if any(entry.stiffness_npm)]
+        for _ in names:
+            held = held.union(*(pair for pair in pairs if pair & held))
+        for i, name in enumerate(names):
+            if name not in held:
+                axles = len(self.axle)
+                raise InputError(
+                    "nothing holds this body: no suspension with stiffness leads from it to the guide",
+                    field=f"axle[{i}].name" if i < axles else f"body[{i - axles}].name",
+                    value=name,
+                    remedy="mount it with a [[suspension]]",
+                )
 
     def model(self, name: str) -> VehicleModel:
         """Build the vehicle that the file describes."""
@@ -115,7 +156,7 @@ class VehicleFile(Part):
         spins: dict[str, float] = {}
         for axle in self.axle:
             # The wheels ride on the bridge at the tape circles: their mass and transverse inertia count.
-            carried = 2.0 * (axle.wheel_mass_kg * 0.75**2 + axle.wheel_transverse_inertia_kgm2)
+            carried = 2.0 * (axle.wheel_mass_kg * axle.wheel_y_m[0] ** 2 + axle.wheel_transverse_inertia_kgm2)
             roll, pitch, yaw = axle.bridge_inertia_kgm2
             bodies.append(
                 Body(
@@ -133,18 +174,25 @@ class VehicleFile(Part):
                     Wheel(name=wheel, axle=axle.name, side=side, spin=spin, radius_m=axle.wheel_radius_m)
                 )
         bodies += [Body(**entry.model_dump()) for entry in self.body]
-        springs = [
-            Suspension(
-                name=entry.name if len(entry.positions_m) == 1 else f"{entry.name} {i + 1}",
-                inner=entry.between[0],
-                outer=entry.between[1],
-                position_m=position,
-                stiffness_npm=entry.stiffness_npm,
-                damping_nspm=entry.damping_nspm,
-            )
-            for entry in self.suspension
-            for i, position in enumerate(entry.positions_m)
-        ]
+        springs: list[Suspension] = []
+        series: list[SeriesDamper] = []
+        for entry in self.suspension:
+            elastic = entry.series_stiffness_npm
+            rigid = [0.0 if k > 0.0 else c for k, c in zip(elastic, entry.damping_nspm, strict=True)]
+            for ends in ends_of(entry):
+                springs.append(
+                    Suspension(
+                        **ends,
+                        stiffness_npm=entry.stiffness_npm,
+                        damping_nspm=(rigid[0], rigid[1], rigid[2]),
+                    )
+                )
+                series += [
+                    SeriesDamper(**ends, axis=k, stiffness_npm=elastic[k], damping_nspm=entry.damping_nspm[k])
+                    for k in range(3)
+                    if elastic[k] > 0.0
+                ]
+        linear = self.linear_contact
         return VehicleModel(
             name=name,
             title=self.title,
@@ -161,5 +209,29 @@ class VehicleFile(Part):
                 gauge_m=self.gauge_m,
                 rail_inclination=self.rail_inclination,
                 friction=self.friction,
+                tape_circle_half_m=self.axle[0].wheel_y_m[0],
+                linear=None if linear is None else LinearContact(**linear.model_dump()),
             ),
+            series=tuple(series),
+            rotations=tuple(
+                Rotation(
+                    name=entry.name,
+                    inner=entry.between[0],
+                    outer=entry.between[1],
+                    stiffness_nmprad=entry.stiffness_nmprad,
+                    damping_nmsprad=entry.damping_nmsprad,
+                )
+                for entry in self.rotation
+            ),
+            tabled=tuple(
+                Tabled(
+                    **ends,
+                    axis="xyz".index(entry.axis),
+                    over=entry.over,
+                    points=tuple(entry.points),
+                )
+                for entry in self.tabled
+                for ends in ends_of(entry)
+            ),
+            gyroscopic=self.gyroscopic,
         )

@@ -17,10 +17,7 @@ from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.vehicle.contact import ContactTable, build_contact, static_height
 from simrail.vehicle.model import SeriesDamper, Tabled, VehicleModel
-from simrail.vehicle.profiles import rail_60e1, s1002
-
-WHEEL_PROFILES = {"S1002": s1002}
-RAIL_PROFILES = {"60E1": rail_60e1}
+from simrail.vehicle.profile_files import rail_profile, wheel_profile
 
 
 class ForceData(NamedTuple):
@@ -66,8 +63,8 @@ def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTab
     """Contact table of a vehicle's wheels at their mean static load."""
     pair = model.wheel_rail
     return build_contact(
-        WHEEL_PROFILES[pair.wheel_profile](),
-        RAIL_PROFILES[pair.rail_profile](),
+        wheel_profile(pair.wheel_profile),
+        rail_profile(pair.rail_profile),
         gauge_m=pair.gauge_m,
         rail_inclination=pair.rail_inclination,
         wheel_radius_m=model.wheels[0].radius_m,
@@ -188,7 +185,7 @@ def _stops(model: VehicleModel) -> tuple[FloatArray, FloatArray]:
         curve = PchipInterpolator(x, force)
         last = (force[-1] - force[-2]) / (x[-1] - x[-2])
         pieces = np.vstack([np.column_stack([x[:-1], curve.c.T]), [x[-1], 0.0, 0.0, last, force[-1]]])
-        rows.append([*_ends(model, element), float(element.over == "speed"), count, len(pieces)])
+        rows.append([*_ends(model, element), float(element.over == "speed_mps"), count, len(pieces)])
         laws.append(pieces)
         count += len(pieces)
     return np.array(rows, dtype=float).reshape(-1, 12), np.vstack([np.zeros((0, 5)), *laws])

@@ -24,6 +24,7 @@ from simrail.vehicle.suspension_forces import (
 
 @njit_borrowed
 def axle_forces(
+    t: float,
     axle: FloatArray,
     wheels: FloatArray,
     spin: FloatArray,
@@ -97,7 +98,8 @@ def axle_forces(
                 zeta[4 * (first + n) : 4 * (first + n) + 4],
                 zeta_rate[4 * (first + n) : 4 * (first + n) + 4], o,
             )  # fmt: skip
-        if flag < 0 and memo[1] == 0.0:
+        # Before 0 the vehicle is still being set down on its rails: where it then stands counts.
+        if flag < 0 and memo[1] == 0.0 and t >= 0.0:
             memo[1], memo[2] = 1.0, s
         gx = f[3] * o[0] + f[4] * o[1] + f[5] * o[2]
         gy = f[6] * o[0] + f[7] * o[1] + f[8] * o[2]
@@ -186,6 +188,6 @@ def forces(
     guide_force(t, guide, drive, grid, table, pose, wrench, memo, f)
     for a in range(axles.shape[0]):
         axle_forces(
-            axles[a], wheels, spin, zeta, spins, switches, grid, table, coef, const,
+            t, axles[a], wheels, spin, zeta, spins, switches, grid, table, coef, const,
             pose, wrench, torque, zeta_rate, memo[1 + 5 * a : 6 + 5 * a], f, o,
         )  # fmt: skip
