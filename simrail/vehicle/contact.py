@@ -2,8 +2,9 @@
 
 `wheel_force` takes where a wheel is and how it moves, and gives the force and moment on it. Normal
 force by Hertz's law on the soft-maximum penetration of `simrail.vehicle.contact_geometry`, creep
-forces by Kalker's linear theory with cubic saturation, fed by relaxation states in place of the
-quotient slip over speed, so that rest and reversal need no special case.
+forces by Kalker's linear theory, saturated by the table's law (`simrail.vehicle.creep_laws`), fed by
+relaxation states in place of the quotient slip over speed, so that rest and reversal need no special
+case.
 
 Not here: making the table, integrating the states, conicity and other readings of a whole wheelset
 (`simrail.vehicle.wheelset`).
@@ -15,6 +16,7 @@ import numpy as np
 
 from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.contact_geometry import COLUMNS, CONSTANTS, ContactTable, build_contact
+from simrail.vehicle.creep_laws import fallen, saturation
 
 __all__ = [
     "COLUMNS",
@@ -111,6 +113,7 @@ def wheel_force(
     kappa_h: float,
     dy_rail: float,
     dz_rail: float,
+    friction: float,
     zeta: FloatArray,
     zeta_dot: FloatArray,
     out: FloatArray,
@@ -139,6 +142,8 @@ def wheel_force(
         Absolute rate of the wheel about the axle, positive rolling forward, rad/s.
     kappa_h : float
         Horizontal curvature k3 of the track frame, 1/m.
+    friction : float
+        Coulomb coefficient of wheel and rail here, at rest.
     zeta, zeta_dot : ndarray, shape (4,)
         Creep states (tread longitudinal, lateral; flange longitudinal, lateral), and their rates
         (written).
@@ -156,14 +161,16 @@ def wheel_force(
     -----
     Creep: ``zeta' = (slip - |V| zeta)/(L0 + tau |V|) - h (zeta + spin share)/T``. The second term
     keeps the state from winding up while the wheel slides without rolling: h is zero, with zero
-    slope, until the linear force reaches three times the friction limit, where the saturated force
-    is constant. It pulls along the direction of the linear force, so the direction of a saturated
-    force in steady rolling is exact as well. Spin creepage is spin V^3/(V^4 + v^4): spin/V when
-    rolling, nothing at rest, where a contact does not spin.
+    slope, until the linear force reaches so many times the friction limit (3 for the cubic law) that
+    the saturated force is constant. It pulls along the direction of the linear force, so the
+    direction of a saturated force in steady rolling is exact as well. Spin creepage is
+    spin V^3/(V^4 + v^4): spin/V when rolling, nothing at rest, where a contact does not spin.
     """
     u0, inv_du, half, r0, hertz = const[0], const[1], const[2], const[3], const[4]
-    friction, chi, length0, tau, taud = const[5], const[6], const[7], const[8], const[9]
+    chi, length0, tau, taud = const[6], const[7], const[8], const[9]
     v_spin, windup_rate, u_min, u_max, touch = const[10], const[11], const[12], const[13], const[14]
+    law, adhesion, slipping = const[15], const[16], const[17]
+    floor, decay, onset = const[18], const[19], const[20]
 
     for k in range(8):
         out[k] = 0.0
@@ -213,13 +220,13 @@ def wheel_force(
         f23 = (((c[8, 0] * x + c[8, 1]) * x + c[8, 2]) * x + c[8, 3]) * d * root
         f33 = (((c[9, 0] * x + c[9, 1]) * x + c[9, 2]) * x + c[9, 3]) * d * d
 
-        bound = friction * N
+        bound = fallen(friction, floor, decay, slip_x, v_2) * N
         turn = f23 * spin * per_speed
         share = turn / f22
         l1 = f11 * z1
         l2 = f22 * z2 + turn
-        excess = max(np.sqrt(l1 * l1 + l2 * l2) / bound - 3.0, 0.0)
-        brake = windup_rate * excess * excess / (9.0 + excess * excess)
+        excess = max(np.sqrt(l1 * l1 + l2 * l2) / bound - onset, 0.0)
+        brake = windup_rate * excess * excess / (onset * onset + excess * excess)
         grip = min(N / touch, 1.0)
         grip = grip * grip * (3.0 - 2.0 * grip)
         d1 = (grip * slip_x - speed * z1) / length - brake * z1
@@ -233,7 +240,7 @@ def wheel_force(
         T2 = -f22 * x2 - turn
         M = direction * f23 * x2 - f33 * spin * abs(per_speed)
         q = np.sqrt(T1 * T1 + T2 * T2) / bound
-        factor = 1.0 - q / 3.0 + q * q / 27.0 if q < 3.0 else 1.0 / q
+        factor = saturation(q, law, adhesion, slipping)
         T1 *= factor
         T2 *= factor
         M *= factor

@@ -22,6 +22,7 @@ from scipy.interpolate import CubicSpline
 from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.vehicle.contact_pair import ContactPair, SoftContact, incline
+from simrail.vehicle.creep_laws import CreepLaw
 from simrail.vehicle.hertz import POISSON_RATIO, SHEAR_MODULUS_PA, hertz_ellipse, kalker_coefficients
 from simrail.vehicle.profiles import RailProfile, WheelProfile, wheel_depth
 
@@ -54,6 +55,12 @@ CONSTANTS = (
     "least_shift_m",
     "derailed_shift_m",
     "touch_load_n",
+    "creep_law",
+    "polach_adhesion",
+    "polach_slip",
+    "friction_floor",
+    "friction_decay_spm",
+    "windup_onset",
 )
 """What `ContactTable.const` holds, in its order."""
 
@@ -88,7 +95,7 @@ class ContactTable:
         tape circle's distance), yaw_rise its second derivative in yaw; abscissa s and depth F are
         those of the contact on the wheel; all in m. f11, f22, f23, f33 are linear creep
         coefficients, to be multiplied by d, d, d^1.5, d^2 of the normal approach d.
-    const : ndarray, shape (15,)
+    const : ndarray, shape (21,)
         See `CONSTANTS`.
     static_load_n : float
         Wheel load for which the smoothing is made.
@@ -122,6 +129,7 @@ def build_contact(
     relaxation_length_m: float | None = None,
     relaxation_time_s: float = 3e-4,
     creep_damping_s: float = 1e-4,
+    creep_law: CreepLaw | None = None,
     shear_modulus_pa: float = SHEAR_MODULUS_PA,
     poisson_ratio: float = POISSON_RATIO,
 ) -> ContactTable:
@@ -151,6 +159,8 @@ def build_contact(
         Creep force builds up over ``length + time |V|``; the length is 10 mm at full scale.
     creep_damping_s : float
         Voigt time of the tangential contact spring.
+    creep_law : CreepLaw, optional
+        How creep forces saturate, and how friction falls with sliding; Shen-Hedrick-Elkins if none.
     shear_modulus_pa, poisson_ratio : float
         Of wheel and rail.
 
@@ -234,6 +244,7 @@ def build_contact(
         "least_shift_m": u[0],
         "derailed_shift_m": derailed,
         "touch_load_n": 0.01 * static_load_n,
+        **(creep_law or CreepLaw()).constants(),
     }
     lean = f"1:{1.0 / rail_inclination:.0f}" if rail_inclination else "upright"
     return ContactTable(

@@ -95,7 +95,7 @@ def axle_forces(
             flag = wheel_force(
                 coef, const, wheel[1], y, z - wheel[3], phi, psi, f[16 + rail], f[17 + rail],
                 speed, vx, y_dot, z_dot, phi_dot, psi_dot, spin[k], f[14], f[20 + rail], f[21 + rail],
-                zeta[4 * (first + n) : 4 * (first + n) + 4],
+                const[5], zeta[4 * (first + n) : 4 * (first + n) + 4],
                 zeta_rate[4 * (first + n) : 4 * (first + n) + 4], o,
             )  # fmt: skip
         # Before 0 the vehicle is still being set down on its rails: where it then stands counts.

@@ -108,7 +108,7 @@ def push_sideways(table: ContactTable, y_m: FloatArray) -> WheelsetAtRest:
     def vertical(side: float, at: float, lift: float, roll: float) -> FloatArray:
         flag = wheel_force(
             table.coef, table.const, side, at, lift, roll, 0.0, 0.0, 0.0, 0.0, 0.0,
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, zeta, rate, out,
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, table.const[5], zeta, rate, out,
         )  # fmt: skip
         if flag < 0:
             raise InputError(

@@ -14,7 +14,7 @@ def many(coef, const, y, z, zeta, rate, out):
     for i in range(y.size):
         flag = wheel_force(
             coef, const, 1.0, y[i], z[i], 1e-4, 1e-3, 0.0, 0.0, 20.0, 20.0, 0.01, 0.01, 1e-3, 1e-3,
-            20.0 / 0.46, 1.0 / 300.0, 0.0, 0.0, zeta, rate, out,
+            20.0 / 0.46, 1.0 / 300.0, 0.0, 0.0, const[5], zeta, rate, out,
         )  # fmt: skip
         total += out[1] + rate[0] + flag
     return total

@@ -46,7 +46,9 @@ def call(contact, zeta=None, **state):
     values = dict.fromkeys(ARGUMENTS, 0.0) | {"side": 1.0} | state
     zeta = np.zeros(4) if zeta is None else np.array(zeta, dtype=float)
     rate, out = np.full(4, np.nan), np.full(8, np.nan)
-    flag = wheel_force(contact.coef, contact.const, *(float(values[a]) for a in ARGUMENTS), zeta, rate, out)
+    friction = values.pop("friction", contact.const[5])
+    arguments = (*(float(values[a]) for a in ARGUMENTS), float(friction))
+    flag = wheel_force(contact.coef, contact.const, *arguments, zeta, rate, out)
     return flag, out, rate
 
 

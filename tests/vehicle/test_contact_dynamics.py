@@ -60,7 +60,7 @@ def rates(s, V, x, dx, coef, const, par, waves, rail, wheel):
         side = 1.0 - 2.0 * n
         wheel_force(
             coef, const, side, y, z, phi, psi, rail[2 * n], rail[2 * n + 1], V, V * (1.0 - kappa * y),
-            v[0], v[1], v[2], v[3], v[6 + n], kappa, rail[4 + 2 * n], rail[5 + 2 * n],
+            v[0], v[1], v[2], v[3], v[6 + n], kappa, rail[4 + 2 * n], rail[5 + 2 * n], const[5],
             x[14 + 4 * n : 18 + 4 * n], dx[14 + 4 * n : 18 + 4 * n], wheel,
         )  # fmt: skip
         fy += wheel[1]

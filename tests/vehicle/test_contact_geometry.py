@@ -139,7 +139,7 @@ def test_static_height_carries_the_load():
         out = np.zeros(8)
         wheel_force(
             contact.coef, contact.const, 1.0, 0.0, static_height(contact), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(4), np.zeros(4), out,
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, contact.const[5], np.zeros(4), np.zeros(4), out,
         )  # fmt: skip
         assert out[2] == pytest.approx(load, rel=1e-9)
 
