@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from simrail.vehicle.contact import build_contact, static_height, wheel_force
 from simrail.vehicle.contact_geometry import COLUMNS
+from simrail.vehicle.creep_laws import CreepLaw
 from simrail.vehicle.hertz import hertz_ellipse, kalker_coefficients
 from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002
 from simrail.vehicle.wheelset import contact_state
@@ -422,8 +423,14 @@ def test_forces_and_creep_rates_are_continuously_differentiable_in_the_creep(ind
     check_smooth(index, 4e-6)
 
 
-def check_smooth(variable, step):
-    contact = table()
+@pytest.mark.parametrize("variable, step", [("z", 2e-7), (0, 4e-6), ("v_x", 1e-4)])
+def test_forces_are_smooth_with_polach_and_falling_friction(variable, step):
+    law = CreepLaw("polach", adhesion=0.9, slip=0.5, friction_floor=0.4, friction_decay_spm=0.6)
+    check_smooth(variable, step, contact=table(creep_law=law))
+
+
+def check_smooth(variable, step, contact=None):
+    contact = contact or table()
     worst = []
     for divisor in (1.0, 4.0, 16.0):
         h, most = step / divisor, 0.0
