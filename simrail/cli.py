@@ -1,4 +1,4 @@
-"""The command line: ``simrail run | list | check | new | cache``.
+"""The command line: ``simrail run | list | check | vehicle | new | cache``.
 
 Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
 imports stand inside the commands, so that those that need little answer at once.
@@ -144,6 +144,47 @@ def list_parts() -> int:
             console.print(
                 f"  [cyan]{name:{width}}[/cyan]  {title}", overflow="ellipsis", no_wrap=True, soft_wrap=wide
             )
+    return DONE
+
+
+@app.command()
+def vehicle(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", help="A shipped vehicle, or the path of a TOML file.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Write an HTML page with figures there, too.")
+    ] = None,
+    speed: Annotated[
+        float, typer.Option("--speed", metavar="KMH", min=1.0, max=1000.0, help="Speed of the mode table.")
+    ] = 80.0,
+    top: Annotated[
+        float, typer.Option("--to", metavar="KMH", min=10.0, max=1000.0, help="Highest speed searched.")
+    ] = 400.0,
+) -> int:
+    """Show a vehicle: masses, wheel loads, natural frequencies, conicity and critical speed."""
+    from rich.console import Console
+
+    from simrail.report.vehicle_study import study_vehicle
+    from simrail.report.vehicle_text import print_study
+    from simrail.scenario.files import blame, find, judge, label, read_toml
+    from simrail.scenario.vehicle_file import VehicleFile
+
+    path = find("vehicle", name)
+    model = judge(VehicleFile, read_toml(path), file=label(path)).model(path.stem)
+    console = Console(stderr=True)
+    with console.status("") as status, blame(label(path), "vehicle"):
+        study = study_vehicle(
+            model,
+            running_mps=speed / 3.6,
+            top_mps=top / 3.6,
+            progress=lambda what, share: status.update(f"{what} {100 * share:.0f} %"),
+        )
+    print_study(Console(), study)
+    if out is not None:
+        from simrail.report.vehicle_page import write_vehicle_page
+
+        print(f"wrote {write_vehicle_page(out, study)}")
     return DONE
 
 

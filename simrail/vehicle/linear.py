@@ -85,6 +85,7 @@ class RunningVehicle:
     _nominal: FloatArray = field(repr=False)
     _mass: FloatArray = field(repr=False)
     _inertia: FloatArray = field(repr=False)
+    _drop_m: float
 
     @property
     def bodies(self) -> int:
@@ -164,21 +165,19 @@ class RunningVehicle:
         state = self._at_rest(speed_mps)
         if start is not None:
             state[: 12 * self.bodies] = start[: 12 * self.bodies]  # the wheels' spins go with the speed
-        steps = self.steps
-        # Newton in multiples of the difference steps: then all columns are of like size.
-        for _ in range(25):
-            fault = self.rates(state, speed_mps)
-            matrix = state_matrix(lambda at: self.rates(at, speed_mps), state, steps)
-            rows = 1.0 / np.maximum(np.abs(matrix * steps).max(axis=1), 1e-30)
-            scaled = matrix * steps * rows[:, None]
-            try:
-                step = np.linalg.solve(scaled, -fault * rows) * steps
-            except np.linalg.LinAlgError:  # a motion that nothing holds stays where it is
-                step = np.linalg.lstsq(scaled, -fault * rows, rcond=1e-12)[0] * steps
+        # The inverse is kept while the steps shrink quickly: a Jacobian costs 150 evaluations.
+        inverse, before, fresh = self._inverse(state, speed_mps), np.inf, True
+        for _ in range(60):
+            step = -inverse @ self.rates(state, speed_mps)
             largest = np.abs(step[: 6 * self.bodies]).max()
             state = state + step * min(1.0, 1e-3 / max(largest, 1e-12))
-            if largest < 1e-11:
+            if largest < 1e-11 or (largest < 1e-9 and largest > 0.5 * before):
                 break
+            if largest > 0.2 * before and not fresh:
+                inverse, fresh = self._inverse(state, speed_mps), True
+            else:
+                fresh = False
+            before = largest
         left = np.abs(self.rates(state, speed_mps))[6 * self.bodies : 12 * self.bodies].max()
         if not left < _BALANCED_MPS2:
             raise InputError(
@@ -215,10 +214,23 @@ class RunningVehicle:
         kept = np.concatenate([first, 6 * self.bodies + first, np.arange(creep, self.size)]).astype(int)
         return matrix[np.ix_(kept, kept)], free
 
+    def _inverse(self, state: FloatArray, speed_mps: float) -> FloatArray:
+        """Inverse of the Jacobian, scaled by the difference steps and by rows before it is inverted."""
+        steps = self.steps
+        matrix = state_matrix(lambda at: self.rates(at, speed_mps), state, steps) * steps
+        rows = 1.0 / np.maximum(np.abs(matrix).max(axis=1), 1e-30)
+        scaled = matrix * rows[:, None]
+        try:
+            inverse = np.linalg.inv(scaled)
+        except np.linalg.LinAlgError:  # a motion that nothing holds stays where it is
+            inverse = np.linalg.pinv(scaled, rcond=1e-12)
+        turned: FloatArray = steps[:, None] * inverse * rows
+        return turned
+
     def _at_rest(self, speed_mps: float) -> FloatArray:
         """Every body at its nominal height less the wheels' penetration, the wheels rolling."""
         state = np.zeros(self.size)
-        state[2 : 6 * self.bodies : 6] = rest_drop_m(self.model, gravity_mps2=self.gravity_mps2)
+        state[2 : 6 * self.bodies : 6] = self._drop_m
         names = list(self.model.spin_inertia_kgm2)
         for wheel in self.model.wheels:
             state[12 * self.bodies + names.index(wheel.spin)] = speed_mps / wheel.radius_m
@@ -242,4 +254,5 @@ def running_vehicle(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Runni
         _nominal=nominal,
         _mass=np.array([body.mass_kg for body in model.bodies]),
         _inertia=np.array([body.inertia_kgm2 for body in model.bodies]),
+        _drop_m=rest_drop_m(model, gravity_mps2=gravity_mps2),
     )

@@ -100,6 +100,53 @@ def test_no_crossing_and_one_from_the_start():
     assert wavelength == pytest.approx(2 * np.pi * np.sqrt(B * R0 / 0.1), rel=1e-3)
 
 
+def suspended(conicity, ky, kpsi):
+    """The shipped suspended wheelset at a stiffness pair and conicity, on a carrier that does not give way.
+
+    Springs at +-a across: ky is their sum, kpsi = ky a^2 by their longitudinal stiffness.
+    """
+    model = load(VehicleFile, "vehicle", "suspended_wheelset").model("suspended_wheelset")
+    arm = np.sqrt(kpsi / ky)
+    springs = tuple(
+        replace(
+            spring,
+            position_m=(0.0, float(np.sign(spring.position_m[1]) * arm), 0.45),
+            stiffness_npm=(0.5 * ky, 0.5 * ky, 0.0),
+        )
+        for spring in model.suspensions
+    )
+    stiff = {
+        name: 100.0 * value
+        for name, value in vars(model.guide).items()
+        if "stiffness" in name and value > 0.0
+    }
+    linear = replace(model.wheel_rail.linear, conicity=conicity)
+    return replace(
+        model,
+        suspensions=springs,
+        guide=replace(model.guide, **stiff),
+        wheel_rail=replace(model.wheel_rail, linear=linear),
+    )
+
+
+SHORT = [(0.1, 0), (0.3, 1), (0.05, 2)]
+ALL = [
+    pytest.param(*case, marks=[] if case in SHORT else [pytest.mark.slow])
+    for case in ((conicity, column) for conicity in SHEET for column in range(3))
+]
+
+
+@pytest.mark.parametrize(("conicity", "column"), ALL)
+def test_vehicle_of_the_closed_form_hunts_at_its_speed(conicity, column):
+    """Critical speed and frequency of the suspended wheelset, a vehicle like any other: 1 %."""
+    ky, kpsi = list(COLUMNS)[column]
+    speed, omega = closed_form(conicity, ky, kpsi)
+    vehicle = running_vehicle(suspended(conicity, ky, kpsi))
+    found = critical_speed(vehicle, root_locus(vehicle, speed * np.array([0.5, 0.8, 0.97, 1.03])))
+    assert found.speed_mps == pytest.approx(speed, rel=0.01)
+    assert found.frequency_hz == pytest.approx(omega / (2.0 * np.pi), rel=0.01)
+
+
 # A vehicle in Python: one axle, a body on four springs and four dampers.
 BODY = Body("body", 8000.0, (6000.0, 20000.0, 21000.0), (0.0, 0.0, 1.2))
 AXLE = Body("axle", 1400.0, (900.0, 100.0, 950.0), (0.0, 0.0, 0.46))

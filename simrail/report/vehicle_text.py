@@ -1,0 +1,88 @@
+"""What ``simrail vehicle`` prints: a study of a vehicle as tables for a terminal."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from simrail.report.vehicle_study import VehicleStudy
+from simrail.vehicle.stability import CriticalSpeed, Mode
+
+MOST_HZ = 40.0
+"""Faster modes (wheels on their contact springs) are not listed."""
+
+
+def critical_words(critical: CriticalSpeed) -> str:
+    """The critical speed in words."""
+    low, high = (3.6 * v for v in critical.searched_mps)
+    if critical.speed_mps is None:
+        return f"none below {high:.0f} km/h"
+    hunting = f"hunting at {critical.frequency_hz:.2f} Hz"
+    if critical.from_the_start:
+        return f"below {low:.0f} km/h already ({hunting})"
+    return f"{3.6 * critical.speed_mps:.1f} km/h ({hunting})"
+
+
+def listed(modes: list[Mode]) -> list[Mode]:
+    """Modes worth listing: not over-damped almost to a standstill, not of the contact springs."""
+    return [m for m in modes if m.natural_frequency_hz < MOST_HZ and m.damping < 0.98]
+
+
+def print_study(console: Console, study: VehicleStudy) -> None:
+    """Print a study."""
+    model = study.model
+    mark = " [yellow](synthetic)[/yellow]" if model.synthetic else ""
+    console.print(f"[bold]{model.name}[/bold]{mark}: {model.title}", highlight=False)
+    console.print(f"[dim]{model.source}[/dim]", highlight=False)
+
+    bodies = _table("body", "mass\nkg", "roll\nkg m2", "pitch\nkg m2", "yaw\nkg m2", "height\nm")
+    for body in model.bodies:
+        inertia = [f"{value:,.0f}" for value in body.inertia_kgm2]
+        bodies.add_row(body.name, f"{body.mass_kg:,.0f}", *inertia, f"{body.position_m[2]:.3f}")
+    console.print(bodies)
+    mass = sum(body.mass_kg for body in model.bodies)
+    loads = ", ".join(
+        f"{wheel.name} {load / 1e3:.2f}" for wheel, load in zip(model.wheels, study.wheel_load_n, strict=True)
+    )
+    console.print(f"in all {mass:,.0f} kg; static wheel loads, kN: {loads}", highlight=False)
+
+    modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held", words=2)
+    for mode in listed(study.standstill):
+        modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", mode.words())
+    console.print(modes)
+
+    pair = model.wheel_rail
+    if study.conicity is None:
+        console.print("contact: prescribed and linear", highlight=False)
+    else:
+        told = ", ".join(
+            f"{1e3 * a:g} mm {value:.3f}"
+            for a, value in zip(study.conicity.amplitude_m, study.conicity.equivalent, strict=True)
+            if np.isclose(a / study.conicity.scale % 1e-3, 0.0, atol=1e-6)
+            or np.isclose(a / study.conicity.scale % 1e-3, 1e-3, atol=1e-6)
+        )
+        console.print(
+            f"wheel {pair.wheel_profile} on rail {pair.rail_profile}, gauge {1e3 * pair.gauge_m:g} mm, "
+            f"inclination {_ratio(pair.rail_inclination)}, under static load",
+            highlight=False,
+        )
+        at = 3.0 * study.conicity.scale
+        console.print(
+            f"equivalent conicity at {at:g} mm: [bold]{study.conicity.at_3_mm:.3f}[/bold]; over the "
+            f"amplitude: {told}",
+            highlight=False,
+        )
+    console.print(f"critical speed: [bold]{critical_words(study.critical)}[/bold]", highlight=False)
+
+
+def _ratio(inclination: float) -> str:
+    return f"1:{1.0 / inclination:g}" if inclination > 0.0 else "0"
+
+
+def _table(*columns: str, words: int = 0) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for i, name in enumerate(columns):
+        table.add_column(name, justify="left" if i == words else "right")
+    return table
