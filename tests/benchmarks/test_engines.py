@@ -16,9 +16,11 @@ from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
+from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
-VEHICLES = {"bogie": "metro_irw_bogie"}
+ENGINES = {"compiled": CompiledEngine, "exudyn": ExudynEngine}
+VEHICLES = {"axle": "irw_axle", "bogie": "metro_irw_bogie", "car": "irw_car"}
 DURATION_S = 40.0
 
 
@@ -32,7 +34,7 @@ def calibration_loop(n: int) -> float:
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-@pytest.mark.parametrize("engine", ["exudyn"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_engine(benchmark, engine, vehicle):
     """A start, a transition and the sharp curve at 40 km/h with flange contact, and a stop."""
     model = load(VehicleFile, "vehicle", VEHICLES[vehicle]).model(vehicle)
@@ -41,7 +43,7 @@ def test_engine(benchmark, engine, vehicle):
     profile = SpeedProfile(330.0, 600.0, 40.0 / 3.6, rest_s=1.0, final_rest_s=2.0, acceleration_mps2=1.0)
 
     def setup():
-        return (ExudynEngine(model, laid, profile=profile, settle_s=0.5),), {}
+        return (ENGINES[engine](model, laid, profile=profile, settle_s=0.5),), {}
 
     def drive(engine):
         return sum(len(segment.time_s) for segment in engine.run(DURATION_S))
