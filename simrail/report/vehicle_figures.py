@@ -119,7 +119,9 @@ def locus_figure(study: VehicleStudy) -> str:
         plane.set_ylim(0.0, _MOST_HZ)
         plane.set_xlabel("real part, 1/s")
         plane.set_ylabel("frequency, Hz")
-        damping = np.where(frequency > SLOWEST_HZ, -values.real / np.abs(values), np.inf).min(axis=1)
+        damping = np.where(
+            frequency > SLOWEST_HZ, -values.real / np.maximum(np.abs(values), 1e-9), np.inf
+        ).min(axis=1)
         below.plot(speed, 100.0 * damping, color=_LEFT, lw=1.6)
         below.axhline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))
         if study.critical.speed_mps is not None:

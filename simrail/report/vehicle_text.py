@@ -19,9 +19,9 @@ def critical_words(critical: CriticalSpeed) -> str:
     low, high = (3.6 * v for v in critical.searched_mps)
     if critical.speed_mps is None:
         return f"none below {high:.0f} km/h"
-    hunting = f"hunting at {critical.frequency_hz:.2f} Hz"
+    hunting = f"above it an oscillation of {critical.frequency_hz:.2f} Hz grows"
     if critical.from_the_start:
-        return f"below {low:.0f} km/h already ({hunting})"
+        return f"below {low:.0f} km/h already (an oscillation of {critical.frequency_hz:.2f} Hz grows)"
     return f"{3.6 * critical.speed_mps:.1f} km/h ({hunting})"
 
 
@@ -51,7 +51,8 @@ def print_study(console: Console, study: VehicleStudy) -> None:
     modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held", words=2)
     for mode in listed(study.standstill):
         modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", mode.words())
-    console.print(modes)
+    if modes.row_count:
+        console.print(modes)
 
     pair = model.wheel_rail
     if study.conicity is None:

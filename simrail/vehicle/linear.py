@@ -141,7 +141,10 @@ class RunningVehicle:
         # Euler, in the body's axes: I w' = M - w x I w.
         moment = np.einsum("bji,bj->bi", rotation, wrench[:, 3:])
         omega = np.einsum("bji,bj->bi", rotation, motion[:, 3:])
-        slope = (moment - np.cross(omega, self._inertia * omega)) / self._inertia
+        # The cross product by columns: np.cross takes a third of the time of everything here.
+        turned = self._inertia * omega
+        gyro = omega[:, [1, 2, 0]] * turned[:, [2, 0, 1]] - omega[:, [2, 0, 1]] * turned[:, [1, 2, 0]]
+        slope = (moment - gyro) / self._inertia
         out = np.empty((b, 6))
         out[:, :3] = wrench[:, :3] / self._mass[:, None]
         out[:, 3:] = np.einsum("bij,bj->bi", rotation, slope)

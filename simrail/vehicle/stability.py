@@ -66,7 +66,7 @@ class Mode:
 def modes_of(
     matrix: FloatArray, vehicle: RunningVehicle, *, bodies: Sequence[int] | None = None
 ) -> list[Mode]:
-    """Oscillatory modes of a state matrix, by rising frequency.
+    """Oscillatory modes of a state matrix, by rising natural frequency.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def modes_of(
                 (vehicle.model.bodies[of[k // 6]].name, DIRECTIONS[k % 6]): float(energy[k]) for k in range(n)
             }
             found.append(Mode(complex(value), shares))
-    return sorted(found, key=lambda mode: mode.frequency_hz)
+    return sorted(found, key=lambda mode: mode.natural_frequency_hz)
 
 
 def standstill_modes(vehicle: RunningVehicle) -> list[Mode]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 
 from simrail.errors import InputError
 from simrail.profile import SpeedProfile
@@ -220,6 +221,22 @@ def test_free_wheelset_has_the_wavelength_of_klingel(inclination, least):
     kinematic = 2 * np.pi / wavelength
     near = values[np.abs(np.abs(values.imag) - kinematic) < 0.3 * kinematic]
     assert not np.any(np.abs(near.real) < 0.3 * kinematic)
+
+
+def test_a_spinning_body_obeys_euler():
+    """Free of forces, w' is that of the body's Euler equations, whatever its attitude."""
+    vehicle = running_vehicle(on_springs())
+    free = replace(
+        vehicle, data=vehicle.data._replace(springs=np.zeros((0, 17)), guide=0 * vehicle.data.guide)
+    )
+    state = np.zeros(free.size)
+    state[9:12] = 0.3, -0.2, 0.5  # turn of the body, in the track's axes
+    omega = np.array([1.0, 2.0, -0.7])
+    state[21:24] = omega
+    slope = free.rates(state, 10.0)[21:24]
+    turn = Rotation.from_rotvec(state[9:12]).as_matrix()
+    inertia = turn @ np.diag(BODY.inertia_kgm2) @ turn.T
+    assert slope == pytest.approx(np.linalg.solve(inertia, -np.cross(omega, inertia @ omega)), rel=1e-9)
 
 
 @pytest.fixture(scope="module")
