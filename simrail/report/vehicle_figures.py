@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from simrail.report.style import INK, MUTED, WIDTH_IN, look, panels, to_svg
 from simrail.report.vehicle_study import Conicity, VehicleStudy
+from simrail.report.vehicle_text import MOST_HZ
 from simrail.vehicle.contact_pair import incline
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.profile_files import rail_profile, wheel_profile
@@ -119,9 +120,8 @@ def locus_figure(study: VehicleStudy) -> str:
         plane.set_ylim(0.0, _MOST_HZ)
         plane.set_xlabel("real part, 1/s")
         plane.set_ylabel("frequency, Hz")
-        damping = np.where(
-            frequency > SLOWEST_HZ, -values.real / np.maximum(np.abs(values), 1e-9), np.inf
-        ).min(axis=1)
+        counts = (frequency > SLOWEST_HZ) & (frequency < MOST_HZ)
+        damping = np.where(counts, -values.real / np.maximum(np.abs(values), 1e-9), np.inf).min(axis=1)
         below.plot(speed, 100.0 * damping, color=_LEFT, lw=1.6)
         below.axhline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))
         if study.critical.speed_mps is not None:

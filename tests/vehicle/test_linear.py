@@ -234,6 +234,9 @@ def test_a_spinning_body_obeys_euler():
     omega = np.array([1.0, 2.0, -0.7])
     state[21:24] = omega
     slope = free.rates(state, 10.0)[21:24]
+    upright, base = state.copy(), Rotation.from_rotvec(state[:12].reshape(2, 6)[:, 3:]).as_matrix()
+    upright[9:12] = 0.0  # the same attitude, as the one that turns start from
+    assert free.rates(upright, 10.0, base=base) == pytest.approx(free.rates(state, 10.0), rel=1e-9, abs=1e-9)
     turn = Rotation.from_rotvec(state[9:12]).as_matrix()
     inertia = turn @ np.diag(BODY.inertia_kgm2) @ turn.T
     assert slope == pytest.approx(np.linalg.solve(inertia, -np.cross(omega, inertia @ omega)), rel=1e-9)
@@ -282,6 +285,7 @@ def test_rigid_wheelsets_make_the_same_bogie_hunt(bogie):
     assert growth_1ps(np.linalg.eigvals(vehicle.linearised(1.03 * found.speed_mps))) > 0.0
 
 
+@pytest.mark.slow
 def test_exudyns_own_linearised_system_has_the_same_eigenvalues(bogie):
     """Metro bogie at 36 km/h, settled by the engine: all oscillatory eigenvalues to 3e-4, most to 1e-6.
 
