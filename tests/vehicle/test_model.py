@@ -14,6 +14,7 @@ from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.vehicle.force_data import pack, states_of
 from simrail.vehicle.forces import forces
+from simrail.vehicle.linear_contact import linear_wheel_force
 from simrail.vehicle.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
 
 
@@ -182,3 +183,22 @@ def test_wheelset_masses_add_up_to_the_source():
     assert axle.inertia_kgm2[0] == pytest.approx(1120.0)
     assert axle.inertia_kgm2[2] == pytest.approx(1120.0)
     assert model.spin_inertia_kgm2[axle.name] == pytest.approx(112.0)
+
+
+def test_prescribed_contact_has_its_gravitational_stiffness():
+    """A wheelset at rest, 1 mm off and turned by 2 mrad: -k y and -k psi, both wheels together."""
+    model, data = data_of("suspended_wheelset")
+    switches = data.switches.copy()
+    switches[9:11] = 0.5 * 4e5, 0.5 * -7e3
+    force = moment = vertical = 0.0
+    for side in (1.0, -1.0):
+        out = np.zeros(8)
+        flag = linear_wheel_force(
+            switches, data.const, side, 1e-3, 0.0, 0.0, 2e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+            0.0, 0.0, 0.0, np.zeros(4), np.zeros(4), out,
+        )  # fmt: skip
+        assert flag == 1
+        force, moment, vertical = force + out[1], moment + out[5], vertical + out[2]
+    assert force == pytest.approx(-4e5 * 1e-3)
+    assert moment == pytest.approx(7e3 * 2e-3)
+    assert vertical == pytest.approx(np.sum(model.wheel_load_n(9.81)))
