@@ -115,7 +115,7 @@ def locus_figure(study: VehicleStudy) -> str:
         )
         bar = figure.colorbar(marks, ax=plane, pad=0.01, aspect=30, fraction=0.03)
         bar.set_label("speed, km/h")
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
         plane.axvline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))
         plane.set_ylim(0.0, _MOST_HZ)
         plane.set_xlabel("real part, 1/s")
