@@ -12,6 +12,7 @@ from simrail.scenario.files import Part
 from simrail.scenario.vehicle_parts import (
     AxleEntry,
     BodyEntry,
+    CreepEntry,
     GuideEntry,
     LinearContactEntry,
     RotationEntry,
@@ -19,6 +20,7 @@ from simrail.scenario.vehicle_parts import (
     TabledEntry,
     ends_of,
 )
+from simrail.vehicle.creep_laws import CreepLaw
 from simrail.vehicle.model import (
     Body,
     Guide,
@@ -50,6 +52,7 @@ class VehicleFile(Part):
     suspension: tuple[SuspensionEntry, ...] = ()
     rotation: tuple[RotationEntry, ...] = ()
     tabled: tuple[TabledEntry, ...] = ()
+    creep: CreepEntry = CreepEntry()
     linear_contact: LinearContactEntry | None = None
     gyroscopic: bool = True
     guide: GuideEntry
@@ -209,6 +212,7 @@ class VehicleFile(Part):
                 gauge_m=self.gauge_m,
                 rail_inclination=self.rail_inclination,
                 friction=self.friction,
+                creep=CreepLaw(name=self.creep.law, **self.creep.model_dump(exclude={"law"})),
                 tape_circle_half_m=self.axle[0].wheel_y_m[0],
                 linear=None if linear is None else LinearContact(**linear.model_dump()),
             ),

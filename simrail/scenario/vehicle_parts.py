@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from simrail.errors import InputError
 from simrail.scenario.files import Part
 
 Positive = Annotated[float, Field(gt=0)]
@@ -73,6 +74,27 @@ class TabledEntry(Part):
     axis: Literal["x", "y", "z"]
     over: Literal["deflection_m", "speed_mps"]
     points: Annotated[list[tuple[Positive, NotNegative]], Field(min_length=2)]
+
+
+class CreepEntry(Part):
+    """How creep forces saturate: see `simrail.vehicle.creep_laws.CreepLaw`."""
+
+    law: Literal["she", "polach"] = "she"
+    adhesion: Annotated[float, Field(gt=0, le=1)] = 1.0
+    slip: Annotated[float, Field(gt=0, le=1)] = 1.0
+    friction_floor: Annotated[float, Field(gt=0, le=1)] = 1.0
+    friction_decay_spm: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.slip > self.adhesion:
+            raise InputError(
+                "Polach's factor of slip exceeds that of adhesion",
+                field="slip",
+                value=self.slip,
+                limit=f"<= adhesion, {self.adhesion:g}",
+            )
+        return self
 
 
 class LinearContactEntry(Part):

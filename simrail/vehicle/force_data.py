@@ -71,6 +71,7 @@ def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTab
         tape_circle_half_m=pair.tape_circle_half_m,
         static_load_n=float(np.mean(model.wheel_load_n(gravity_mps2))),
         friction=pair.friction,
+        creep_law=pair.creep,
     )
 
 

@@ -8,13 +8,14 @@ point. Statics (preload of the springs, wheel loads) follow from the description
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from simrail.errors import InputError
 from simrail.jit import FloatArray
+from simrail.vehicle.creep_laws import CreepLaw
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,7 @@ class WheelRail:
     rail_inclination: float
     friction: float
     tape_circle_half_m: float = 0.75
+    creep: CreepLaw = field(default_factory=CreepLaw)
     linear: LinearContact | None = None
 
 

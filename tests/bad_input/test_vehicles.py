@@ -32,6 +32,13 @@ FAULTS = {
         "[10.0e3, 6.0e3, -4.0e3]",
         ["suspension[0].damping_nspm"],
     ),
+    "unknown creep law": (BOGIE, "[guide]", '[creep]\nlaw = "dahl"\n\n[guide]', ["creep.law", "dahl"]),
+    "slip over adhesion": (
+        BOGIE,
+        "[guide]",
+        '[creep]\nlaw = "polach"\nadhesion = 0.4\nslip = 0.6\n\n[guide]',
+        ["creep.slip", "0.6", "0.4"],
+    ),
     "body that nothing holds": (BOGIE, "[guide]", LOOSE, ["body[2].name", "toolbox", "[[suspension]]"]),
     "axle that nothing holds": (
         BOGIE,

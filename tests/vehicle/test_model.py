@@ -7,12 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation as Turn
 
 from simrail.profile import SpeedProfile
-from simrail.scenario.files import load
+from simrail.scenario.files import judge, load, parse_toml, shipped
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.vehicle.force_data import pack, states_of
+from simrail.vehicle.contact_geometry import CONSTANTS
+from simrail.vehicle.force_data import contact_of, pack, states_of
 from simrail.vehicle.forces import forces
 from simrail.vehicle.linear_contact import linear_wheel_force
 from simrail.vehicle.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
@@ -202,3 +203,16 @@ def test_prescribed_contact_has_its_gravitational_stiffness():
     assert force == pytest.approx(-4e5 * 1e-3)
     assert moment == pytest.approx(7e3 * 2e-3)
     assert vertical == pytest.approx(np.sum(model.wheel_load_n(9.81)))
+
+
+def test_creep_law_of_the_file_reaches_the_contact():
+    """Polach's law, chosen in the file, is what the wheels' table holds; nothing said is SHE."""
+    text = shipped("vehicle")["metro_irw_bogie"].read_text(encoding="utf-8")
+    chosen = text.replace("[guide]", '[creep]\nlaw = "polach"\nslip = 0.4\n\n[guide]')
+    plain, polach = (
+        contact_of(judge(VehicleFile, parse_toml(one, file="v"), file="v").model("v")).const
+        for one in (text, chosen)
+    )
+    law, slip = CONSTANTS.index("creep_law"), CONSTANTS.index("polach_slip")
+    assert (plain[law], polach[law]) == (0.0, 1.0)
+    assert polach[slip] == 0.4
