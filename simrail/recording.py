@@ -107,6 +107,9 @@ class Recording:
         ``"encoder"``, ``"truth"`` (an ablation), or the name of the method that made it.
     gravity_mps2 : float
         Local gravity.
+    gaps : pandas.DataFrame, optional
+        Where the IMU's samples were lost and are interpolated in `imu`, one row per gap, columns
+        `simrail.resample.GAPS`; None if none were.
     """
 
     name: str
@@ -122,6 +125,7 @@ class Recording:
     odometry: pd.DataFrame
     odometry_source: str
     gravity_mps2: float = 9.81
+    gaps: pd.DataFrame | None = None
 
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""

@@ -22,6 +22,7 @@ import pandas as pd
 from simrail.columns import ACCEL, ENCODER, GYRO, IMU, ODOMETRY, ODOMETRY_SD, require
 from simrail.errors import InputError
 from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.resample import check_stamps
 from simrail.track.design import TrackDesign
 
 FORMAT = "simrail recording 1"
@@ -235,21 +236,7 @@ def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, f
             value=f"{frame.index.name} ({frame.index.dtype})",
             limit="an index time_s of seconds",
         )
-    time = frame.index.to_numpy(dtype=np.float64)
-    bad = ~np.isfinite(time)
-    step = np.diff(time)
-    wrong = np.flatnonzero(bad[1:] | bad[:-1] | ~(step > 0.0))
-    if len(wrong):
-        i = int(wrong[0])
-        kind = "NaN" if bad[i] or bad[i + 1] else ("duplicate" if step[i] == 0.0 else "reversed")
-        raise InputError(
-            f"has {kind} time stamps at sample {i + 1}",
-            file=file,
-            field=f"{what}.time_s",
-            value=[float(time[i]), float(time[i + 1])],
-            limit="strictly increasing",
-            remedy="sort the samples, and drop those that the logger wrote twice",
-        )
+    check_stamps(frame.index.to_numpy(dtype=np.float64), field=f"{what}.time_s", file=file)
 
 
 def _check_uniform(time: np.ndarray, rate_hz: float, file: object) -> None:
