@@ -1,7 +1,7 @@
-"""Compiled loops of the curve-matched odometry: a thirteen-state Kalman filter and its smoother.
+"""Compiled loops of the curve-matched odometry: a Kalman filter along the line, and its smoother.
 
-Arrays in, arrays out; nothing here knows of recordings or data frames. The states, their model and the
-choice of its noise are those of `estimators.odometry`.
+Arrays in, arrays out; nothing here knows of recordings or data frames. What the states are, and how their
+noise is chosen, stands in `estimators.odometry`.
 """
 
 from __future__ import annotations
@@ -11,39 +11,35 @@ import numpy as np
 from simrail.jit import FloatArray, njit
 
 STATES = 13
-S, V, A, W, SCALE, PUSH, YAW, DRIFT, SWAY, LAG, TREAD, TURN, LEAD = range(STATES)
-"""Position, speed, acceleration, way of the wheel, its scale, accelerometer offset, heading, gyro bias,
-heading of the body in the track, lag of that heading."""
+S, V, A, WAY, SCALE, TREAD, TURN, PUSH, LEAD, YAW, DRIFT, SWAY, LAG = range(STATES)
 
 UPDATES = 4
 """Scalar updates of a step at most: wheel, accelerometer, heading, rest."""
 
 MODEL = (
+    "pulse_m",
+    "still_s",
+    "gate",
     "jerk_m2ps5",
+    "wheel_walk_m",
     "tread_sd",
+    "tread_length_m",
+    "force_m2ps3",
     "push_walk_m2ps5",
     "gyro_rad2ps",
-    "drift_sd_radps",
-    "drift_correlation_s",
+    "drift_walk_rad2ps3",
+    "gyro_scale",
     "sway_sd_rad",
-    "sway_per_curvature_m",
     "sway_length_m",
     "lag_walk_m",
-    "force_m2ps3",
-    "force_per_speed_m2ps3",
     "heading_sd_rad",
-    "pulse_m",
-    "gate",
-    "still_s",
-    "tread_length_m",
-    "wheel_walk_m",
 )
-"""What the kernel's `model` holds, in its order (`estimators.odometry.CurveMatched`)."""
+"""What `curve_matched` takes as its `model`, in this order (see `estimators.odometry.CurveMatchedOdometry`)."""
 
 
 @njit
-def _line(grid: FloatArray, table: FloatArray, s: float, out: FloatArray) -> None:
-    """Heading, its slope, and the tangents that turn body rates into a yaw rate, at s, into out (5,)."""
+def line_at(grid: FloatArray, table: FloatArray, s: float, out: FloatArray) -> None:
+    """Design at s into out (5,): heading, its slope, roll, pitch, the slope of the pitch."""
     at = min(max((s - grid[0]) * grid[1], 0.0), table.shape[0] - 1.000001)
     i = int(at)
     x = at - i
@@ -53,9 +49,40 @@ def _line(grid: FloatArray, table: FloatArray, s: float, out: FloatArray) -> Non
 
 
 @njit
-def _predict(x: FloatArray, p: FloatArray, f: FloatArray, work: FloatArray) -> None:
-    """P <- F P F' in place for a dense F (its few non-zeros are not worth a special case)."""
+def predict(
+    x: FloatArray,
+    p: FloatArray,
+    f: FloatArray,
+    work: FloatArray,
+    line: FloatArray,
+    rate_y: float,
+    rate_z: float,
+    dt: float,
+    model: FloatArray,
+) -> None:
+    """One step of the model, in place: x, P and F. ``line`` is the design at x[S]."""
     n = x.shape[0]
+    turn = (rate_y * np.sin(line[2]) + rate_z * np.cos(line[2])) / np.cos(line[3])
+    half = 0.5 * dt * dt
+    way = dt * x[V] + half * x[A]
+    run = abs(way)
+    rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * line[1]
+    wears, sways = np.exp(-run / model[6]), np.exp(-run / model[13])
+    f[:, :] = 0.0
+    for i in range(n):
+        f[i, i] = 1.0
+    f[S, V], f[S, A], f[V, A] = dt, half, dt
+    f[WAY, V], f[WAY, A] = rolls * dt, rolls * half
+    f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * line[1]
+    f[TREAD, TREAD], f[SWAY, SWAY] = wears, sways
+    f[YAW, DRIFT] = -dt
+    x[S] += way
+    x[V] += dt * x[A]
+    x[WAY] += rolls * way
+    x[TREAD] *= wears
+    x[YAW] += dt * (turn - x[DRIFT])
+    x[SWAY] *= sways
+
     for i in range(n):
         for j in range(n):
             total = 0.0
@@ -72,12 +99,29 @@ def _predict(x: FloatArray, p: FloatArray, f: FloatArray, work: FloatArray) -> N
             p[i, j] = total
             p[j, i] = total
 
+    # White jerk moves position, speed, acceleration, and with them the way of the wheel.
+    q = model[3]
+    places = (S, V, A, WAY)
+    powers = (2, 1, 0, 2)
+    factors = (0.5, 1.0, 1.0, 0.5)
+    for i in range(4):
+        for j in range(4):
+            power = powers[i] + powers[j] + 1
+            p[places[i], places[j]] += q * factors[i] * factors[j] * dt**power / power
+    p[WAY, WAY] += model[4] * run
+    p[TREAD, TREAD] += model[5] ** 2 * (1.0 - wears * wears)
+    p[PUSH, PUSH] += model[8] * dt
+    p[YAW, YAW] += model[9] * dt + (model[11] * turn) ** 2 * dt * 10.0
+    p[DRIFT, DRIFT] += model[10] * dt
+    p[SWAY, SWAY] += model[12] ** 2 * (1.0 - sways * sways)
+    p[LAG, LAG] += model[14] * run
+
 
 @njit
-def _update(
+def update(
     x: FloatArray, p: FloatArray, h: FloatArray, error: float, variance: float, gain: FloatArray
 ) -> float:
-    """Scalar Kalman update in place; the gain is written, the innovation's variance returned."""
+    """Scalar Kalman update in place; writes the gain and returns the innovation's variance."""
     n = x.shape[0]
     s = variance
     for i in range(n):
@@ -100,7 +144,7 @@ def _update(
 
 @njit
 def curve_matched(
-    step_s: float,
+    dt: float,
     rate: FloatArray,
     force: FloatArray,
     count: FloatArray,
@@ -112,7 +156,7 @@ def curve_matched(
     p: FloatArray,
     states: FloatArray,
     covariance: FloatArray,
-    slipping: FloatArray,
+    flags: FloatArray,
     before: FloatArray,
     before_covariance: FloatArray,
     transition: FloatArray,
@@ -124,190 +168,124 @@ def curve_matched(
 
     Parameters
     ----------
-    step_s : float
-        Step.
-    rate : ndarray (n, 3)
-        Mean angular rate over the step that ends here, body axes, rad/s.
+    dt : float
+        Step, s.
+    rate : ndarray (n, 2)
+        Mean angular rates about Y and Z over the step that ends here, body axes, rad/s.
     force : ndarray (n,)
         Mean specific force along X over that step, m/s2.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
-    model : ndarray (18,)
+    model : ndarray (16,)
         See `MODEL`.
     gravity : float
         m/s2.
     grid, table : ndarray (2,), (m, 4)
-        First place and places per metre of the design's table: heading, curvature k3 over the
-        horizontal way, roll, pitch.
+        First place and places per metre of the design's table: heading, its slope, roll, pitch.
     x, p : ndarray (13,), (13, 13)
         State and covariance at the start; replaced by the last ones.
     states, covariance : ndarray (n, 13), (n, 13, 13), output
         Filtered.
-    slipping : ndarray (n,), output
-        1 where the wheel was not believed.
+    flags : ndarray (n, 2), output
+        1 where the wheel is not believed; 1 where the train stands.
     before, before_covariance, transition : ndarray (n, 13), (n, 13, 13), (n, 13, 13), output
-        Predicted state and covariance, and F of the step: what the smoother needs. Arrays of no rows
-        where only the filter is wanted.
+        Predicted state and covariance, and F of the step, for `smooth`; of no rows where no smoother follows.
     rows, gains : ndarray (n, 4, 13), output
-        Row of the Jacobian and gain of each scalar update, zero for one that was not made.
+        Row of the Jacobian and gain of each scalar update.
     scaled : ndarray (n, 8), output
-        Innovation over its variance of each update, then one over its variance.
+        Innovation over its variance of each update, then one over its variance; 0 for one not made.
     """
     n = x.shape[0]
     keep = before.shape[0] > 0
     f, work = np.zeros((n, n)), np.zeros((n, n))
-    h, gain, line = np.zeros(n), np.zeros(n), np.zeros(5)
-    pulse, gate = model[13], model[14]
-    direction = 0.0
-    idle = 0.0
-    resting = True
-    moving_s = 0.0
-    agree_s = 0.0
-    slip = False
-    wheel_speed = 0.0
+    h, gain, line = np.zeros((UPDATES, n)), np.zeros(n), np.zeros(5)
+    error, variance, wanted = np.zeros(UPDATES), np.zeros(UPDATES), np.zeros(UPDATES)
+    pulse, still, gate = model[0], model[1], model[2]
+    h[0, WAY] = 1.0
+    h[2, YAW], h[2, SWAY] = 1.0, -1.0
+    h[3, V] = 1.0
+    direction = idle = moving = agreed = wheel_speed = 0.0
+    resting, slipping = True, False
     for k in range(rate.shape[0]):
-        # Predict: constant acceleration, the wheel rolls (1 + scale) times the way, the gyro turns.
-        _line(grid, table, x[S], line)
-        roll, pitch = line[2], line[3]
-        turn = (rate[k, 1] * np.sin(roll) + rate[k, 2] * np.cos(roll)) / np.cos(pitch)
-        way = step_s * x[V] + 0.5 * step_s * step_s * x[A]
-        run = abs(way)
-        stays = np.exp(-run / model[8])
-        holds = np.exp(-step_s / model[5])
-        f[:, :] = 0.0
-        for i in range(n):
-            f[i, i] = 1.0
-        f[S, V], f[S, A], f[V, A] = step_s, 0.5 * step_s * step_s, step_s
-        ratio = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * line[1]
-        wears = np.exp(-run / model[16])
-        f[W, V] = ratio * step_s
-        f[W, A] = ratio * 0.5 * step_s * step_s
-        f[W, SCALE] = way
-        f[W, TREAD] = way
-        f[W, TURN] = way * line[1]
-        f[TREAD, TREAD] = wears
-        f[YAW, DRIFT] = -step_s
-        f[DRIFT, DRIFT] = holds
-        f[SWAY, SWAY] = stays
-        x[S] += way
-        x[V] += step_s * x[A]
-        x[W] += ratio * way
-        x[TREAD] *= wears
-        x[YAW] += step_s * (turn - x[DRIFT])
-        x[DRIFT] *= holds
-        x[SWAY] *= stays
-        _predict(x, p, f, work)
-        q = model[0]
-        for i in range(3):
-            a = step_s**5 / 20.0 if i == 0 else (step_s**3 / 3.0 if i == 1 else step_s)
-            p[i, i] += q * a
-        p[S, V] += q * step_s**4 / 8.0
-        p[S, A] += q * step_s**3 / 6.0
-        p[V, A] += q * step_s**2 / 2.0
-        p[V, S], p[A, S], p[A, V] = p[S, V], p[S, A], p[V, A]
-        p[W, W] += q * step_s**5 / 20.0 + model[17] * run
-        for i, a in ((S, step_s**5 / 20.0), (V, step_s**4 / 8.0), (A, step_s**3 / 6.0)):
-            p[i, W] += q * a
-            p[W, i] = p[i, W]
-        p[TREAD, TREAD] += model[1] ** 2 * (1.0 - wears * wears)
-        p[PUSH, PUSH] += model[2] * step_s
-        p[YAW, YAW] += model[3] * step_s
-        p[DRIFT, DRIFT] += model[4] ** 2 * (1.0 - holds * holds)
-        sway = model[6] ** 2 + (model[7] * line[1]) ** 2
-        p[SWAY, SWAY] += sway * (1.0 - stays * stays)
-        p[LAG, LAG] += model[9] * run
-        if keep:
-            before[k], before_covariance[k], transition[k] = x, p, f
-            rows[k] = 0.0
-            gains[k] = 0.0
-            scaled[k] = 0.0
+        line_at(grid, table, x[S], line)
+        rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * line[1]
+        predict(x, p, f, work, line, rate[k, 0], rate[k, 1], dt, model)
 
-        # The wheel: the count says between which two edges it stands.
+        # The wheel. Its count says between which two edges it stands; an edge that has just been
+        # passed says more at low speed.
         change = count[k] - count[k - 1] if k > 0 else 0.0
         measured = (count[k] - count[0]) * pulse
-        idle += step_s
+        wheel_speed += 0.1 * (change * pulse / dt - wheel_speed)
+        idle += dt
+        moving += dt
         if change != 0.0:
             direction = 1.0 if change > 0.0 else -1.0
-            if resting:
-                # It started less than a pulse ago, with a jerk that the model of a moving train lacks.
-                start = 0.5 * np.cbrt(0.5 * 36.0 * pulse * pulse)
-                p[V, V] += start * start
-                p[A, A] += np.cbrt(6.0 * pulse * 0.25) ** 2
-                moving_s = 0.0
             idle = 0.0
+            if resting:
+                # It left less than a pulse ago, with a jerk of some 0.5 m/s3 that no sensor has seen yet.
+                p[V, V] += (0.5 * np.cbrt(0.5 * 36.0 * pulse * pulse)) ** 2
+                p[A, A] += np.cbrt(1.5 * pulse) ** 2
+                moving = 0.0
             resting = False
-        moving_s += step_s
-        wheel_speed += 0.1 * (change * pulse / step_s - wheel_speed)
-        error = measured - x[W]
         width = pulse
+        error[0] = measured - x[WAY]
         if abs(change) == 1.0:
-            width = min(pulse, max(0.1 * pulse, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * step_s))
-            error -= 0.5 * direction * (pulse - width)
-        variance = width * width / 12.0
-        believed = change != 0.0
-        if change == 0.0 and abs(error) > 0.5 * pulse:
-            error -= np.sign(error) * 0.5 * pulse
-            believed = True
-        spread = p[W, W] + variance
-        if slip:
-            off = abs(wheel_speed - x[V] * ratio)
-            agree_s = agree_s + step_s if off < 3.0 * np.sqrt(p[V, V]) + 0.01 * abs(x[V]) else 0.0
-            if agree_s > 0.5:
-                slip = False
-        elif believed and error * error > gate * gate * spread and moving_s > 2.0:
-            slip = True
-            agree_s = 0.0
-        slipping[k] = 1.0 if slip else 0.0
-        if slip:
-            # Whatever way the wheel made says nothing: it starts anew from what it reads.
-            shift = measured - x[W]
+            width = min(pulse, max(0.1 * pulse, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
+            error[0] -= 0.5 * direction * (pulse - width)
+        elif change == 0.0:
+            # No pulse: the wheel is at most at the edge.
+            beyond = abs(error[0]) - 0.5 * pulse
+            error[0] = np.sign(error[0]) * max(beyond, 0.0)
+        variance[0] = width * width / 12.0
+        wanted[0] = 1.0 if change != 0.0 or error[0] != 0.0 else 0.0
+        if slipping:
+            off = abs(wheel_speed - x[V] * rolls)
+            agreed = agreed + dt if off < 3.0 * np.sqrt(p[V, V]) + 0.005 * abs(x[V]) else 0.0
+            slipping = agreed <= 0.5
+        elif moving > 2.0 and error[0] * error[0] > gate * gate * (p[WAY, WAY] + variance[0]):
+            slipping = True
+            agreed = 0.0
+        if slipping:
+            # The way that the wheel makes says nothing: it starts anew from what it reads.
+            wanted[0] = 0.0
             for i in range(n):
-                p[i, W] = p[W, i] = 0.0
-            p[W, W] = pulse * pulse / 12.0
-            x[W] += shift
-            if keep:
-                # For the smoother the wheel's state is new: nothing after flows back through it.
-                transition[k, W, :] = 0.0
-                before[k], before_covariance[k] = x, p
-        elif believed:
-            h[:] = 0.0
-            h[W] = 1.0
-            s = _update(x, p, h, error, variance, gain)
-            if keep:
-                rows[k, 0], gains[k, 0], scaled[k, 0], scaled[k, 4] = h, gain, error / s, 1.0 / s
-
-        # The accelerometer: acceleration, gravity along the slope, and an offset.
-        h[:] = 0.0
-        _line(grid, table, x[S] - x[LEAD], line)
-        pitch = line[3]
-        h[S], h[A], h[PUSH] = -gravity * np.cos(pitch) * line[4], 1.0 / np.cos(pitch), 1.0
-        h[LEAD] = -h[S]
-        error = force[k] + gravity * np.sin(pitch) - x[A] / np.cos(pitch) - x[PUSH]
-        s = _update(x, p, h, error, (model[10] + model[11] * x[V] * x[V]) / step_s, gain)
+                p[i, WAY] = p[WAY, i] = f[WAY, i] = 0.0
+            p[WAY, WAY] = pulse * pulse / 12.0
+            x[WAY] = measured
         if keep:
-            rows[k, 1], gains[k, 1], scaled[k, 1], scaled[k, 5] = h, gain, error / s, 1.0 / s
+            before[k], before_covariance[k], transition[k] = x, p, f
 
-        # The heading: that of the design where the body points, and the body's sway about it.
-        _line(grid, table, x[S] - direction * x[LAG], line)
-        h[:] = 0.0
-        h[S], h[LAG] = -line[1], direction * line[1]
-        h[YAW], h[SWAY] = 1.0, -1.0
-        error = line[0] - x[YAW] + x[SWAY]
-        s = _update(x, p, h, error, model[12] ** 2, gain)
-        if keep:
-            rows[k, 2], gains[k, 2], scaled[k, 2], scaled[k, 6] = h, gain, error / s, 1.0 / s
-
-        # Rest: no pulse for a while.
-        if idle > model[15] and (resting or abs(x[V]) * idle < 2.0 * pulse):
-            resting = True
-            h[:] = 0.0
-            h[V] = 1.0
-            error = -x[V]
-            s = _update(x, p, h, error, 1e-8, gain)
+        resting = resting or (idle > still and abs(x[V]) * idle < 2.0 * pulse)
+        wanted[1] = wanted[2] = 1.0
+        wanted[3] = 1.0 if resting else 0.0
+        variance[1], variance[2], variance[3] = model[7] / dt, model[15] ** 2, 1e-8
+        for m in range(UPDATES):
+            rows_m = h[m]
+            if m == 1:
+                # The accelerometer: acceleration, gravity along the slope, an offset.
+                line_at(grid, table, x[S] - x[LEAD], line)
+                secant = 1.0 / np.cos(line[3])
+                rows_m[A], rows_m[PUSH] = secant, 1.0
+                rows_m[LEAD] = gravity * line[4] / secant
+                rows_m[S] = -rows_m[LEAD]
+                error[1] = force[k] + gravity * np.sin(line[3]) - x[A] * secant - x[PUSH]
+            elif m == 2:
+                # The heading: that of the design where the body points, and its sway about that.
+                line_at(grid, table, x[S] - direction * x[LAG], line)
+                rows_m[S], rows_m[LAG] = -line[1], direction * line[1]
+                error[2] = line[0] - x[YAW] + x[SWAY]
+            elif m == 3:
+                error[3] = -x[V]
+            s = 0.0
+            if wanted[m] > 0.0:
+                s = update(x, p, rows_m, error[m], variance[m], gain)
             if keep:
-                rows[k, 3], gains[k, 3], scaled[k, 3], scaled[k, 7] = h, gain, error / s, 1.0 / s
-            h[:] = 0.0
+                rows[k, m], gains[k, m] = rows_m, gain
+                scaled[k, m] = error[m] / s if s > 0.0 else 0.0
+                scaled[k, UPDATES + m] = 1.0 / s if s > 0.0 else 0.0
         states[k], covariance[k] = x, p
+        flags[k, 0] = 1.0 if slipping else 0.0
+        flags[k, 1] = 1.0 if resting else 0.0
 
 
 @njit
@@ -321,72 +299,45 @@ def smooth(
     states: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Smoothed states and covariances from what the filter kept (modified Bryson-Frazier, no inverse).
+    """Smoothed states and covariances from what the filter kept: modified Bryson-Frazier, no inverse.
 
-    lam and its covariance Lam run backwards: through each update lam <- lam - h (K.lam + e/s) and
-    Lam <- C' Lam C + h h'/s with C = I - K h', through the prediction lam <- F' lam. Smoothed:
-    x - P lam, P - P Lam P at the predicted state.
+    Backwards through each update with row h, gain K, innovation e of variance s, then through F:
+
+        lam <- lam - h (K lam + e/s),   Lam <- (I - h K') Lam (I - K h') + h h'/s
+        x = x^- - P^- lam,              P = P^- - P^- Lam P^-
+        lam <- F' lam,                  Lam <- F' Lam F
+
+    Parameters
+    ----------
+    before ... scaled : ndarray
+        As `curve_matched` wrote them.
+    states, covariance : ndarray (n, 13), (n, 13, 13), output
+        Smoothed.
     """
-    m, n = before.shape
-    lam = np.zeros(n)
+    steps, n = before.shape
+    lam, v = np.zeros(n), np.zeros(n)
     info = np.zeros((n, n))
-    v = np.zeros(n)
-    work = np.zeros((n, n))
-    for k in range(m - 1, -1, -1):
-        for u in range(UPDATES - 1, -1, -1):
-            h, gain = rows[k, u], gains[k, u]
-            inverse = scaled[k, UPDATES + u]
+    for k in range(steps - 1, -1, -1):
+        for m in range(UPDATES - 1, -1, -1):
+            inverse = scaled[k, UPDATES + m]
             if inverse == 0.0:
                 continue
-            dot = 0.0
+            h, gain = rows[k, m], gains[k, m]
+            dot = scaled[k, m]
+            square = inverse
             for i in range(n):
                 dot += gain[i] * lam[i]
-            for i in range(n):
                 total = 0.0
                 for j in range(n):
                     total += info[i, j] * gain[j]
                 v[i] = total
-            quad = 0.0
+                square += gain[i] * total
             for i in range(n):
-                quad += gain[i] * v[i]
-            for i in range(n):
-                lam[i] -= h[i] * (dot + scaled[k, u])
-            for i in range(n):
+                lam[i] -= h[i] * dot
                 for j in range(n):
-                    info[i, j] += h[i] * h[j] * (quad + inverse) - h[i] * v[j] - v[i] * h[j]
-        p = before_covariance[k]
-        for i in range(n):
-            total = before[k, i]
-            for j in range(n):
-                total -= p[i, j] * lam[j]
-            states[k, i] = total
-            for j in range(n):
-                total = 0.0
-                for l in range(n):
-                    total += p[i, l] * info[l, j]
-                work[i, j] = total
-        for i in range(n):
-            for j in range(n):
-                total = p[i, j]
-                for l in range(n):
-                    total -= work[i, l] * p[l, j]
-                covariance[k, i, j] = total
-        f = transition[k]
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += f[j, i] * lam[j]
-            v[i] = total
-        lam[:] = v
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for l in range(n):
-                    total += info[i, l] * f[l, j]
-                work[i, j] = total
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for l in range(n):
-                    total += f[l, i] * work[l, j]
-                info[i, j] = total
+                    info[i, j] += h[i] * h[j] * square - h[i] * v[j] - v[i] * h[j]
+        p, f = before_covariance[k], transition[k]
+        states[k] = before[k] - p @ lam
+        covariance[k] = p - p @ info @ p
+        lam = f.T @ lam
+        info = f.T @ info @ f
