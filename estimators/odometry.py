@@ -114,8 +114,8 @@ class CurveMatchedOdometry:
     smoothed: bool = False
     start_sd_m: float = 0.05
     radius_sd: float = 0.01
-    tread_sd: float = 0.002
-    tread_length_m: float = 60.0
+    tread_sd: float = 0.0015
+    tread_length_m: float = 40.0
     turn_sd_m: float = 1.0
     wheel_walk_m: float = 1e-6
     jerk_m2ps5: float = 0.01
@@ -123,10 +123,10 @@ class CurveMatchedOdometry:
     push_sd_mps2: float = 0.05
     push_walk_m2ps5: float = 1e-6
     lag_sd_m: float = 1.0
-    lag_walk_m: float = 1e-4
+    lag_walk_m: float = 1e-5
     lead_sd_m: float = 1.0
     sway_sd_rad: float = 6e-4
-    sway_length_m: float = 6.0
+    sway_length_m: float = 4.0
     heading_sd_rad: float = 2e-4
     gate: float = 5.0
 
