@@ -41,7 +41,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from estimators.kernels.odometry import A, SCALE, STATES, UPDATES, S, V, curve_matched, smooth
+from estimators.kernels.odometry import SCALE, STATES, UPDATES, A, S, V, curve_matched, smooth
 from simrail.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.estimate import Estimate
@@ -282,8 +282,16 @@ class CurveMatchedOdometry:
 
 
 def line_table(track: TrackDesign) -> tuple[FloatArray, FloatArray]:
-    """The design as the kernel takes it: (first place, places per metre), and rows of heading, its slope, roll, pitch."""
-    count = int(math.ceil((track.end_m - track.start_m) * _PLACES_PER_M)) + 1
+    """The design as the kernel takes it.
+
+    Returns
+    -------
+    grid : ndarray (2,)
+        First place (m), places per metre.
+    table : ndarray (m, 4)
+        Heading, its slope, roll, pitch at every place.
+    """
+    count = math.ceil((track.end_m - track.start_m) * _PLACES_PER_M) + 1
     places = np.minimum(track.start_m + np.arange(count) / _PLACES_PER_M, track.end_m)
     frame = track.frame(places)
     table = np.column_stack([frame.yaw_rad, frame.rates[:, 2], frame.roll_rad, frame.pitch_rad])

@@ -34,7 +34,7 @@ MODEL = (
     "lag_walk_m",
     "heading_sd_rad",
 )
-"""What `curve_matched` takes as its `model`, in this order (see `estimators.odometry.CurveMatchedOdometry`)."""
+"""What `curve_matched` takes as its `model`, in this order; see `estimators.odometry`."""
 
 
 @njit
