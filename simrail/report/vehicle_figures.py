@@ -10,7 +10,7 @@ from simrail.report.vehicle_study import Conicity, VehicleStudy
 from simrail.report.vehicle_text import MOST_HZ
 from simrail.vehicle.contact_pair import incline
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.profile_files import rail_profile, wheel_profile
+from simrail.vehicle.profile_files import profiles_of
 from simrail.vehicle.stability import SLOWEST_HZ
 
 _LEFT, _RIGHT, _THIRD = "#0072B2", "#D55E00", "#009E73"
@@ -21,8 +21,7 @@ _MOST_HZ = 20.0
 def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     """The left wheel on its rail, to scale, in mm: seen from behind, the middle of the track to the right."""
     pair = model.wheel_rail
-    wheel = wheel_profile(pair.wheel_profile)
-    rail = rail_profile(pair.rail_profile)
+    wheel, rail = profiles_of(pair)
     head = incline(rail, pair.rail_inclination, gauge_depth_m=_GAUGE_DEPTH_M * contact.scale)
     # Abscissae from the tape circle, outward; the rail's from its own top.
     offset = pair.tape_circle_half_m - 0.5 * pair.gauge_m + head.gauge_abscissa_m
@@ -85,7 +84,7 @@ def conicity_figure(contact: Conicity) -> str:
         at = 3.0 * contact.scale
         axis.axvline(at, color=MUTED, lw=0.9, ls=(0, (4, 3)))
         axis.annotate(
-            f"{contact.at_3_mm:.3f} at {at:g} mm",
+            f"{contact.at_3_mm:.3f} at {at:.2g} mm",
             (at, contact.at_3_mm),
             xytext=(8, -16),
             textcoords="offset points",

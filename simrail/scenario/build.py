@@ -35,6 +35,7 @@ from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.truth import Mount
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.profile_files import profiles_digest
 
 _Part = TypeVar("_Part", bound=Part)
 
@@ -80,7 +81,9 @@ class Parts:
         if ("vehicle", name) not in self._read:
             with blame(self.scenario.file, "vehicle"):
                 part = self._load(VehicleFile, "vehicle", name)
-            self._read["vehicle", name] = part.model(Path(name).stem)
+            model = part.model(Path(name).stem)
+            self._content[f"profiles {name}"] = profiles_digest(model.wheel_rail)
+            self._read["vehicle", name] = model
         vehicle: VehicleModel = self._read["vehicle", name]
         return vehicle
 

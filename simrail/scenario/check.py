@@ -23,9 +23,9 @@ from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 from simrail.sensors.decimation import decimation_factor
 from simrail.track.design import TrackDesign
-from simrail.track.irregularity import SAMPLES_PER_WAVE
 from simrail.track.laid import lay
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.step_limit import ACCURATE, contact_resonance
 
 WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5
@@ -33,7 +33,6 @@ LONGEST_RIDE_S = 7200.0
 MOST_CELLS = 1_000_000
 TRUTH_RATE_HZ = 1000.0
 GRAVITY_MPS2 = 9.81
-KNOT_STEP_M = 0.125
 
 
 @dataclass(frozen=True)
@@ -145,19 +144,9 @@ def _judge_estimators(scenario: Scenario) -> dict[str, Estimator]:
 
 def _judge_irregularity(scenario: Scenario, cell: Cell, track: TrackDesign) -> None:
     irregularity = irregularity_of(cell)
-    shortest = SAMPLES_PER_WAVE * KNOT_STEP_M
-    if not irregularity.wavelengths_m[0] >= shortest:
-        raise InputError(
-            "the shortest wave is too short for the table of the rails",
-            file=scenario.file,
-            field="irregularity.wavelengths_m",
-            value=irregularity.wavelengths_m,
-            limit=f">= {shortest:g} m",
-            remedy="take longer waves",
-        )
     # Laying the track is the judgement: it takes a moment and no rule can be forgotten.
     try:
-        lay(track, irregularity, seed=cell.ride_seed, table_step_m=KNOT_STEP_M)
+        lay(track, irregularity, seed=cell.ride_seed)
     except InputError as error:
         if error.file is None:
             error.file = scenario.file
@@ -193,7 +182,33 @@ def _judge_ride(scenario: Scenario, cell: Cell, parts: Parts) -> tuple[float, li
             limit=f"{LONGEST_RIDE_S:.0f} s",
             remedy="ride faster, shorter, or with less dwell time",
         )
-    return duration, _judge_dynamics(scenario, cell, track, profile)
+    warnings = _judge_step(scenario, cell, vehicle)
+    return duration, [*warnings, *_judge_dynamics(scenario, cell, track, profile)]
+
+
+def _judge_step(scenario: Scenario, cell: Cell, vehicle: VehicleModel) -> list[str]:
+    """Refuse a step that the vehicle's wheels on their rails make unstable; warn where it is inaccurate."""
+    if cell.spec.engine == "kinematic":
+        return []
+    step, resonance = cell.spec.step_s, contact_resonance(vehicle, gravity_mps2=GRAVITY_MPS2)
+    advised = f"step_s = {resonance.advised_step_s:.8g}"
+    frequency = f"{resonance.normal_radps / (2.0 * np.pi):.0f} Hz"
+    if step > resonance.longest_step_s:
+        raise InputError(
+            f"the integrator would be unstable: axles of {vehicle.name} swing on their rails at {frequency}",
+            file=scenario.file,
+            field="step_s",
+            value=step,
+            limit=f"{resonance.longest_step_s:.2g} s",
+            remedy=f"set {advised}",
+        )
+    if step * resonance.normal_radps > ACCURATE:
+        off = (step * resonance.normal_radps) ** 4 / 1.2
+        return [
+            f"step_s = {step:g} is long for {vehicle.name}, whose axles swing on their rails at {frequency}: "
+            f"it puts that off by {off:.0f} %; {advised} is within 1 %"
+        ]
+    return []
 
 
 def _judge_loads(vehicle: VehicleModel) -> None:

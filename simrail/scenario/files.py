@@ -109,11 +109,14 @@ def parse_toml(text: str, *, file: object) -> dict[str, Any]:
         ) from error
 
 
-def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
-    """Build a file model from raw TOML data; the first fault becomes an `InputError`."""
+def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Path | None = None) -> _Part:
+    """Build a file model from raw TOML data; the first fault becomes an `InputError`.
+
+    ``folder`` is where files that the data names by a relative path are looked for.
+    """
     try:
         # JSON is the mode in which pydantic is strict about numbers and still takes arrays for tuples.
-        return model.model_validate_json(json.dumps(data, default=str))
+        return model.model_validate_json(json.dumps(data, default=str), context={"folder": folder})
     except ValidationError as error:
         raise _as_input_error(error, model, file) from None
 
@@ -121,7 +124,7 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
 def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None) -> _Part:
     """Find, read and judge one file."""
     path = find(kind, name, folder=folder)
-    return judge(model, read_toml(path), file=label(path))
+    return judge(model, read_toml(path), file=label(path), folder=path.parent)
 
 
 @contextmanager
