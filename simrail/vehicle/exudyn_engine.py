@@ -313,7 +313,9 @@ class ExudynEngine:
                 self.mbs.AddMarker(
                     MarkerBodyRigid(
                         bodyNumber=objects[int(body)],
-                        localHT=exu.HT(rotation=np.diag(HALF_TURN), translation=arm * HALF_TURN),
+                        localHT=exu.HT(  # type: ignore[call-arg]  # its stub has no constructor
+                            rotation=np.diag(HALF_TURN), translation=arm * HALF_TURN
+                        ),
                     )
                 )
                 for body, arm in ((row[0], row[2:5]), (row[1], row[5:8]))

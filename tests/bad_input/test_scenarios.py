@@ -121,8 +121,8 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     ),
     "waves too short for the track's table": (
         "wavelengths_m = [1.5, 100.0]",
-        "wavelengths_m = [0.6, 100.0]",
-        ["irregularity.wavelengths_m", "0.6", ">= 1 m", "longer waves"],
+        "wavelengths_m = [0.2, 100.0]",
+        ["irregularity.wavelengths_m", "0.2", "0.25 <= shortest"],
     ),
     "a fade longer than the track": (
         "fade_m = 40.0",
