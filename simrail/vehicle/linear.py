@@ -41,10 +41,12 @@ _MIDDLE_M = 256.0
 _STEPS = {"place": 1e-6, "turn": 1e-6, "velocity": 1e-5, "rate": 1e-5, "spin": 1e-5, "inner": 1e-7}
 """Difference steps (m, rad, m/s, rad/s): small against a contact patch's penetration (0.1 mm) and the
 creepage that saturates it (3e-3), large against rounding."""
-_USUAL_DROP_M = 5e-5
-"""A full-size wheel sinks by this and more; where a scale vehicle's sinks by less, places step by less."""
+_FULL_SIZE_RADIUS_M = 0.25
+"""No full-size wheel is smaller. A smaller one is a scale vehicle's: of like build, its contact gives way by
+the 5/3rd power of its size, and places step by less."""
 _BALANCED_MPS2 = 1e-6
-"""Acceleration that an equilibrium may leave: far above rounding, far below any motion."""
+"""Acceleration that an equilibrium may leave: far above rounding, far below any motion. A stiffer contact,
+as that of a scale vehicle, makes more of the same error of place."""
 
 
 def state_matrix(
@@ -110,8 +112,9 @@ class RunningVehicle:
 
     @property
     def _fineness(self) -> float:
-        """1 for a full-size vehicle; less for one whose wheels sink less."""
-        return min(1.0, -self._drop_m / _USUAL_DROP_M) if self._drop_m < 0.0 else 1.0
+        """1 for a full-size vehicle, less for a scale one: how much less its contacts give way."""
+        smallest = min(wheel.radius_m for wheel in self.model.wheels)
+        return float(min(1.0, smallest / _FULL_SIZE_RADIUS_M) ** (5.0 / 3.0))
 
     def rates(self, state: FloatArray, speed_mps: float, *, base: FloatArray | None = None) -> FloatArray:
         """d(state)/dt (n,) at a speed.
@@ -190,7 +193,7 @@ class RunningVehicle:
                 fresh = False
             before = largest
         left = np.abs(self.rates(state, speed_mps))[6 * self.bodies : 12 * self.bodies].max()
-        if not left < _BALANCED_MPS2:
+        if not left < _BALANCED_MPS2 / fine:
             raise InputError(
                 "does not run steadily on straight level track",
                 file=f"vehicle {self.model.name}",

@@ -234,3 +234,33 @@ def test_critical_speed_of_the_suspended_wheelset(conicity, stiffness, critical_
         y = position[:, 0, 1]
         early, late = (np.abs(y[(time_s > a) & (time_s < a + 1.5)]).max() for a in (2.5, 4.5))
         assert (late > early) == grows
+
+
+def test_train_runs_from_rest_through_the_sharp_curve():
+    """It stands still on level track, and takes the 250 m curve of the line at 40 km/h on all its wheels."""
+    model = vehicle("metro_irw_train")
+    still = CompiledEngine(
+        model, lay(straight(), SMOOTH, seed=1), profile=SpeedProfile(100.0, 110.0, 1.0, rest_s=5.0)
+    )
+    assert np.abs(np.concatenate([part.acceleration for part in still.run(1.0)])).max() < 1e-6
+    line = load(TrackFile, "track", "condequinto_olivar").design("condequinto_olivar")
+    profile = SpeedProfile(345.0, 640.0, 40.0 / 3.6, rest_s=0.5, acceleration_mps2=1.0, jerk_mps3=1.0)
+    engine = CompiledEngine(model, lay(line, ROUGH, seed=1), profile=profile, settle_s=2.0)
+    felt, loads = [], []
+    for part in engine.run(22.0, segment_s=0.5):
+        felt.append(part.acceleration)
+        loads.append(engine.wheel_loads_n())
+    assert np.sqrt(np.mean(np.concatenate(felt)[:, :, 1:] ** 2, axis=0)).max() < 0.6
+    assert np.min(loads) > 0.5 * np.min(model.wheel_load_n(G))
+
+
+def test_middle_module_hangs_on_both_others():
+    """By moments about its bogie each end module carries 3 t at 2.8 m with its own 10 t at 0.84 m."""
+    model = vehicle("metro_irw_train")
+    preload = dict(zip([s.name for s in model.suspensions], model.preload_n(G), strict=True))
+    for end in ("front", "rear"):
+        assert abs(preload[f"floor joint {end}"]) == pytest.approx(3000.0 * G, rel=1e-6)
+        assert preload[f"roof link {end}"] == pytest.approx(0.0, abs=1e-3)
+        four = [preload[f"secondary {end} {i}"] for i in range(1, 5)]
+        np.testing.assert_allclose(four, 13000.0 * G / 4.0, rtol=1e-3)
+    assert 8.5e3 < 2.0 * model.wheel_load_n(G)[0] / G < 11.5e3
