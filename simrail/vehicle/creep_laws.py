@@ -1,4 +1,4 @@
-"""How a creep force saturates at the friction limit (Shen-Hedrick-Elkins, Polach, FASTSIM), and falling friction.
+"""How a creep force saturates at the friction limit: three laws; and falling friction.
 
 The first two take Kalker's linear force and say which part of it the contact can give. With q = linear force
 over friction limit, the force over the friction limit is
