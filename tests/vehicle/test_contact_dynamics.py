@@ -11,8 +11,8 @@ import pytest
 from simrail.jit import njit
 from simrail.vehicle.contact import build_contact, static_height, wheel_force
 from simrail.vehicle.creep_laws import CreepLaw
-from simrail.vehicle.profiles import rail_60e1, s1002
-from simrail.vehicle.wheelset import conicity
+from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002
+from simrail.vehicle.wheelset import conicity, contact_state, push_sideways
 
 AXLE_KG, FRAME_KG, ROLL_KGM2, SPIN_KGM2 = 1500.0, 9300.0, 700.0, 60.0
 LOAD_N = 0.5 * (AXLE_KG + FRAME_KG) * 9.81
@@ -222,6 +222,67 @@ def test_free_wheelset_runs_klingels_wavelength(amplitude):
     reached = np.abs(y[crossings[0] : crossings[1]]).max()
     expected = 2.0 * np.pi * np.sqrt(0.75 * 0.46 / conicity(contact, reached))
     assert 2.0 * (first[1] - first[0]) == pytest.approx(expected, rel=0.03)
+
+
+@cache
+def cone(conicity_of_wheel):
+    """Contact of a cone and what steers it: conicity, half distance, radius at the contact, roll by shift.
+
+    Read off the static equilibrium of a pushed wheelset, which is tested against Wickens' closed forms.
+    """
+    contact = build_contact(conical_wheel(conicity_of_wheel), rail_60e1(), static_load_n=LOAD_N)
+    step = 1e-5
+    rest = push_sideways(contact, np.array([-step, step]))
+    slope = float(np.diff(rest.radius_left_m - rest.radius_right_m)[0] / (4.0 * step))
+    roll = float(np.diff(rest.roll_rad)[0] / (2.0 * step))
+    at = contact_state(contact, 1.0, y_m=0.0, z_m=static_height(contact))["tread"]
+    return contact, slope, contact.const[2] + at["abscissa_m"], at["radius_m"], roll
+
+
+def klingel(conicity_of_wheel):
+    """Klingel's wavelength for the points of contact, which move by 1 + r roll' per shift of the axle."""
+    _, slope, half, radius, roll = cone(conicity_of_wheel)
+    return 2.0 * np.pi * np.sqrt(half * radius * (1.0 + radius * roll) / slope)
+
+
+@pytest.mark.parametrize("lean", [0.05, 0.1, 0.2])
+def test_klingels_wavelength_is_the_limit_of_low_speed_and_amplitude(lean):
+    """The error shrinks with them (30 m/s, 3 mm; 10, 1; 3, 0.3); extrapolated below 0.2 %, asked 1 %."""
+    contact, expected = cone(lean)[0], klingel(lean)
+    # Its textbook form, without roll and with the tape circle's half distance and radius.
+    assert expected == pytest.approx(2.0 * np.pi * np.sqrt(0.75 * 0.46 / lean), rel=0.03)
+    errors = []
+    for V, amplitude in ((30.0, 3e-3), (10.0, 1e-3), (3.0, 3e-4)):
+        out = run(
+            contact, seconds=1.5 * expected / V, h=5e-4, V=V, y=amplitude, every_s=5e-4, rigid=True, free=0.0,
+            soft=(0.0, 8e6, 2.4e6),
+        )  # fmt: skip
+        y, s = out[:, 2], out[:, 3]
+        i = np.flatnonzero(np.diff(np.sign(y)))
+        crossings = s[i] - y[i] * (s[i + 1] - s[i]) / (y[i + 1] - y[i])
+        errors.append(2.0 * (crossings[1] - crossings[0]) / expected - 1.0)
+    assert abs(errors[0]) > abs(errors[1]) > abs(errors[2])
+    # Inertia against creep forces: second order in the speed.
+    assert abs(errors[2] + (errors[2] - errors[1]) * 9.0 / (100.0 - 9.0)) < 2e-3
+
+
+@pytest.mark.parametrize("lean", [0.05, 0.1, 0.2])
+def test_a_rigid_wheelset_settles_where_its_radii_fit_a_balanced_curve(lean):
+    """Outward by b r/(conicity R), to 0.2 %: free to yaw, so no steering force shifts it.
+
+    Pure rolling: the radii are as the distances from the curve's centre, r_right/r_left =
+    (R + b)/(R - b), and their difference is 2 conicity times the shift.
+    """
+    contact, slope, half, radius, _ = cone(lean)
+    curve = 100.0 / lean
+    out = run(
+        contact, seconds=80.0, h=1e-3, V=2.0, radius=curve, rigid=True, soft=(0.0, 8e6, 2.4e6), fade_m=60.0
+    )
+    y, s = out[:, 2], out[:, 3]
+    last = s > s[-1] - klingel(lean)
+    assert np.ptp(y[last]) < 1e-4
+    assert y[last].mean() == pytest.approx(-half * radius / (slope * curve), rel=2e-3)
+    assert y[last].mean() < -2.8e-3
 
 
 def test_independent_wheels_do_not_hunt():
