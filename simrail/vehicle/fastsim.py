@@ -16,12 +16,12 @@ with q1, q2 the linear forces of the creepages and turn, twist that of the spin 
 For, over a strip that sticks, the two add up to Kalker's linear forces: the integral of (X0 - X) over the
 unit ellipse is 8/3, that of (X0^2 - X^2) is pi/2, X0 being the strip's leading edge.
 
-The grid is fixed: eight strips at Gauss points across, eight elements along. Forces of small creepages are
-0.8 % below Kalker's, full slip is mu N to 3e-4; against a dense grid forces are wrong by 1 % of mu N (rms
-over creepages and spins), by 7 % where spin alone slides the contact. The theory itself is an approximation:
-at the usual check point (lateral creepage and spin of a 2:1 ellipse) it is 5.5 % above the exact one, with
-this grid 4.8 %. The moment of small creepages is the theory's own, not Kalker's: 3 pi/32 a f22 in place
-of f23 (three quarters of it for a circle).
+The grid is fixed: eight strips at Gauss points across, eight elements along, 1 to 6 us a patch. Forces of
+small creepages are 0.8 % below Kalker's, full slip is mu N to 3e-4; against a dense grid forces are wrong
+by 1 % of mu N (rms over creepages and spins), by 7 % where spin alone slides the contact. The theory itself
+is an approximation: at the usual check point (lateral creepage and spin of a 2:1 ellipse) it is 5.5 % above
+the exact one, with this grid 4.8 %. The moment of small creepages is the theory's own, not Kalker's: 3
+pi/32 a f22 in place of f23 (three quarters of it for a circle).
 
 Not here: linear forces, relaxation and the falling of friction (`simrail.vehicle.contact`).
 """
