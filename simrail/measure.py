@@ -75,18 +75,10 @@ def measure(
         if encoder.radius == "calibrated":
             position = motion["position_m"].to_numpy()
             radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
-        counts = sample_encoder(
-            angle,
-            truth.time_s,
-            pulses_per_revolution=encoder.pulses_per_revolution,
-            rate_hz=encoder.rate_hz,
-            seed=seed,
-            draw=draw,
-            name=encoder.wheel,
-        )
+        counts = sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw)
         sheet = EncoderSheet(
             wheel=wheel,
-            pulses_per_revolution=encoder.pulses_per_revolution,
+            pulses_per_revolution=encoder.counts_per_revolution,
             wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
             rate_hz=encoder.rate_hz,
         )

@@ -60,7 +60,7 @@ class EncoderSheet:
     wheel : str
         Name of the wheel, e.g. ``"front.left"``.
     pulses_per_revolution : int
-        Pulses counted per turn of the wheel.
+        Counts per turn of the wheel: its pulses, or four times as many in quadrature.
     wheel_radius_m : float
         Nominal wheel radius; the true one differs.
     rate_hz : float
@@ -95,7 +95,7 @@ class Recording:
     track : TrackDesign
         The design track.
     encoder : pandas.DataFrame, optional
-        Indexed by ``time_s``, column ``pulse_count``.
+        Indexed by ``time_s``, column ``pulse_count``, and ``edge_time_s`` if the logger times edges.
     encoder_sheet : EncoderSheet, optional
         Its data sheet.
     start_position_m : float
