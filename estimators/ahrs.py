@@ -29,7 +29,7 @@ class Vqf:
         Take the design track's acceleration off the accelerometer first; a general-purpose AHRS
         cannot, so this is off unless asked for.
     rest_bias : bool
-        Subtract the gyro's mean over the initial rest, as every method does.
+        Subtract the gyro's mean over the rests so far, as every method does.
     """
 
     compensated: bool = False

@@ -20,7 +20,7 @@ import pandas as pd
 from simrail.columns import COLUMNS, INNOVATION
 from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
-from simrail.rest import at_rest_initially
+from simrail.rest import at_rest_initially, rest_periods
 
 Check = Callable[[Estimator, Recording], None]
 
@@ -189,9 +189,12 @@ def _require_bits(a: np.ndarray, b: np.ndarray, *, what: str) -> None:
 
 
 def prefix_lengths(recording: Recording) -> list[int]:
-    """Where `sees_no_future` cuts: at the very start, inside and after the rest, odd places, the end."""
+    """Where `sees_no_future` cuts: at the very start, inside and after rests, odd places, the end."""
     n, rest = len(recording.imu), at_rest_initially(recording)
     wanted = {2, rest // 3, rest - 1, rest + 1, n // 3, n // 2 + 1, n - 1}
+    # Within the last rest, since a stop may refresh what the initial rest has found.
+    middle = rest_periods(recording).iloc[-1:].mean(axis=1)
+    wanted.update(int(i) for i in np.searchsorted(recording.imu.index.to_numpy(), middle))
     return sorted(length for length in wanted if 2 <= length < n)
 
 
