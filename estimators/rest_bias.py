@@ -4,20 +4,20 @@ Every attitude method uses this one, so that none gets a better gyro than anothe
 is used only when it is `simrail.rest.guard_s` old, so that the first jerk of a departure, which the encoder
 notices late, never enters; and no rest is known to be one before it is long enough.
 
-**How much a new rest counts** follows from the data sheet. The mean over a rest of length T has the  the correlation time tau of a Gauss-Markov
-process it changes in the time t by a variance of D(t) = 2 B^2 (1 - exp(-t / tau)). Taken as a random walk over
-the rest, the bias b0 at its start is known from before with the variance P0 = P + D(gap), the mean is off b0
-by noise of M = D(T) / 3 + N^2 / T, and the bias at the end, which is wanted, has moved on by D(T), of which
-the mean has seen one half (the covariance of a walk with its mean). The estimate
-b = b_before + K (mean - b_before) has the error variance
+**How much a new rest counts** follows from the data sheet. The mean over a rest of length T has the white
+noise N^2 / T. The in-run bias wanders: as a Gauss-Markov process of variance b^2 (`WANDER_PER_INSTABILITY`)
+and correlation time tau it changes in the time t by a variance of D(t) = 2 b^2 (1 - exp(-t / tau)). Taken as
+a random walk over the rest: the bias b0 at its start is known from before with the variance
+P0 = P + D(gap), the mean is off b0 by noise of M = D(T) / 3 + N^2 / T, and the bias at the end, which is
+wanted, has moved on by D(T), of which the mean has seen one half (the covariance of a walk with its mean).
+The estimate b = b_before + K (mean - b_before) has the error variance
 
     P = (1 - K)^2 P0 + K^2 M + (1 - K) D(T),     least for     K = (P0 + D(T) / 2) / (P0 + M), at most 1.
 
 Without wandering that is the mean over all rests together; without white noise, the newest alone. The first
 rest counts fully: what the sheet says of the bias at switch-on is no match for it.
 
-A sheet prints B but not tau; `CORRELATION_S` stands for it. A factor of 3 either way changes K by a tenth or two
-and the error by a few per cent, since the optimum is flat.
+A sheet prints B but not tau; `CORRELATION_S` stands for it.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ CORRELATION_S = 300.0
 """Correlation time of the in-run bias, which sheets do not print: some minutes for MEMS gyros."""
 
 WANDER_PER_INSTABILITY = 1.076
-"""Standard deviation of the process over B: 0.664 / 0.617, since the Allan deviation of a Gauss-Markov process
-peaks at 0.617 of its standard deviation, and the floor of a sheet is 0.664 B (IEEE 952)."""
+"""Standard deviation b of the process over B: 0.664 / 0.617, since the Allan deviation of a Gauss-Markov
+process peaks at 0.617 of its standard deviation, and the floor of a sheet is 0.664 B (IEEE 952)."""
 
 LEAST_NOISE = 1e-20
 """(rad/s)^2 s: a sheet without noise still weighs its rests by their lengths."""

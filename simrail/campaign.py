@@ -28,7 +28,7 @@ from simrail.interrupts import Check, interruptible
 from simrail.measure import measure
 from simrail.recording import Recording
 from simrail.ride import is_cached, simulate
-from simrail.scenario.build import Parts, encoder_of, mount_of
+from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of
 from simrail.scenario.cells import Cell, Method, cells, methods
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -247,6 +247,7 @@ def _run_cell(
                 mount=mount_of(cell),
                 grade=parts.grade(cell),
                 encoder=encoder_of(cell),
+                magnetometer=magnetometer_of(cell),
                 odometry=cell.spec.odometry,
                 seed=cell.sensor_seed,
                 draw=cell.sensor_draw,
@@ -315,7 +316,16 @@ def _beginning(recording: Recording, *, samples: int) -> Recording:
     encoder = recording.encoder
     if encoder is not None:
         encoder = encoder.loc[: imu.index[-1]]
-    return replace(recording, imu=imu, encoder=encoder, odometry=recording.odometry.iloc[:samples])
+    magnetic = recording.magnetometer
+    if magnetic is not None:
+        magnetic = magnetic.iloc[:samples]
+    return replace(
+        recording,
+        imu=imu,
+        encoder=encoder,
+        odometry=recording.odometry.iloc[:samples],
+        magnetometer=magnetic,
+    )
 
 
 def _cell_record(cell: Cell) -> dict[str, object]:

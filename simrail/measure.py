@@ -14,10 +14,11 @@ import pandas as pd
 from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.odometry import encoder_odometry
-from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet, Recording
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import EarthRate, sample_imu
+from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 from simrail.truth import Mount, Truth
 
 
@@ -28,6 +29,7 @@ def measure(
     mount: Mount,
     grade: ImuGrade,
     encoder: EncoderSpec | None = None,
+    magnetometer: MagnetometerSpec | None = None,
     odometry: str = "encoder",
     seed: int,
     draw: int,
@@ -47,6 +49,8 @@ def measure(
         The IMU.
     encoder : EncoderSpec, optional
         The wheel encoder; None for a train without one.
+    magnetometer : MagnetometerSpec, optional
+        A magnetometer in the housing of the IMU, sampled at the IMU's times.
     odometry : str
         ``"encoder"``, or ``"truth"`` for the true position, speed and acceleration of the mount.
     seed, draw : int
@@ -82,6 +86,17 @@ def measure(
             wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
             rate_hz=encoder.rate_hz,
         )
+    magnetic = None
+    if magnetometer is not None:
+        magnetic = sample_magnetometer(
+            motion,
+            imu.index,
+            magnetometer,
+            seed=seed,
+            draw=draw,
+            name=mount.name,
+            track_m=(truth.track.start_m, truth.track.end_m),
+        )
     if odometry == "truth":
         frame = true_odometry(motion, imu.index)
     elif odometry != "encoder":
@@ -115,6 +130,18 @@ def measure(
         odometry=frame,
         odometry_source=odometry,
         gravity_mps2=truth.gravity_mps2,
+        magnetometer=magnetic,
+        magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
+    )
+
+
+def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:
+    """What a chart of the Earth's field and the data sheet tell an estimator; nothing of disturbances."""
+    return MagnetometerSheet(
+        noise_tpsqrthz=spec.noise_tpsqrthz,
+        intensity_t=spec.field.intensity_t,
+        inclination_rad=spec.field.inclination_rad,
+        north_rad=spec.field.north_rad,
     )
 
 

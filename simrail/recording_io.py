@@ -1,6 +1,7 @@
 """Recordings as files, and the judgement of recordings, ours or a stranger's.
 
-A recording is a folder: Parquet for the signals (``imu``, ``odometry``, ``encoder``), one JSON file
+A recording is a folder: Parquet for the signals (``imu``, ``odometry``, ``encoder``,
+``magnetometer``), one JSON file
 for what the train knows. Numbers survive the round trip bit by bit. Nothing is repaired: a recording
 with a fault is refused, with the place of the fault.
 
@@ -19,9 +20,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.columns import ACCEL, ENCODER, GYRO, IMU, ODOMETRY, ODOMETRY_SD, require
+from simrail.columns import ACCEL, EDGE_TIME, ENCODER, GYRO, IMU, MAGNETIC, ODOMETRY, ODOMETRY_SD, require
 from simrail.errors import InputError
-from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet, Recording
 from simrail.resample import check_stamps
 from simrail.track.design import TrackDesign
 
@@ -29,7 +30,10 @@ FORMAT = "simrail recording 1"
 MAX_RATE_RADPS, MAX_FORCE_MPS2 = 20.0, 500.0
 """No train turns or shakes harder: beyond this the unit is wrong."""
 
-_PARTS = ("imu", "odometry", "encoder")
+MAX_FIELD_T = 1e-2
+"""Two hundred times the Earth's field: beyond this the unit is wrong."""
+
+_PARTS = ("imu", "odometry", "encoder", "magnetometer")
 
 
 def check_recording(recording: Recording, *, file: object = None) -> None:
@@ -47,13 +51,14 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
     InputError
         At the first of: a missing column; a value that is no number; time stamps that are not
         increasing, or not uniform in the IMU; angular rates above 20 rad/s (degrees?) or specific
-        forces above 500 m/s2; an IMU rate other than its sheet's; odometry at other times than the
-        IMU's; an encoder without its sheet.
+        forces above 500 m/s2, fields above 10 mT; an IMU rate other than its sheet's; odometry or
+        magnetometer at other times than the IMU's; an encoder or magnetometer without its sheet.
     """
     _check_signal(recording.imu, IMU, what="imu", file=file)
     _check_signal(recording.odometry, ODOMETRY + ODOMETRY_SD, what="odometry", file=file)
     if recording.encoder is not None:
-        _check_signal(recording.encoder, ENCODER, what="encoder", file=file)
+        timed = (EDGE_TIME,) if EDGE_TIME in recording.encoder else ()
+        _check_signal(recording.encoder, ENCODER + timed, what="encoder", file=file)
         if recording.encoder_sheet is None:
             raise InputError(
                 "an encoder without its sheet says nothing",
@@ -62,29 +67,35 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
                 remedy="give pulses per revolution and wheel radius",
             )
     _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz, file)
-    limits = ((GYRO, MAX_RATE_RADPS, "rad/s", "degrees"), (ACCEL, MAX_FORCE_MPS2, "m/s2", "mg"))
-    for columns, limit, unit, suspect in limits:
-        for column in columns:
-            values = np.abs(recording.imu[column].to_numpy(dtype=np.float64))
-            if values.max() > limit:
-                worst = int(np.argmax(values))
-                raise InputError(
-                    f"is beyond what a train does at time_s = {float(recording.imu.index[worst]):.6g}",
-                    file=file,
-                    field=f"imu.{column}",
-                    value=float(recording.imu[column].iloc[worst]),
-                    limit=f"{limit:g} {unit}",
-                    remedy=f"convert to {unit}; the values look like {suspect}",
-                )
-    if not np.array_equal(recording.odometry.index.to_numpy(), recording.imu.index.to_numpy()):
-        raise InputError(
-            "has other time stamps than the IMU",
-            file=file,
-            field="odometry.time_s",
-            value=f"{len(recording.odometry)} samples",
-            limit=f"the {len(recording.imu)} time stamps of the IMU",
-            remedy="make the odometry at the IMU's times",
-        )
+    limits = [
+        ("imu", GYRO, MAX_RATE_RADPS, "rad/s", "degrees"),
+        ("imu", ACCEL, MAX_FORCE_MPS2, "m/s2", "mg"),
+    ]
+    at_imu_times = ["odometry"]
+    if recording.magnetometer is not None:
+        _check_signal(recording.magnetometer, MAGNETIC, what="magnetometer", file=file)
+        if recording.magnetometer_sheet is None:
+            raise InputError(
+                "a magnetometer without its sheet gives no heading",
+                file=file,
+                field="magnetometer_sheet",
+                remedy="give the Earth's field and the direction of magnetic north",
+            )
+        limits.append(("magnetometer", MAGNETIC, MAX_FIELD_T, "T", "microtesla or gauss"))
+        at_imu_times.append("magnetometer")
+    for what, columns, limit, unit, suspect in limits:
+        _check_size(getattr(recording, what), columns, (limit, unit, suspect), what=what, file=file)
+    for what in at_imu_times:
+        frame = getattr(recording, what)
+        if not np.array_equal(frame.index.to_numpy(), recording.imu.index.to_numpy()):
+            raise InputError(
+                "has other time stamps than the IMU",
+                file=file,
+                field=f"{what}.time_s",
+                value=f"{len(frame)} samples",
+                limit=f"the {len(recording.imu)} time stamps of the IMU",
+                remedy=f"make the {what} at the IMU's times",
+            )
 
 
 def write_recording(recording: Recording, folder: Path) -> None:
@@ -111,7 +122,7 @@ def write_recording(recording: Recording, folder: Path) -> None:
             frame = getattr(recording, part)
             if frame is not None:
                 frame.to_parquet(unfinished / f"{part}.parquet")
-        sheet = recording.encoder_sheet
+        sheet, magnetic = recording.encoder_sheet, recording.magnetometer_sheet
         plain = {
             "format": FORMAT,
             "name": recording.name,
@@ -121,6 +132,7 @@ def write_recording(recording: Recording, folder: Path) -> None:
             "mount_position_m": list(recording.mount_position_m),
             "track": recording.track.to_dict(),
             "encoder_sheet": None if sheet is None else asdict(sheet),
+            "magnetometer_sheet": None if magnetic is None else asdict(magnetic),
             "start_position_m": recording.start_position_m,
             "odometry_source": recording.odometry_source,
             "gravity_mps2": recording.gravity_mps2,
@@ -146,7 +158,7 @@ def read_recording(folder: Path) -> Recording:
     plain = _read_json(path)
     imu, odometry = _read_frame(folder / "imu.parquet"), _read_frame(folder / "odometry.parquet")
     try:
-        sheet = plain["encoder_sheet"]
+        sheet, magnetic = plain["encoder_sheet"], plain.get("magnetometer_sheet")
         x, y, z = (float(value) for value in plain["mount_position_m"])
         recording = Recording(
             name=plain["name"],
@@ -162,6 +174,8 @@ def read_recording(folder: Path) -> Recording:
             odometry=odometry,
             odometry_source=plain["odometry_source"],
             gravity_mps2=float(plain["gravity_mps2"]),
+            magnetometer=None if magnetic is None else _read_frame(folder / "magnetometer.parquet"),
+            magnetometer_sheet=None if magnetic is None else MagnetometerSheet(**magnetic),
         )
     except KeyError as error:
         raise InputError("is required", file=path, field=str(error.args[0]), remedy="add it") from None
@@ -237,6 +251,25 @@ def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, f
             limit="an index time_s of seconds",
         )
     check_stamps(frame.index.to_numpy(dtype=np.float64), field=f"{what}.time_s", file=file)
+
+
+def _check_size(
+    frame: pd.DataFrame, columns: tuple[str, ...], bound: tuple[float, str, str], *, what: str, file: object
+) -> None:
+    """Refuse values beyond (limit, unit); they look like another unit, which the bound names third."""
+    limit, unit, suspect = bound
+    for column in columns:
+        values = np.abs(frame[column].to_numpy(dtype=np.float64))
+        if values.max() > limit:
+            worst = int(np.argmax(values))
+            raise InputError(
+                f"is beyond what a train does at time_s = {float(frame.index[worst]):.6g}",
+                file=file,
+                field=f"{what}.{column}",
+                value=float(frame[column].iloc[worst]),
+                limit=f"{limit:g} {unit}",
+                remedy=f"convert to {unit}; the values look like {suspect}",
+            )
 
 
 def _check_uniform(time: np.ndarray, rate_hz: float, file: object) -> None:

@@ -40,8 +40,8 @@ def guard_s(recording: Recording) -> float:
     Returns
     -------
     float
-        Time in which a gentle start moves by two counts, (12 q / jerk)^(1/3), at least `GUARD_S`: an encoder of
-        few pulses sees a departure late.
+        Time in which a gentle start moves by two counts, (12 q / jerk)^(1/3), at least `GUARD_S`: an
+        encoder of few pulses sees a departure late.
     """
     if recording.encoder_sheet is None:
         return GUARD_S

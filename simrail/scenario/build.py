@@ -31,6 +31,7 @@ from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.grades import ImuGrade
+from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.truth import Mount
@@ -157,7 +158,13 @@ def mount_of(cell: Cell) -> Mount:
 def encoder_of(cell: Cell) -> EncoderSpec | None:
     """Encoder of a cell, if its scenario has one."""
     part = cell.spec.encoder
-    return None if part is None else EncoderSpec(**part.model_dump())
+    return None if part is None else part.spec()
+
+
+def magnetometer_of(cell: Cell) -> MagnetometerSpec | None:
+    """Magnetometer of a cell, if its scenario has one; steel stands where the seed of the track puts it."""
+    part = cell.spec.magnetometer
+    return None if part is None else part.spec(cell.ride_seed)
 
 
 def estimator_of(scenario: Scenario, method: Method) -> Estimator:

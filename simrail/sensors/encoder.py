@@ -197,7 +197,7 @@ def sample_encoder(
 
 
 def slipped_angle(angle: FloatArray, time_s: FloatArray, slip: tuple[Slip, ...]) -> FloatArray:
-    """By how much (n,) the slips have turned the wheel beyond its rolling, rad: the integral of creepage dtheta."""
+    """By how much (n,) slip has turned the wheel beyond its rolling, rad: the integral of creepage dtheta."""
     creepage = np.zeros_like(angle)
     for event in slip:
         ramp = event.ramp_s

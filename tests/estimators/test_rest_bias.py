@@ -186,7 +186,9 @@ def test_without_wandering_it_is_the_mean_of_all_rests() -> None:
 
 
 def test_without_white_noise_the_newest_rest_alone_counts() -> None:
-    steps = np.repeat([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]], [70 * SLOW, 80 * SLOW, 110 * SLOW], axis=0)
+    steps = np.repeat(
+        [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]], [70 * SLOW, 80 * SLOW, 110 * SLOW], axis=0
+    )
     found = rest_bias(three_rests(steps, sheet=replace(SHEET, gyro_noise_radpsqrts=0.0)))
     np.testing.assert_allclose(found.bias[at(70.0)], [1.0, 2.0, 3.0], rtol=1e-9)
     np.testing.assert_allclose(found.bias[at(150.0)], [4.0, 5.0, 6.0], rtol=1e-9)
