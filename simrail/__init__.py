@@ -18,7 +18,8 @@ radians inside, units in names; degrees and millimetres in reports only.
 frame                  columns
 =====================  =========================================================================
 IMU signals            ``gyro_{x,y,z}_radps``, ``accel_{x,y,z}_mps2`` (at rest +g on Z)
-encoder                ``pulse_count``
+encoder                ``pulse_count``, and ``edge_time_s`` where the logger times edges
+magnetometer           ``magnetic_{x,y,z}_t``
 odometry               ``position_m``, ``speed_mps``, ``acceleration_mps2`` and their ``..._sd_...``
 attitude               ``roll_rad``, ``pitch_rad``, ``yaw_rad`` (global), ``{angle}_sd_rad``
 relative attitude      ``relative_{angle}_rad`` (in the design track frame)
@@ -37,7 +38,8 @@ horizontal projection of the track. Gravity is 9.81 m/s2 on a flat Earth that do
 `measure` is told otherwise.
 
 The nouns: `TrackDesign`, `Irregularity` and `LaidTrack` (the track), `VehicleModel`, `SpeedProfile`,
-`Ride`, `Truth`, `Mount`, `ImuGrade`, `EncoderSpec`, `Recording`, `Estimate`, `Scenario`, `Results`.
+`Ride`, `Truth`, `Mount`, `ImuGrade`, `EncoderSpec`, `MagnetometerSpec`, `Recording`, `Estimate`,
+`Scenario`, `Results`.
 A `Recording` holds what the train may know and never a true value; truth and estimate meet in `score`
 only. A person's faulty input raises `InputError`, whose text names file, field, value, limit and remedy.
 """
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
     from simrail.score import score, score_odometry
     from simrail.sensors.encoder import EncoderSpec
     from simrail.sensors.grades import ImuGrade
+    from simrail.sensors.magnetometer import MagnetometerSpec
     from simrail.track.design import TrackDesign
     from simrail.track.irregularity import Irregularity
     from simrail.track.laid import LaidTrack, lay
@@ -87,6 +90,7 @@ _HOMES = {
     "score": ("score", "score_odometry"),
     "sensors.encoder": ("EncoderSpec",),
     "sensors.grades": ("ImuGrade",),
+    "sensors.magnetometer": ("MagnetometerSpec",),
     "track.design": ("TrackDesign",),
     "track.irregularity": ("Irregularity",),
     "track.laid": ("LaidTrack", "lay"),
@@ -105,6 +109,7 @@ __all__ = [
     "InputError",
     "Irregularity",
     "LaidTrack",
+    "MagnetometerSpec",
     "Mount",
     "Parts",
     "Recording",

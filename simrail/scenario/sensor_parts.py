@@ -129,22 +129,22 @@ class MagnetometerPart(Part):
         iron, traction, steel = self.iron, self.traction, self.steel
         return MagnetometerSpec(
             field=EarthField(
-                intensity_t=1e-6 * self.intensity_ut,
+                intensity_t=self.intensity_ut / 1e6,
                 inclination_rad=radians(self.inclination_deg),
                 declination_rad=radians(self.declination_deg),
                 x_axis_rad=radians(self.x_axis_deg),
             ),
-            noise_tpsqrthz=1e-9 * self.noise_ntpsqrthz,
-            bias_t=1e-9 * self.bias_nt,
-            range_t=1e-6 * self.range_ut,
-            resolution_t=1e-9 * self.resolution_nt,
+            noise_tpsqrthz=self.noise_ntpsqrthz / 1e9,
+            bias_t=self.bias_nt / 1e9,
+            range_t=self.range_ut / 1e6,
+            resolution_t=self.resolution_nt / 1e9,
             iron=None
             if iron is None
             else VehicleIron(
                 hard_iron_t=(
-                    1e-6 * iron.hard_iron_ut[0],
-                    1e-6 * iron.hard_iron_ut[1],
-                    1e-6 * iron.hard_iron_ut[2],
+                    iron.hard_iron_ut[0] / 1e6,
+                    iron.hard_iron_ut[1] / 1e6,
+                    iron.hard_iron_ut[2] / 1e6,
                 ),
                 soft_iron=iron.soft_iron,
             ),
