@@ -209,6 +209,18 @@ def test_motion_never_enters() -> None:
     np.testing.assert_allclose(rest_bias(shaken).bias, rest_bias(recording).bias, rtol=0, atol=1e-11)
 
 
+def test_a_crawl_in_steps_is_no_rest() -> None:
+    """Two counts every 2 s leave half a second between the guards: too short to be called a rest."""
+    gyro = np.random.default_rng(8).standard_normal((round(END_S * SLOW), 3))
+    recording = three_rests(gyro)
+    stepwise = 2 * np.maximum((recording.imu.index.to_numpy() - 20.0) // 2.0, -1.0).astype(int)
+    recording.encoder["pulse_count"] = stepwise
+    found = rest_bias(recording)
+    assert len(rest_periods(recording)) == 1
+    assert found.samples[-1] == found.samples[at(25.0)] > 0
+    np.testing.assert_array_equal(found.bias[-1], found.bias[at(25.0)])
+
+
 @pytest.mark.parametrize("direction", (1, -1))
 def test_the_bias_of_a_prefix_is_the_prefix_of_the_bias(direction: int) -> None:
     rng = np.random.default_rng(5)
