@@ -10,9 +10,10 @@ from __future__ import annotations
 import difflib
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.resources import files
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -107,6 +108,36 @@ def parse_toml(text: str, *, file: object) -> dict[str, Any]:
             file=file,
             remedy='mend that place; text stands in quotes, numbers do not: name = "go20A", speed_kmh = 20.0',
         ) from error
+
+
+def toml_text(data: Mapping[str, Any], *, prefix: str = "") -> str:
+    """TOML text of plain data: text, numbers, tuples or lists of them, tables and arrays of tables.
+
+    Numbers read back bit by bit. None is left out: TOML has no such value.
+    """
+    lines, tables = [], []
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            tables.append(f"\n[{prefix}{key}]\n" + toml_text(value, prefix=f"{prefix}{key}."))
+        elif isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
+            tables += [f"\n[[{prefix}{key}]]\n" + toml_text(item, prefix=f"{prefix}{key}.") for item in value]
+        elif value is not None:
+            lines.append(f"{key} = {_toml_value(value)}\n")
+    return "".join(lines) + "".join(tables)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Integral):
+        return str(int(value))
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_toml_value(item) for item in value)}]"
+    raise TypeError(f"no TOML for {type(value).__name__}")
 
 
 def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Path | None = None) -> _Part:
