@@ -103,6 +103,6 @@ def _logged(imu: pd.DataFrame, encoder: pd.DataFrame) -> str:
     for names, letter, scale in ((GYRO, "w", np.pi / 180.0), (ACCEL, "a", STANDARD_GRAVITY_MPS2)):
         for name, axis, sign in zip(names, "xyz", (1.0, -1.0, -1.0), strict=True):
             columns[letter + axis] = np.round(sign * at(imu[name].to_numpy()) / scale, 5)
-    reading = np.searchsorted(encoder.index.to_numpy(), stamps, side="right") - 1
-    columns["pulses"] = encoder["pulse_count"].to_numpy()[reading]
+    counted = np.interp(stamps, encoder.index.to_numpy(), encoder["pulse_count"].to_numpy())
+    columns["pulses"] = np.floor(counted).astype(np.int64)
     return str(pd.DataFrame(columns).to_csv(index=False, lineterminator="\n"))

@@ -30,6 +30,10 @@ LEAST_TURN_RAD = 0.3
 """Turn of the track on a ride, there and back counted, from which on the gyro is held against it."""
 
 
+BEYOND_TRACK_M = 20.0
+"""How far an odometry may be off the end of the track by its own error."""
+
+
 def check_plausible(recording: Recording, *, file: object = None) -> None:
     """Refuse a recording whose units, axes or signs cannot be those that are claimed.
 
@@ -39,8 +43,9 @@ def check_plausible(recording: Recording, *, file: object = None) -> None:
     Raises
     ------
     InputError
-        If gravity has another size or direction; if the train turns faster than a train; if the gyro does
-        not turn with the track: by none of its curves, the other way, or many times as much.
+        If gravity has another size or direction; if the train turns faster than a train; if it leaves the
+        track; if the gyro does not turn with the track: by none of its curves, the other way, or many times
+        as much.
     """
     _check_gravity(recording, file)
     _check_turning(recording, file)
@@ -117,6 +122,16 @@ def _check_curves(recording: Recording, file: object) -> None:
     odometry = recording.odometry
     position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
     track = recording.track
+    for place in (position.min(), position.max()):
+        if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:
+            raise InputError(
+                f"the ride leaves track {track.name!r}",
+                file=file,
+                field="odometry.position_m",
+                value=round(float(place), 2),
+                limit=f"{track.start_m:g} to {track.end_m:g} m",
+                remedy="mend start_position_m or the direction (reverse = true), or lengthen the track",
+            )
     inside = (position >= track.start_m) & (position <= track.end_m)
     expected = np.zeros(len(position))
     expected[inside] = track.curvature(position[inside]) * speed[inside]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from simrail.errors import InputError
 from simrail.recording import EncoderSheet, ImuSheet
@@ -29,6 +29,14 @@ from simrail.signals import (
 
 DATE_TIMES = ("iso", "epoch_s", "epoch_ms", "epoch_us", "epoch_ns")
 """Time stamps that are dates: text as ISO 8601 has it, or a count since 1970."""
+
+
+def _as_tuple(value: object) -> object:
+    return (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else value
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
+"""Column names: one text, or an array of them."""
 
 Positive = Annotated[float, Field(gt=0.0)]
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -50,7 +58,7 @@ class SignalPart(DataPart):
         Time of the first sample of a file without time stamps.
     """
 
-    columns: dict[str, str | tuple[str, str, str]] = Field(default_factory=dict)
+    columns: dict[str, Names] = Field(default_factory=dict)
     units: dict[str, str] = Field(default_factory=dict)
     rate_hz: Positive | None = None
     start_s: float = 0.0
@@ -75,13 +83,12 @@ class SignalPart(DataPart):
                     )
         for key, names in self.columns.items():
             count = len(quantities[key].columns) if key in quantities else 1
-            given = 1 if isinstance(names, str) else len(names)
-            if given != count:
+            if len(names) != count:
                 wanted = "three column names, of the axes x, y, z" if count == 3 else "one column name"
                 raise InputError(
                     "lacks an axis" if count == 3 else "names several columns",
                     field=f"columns.{key}",
-                    value=names,
+                    value=list(names),
                     limit=wanted,
                     remedy='e.g. ["ax", "ay", "az"]' if count == 3 else None,
                 )

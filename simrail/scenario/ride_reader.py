@@ -142,11 +142,10 @@ class _Reader:
         found = column_names(part, self._folder, table=table)
         names: dict[str, list[str]] = {}
         for quantity in signal.quantities:
-            given = part.columns.get(quantity.key, quantity.columns)
-            named = [given] if isinstance(given, str) else list(given)
+            named = list(part.columns.get(quantity.key, quantity.columns))
             if quantity.required or quantity.key in part.columns or set(named) <= set(found):
                 names[quantity.key] = named
-        time_name, unit = str(part.columns.get("time", "time_s")), part.units.get("time", "s")
+        time_name, unit = part.columns.get("time", ("time_s",))[0], part.units.get("time", "s")
         stamped = signal.timed and ("time" in part.columns or time_name in found or part.rate_hz is None)
         wanted = [*([time_name] if stamped else []), *(name for group in names.values() for name in group)]
         text = [time_name] if stamped and unit == "iso" else []
@@ -200,7 +199,7 @@ class _Reader:
                 raise InputError(
                     f"holds no date-time ({error})",
                     file=label(self._folder / part.file),
-                    field=str(part.columns.get("time", "time_s")),
+                    field=part.columns.get("time", ("time_s",))[0],
                     limit="e.g. 2024-05-31T12:00:00.123",
                 ) from None
             count = stamps.dt.as_unit("ns").astype("int64").to_numpy()

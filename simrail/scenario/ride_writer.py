@@ -100,4 +100,6 @@ def write_frame(frame: pd.DataFrame, path: Path, *, format: Format) -> None:
         plain.to_parquet(path, index=False)
     else:
         table = pa.Table.from_pandas(plain, preserve_index=False)
-        pa_csv.write_csv(table, path, pa_csv.WriteOptions(quoting_style="none"))
+        with path.open("wb") as file:
+            file.write((",".join(map(str, plain.columns)) + "\n").encode())
+            pa_csv.write_csv(table, file, pa_csv.WriteOptions(include_header=False))
