@@ -15,6 +15,7 @@ import pandas as pd
 from simrail.campaign import Watcher, record_cell
 from simrail.drafts import draft_of
 from simrail.errors import InputError
+from simrail.interrupts import interruptible
 from simrail.ride import simulate
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
@@ -83,11 +84,15 @@ def export(
     ]
     names = _names(chosen)
     records = []
-    with draft_of(folder) as draft:
+    with interruptible() as check, draft_of(folder) as draft:
         for number, (_, group) in enumerate(groupby(chosen, key=lambda cell: cell.ride_number), start=1):
             ride_cells = list(group)
             watcher.ride_begins(number, plan.rides // scenario.spec.track_draws, ride_cells[0].ride.name)
-            motion = simulate(parts.ride(ride_cells[0]), progress=watcher.ride_goes)
+            try:
+                motion = simulate(parts.ride(ride_cells[0]), progress=watcher.ride_goes)
+            except Exception:
+                check()  # an engine in C++ may have made an error of its own of Ctrl-C
+                raise
             watcher.ride_ends()
             for cell in ride_cells:
                 recording = record_cell(cell, motion, parts)

@@ -17,7 +17,9 @@ from simrail.scenario.build import class_named, construct
 from simrail.scenario.files import blame
 from simrail.scenario.overrides import override
 from simrail.scenario.ride_reader import read_ride
-from simrail.scenario.ride_writer import Format, refuse_existing, write_frame
+from simrail.scenario.ride_writer import Format, write_frame
+
+PAGE = "estimate.html"
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ def estimate_ride(
         Registered name, or ``"file.py:Class"``.
     folder : Path
         Where ``estimate.<format>``, ``innovations.<format>``, ``geometry.<format>`` (those that the method
-        has) and ``estimate.html`` go. Must not exist yet; appears whole or not at all.
+        has) and ``estimate.html`` go. It appears, or replaces an earlier estimate, whole or not at all.
     settings : sequence of str
         Options of the estimator, ``option=value``.
     format : str
@@ -53,9 +55,17 @@ def estimate_ride(
     Raises
     ------
     InputError
-        If the ride cannot be read, there is no such estimator or option, or the folder exists.
+        If the ride cannot be read, there is no such estimator or option, or the folder holds other
+        things.
     """
-    refuse_existing(folder)
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / PAGE).is_file())):
+        raise InputError(
+            "holds other things than an estimate, and would be replaced",
+            field="--out",
+            value=str(folder),
+            limit=f"a new folder, or one that holds an {PAGE}",
+            remedy="choose another folder with --out",
+        )
     with blame("--estimator", method):
         known = class_named(method, None)
     with blame("--set", method):
@@ -77,7 +87,7 @@ def estimate_ride(
             if frame is not None:
                 write_frame(frame, draft / f"{name}.{format}", format=format)
         write_estimate_page(
-            draft / "estimate.html",
+            draft / PAGE,
             recording,
             estimate,
             label=readable(method.rpartition(":")[2]),

@@ -235,7 +235,7 @@ def test_a_fault_is_refused_by_name(fault: str, ride: Path, capsys: pytest.Captu
         (["--estimator", "AttitudeEkf", "--set", "compensated=maybe"], "compensated"),
         (["--estimator", "AttitudeEkf", "--set", "compensated"], "key=value"),
         (["--estimator", "DesignAngles", "--format", "xlsx"], "csv or parquet"),
-        (["--estimator", "DesignAngles", "--out", "."], "exists already"),
+        (["--estimator", "DesignAngles", "--out", "."], "other things than an estimate"),
     ],
 )
 def test_a_bad_command_is_refused(
