@@ -1,9 +1,9 @@
 """Can it be true? Units, axes and signs of a recording, judged by what every train does.
 
-A wrong unit or a device upside down leaves a file that looks sound. It shows against three things that are
-known: gravity, that a train turns slowly, and the curves of the design track. Each test has a limit far from
-what a sound recording does and far from what the fault does. Faults of form (columns, stamps, numbers) are
-judged by `simrail.recording_check`.
+A wrong unit or a device upside down leaves a file that looks sound. It shows against what is known: gravity,
+that a train turns slowly, the curves of the design track, and the odometry's setting off and braking. Each
+test has a limit far from what a sound recording does and far from what the fault does. Faults of form
+(columns, stamps, numbers) are judged by `simrail.recording_check`.
 """
 
 from __future__ import annotations
@@ -26,9 +26,16 @@ UPRIGHT = 0.9
 MEAN_RATE_RADPS, MEAN_OVER_S = 0.5, 10.0
 """No train turns by 290 deg in 10 s; in deg/s a curve of 500 m at 50 km/h already shows 1.6."""
 
-LEAST_TURN_RAD = 0.3
+LEAST_TURN_RAD = 0.1
 """Turn of the track on a ride, there and back counted, from which on the gyro is held against it."""
 
+LEAST_WAY_M, LEAST_VARIANCE_M2PS4 = 20.0, 0.01
+"""Way, and variance of the acceleration, from which on the accelerometer is held against the odometry."""
+
+
+SURE = 6.0
+"""Standard deviations that a slope must be off 1 before a ride is refused for it; they take seconds as
+independent, which sway and drift are not."""
 
 BEYOND_TRACK_M = 20.0
 """How far an odometry may be off the end of the track by its own error."""
@@ -38,18 +45,20 @@ def check_plausible(recording: Recording, *, file: object = None) -> None:
     """Refuse a recording whose units, axes or signs cannot be those that are claimed.
 
     The specific force is judged at rest, where the ride begins with a second of it, else by its median.
-    The yaw rate of the track, curvature times speed, is compared with the gyro's Z by least squares.
+    Where the ride has them, its curves are compared with the gyro's Z (the track's yaw rate, d yaw / ds times
+    speed), its setting off and braking with the accelerometer's X and Y, by least squares. A ride on the
+    straight at constant speed says nothing of either.
 
     Raises
     ------
     InputError
         If gravity has another size or direction; if the train turns faster than a train; if it leaves the
         track; if the gyro does not turn with the track: by none of its curves, the other way, or many times
-        as much.
+        as much; if the accelerometer does not push when the train gains speed, or sideways, or backwards.
     """
     _check_gravity(recording, file)
     _check_turning(recording, file)
-    _check_curves(recording, file)
+    _check_motion(recording, file)
 
 
 def _check_gravity(recording: Recording, file: object) -> None:
@@ -118,10 +127,10 @@ def _check_turning(recording: Recording, file: object) -> None:
             )
 
 
-def _check_curves(recording: Recording, file: object) -> None:
-    odometry = recording.odometry
+def _check_motion(recording: Recording, file: object) -> None:
+    """Hold gyro and accelerometer against what track and odometry say, in means over a second."""
+    odometry, track = recording.odometry, recording.track
     position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
-    track = recording.track
     for place in (position.min(), position.max()):
         if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:
             raise InputError(
@@ -132,19 +141,29 @@ def _check_curves(recording: Recording, file: object) -> None:
                 limit=f"{track.start_m:g} to {track.end_m:g} m",
                 remedy="mend start_position_m or the direction (reverse = true), or lengthen the track",
             )
-    inside = (position >= track.start_m) & (position <= track.end_m)
-    expected = np.zeros(len(position))
-    expected[inside] = track.curvature(position[inside]) * speed[inside]
-    if np.abs(expected).sum() / recording.imu_sheet.rate_hz < LEAST_TURN_RAD:
-        return
-    slope, sd = _slope(recording.imu[GYRO[2]].to_numpy(), expected)
-    if sd > 0.05 * max(1.0, abs(slope)) or 0.2 < slope < 5.0:
+    seconds = max(1, round(recording.imu_sheet.rate_hz))
+    frame = track.frame_extended(_means(position, seconds))
+    bend = frame.rates[:, 2] * _means(speed, seconds)
+    if np.abs(bend).sum() > LEAST_TURN_RAD:
+        _judge_turn(recording, _slope(_means(recording.imu[GYRO[2]].to_numpy(), seconds), bend), file)
+    acceleration = odometry["acceleration_mps2"].to_numpy()
+    along = _means(acceleration, seconds) - recording.gravity_mps2 * np.sin(frame.pitch_rad)
+    # A noisy regressor flattens the line: only an acceleration that the odometry knows is one to hold to.
+    noise = float(np.mean(odometry["acceleration_sd_mps2"].to_numpy() ** 2))
+    if np.ptp(position) > LEAST_WAY_M and np.var(along) > max(2.0 * noise, LEAST_VARIANCE_M2PS4):
+        x, y = (_slope(_means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
+        _judge_push(x, y, file)
+
+
+def _judge_turn(recording: Recording, line: tuple[float, float], file: object) -> None:
+    slope, sd = line
+    if 0.2 < slope < 5.0 or abs(slope - 1.0) < SURE * sd:
         return
     if slope <= -0.2:
         problem = "turns against the curves of the track"
         remedy = (
             "mend the axes; or the direction: a train that ran towards smaller s has falling pulse counts "
-            "(reverse = true), and a device that looked backwards needs axes that say so"
+            "(reverse = true)"
         )
     elif slope < 0.2:
         problem = "does not turn with the curves of the track"
@@ -156,16 +175,53 @@ def _check_curves(recording: Recording, file: object) -> None:
         problem,
         file=file,
         field=f"imu.{GYRO[2]}",
-        value=f"{slope:.3g} times the curvature of {track.name!r} times speed",
+        value=f"{slope:.3g} times the curvature of {recording.track.name!r} times speed",
         limit="about 1",
         remedy=remedy,
     )
+
+
+def _judge_push(x: tuple[float, float], y: tuple[float, float], file: object) -> None:
+    if x[0] > 0.4 or 1.0 - x[0] < SURE * x[1]:
+        return
+    sideways = abs(y[0]) > max(abs(x[0]), 0.4)
+    if x[0] < -0.4 and not sideways:
+        problem, remedy = (
+            "pushes backwards when the train gains speed",
+            (
+                'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards '
+                "smaller s has falling pulse counts (reverse = true)"
+            ),
+        )
+    elif sideways:
+        axes = '["y", "-x", "z"]' if y[0] > 0.0 else '["-y", "x", "z"]'
+        problem, remedy = "pushes sideways when the train gains speed", f"turn the axes as by axes = {axes}"
+    else:
+        problem, remedy = "does not push when the train gains speed", "mend the axes, or the odometry"
+    raise InputError(
+        problem,
+        file=file,
+        field=f"imu.{ACCEL[0]}",
+        value=f"{x[0]:.2g} times the acceleration of the odometry along X, {y[0]:.2g} along Y",
+        limit="about 1, and 0",
+        remedy=remedy,
+    )
+
+
+def _means(values: FloatArray, count: int) -> FloatArray:
+    """Means (n // count,) of a signal over `count` samples each; of all of it, if it is shorter."""
+    count = min(count, len(values))
+    whole = len(values) // count * count
+    means: FloatArray = values[:whole].reshape(-1, count).mean(axis=1)
+    return means
 
 
 def _slope(measured: FloatArray, expected: FloatArray) -> tuple[float, float]:
     """Slope of the least-squares line measured = a + slope * expected, and its standard deviation (white)."""
     x, y = expected - expected.mean(), measured - measured.mean()
     power = float(x @ x)
+    if power == 0.0:
+        return 1.0, np.inf
     slope = float(x @ y) / power
     rest = y - slope * x
     return slope, float(np.sqrt(rest @ rest / len(x) / power))

@@ -12,6 +12,7 @@ import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from importlib.resources import files
 from numbers import Integral
 from pathlib import Path
@@ -173,7 +174,7 @@ def blame(file: object, field: str) -> Iterator[None]:
 def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
     faults = error.errors()
     # An unknown key is usually a misspelling that also leaves a required one missing: say it first.
-    first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
+    first = next((fault for fault in faults if fault["type"] in _UNKNOWN), faults[0])
     field = ""
     for step in first["loc"]:
         field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
@@ -183,7 +184,7 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         value = None
     context = first.get("ctx", {})
     kind = first["type"]
-    if kind == "extra_forbidden":
+    if kind in _UNKNOWN:
         allowed = _fields_at(model, first["loc"][:-1])
         near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
         problem = "unknown key"
@@ -228,6 +229,9 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
     return InputError(problem, file=file, field=field or None, value=value, limit=limit, remedy=remedy)
 
 
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""An unknown key, in a model and in a dataclass."""
+
 _TYPES = {
     "float_type": "a number",
     "float_parsing": "a number",
@@ -246,17 +250,19 @@ _TYPES = {
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """Names of the fields that are allowed at a place in a model."""
-    current: type[BaseModel] | None = model
+    current: type[Any] | None = model
     for step in location:
-        if isinstance(step, int) or current is None:
+        if isinstance(step, int) or current is None or not issubclass(current, BaseModel):
             continue
         annotation = current.model_fields.get(step)
         current = _model_in(annotation.annotation) if annotation else None
-    return list(current.model_fields) if current else []
+    if current is None:
+        return []
+    return list(current.model_fields) if issubclass(current, BaseModel) else [f.name for f in fields(current)]
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _model_in(annotation: Any) -> type[Any] | None:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
         found = _model_in(argument)

@@ -278,7 +278,11 @@ class OdometerPart(SignalPart):
 
 
 class OdometrySignalPart(SignalPart):
-    """``[odometry]``: position, speed and acceleration at the IMU's times, made elsewhere by `source`."""
+    """``[odometry]``: position, speed and acceleration of the IMU, made elsewhere by `source`.
+
+    At other times than the IMU's they are interpolated by straight lines: that looks ahead by up to one of
+    its intervals.
+    """
 
     source: str
 

@@ -88,6 +88,8 @@ def read_ride(path: Path) -> Recording:
     times = imu.index.to_numpy()
     if spec.odometry is not None:
         odometry, source = reader.frame(spec.odometry, "odometry"), spec.odometry.source
+        if not np.array_equal(odometry.index.to_numpy(), times):
+            odometry, _ = resample(odometry, times, longest_gap_s=WAY_GAP_S, what="odometry", file=file)
     elif encoder is not None and encoder_sheet is not None and spec.encoder is not None:
         source = "encoder"
         odometry = encoder_odometry(
@@ -134,8 +136,11 @@ class _Reader:
 
     def frame(self, part: SignalPart, table: str) -> pd.DataFrame:
         """Frame of a signal: its columns in SI and in the body's axes, indexed by ``time_s``."""
-        with blame(self._file, ""):
+        try:
             return self._frame(part, table)
+        except InputError as error:
+            error.file = self._file if error.file is None else error.file
+            raise
 
     def _frame(self, part: SignalPart, table: str) -> pd.DataFrame:
         signal = part.signal()

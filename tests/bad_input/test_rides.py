@@ -141,6 +141,22 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
         ["imu.axes", "gravity lies along -Y"],
     ),
     "turns_the_other_way": (scaled(-1.0, "wz"), ["imu.gyro_z_radps", "against the curves", "reverse"]),
+    "looks_backwards": (
+        text(('axes = ["x", "-y", "-z"]', 'axes = ["-x", "y", "-z"]')),
+        ["imu.accel_x_mps2", "backwards", "-1 times", "reverse"],
+    ),
+    "turned_by_90": (
+        text(('axes = ["x", "-y", "-z"]', 'axes = ["y", "x", "-z"]')),
+        ["imu.accel_x_mps2", "sideways", "axes"],
+    ),
+    "counts_backwards": (
+        text(("reverse = false", "reverse = true"), ("start_position_m = 110.0", "start_position_m = 330.0")),
+        ["imu.", "reverse = true"],
+    ),
+    "leaves_the_track": (
+        text(("reverse = false", "reverse = true")),
+        ["odometry.position_m", "leaves track", "-110", "0 to 600 m", "direction"],
+    ),
     "missing_axis": (
         text(('["wx", "wy", "wz"]', '["wx", "wy"]')),
         ["imu.columns.gyro", "lacks an axis", "x, y, z"],
@@ -198,7 +214,10 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
         ["encoder.sheet.wheel_radius_m", "1.5"],
     ),
     "no_pulses": (text(("per_revolution = 1024", "per_revolution = 0")), ["pulses_per_revolution", "> 0"]),
-    "sheet_typo": (text(("pulses_per_rev", "pulse_per_rev")), ["encoder.sheet", "puls"]),
+    "sheet_typo": (
+        text(("pulses_per_rev", "pulse_per_rev")),
+        ["encoder.sheet", "unknown key", "did you mean pulses_per_revolution"],
+    ),
     "typo": (text(("gravity_mps2", "gravity_mps")), ["gravity_mps", "did you mean gravity_mps2"]),
     "gravity": (text(("gravity_mps2 = 9.81", "gravity_mps2 = 981.0")), ["gravity_mps2", "981", "9.9"]),
     "no_body": (text(('body = "front"', "")), ["imu.body", "required"]),
