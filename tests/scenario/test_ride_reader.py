@@ -23,7 +23,7 @@ from simrail.scenario.ride_file import ImuSignalPart
 from simrail.scenario.ride_reader import _Reader, read_ride
 from simrail.scenario.track_file import track_by_name
 from simrail.sensors.encoder import sample_encoder
-from simrail.signals import FORCES, RATES
+from simrail.signals import FORCES, LENGTHS, RATES, SPEEDS, TIMES
 from simrail.truth import Mount, Truth, rotation_matrix
 from simrail.vehicle.kinematic_engine import kinematic_truth
 
@@ -332,3 +332,23 @@ def test_speed_filter_is_causal_and_signed():
     np.testing.assert_array_equal(back["position_m"], -whole["position_m"])
     # s = t^2/2 while the speed rises evenly, known to a small lag.
     assert whole["position_m"].iloc[-1] - 5.0 == pytest.approx(32.0 + 8.0 * 7.99, abs=0.3)
+
+
+def test_units_are_those_of_the_tables_of_units():
+    """Against literal figures: standard gravity by definition, 180 deg per pi, 3600 s per hour."""
+    known = {
+        "g": 9.80665,
+        "mg": 9.80665e-3,
+        "deg/s": 0.017453292519943295,
+        "deg/h": 4.84813681109536e-06,
+        "km/h": 0.2777777777777778,
+        "km": 1000.0,
+        "mm": 1e-3,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "ns": 1e-9,
+    }
+    listed = {**RATES, **FORCES, **SPEEDS, **LENGTHS, **TIMES}
+    for unit, (multiply, divide) in listed.items():
+        assert multiply / divide == pytest.approx(known.get(unit, 1.0), rel=1e-15), unit
+    assert set(known) | {"s", "m", "m/s", "m/s2", "rad/s"} == set(listed)

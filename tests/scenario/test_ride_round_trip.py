@@ -133,6 +133,17 @@ def test_track_in_drawing_units_reads_back_bit_by_bit(value):
     assert judge(TrackFile, parse_toml(track_text(simple), file="t"), file="t").design("") == simple
 
 
+def test_whatever_a_track_file_can_say_can_be_written_again():
+    """Cants of seventeen digits, as a fit of measured track gives them: a file said them, so a file can."""
+    for cant_mm in np.random.default_rng(4).uniform(1.0, 150.0, 300):
+        design = TrackDesign(
+            "t",
+            0.0,
+            (Straight(10.0), Transition(30.0), Curve(11.0, 300.0, cant_mm / 1000.0)),
+        )
+        assert judge(TrackFile, parse_toml(track_text(design), file="t"), file="t").design("") == design
+
+
 @pytest.mark.parametrize("name", sorted(shipped("track")))
 def test_every_shipped_track_can_be_written(name):
     design = track_by_name(name)
