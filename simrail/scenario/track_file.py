@@ -7,7 +7,6 @@ positive uphill in the direction of s.
 
 from __future__ import annotations
 
-from math import inf, nextafter
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -180,7 +179,12 @@ def track_text(design: TrackDesign) -> str:
 def _thousandths(value: float, field: str) -> float:
     """The number that divided by 1000 gives a value exactly."""
     middle = value * 1000.0
-    for candidate in (round(middle, 9), middle, nextafter(middle, -inf), nextafter(middle, inf)):
+    for candidate in (round(middle, 9), middle):
         if candidate / 1000.0 == value:
             return candidate
-    raise InputError("cannot be written exactly", field=field, value=value, remedy="round it to nine digits")
+    raise InputError(
+        "is a number that no decimal in mm or permil gives exactly",
+        field=field,
+        value=value,
+        remedy=f"take {middle!r} / 1000 instead: it differs in the last of its 53 bits",
+    )
