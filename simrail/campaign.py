@@ -55,6 +55,9 @@ class Watcher:
     def estimate_made(self, number: int, count: int, name: str) -> None:
         """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
 
+    def recording_written(self, number: int, count: int, name: str) -> None:
+        """Recording `number` (from 1) of `count` has been written, by an export."""
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -241,17 +244,7 @@ def _run_cell(
     keep = {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
     try:
         with ledger.timed("measure"):
-            recording = measure(
-                truth,
-                name=cell.ride.name,
-                mount=mount_of(cell),
-                grade=parts.grade(cell),
-                encoder=encoder_of(cell),
-                magnetometer=magnetometer_of(cell),
-                odometry=cell.spec.odometry,
-                seed=cell.sensor_seed,
-                draw=cell.sensor_draw,
-            )
+            recording = record_cell(cell, truth, parts)
         with ledger.timed("score"):
             motion = truth_at_imu(truth, recording)
             reference = reference_of(motion, recording)
@@ -284,6 +277,21 @@ def _run_cell(
         described = {**ledger.labels(cell, ""), **_cell_record(cell)}
         del described["estimator"], described["tuning"]
         ledger.examples.append(CellResult(described, recording, motion, estimates))
+
+
+def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
+    """Measure a cell: its sensors on its ride."""
+    return measure(
+        truth,
+        name=cell.ride.name,
+        mount=mount_of(cell),
+        grade=parts.grade(cell),
+        encoder=encoder_of(cell),
+        magnetometer=magnetometer_of(cell),
+        odometry=cell.spec.odometry,
+        seed=cell.sensor_seed,
+        draw=cell.sensor_draw,
+    )
 
 
 def _note_not_finite(cell: Cell, name: str, estimate: Estimate, ledger: _Ledger) -> None:

@@ -14,11 +14,12 @@ import pandas as pd
 from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.odometry import encoder_odometry
-from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet, Recording
+from simrail.recording import EncoderSheet, MagnetometerSheet, Recording
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import EarthRate, sample_imu
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
+from simrail.sheets import imu_sheet
 from simrail.truth import Mount, Truth
 
 
@@ -142,21 +143,6 @@ def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:
         intensity_t=spec.field.intensity_t,
         inclination_rad=spec.field.inclination_rad,
         north_rad=spec.field.north_rad,
-    )
-
-
-def imu_sheet(grade: ImuGrade, *, delay_s: float) -> ImuSheet:
-    """What the data sheet of a grade tells an estimator."""
-    return ImuSheet(
-        grade=grade.name,
-        rate_hz=grade.rate_hz,
-        delay_s=delay_s,
-        gyro_noise_radpsqrts=grade.gyro_noise_radpsqrts,
-        accel_noise_mpsqrts=grade.accel_noise_mpsqrts,
-        gyro_bias_instability_radps=grade.gyro_bias_instability_radps,
-        accel_bias_instability_mps2=grade.accel_bias_instability_mps2,
-        gyro_turn_on_bias_radps=grade.gyro_turn_on_bias_radps,
-        accel_turn_on_bias_mps2=grade.accel_turn_on_bias_mps2,
     )
 
 

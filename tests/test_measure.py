@@ -10,7 +10,7 @@ from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
-from simrail.recording_io import check_recording
+from simrail.recording_check import check_recording
 from simrail.rest import GUARD_S, at_rest_initially, first_motion_s
 from simrail.scenario.imu_file import load_grade
 from simrail.sensors.encoder import EncoderSpec, Slip

@@ -15,8 +15,10 @@ from simrail.columns import ATTITUDE, MAGNETIC, MOTION
 from simrail.errors import InputError
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
-from simrail.recording_io import check_recording, read_recording, write_recording
+from simrail.recording_check import check_recording
 from simrail.scenario.imu_file import load_grade
+from simrail.scenario.ride_reader import read_ride
+from simrail.scenario.ride_writer import write_ride
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.magnetic_surroundings import (
     Steel,
@@ -314,14 +316,14 @@ def test_the_sheet_says_what_a_chart_says_and_nothing_of_disturbances(truth):
 def test_it_survives_the_disk_bit_by_bit(truth, tmp_path):
     recording = record(truth, URBAN, encoder=EncoderSpec("wheel", edge_times=True, quadrature=True))
     check_recording(recording)
-    write_recording(recording, tmp_path / "ride")
-    again = read_recording(tmp_path / "ride")
+    write_ride(recording, tmp_path / "ride")
+    again = read_ride(tmp_path / "ride")
     for part in ("magnetometer", "encoder", "imu"):
         pd.testing.assert_frame_equal(getattr(again, part), getattr(recording, part), check_exact=True)
     assert again.magnetometer_sheet == recording.magnetometer_sheet
     assert list(again.encoder) == ["pulse_count", "edge_time_s"]
-    write_recording(record(truth, None), tmp_path / "without")
-    assert read_recording(tmp_path / "without").magnetometer is None
+    write_ride(record(truth, None), tmp_path / "without")
+    assert read_ride(tmp_path / "without").magnetometer is None
 
 
 FAULTS = {

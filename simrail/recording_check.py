@@ -1,39 +1,24 @@
-"""Recordings as files, and the judgement of recordings, ours or a stranger's.
+"""The judgement of a recording, ours or a stranger's: is it one at all?
 
-A recording is a folder: Parquet for the signals (``imu``, ``odometry``, ``encoder``,
-``magnetometer``), one JSON file
-for what the train knows. Numbers survive the round trip bit by bit. Nothing is repaired: a recording
-with a fault is refused, with the place of the fault.
-
-Files of other loggers, in other units, are not read here.
+Columns, numbers, time stamps, sheets. Nothing is repaired: a recording with a fault is refused, with the
+place of the fault. Whether what it says can be true (units, axes) is judged by `simrail.plausible`.
 """
 
 from __future__ import annotations
-
-import json
-import shutil
-import tempfile
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from simrail.columns import ACCEL, EDGE_TIME, ENCODER, GYRO, IMU, MAGNETIC, ODOMETRY, ODOMETRY_SD, require
 from simrail.errors import InputError
-from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet, Recording
+from simrail.recording import Recording
 from simrail.resample import check_stamps
-from simrail.track.design import TrackDesign
 
-FORMAT = "simrail recording 1"
 MAX_RATE_RADPS, MAX_FORCE_MPS2 = 20.0, 500.0
 """No train turns or shakes harder: beyond this the unit is wrong."""
 
 MAX_FIELD_T = 1e-2
 """Two hundred times the Earth's field: beyond this the unit is wrong."""
-
-_PARTS = ("imu", "odometry", "encoder", "magnetometer")
 
 
 def check_recording(recording: Recording, *, file: object = None) -> None:
@@ -96,126 +81,6 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
                 limit=f"the {len(recording.imu)} time stamps of the IMU",
                 remedy=f"make the {what} at the IMU's times",
             )
-
-
-def write_recording(recording: Recording, folder: Path) -> None:
-    """Write a recording into a new folder; it appears whole or not at all.
-
-    Parameters
-    ----------
-    recording : Recording
-        What to write.
-    folder : Path
-        Must not exist yet; its parents are made.
-
-    Raises
-    ------
-    InputError
-        If the folder exists.
-    """
-    if folder.exists():
-        raise InputError("exists already", file=folder, remedy="remove it or choose another name")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
-        for part in _PARTS:
-            frame = getattr(recording, part)
-            if frame is not None:
-                frame.to_parquet(unfinished / f"{part}.parquet")
-        sheet, magnetic = recording.encoder_sheet, recording.magnetometer_sheet
-        plain = {
-            "format": FORMAT,
-            "name": recording.name,
-            "imu_sheet": asdict(recording.imu_sheet),
-            "mount": recording.mount,
-            "mount_body": recording.mount_body,
-            "mount_position_m": list(recording.mount_position_m),
-            "track": recording.track.to_dict(),
-            "encoder_sheet": None if sheet is None else asdict(sheet),
-            "magnetometer_sheet": None if magnetic is None else asdict(magnetic),
-            "start_position_m": recording.start_position_m,
-            "odometry_source": recording.odometry_source,
-            "gravity_mps2": recording.gravity_mps2,
-        }
-        text = json.dumps(plain, indent=1, ensure_ascii=False)
-        (unfinished / "recording.json").write_text(text, encoding="utf-8")
-        unfinished.chmod(0o755)
-        unfinished.rename(folder)
-    except BaseException:
-        shutil.rmtree(unfinished, ignore_errors=True)
-        raise
-
-
-def read_recording(folder: Path) -> Recording:
-    """Read what `write_recording` wrote, and judge it.
-
-    Raises
-    ------
-    InputError
-        If a file is missing or unreadable, or the recording does not pass `check_recording`.
-    """
-    path = folder / "recording.json"
-    plain = _read_json(path)
-    imu, odometry = _read_frame(folder / "imu.parquet"), _read_frame(folder / "odometry.parquet")
-    try:
-        sheet, magnetic = plain["encoder_sheet"], plain.get("magnetometer_sheet")
-        x, y, z = (float(value) for value in plain["mount_position_m"])
-        recording = Recording(
-            name=plain["name"],
-            imu=imu,
-            imu_sheet=ImuSheet(**plain["imu_sheet"]),
-            mount=plain["mount"],
-            mount_body=plain["mount_body"],
-            mount_position_m=(x, y, z),
-            track=TrackDesign.from_dict(plain["track"]),
-            encoder=None if sheet is None else _read_frame(folder / "encoder.parquet"),
-            encoder_sheet=None if sheet is None else EncoderSheet(**sheet),
-            start_position_m=float(plain["start_position_m"]),
-            odometry=odometry,
-            odometry_source=plain["odometry_source"],
-            gravity_mps2=float(plain["gravity_mps2"]),
-            magnetometer=None if magnetic is None else _read_frame(folder / "magnetometer.parquet"),
-            magnetometer_sheet=None if magnetic is None else MagnetometerSheet(**magnetic),
-        )
-    except KeyError as error:
-        raise InputError("is required", file=path, field=str(error.args[0]), remedy="add it") from None
-    except InputError as error:
-        error.file = path if error.file is None else error.file
-        raise
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"cannot be understood ({error})", file=path, remedy="write the recording again"
-        ) from None
-    check_recording(recording, file=folder)
-    return recording
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        plain = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"cannot be read ({error.strerror})", file=path, remedy="give the folder of a recording"
-        ) from None
-    except ValueError as error:
-        raise InputError(
-            f"is not valid JSON: {error}", file=path, remedy="write the recording again"
-        ) from None
-    if not isinstance(plain, dict) or plain.get("format") != FORMAT:
-        found = plain.get("format") if isinstance(plain, dict) else None
-        raise InputError(
-            "is not a recording of this version", file=path, field="format", value=found, limit=FORMAT
-        )
-    return plain
-
-
-def _read_frame(path: Path) -> pd.DataFrame:
-    if not path.exists():
-        raise InputError("is missing", file=path, remedy="write the recording again, whole")
-    try:
-        return pd.read_parquet(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"is not readable Parquet ({error})", file=path, remedy="write it again") from None
 
 
 def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, file: object) -> None:
