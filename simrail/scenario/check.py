@@ -16,12 +16,21 @@ import numpy as np
 from simrail.errors import InputError
 from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
-from simrail.scenario.build import Parts, estimator_of, irregularity_of, profile_of
+from simrail.scenario.build import (
+    Parts,
+    encoder_of,
+    estimator_of,
+    irregularity_of,
+    magnetometer_of,
+    profile_of,
+)
 from simrail.scenario.cells import Cell, cells, count, methods
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 from simrail.sensors.decimation import decimation_factor
+from simrail.sensors.encoder import check_encoder
+from simrail.sensors.magnetometer import check_magnetometer
 from simrail.track.design import TrackDesign
 from simrail.track.laid import lay
 from simrail.vehicle.model import VehicleModel
@@ -96,7 +105,12 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
         if cell.track_draw or cell.sensor_draw:
             continue
         ride_key = (cell.spec.track, cell.spec.vehicle, cell.spec.engine, repr(cell.ride))
-        sensor_key = (cell.spec.vehicle, cell.spec.engine, repr(cell.imu), repr(cell.spec.encoder))
+        sensor_key = (
+            cell.spec.vehicle,
+            cell.spec.engine,
+            repr(cell.imu),
+            *map(repr, (cell.spec.encoder, cell.spec.magnetometer)),
+        )
         if (*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)) not in judged_rides:
             judged_rides.add((*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)))
             _judge_irregularity(scenario, cell, parts.track(cell))
@@ -312,7 +326,11 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     grade = parts.grade(cell)
     with blame(scenario.file, f"{field}.grade"):
         decimation_factor(TRUTH_RATE_HZ, grade.rate_hz)
-    encoder = cell.spec.encoder
+    magnetometer = magnetometer_of(cell)
+    if magnetometer is not None:
+        with blame(scenario.file, "magnetometer"):
+            check_magnetometer(magnetometer)
+    encoder = encoder_of(cell)
     if encoder is None:
         if cell.spec.odometry == "encoder":
             raise InputError(
@@ -329,6 +347,18 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     _one_of(wheels, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel")
     with blame(scenario.file, "encoder"):
         decimation_factor(TRUTH_RATE_HZ, encoder.rate_hz)
+        check_encoder(encoder)
+    duration = profile_of(cell).duration_s
+    for i, event in enumerate(encoder.slip):
+        if event.start_s >= duration:
+            raise InputError(
+                f"the slip begins after the end of ride {cell.ride.name}",
+                file=scenario.file,
+                field=f"encoder.slip[{i}].start_s",
+                value=event.start_s,
+                limit=f"< {duration:.1f} s",
+                remedy="let it begin earlier, or put the ride into a scenario of its own",
+            )
 
 
 def _one_of(known: Iterable[str], name: str, file: str, field: str, problem: str) -> None:
