@@ -11,7 +11,8 @@ from vqf import VQF
 from estimators.compensation import design_frame, gravity_force
 from estimators.quaternions import to_euler
 from estimators.rest_bias import rest_bias
-from simrail.columns import ATTITUDE, GYRO
+from simrail.columns import ATTITUDE, GYRO, MAGNETIC
+from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.recording import Recording
 
@@ -28,27 +29,54 @@ class Vqf:
     compensated : bool
         Take the design track's acceleration off the accelerometer first; a general-purpose AHRS
         cannot, so this is off unless asked for.
+    magnetometer : bool
+        Take the heading from the magnetometer (VQF's nine-axis filter), in place of the design track's at the
+        start and the gyro from there on. VQF lowers the weight of a field that is not as strong or as
+        steep as it was used to; it cannot tell the iron of its own vehicle from the Earth.
     rest_bias : bool
-        Subtract the gyro's mean over the initial rest, as every method does.
+        Subtract the gyro's mean over the rests so far, as every method does.
     """
 
     compensated: bool = False
+    magnetometer: bool = False
     rest_bias: bool = True
 
     causal = True
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate roll, pitch and yaw; yaw starts at the design track's."""
+        """Estimate roll, pitch and yaw.
+
+        Yaw starts at the design track's; with the magnetometer it is the magnetic heading's.
+
+        Raises
+        ------
+        InputError
+            If the magnetometer is asked for and the recording has none.
+        """
+        sheet = recording.magnetometer_sheet
+        if self.magnetometer and (recording.magnetometer is None or sheet is None):
+            raise InputError(
+                "the recording has no magnetometer",
+                field="magnetometer",
+                value=recording.name,
+                remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
+            )
         gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
-        gyro = gyro - rest_bias(recording, enabled=self.rest_bias).bias
+        gyro = np.ascontiguousarray(gyro - rest_bias(recording, enabled=self.rest_bias).bias)
         force = gravity_force(recording, compensated=self.compensated)
-        quaternions = VQF(1.0 / recording.imu_sheet.rate_hz).updateBatch(np.ascontiguousarray(gyro), force)[
-            "quat6D"
-        ]
+        vqf = VQF(1.0 / recording.imu_sheet.rate_hz)
         start_yaw = float(design_frame(recording, count=1).yaw_rad[0])
-        angles = to_euler(quaternions, start_yaw_rad=0.0)
-        # Its heading starts anywhere: turned so that the first sample is the design track's.
-        angles[:, 2] += start_yaw - angles[0, 2]
+        if self.magnetometer and recording.magnetometer is not None and sheet is not None:
+            field = recording.magnetometer[list(MAGNETIC)].to_numpy(dtype=np.float64)
+            # Its level axes are magnetic east and north; ours begin at X.
+            east = sheet.north_rad - 0.5 * np.pi
+            found = vqf.updateBatch(gyro, force, np.ascontiguousarray(field))["quat9D"]
+            angles = to_euler(found, start_yaw_rad=start_yaw - east)
+            angles[:, 2] += east
+        else:
+            angles = to_euler(vqf.updateBatch(gyro, force)["quat6D"], start_yaw_rad=0.0)
+            # Its heading starts anywhere: turned so that the first sample is the design track's.
+            angles[:, 2] += start_yaw - angles[0, 2]
         return Estimate(
             states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
             mount=recording.mount,

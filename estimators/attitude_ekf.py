@@ -59,7 +59,7 @@ class AttitudeEkf:
         How a paper's or a given process noise is read: ``"intensity"`` (Q = value Ts) or
         ``"per_step"`` (Q = value).
     rest_bias : bool
-        Subtract the gyro's mean over the initial rest.
+        Subtract the gyro's mean over the rests so far.
     printed : bool
         Compensate as paper 000 prints it (`estimators.compensation.track_acceleration`).
     backend : str

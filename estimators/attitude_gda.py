@@ -46,7 +46,7 @@ class AttitudeGda:
     gyro_error_radps : float, optional
         Gyro error in place of the tuning's, rad/s.
     rest_bias : bool
-        Subtract the gyro's mean over the initial rest.
+        Subtract the gyro's mean over the rests so far.
     printed : bool
         Compensate as paper 000 prints it (`estimators.compensation.track_acceleration`).
     """

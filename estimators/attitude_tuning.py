@@ -2,7 +2,7 @@
 
 Kept apart from the filter because it is a matter of judgement, and the filter is not.
 
-**The recommended setting** follows from the data sheet, the initial rest and one allowance for the
+**The recommended setting** follows from the data sheet, the rests and one allowance for the
 body's own motion. Gravity corrects roll and pitch with the time constant tau = sqrt(R Ts / Qc) / g
 (EQUATIONS 2.3), and the error of an angle has three parts that tau trades against each other:
 

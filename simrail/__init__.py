@@ -8,6 +8,7 @@ The way of the data, and the verbs between the nouns::
     result   = AttitudeEkf().estimate(record)                                # -> Estimate
     table    = score(result, truth, record) # one row per figure               -> DataFrame
     results  = run("go20a")                 # all of it, for every cell        -> Results, results/go20a/
+    record   = read_ride(path)              # a ride of a real train, or one that write_ride wrote
 
 The data vocabulary
 -------------------
@@ -18,7 +19,9 @@ radians inside, units in names; degrees and millimetres in reports only.
 frame                  columns
 =====================  =========================================================================
 IMU signals            ``gyro_{x,y,z}_radps``, ``accel_{x,y,z}_mps2`` (at rest +g on Z)
-encoder                ``pulse_count``
+encoder                ``pulse_count``, and ``edge_time_s`` where the logger times edges
+magnetometer           ``magnetic_{x,y,z}_t``
+gaps of the IMU        ``start_s``, ``end_s``, ``missing`` (no time index)
 odometry               ``position_m``, ``speed_mps``, ``acceleration_mps2`` and their ``..._sd_...``
 attitude               ``roll_rad``, ``pitch_rad``, ``yaw_rad`` (global), ``{angle}_sd_rad``
 relative attitude      ``relative_{angle}_rad`` (in the design track frame)
@@ -37,7 +40,8 @@ horizontal projection of the track. Gravity is 9.81 m/s2 on a flat Earth that do
 `measure` is told otherwise.
 
 The nouns: `TrackDesign`, `Irregularity` and `LaidTrack` (the track), `VehicleModel`, `SpeedProfile`,
-`Ride`, `Truth`, `Mount`, `ImuGrade`, `EncoderSpec`, `Recording`, `Estimate`, `Scenario`, `Results`.
+`Ride`, `Truth`, `Mount`, `ImuGrade`, `EncoderSpec`, `MagnetometerSpec`, `Recording`, `Estimate`,
+`Scenario`, `Results`.
 A `Recording` holds what the train may know and never a true value; truth and estimate meet in `score`
 only. A person's faulty input raises `InputError`, whose text names file, field, value, limit and remedy.
 """
@@ -61,10 +65,13 @@ if TYPE_CHECKING:
     from simrail.scenario.build import Parts
     from simrail.scenario.cells import Cell, cells
     from simrail.scenario.check import judge_scenario
+    from simrail.scenario.ride_reader import read_ride
+    from simrail.scenario.ride_writer import write_ride
     from simrail.scenario.scenario import Scenario, load_scenario
     from simrail.score import score, score_odometry
     from simrail.sensors.encoder import EncoderSpec
     from simrail.sensors.grades import ImuGrade
+    from simrail.sensors.magnetometer import MagnetometerSpec
     from simrail.track.design import TrackDesign
     from simrail.track.irregularity import Irregularity
     from simrail.track.laid import LaidTrack, lay
@@ -83,10 +90,13 @@ _HOMES = {
     "scenario.build": ("Parts",),
     "scenario.cells": ("Cell", "cells"),
     "scenario.check": ("judge_scenario",),
+    "scenario.ride_reader": ("read_ride",),
+    "scenario.ride_writer": ("write_ride",),
     "scenario.scenario": ("Scenario", "load_scenario"),
     "score": ("score", "score_odometry"),
     "sensors.encoder": ("EncoderSpec",),
     "sensors.grades": ("ImuGrade",),
+    "sensors.magnetometer": ("MagnetometerSpec",),
     "track.design": ("TrackDesign",),
     "track.irregularity": ("Irregularity",),
     "track.laid": ("LaidTrack", "lay"),
@@ -105,6 +115,7 @@ __all__ = [
     "InputError",
     "Irregularity",
     "LaidTrack",
+    "MagnetometerSpec",
     "Mount",
     "Parts",
     "Recording",
@@ -120,10 +131,12 @@ __all__ = [
     "lay",
     "load_scenario",
     "measure",
+    "read_ride",
     "run",
     "score",
     "score_odometry",
     "simulate",
+    "write_ride",
 ]
 
 

@@ -28,7 +28,7 @@ from simrail.interrupts import Check, interruptible
 from simrail.measure import measure
 from simrail.recording import Recording
 from simrail.ride import is_cached, simulate
-from simrail.scenario.build import Parts, encoder_of, mount_of
+from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of
 from simrail.scenario.cells import Cell, Method, cells, methods
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -54,6 +54,9 @@ class Watcher:
 
     def estimate_made(self, number: int, count: int, name: str) -> None:
         """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
+
+    def recording_written(self, number: int, count: int, name: str) -> None:
+        """Recording `number` (from 1) of `count` has been written, by an export."""
 
 
 @dataclass(frozen=True)
@@ -241,16 +244,7 @@ def _run_cell(
     keep = {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
     try:
         with ledger.timed("measure"):
-            recording = measure(
-                truth,
-                name=cell.ride.name,
-                mount=mount_of(cell),
-                grade=parts.grade(cell),
-                encoder=encoder_of(cell),
-                odometry=cell.spec.odometry,
-                seed=cell.sensor_seed,
-                draw=cell.sensor_draw,
-            )
+            recording = record_cell(cell, truth, parts)
         with ledger.timed("score"):
             motion = truth_at_imu(truth, recording)
             reference = reference_of(motion, recording)
@@ -285,6 +279,21 @@ def _run_cell(
         ledger.examples.append(CellResult(described, recording, motion, estimates))
 
 
+def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
+    """Measure a cell: its sensors on its ride."""
+    return measure(
+        truth,
+        name=cell.ride.name,
+        mount=mount_of(cell),
+        grade=parts.grade(cell),
+        encoder=encoder_of(cell),
+        magnetometer=magnetometer_of(cell),
+        odometry=cell.spec.odometry,
+        seed=cell.sensor_seed,
+        draw=cell.sensor_draw,
+    )
+
+
 def _note_not_finite(cell: Cell, name: str, estimate: Estimate, ledger: _Ledger) -> None:
     """An estimate that is not finite has rows that say so; it is a failure of its cell as well."""
     bad = int((~np.isfinite(estimate.states.to_numpy(dtype=np.float64))).any(axis=1).sum())
@@ -315,7 +324,16 @@ def _beginning(recording: Recording, *, samples: int) -> Recording:
     encoder = recording.encoder
     if encoder is not None:
         encoder = encoder.loc[: imu.index[-1]]
-    return replace(recording, imu=imu, encoder=encoder, odometry=recording.odometry.iloc[:samples])
+    magnetic = recording.magnetometer
+    if magnetic is not None:
+        magnetic = magnetic.iloc[:samples]
+    return replace(
+        recording,
+        imu=imu,
+        encoder=encoder,
+        odometry=recording.odometry.iloc[:samples],
+        magnetometer=magnetic,
+    )
 
 
 def _cell_record(cell: Cell) -> dict[str, object]:

@@ -39,6 +39,8 @@ ODOMETRY = ("position_m", "speed_mps", "acceleration_mps2")
 ODOMETRY_SD = ("position_sd_m", "speed_sd_mps", "acceleration_sd_mps2")
 RELATIVE_POSITION = ("lateral_m", "vertical_m")
 ENCODER = ("pulse_count",)
+EDGE_TIME = "edge_time_s"
+MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
 MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
 GYRO_BIAS = ("gyro_bias_x_radps", "gyro_bias_y_radps", "gyro_bias_z_radps")
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
@@ -63,7 +65,9 @@ _TABLE = [
     Column("acceleration_sd_mps2", "m/s2", "track", "standard deviation of acceleration_mps2"),
     Column("lateral_m", "m", "track", "lateral position r_y of the mount, positive left"),
     Column("vertical_m", "m", "track", "vertical position r_z of the mount above the design rail plane"),
-    Column("pulse_count", "1", "-", "signed encoder pulses counted since the start"),
+    Column("pulse_count", "1", "-", "signed encoder counts since the start"),
+    Column("edge_time_s", "s", "-", "time of the last edge that the encoder passed; optional"),
+    Column("magnetic_{axis}_t", "T", "body", "magnetic flux density along the axis"),
     Column("gyro_bias_{axis}_radps", "rad/s", "body", "estimated gyro bias"),
     Column("innovation_{axis}_mps2", "m/s2", "body", "measured minus predicted specific force"),
     Column("nis", "1", "-", "normalised innovation squared"),

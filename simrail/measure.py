@@ -14,10 +14,12 @@ import pandas as pd
 from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.odometry import encoder_odometry
-from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording import EncoderSheet, MagnetometerSheet, Recording
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import EarthRate, sample_imu
+from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
+from simrail.sheets import imu_sheet
 from simrail.truth import Mount, Truth
 
 
@@ -28,6 +30,7 @@ def measure(
     mount: Mount,
     grade: ImuGrade,
     encoder: EncoderSpec | None = None,
+    magnetometer: MagnetometerSpec | None = None,
     odometry: str = "encoder",
     seed: int,
     draw: int,
@@ -47,6 +50,8 @@ def measure(
         The IMU.
     encoder : EncoderSpec, optional
         The wheel encoder; None for a train without one.
+    magnetometer : MagnetometerSpec, optional
+        A magnetometer in the housing of the IMU, sampled at the IMU's times.
     odometry : str
         ``"encoder"``, or ``"truth"`` for the true position, speed and acceleration of the mount.
     seed, draw : int
@@ -75,20 +80,23 @@ def measure(
         if encoder.radius == "calibrated":
             position = motion["position_m"].to_numpy()
             radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
-        counts = sample_encoder(
-            angle,
-            truth.time_s,
-            pulses_per_revolution=encoder.pulses_per_revolution,
-            rate_hz=encoder.rate_hz,
-            seed=seed,
-            draw=draw,
-            name=encoder.wheel,
-        )
+        counts = sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw)
         sheet = EncoderSheet(
             wheel=wheel,
-            pulses_per_revolution=encoder.pulses_per_revolution,
+            pulses_per_revolution=encoder.counts_per_revolution,
             wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
             rate_hz=encoder.rate_hz,
+        )
+    magnetic = None
+    if magnetometer is not None:
+        magnetic = sample_magnetometer(
+            motion,
+            imu.index,
+            magnetometer,
+            seed=seed,
+            draw=draw,
+            name=mount.name,
+            track_m=(truth.track.start_m, truth.track.end_m),
         )
     if odometry == "truth":
         frame = true_odometry(motion, imu.index)
@@ -123,21 +131,18 @@ def measure(
         odometry=frame,
         odometry_source=odometry,
         gravity_mps2=truth.gravity_mps2,
+        magnetometer=magnetic,
+        magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
     )
 
 
-def imu_sheet(grade: ImuGrade, *, delay_s: float) -> ImuSheet:
-    """What the data sheet of a grade tells an estimator."""
-    return ImuSheet(
-        grade=grade.name,
-        rate_hz=grade.rate_hz,
-        delay_s=delay_s,
-        gyro_noise_radpsqrts=grade.gyro_noise_radpsqrts,
-        accel_noise_mpsqrts=grade.accel_noise_mpsqrts,
-        gyro_bias_instability_radps=grade.gyro_bias_instability_radps,
-        accel_bias_instability_mps2=grade.accel_bias_instability_mps2,
-        gyro_turn_on_bias_radps=grade.gyro_turn_on_bias_radps,
-        accel_turn_on_bias_mps2=grade.accel_turn_on_bias_mps2,
+def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:
+    """What a chart of the Earth's field and the data sheet tell an estimator; nothing of disturbances."""
+    return MagnetometerSheet(
+        noise_tpsqrthz=spec.noise_tpsqrthz,
+        intensity_t=spec.field.intensity_t,
+        inclination_rad=spec.field.inclination_rad,
+        north_rad=spec.field.north_rad,
     )
 
 

@@ -1,7 +1,7 @@
 """Templates: ``simrail new estimator NAME`` writes one file that works, to be changed into one's own.
 
 An estimator is written from the template here; a track, vehicle, IMU or scenario is a copy of a
-shipped file, so the template is always one that runs.
+shipped file, so the template is always one that runs. A ride has its data beside it (`simrail.new_ride`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SHIPPED = {
     "vehicle": ("metro_irw_bogie", 'vehicle = "./{file}"'),
     "imu": ("lord_3dm_gx4_25", 'grade = "./{file}" in an [[imu]]'),
 }
-KINDS = ("estimator", *SHIPPED, "scenario")
+KINDS = ("estimator", *SHIPPED, "scenario", "ride")
 
 _ESTIMATOR = Template('''"""$Class: what it is for, in one line.
 
@@ -92,7 +92,7 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     Parameters
     ----------
     kind : str
-        ``estimator``, ``track``, ``vehicle``, ``imu`` or ``scenario``.
+        ``estimator``, ``track``, ``vehicle``, ``imu``, ``scenario`` or ``ride``.
     name : str
         Name of the part: a word of letters, digits and ``_``, e.g. ``my_filter``.
     folder : Path, optional
@@ -128,7 +128,19 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     if not folder.is_dir():
         raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
     path = folder / f"{name}.{'py' if kind == 'estimator' else 'toml'}"
-    if kind == "estimator":
+    data = folder / f"{name}.csv" if kind == "ride" else None
+    for file in (path, data):
+        if file is not None and file.exists():
+            raise InputError(
+                "the file exists", file=label(file), remedy="choose another name, or move the file away"
+            )
+    if data is not None:
+        from simrail.new_ride import ride_template  # it simulates: too heavy for the other templates
+
+        text, logged = ride_template(name)
+        data.write_text(logged, encoding="utf-8")
+        next_step = f"its data: {label(data)}\ntry it: simrail estimate {label(path)} --estimator AttitudeEkf"
+    elif kind == "estimator":
         text, next_step = _estimator(name, path)
     elif kind == "scenario":
         text, next_step = _copy("scenario", "quick_kinematic", name), f"run it: simrail run {label(path)}"
@@ -136,13 +148,7 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
         source, use = SHIPPED[kind]
         text = _copy(kind, source, name)
         next_step = f"use it in a scenario beside it: {use.format(file=path.name)}"
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise InputError(
-            "the file exists", file=label(path), remedy="choose another name, or move the file away"
-        ) from None
+    path.write_text(text, encoding="utf-8")
     return path, next_step
 
 

@@ -88,6 +88,55 @@ def encoder_odometry(
     return pd.DataFrame(states, index=pd.Index(wanted, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
 
 
+def speed_odometry(
+    time: FloatArray,
+    speed_mps: FloatArray,
+    times: FloatArray,
+    *,
+    start_position_m: float,
+    speed_sd_mps: float,
+    scale_relative_sd: float = 0.0,
+    jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5,
+    still_mps: float = 0.02,
+) -> pd.DataFrame:
+    """Position, speed and acceleration from an odometer that gives the speed, with the same model.
+
+    Parameters
+    ----------
+    time, speed_mps : ndarray (m,)
+        Increasing times of the readings, s, and the readings, negative towards smaller s.
+    times : ndarray (n,)
+        As in `encoder_odometry`.
+    start_position_m : float
+        Position s at the first reading.
+    speed_sd_mps : float
+        Standard deviation of a reading; its error is treated as white.
+    scale_relative_sd : float
+        Relative standard deviation of the odometer's scale.
+    jerk_intensity_m2ps5 : float
+        Intensity of the white jerk.
+    still_mps : float
+        A reading below this is a train at rest.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As that of `encoder_odometry`.
+    """
+    wanted = np.ascontiguousarray(times, dtype=np.float64)
+    states = _speed_filter(
+        np.ascontiguousarray(time, dtype=np.float64),
+        np.ascontiguousarray(speed_mps, dtype=np.float64),
+        wanted,
+        speed_sd_mps**2,
+        jerk_intensity_m2ps5,
+        still_mps,
+    )
+    states[:, 3:] = np.sqrt(states[:, 3:] + (scale_relative_sd * states[:, :3]) ** 2)
+    states[:, 0] += start_position_m
+    return pd.DataFrame(states, index=pd.Index(wanted, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
+
+
 @njit
 def _predict(x: FloatArray, p: FloatArray, dt: float, intensity: float) -> None:
     """x <- F x, P <- F P F' + Q in place; F and Q of a triple integrator driven by white noise."""
@@ -112,16 +161,16 @@ def _predict(x: FloatArray, p: FloatArray, dt: float, intensity: float) -> None:
 
 
 @njit
-def _update(x: FloatArray, p: FloatArray, position: float, variance: float) -> None:
-    """Kalman update with a measured position, in place; P in Joseph's form, so that it stays positive."""
-    s = p[0, 0] + variance
-    k0, k1, k2 = p[0, 0] / s, p[1, 0] / s, p[2, 0] / s
-    innovation = position - x[0]
+def _update(x: FloatArray, p: FloatArray, measured: float, variance: float, m: int = 0) -> None:
+    """Kalman update with a measured x[m], in place; P in Joseph's form, so that it stays positive."""
+    s = p[m, m] + variance
+    k0, k1, k2 = p[0, m] / s, p[1, m] / s, p[2, m] / s
+    innovation = measured - x[m]
     x[0] += k0 * innovation
     x[1] += k1 * innovation
     x[2] += k2 * innovation
     gain = (k0, k1, k2)
-    row = (p[0, 0], p[0, 1], p[0, 2])
+    row = (p[m, 0], p[m, 1], p[m, 2])
     for i in range(3):
         for j in range(3):
             p[i, j] += gain[i] * gain[j] * s - gain[i] * row[j] - row[i] * gain[j]
@@ -185,6 +234,52 @@ def _filter(
             # Less than one pulse in this time, in either direction: uniform in [-b, b] has sd b/sqrt(3).
             p[1, 1] = min(start_speed, q / quiet) ** 2 / 3.0
             p[2, 2] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
+        until = time[k + 1] if k + 1 < len(time) else np.inf
+        while next_out < len(wanted) and wanted[next_out] < until:
+            ahead_x[:] = x
+            ahead_p[:, :] = p
+            lead = wanted[next_out] - time[k]
+            if lead > 0.0 and not resting:
+                _predict(ahead_x, ahead_p, lead, intensity)
+            out[next_out, :3] = ahead_x
+            for i in range(3):
+                out[next_out, 3 + i] = ahead_p[i, i]
+            next_out += 1
+    return out
+
+
+@njit
+def _speed_filter(
+    time: FloatArray, speed: FloatArray, wanted: FloatArray, variance: float, intensity: float, still: float
+) -> FloatArray:
+    """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
+    out = np.empty((len(wanted), 6))
+    x = np.zeros(3)
+    p = np.zeros((3, 3))
+    ahead_x = np.empty(3)
+    ahead_p = np.empty((3, 3))
+    resting = True
+    next_out = 0
+    for k in range(len(time)):
+        if k > 0 and not resting:
+            _predict(x, p, time[k] - time[k - 1], intensity)
+        if abs(speed[k]) < still:
+            resting = True
+            x[1] = 0.0
+            x[2] = 0.0
+            p[1, :] = 0.0
+            p[2, :] = 0.0
+            p[:, 1] = 0.0
+            p[:, 2] = 0.0
+            p[1, 1] = still * still / 3.0
+        else:
+            if resting:
+                # Setting off, or the first reading of a moving train: an acceleration of up to 1 m/s2.
+                x[1] = speed[k]
+                p[1, 1] = variance
+                p[2, 2] = 1.0
+                resting = False
+            _update(x, p, speed[k], variance, 1)
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
             ahead_x[:] = x

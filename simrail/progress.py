@@ -88,6 +88,13 @@ class ProgressWatcher(Watcher):
             self._estimates = self._progress.add_task("estimates", total=count, note="")
         self._progress.update(self._estimates, completed=number, note=f"{number} of {count}, {name}")
 
+    def recording_written(self, number: int, count: int, name: str) -> None:
+        """See `Watcher`."""
+        if self._ride is not None:
+            self._progress.update(self._ride, note=f"{number} of {count} recordings written, {name}")
+        if not self._console.is_terminal:
+            self._console.print(f"wrote {name} ({number} of {count})", highlight=False)
+
 
 def print_scores(console: Console, results: Results) -> None:
     """Print the score table: one block per ride and IMU, one row per estimator, RMS over all draws."""

@@ -1,7 +1,7 @@
 """What the logger on the train saw, and what the train may know: the wall before the truth.
 
-A `Recording` holds the signals (IMU, encoder), an odometry frame that says where on the track each
-sample was taken, and the knowledge that a real train has: the design track, the nominal wheel
+A `Recording` holds the signals (IMU, encoder, magnetometer), an odometry frame that says where on the
+track each sample was taken, and the knowledge that a real train has: the design track, the nominal wheel
 radius, the IMU's data sheet, where it is mounted. It never holds a true value, except in an odometry
 frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read into the same
 class, so the same estimators run on them.
@@ -60,7 +60,7 @@ class EncoderSheet:
     wheel : str
         Name of the wheel, e.g. ``"front.left"``.
     pulses_per_revolution : int
-        Pulses counted per turn of the wheel.
+        Counts per turn of the wheel: its pulses, or four times as many in quadrature.
     wheel_radius_m : float
         Nominal wheel radius; the true one differs.
     rate_hz : float
@@ -71,6 +71,26 @@ class EncoderSheet:
     pulses_per_revolution: int
     wheel_radius_m: float
     rate_hz: float
+
+
+@dataclass(frozen=True)
+class MagnetometerSheet:
+    """What the train knows of its magnetometer, and of the field of the Earth where it runs.
+
+    Attributes
+    ----------
+    noise_tpsqrthz : float
+        Density N of the white noise, T/sqrt(Hz): one sample has the standard deviation N sqrt(rate).
+    intensity_t, inclination_rad : float
+        The Earth's field from a model or a chart: total intensity, and dip below the horizontal.
+    north_rad : float
+        Direction of magnetic north, counter-clockwise from the global X axis (seen from above).
+    """
+
+    noise_tpsqrthz: float
+    intensity_t: float
+    inclination_rad: float
+    north_rad: float
 
 
 @dataclass(frozen=True)
@@ -95,7 +115,7 @@ class Recording:
     track : TrackDesign
         The design track.
     encoder : pandas.DataFrame, optional
-        Indexed by ``time_s``, column ``pulse_count``.
+        Indexed by ``time_s``, column ``pulse_count``, and ``edge_time_s`` if the logger times edges.
     encoder_sheet : EncoderSheet, optional
         Its data sheet.
     start_position_m : float
@@ -110,6 +130,10 @@ class Recording:
     gaps : pandas.DataFrame, optional
         Where the IMU's samples were lost and are interpolated in `imu`, one row per gap, columns
         `simrail.resample.GAPS`; None if none were.
+    magnetometer : pandas.DataFrame, optional
+        Indexed by the IMU's ``time_s``, columns `simrail.columns.MAGNETIC`, on the axes of the IMU.
+    magnetometer_sheet : MagnetometerSheet, optional
+        What is known of it.
     """
 
     name: str
@@ -126,6 +150,8 @@ class Recording:
     odometry_source: str
     gravity_mps2: float = 9.81
     gaps: pd.DataFrame | None = None
+    magnetometer: pd.DataFrame | None = None
+    magnetometer_sheet: MagnetometerSheet | None = None
 
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""

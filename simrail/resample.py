@@ -84,6 +84,12 @@ def rate_of(time: FloatArray) -> float:
     return float(np.sum(intervals) / (time[-1] - time[0]))
 
 
+def is_uniform(time: FloatArray, rate_hz: float) -> bool:
+    """True if each step is one interval to 1 %, and the mean rate that of `rate_hz` to 0.01 %."""
+    step = np.diff(time) * rate_hz
+    return bool(np.abs(step - 1.0).max() <= 0.01 and abs(step.mean() - 1.0) <= 1e-4)
+
+
 def uniform_times(first_s: float, last_s: float, rate_hz: float) -> FloatArray:
     """Times first, first + 1/rate, ... up to last (n,), s; a last sample late by rounding still counts."""
     count = int(np.floor((last_s - first_s) * rate_hz + 1e-6)) + 1

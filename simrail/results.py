@@ -10,11 +10,9 @@ from __future__ import annotations
 import json
 import os
 import platform
-import shutil
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -22,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from simrail.campaign import CampaignResult, Watcher, run_campaign
+from simrail.drafts import draft_of
 from simrail.errors import InputError
 from simrail.report.page import write_report
 from simrail.scenario.scenario import Scenario, load_scenario
@@ -156,40 +155,6 @@ def git_revision() -> str | None:
             return None
         found.append(done.stdout.strip())
     return found[0] + ("+" if found[1] else "")
-
-
-@contextmanager
-def draft_of(folder: Path) -> Iterator[Path]:
-    """A folder to write into, which takes the place of `folder` when the block ends without an exception.
-
-    The former folder is kept until the new one is complete.
-    """
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    _drop_leftovers(folder)
-    draft = folder.parent / f".{folder.name}.{os.getpid()}.draft"
-    former = folder.parent / f".{folder.name}.{os.getpid()}.former"
-    shutil.rmtree(draft, ignore_errors=True)
-    draft.mkdir()
-    try:
-        yield draft
-        if folder.exists():
-            folder.replace(former)
-        try:
-            draft.replace(folder)
-        except OSError:
-            if former.exists():
-                former.replace(folder)
-            raise
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-        shutil.rmtree(former, ignore_errors=True)
-
-
-def _drop_leftovers(folder: Path) -> None:
-    """Remove drafts that a killed run left behind: those that nobody wrote to for a day."""
-    for draft in folder.parent.glob(f".{folder.name}.*.draft"):
-        if draft.is_dir() and time.time() - draft.stat().st_mtime > 86400.0:
-            shutil.rmtree(draft, ignore_errors=True)
 
 
 def _judge_folder(folder: Path) -> None:

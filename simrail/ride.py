@@ -26,6 +26,7 @@ from simrail.truth_files import create_arrays, load_truth, save_truth, write_hea
 from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.kinematic_engine import kinematic_truth, rail_following
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.profile_files import profiles_digest
 
 if TYPE_CHECKING:
     from simrail.vehicle.exudyn_engine import ExudynEngine
@@ -83,6 +84,7 @@ class Ride:
             "irregularity": asdict(self.irregularity),
             "track_seed": self.track_seed,
             "vehicle": asdict(self.vehicle),
+            "profiles": profiles_digest(self.vehicle.wheel_rail),
             "profile": asdict(self.profile),
             "engine": self.engine,
             "step_s": self.step_s,

@@ -20,7 +20,7 @@ import pandas as pd
 from simrail.columns import COLUMNS, INNOVATION
 from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
-from simrail.rest import at_rest_initially
+from simrail.rest import at_rest_initially, rest_periods
 
 Check = Callable[[Estimator, Recording], None]
 
@@ -84,10 +84,17 @@ def leaves_the_recording_alone(estimator: Estimator, recording: Recording) -> No
     """No signal, no odometry, no piece of knowledge is changed."""
     own = copy.deepcopy(recording)
     estimator.estimate(own)
-    for field in ("imu", "odometry", "encoder"):
+    for field in ("imu", "odometry", "encoder", "magnetometer"):
         before, after = getattr(recording, field), getattr(own, field)
         assert before is None or (before.equals(after) and list(before) == list(after)), f"changed {field}"
-    for field in ("imu_sheet", "encoder_sheet", "track", "mount_position_m", "start_position_m"):
+    for field in (
+        "imu_sheet",
+        "encoder_sheet",
+        "magnetometer_sheet",
+        "track",
+        "mount_position_m",
+        "start_position_m",
+    ):
         assert getattr(recording, field) == getattr(own, field), f"changed {field}"
 
 
@@ -189,9 +196,12 @@ def _require_bits(a: np.ndarray, b: np.ndarray, *, what: str) -> None:
 
 
 def prefix_lengths(recording: Recording) -> list[int]:
-    """Where `sees_no_future` cuts: at the very start, inside and after the rest, odd places, the end."""
+    """Where `sees_no_future` cuts: at the very start, inside and after rests, odd places, the end."""
     n, rest = len(recording.imu), at_rest_initially(recording)
     wanted = {2, rest // 3, rest - 1, rest + 1, n // 3, n // 2 + 1, n - 1}
+    # Within the last rest, since a stop may refresh what the initial rest has found.
+    middle = rest_periods(recording).iloc[-1:].mean(axis=1)
+    wanted.update(int(i) for i in np.searchsorted(recording.imu.index.to_numpy(), middle))
     return sorted(length for length in wanted if 2 <= length < n)
 
 
@@ -203,6 +213,7 @@ def prefix(recording: Recording, n: int) -> Recording:
         imu=recording.imu.iloc[:n].copy(),
         odometry=recording.odometry.iloc[:n].copy(),
         encoder=None if encoder is None else encoder.loc[: recording.imu.index[n - 1]].copy(),
+        magnetometer=None if recording.magnetometer is None else recording.magnetometer.iloc[:n].copy(),
     )
 
 
@@ -225,7 +236,8 @@ def time_reversed(recording: Recording) -> Recording:
     odometry = _turned(recording.odometry, negate="speed_mps")
     encoder = recording.encoder
     if encoder is not None:
-        encoder = _turned(encoder, negate="")
+        # When an edge passed on the way back, the times of the way there do not say.
+        encoder = _turned(encoder[["pulse_count"]], negate="")
         encoder["pulse_count"] -= encoder["pulse_count"].iloc[0]
     return replace(
         recording,
@@ -233,6 +245,7 @@ def time_reversed(recording: Recording) -> Recording:
         imu=imu,
         odometry=odometry,
         encoder=encoder,
+        magnetometer=None if recording.magnetometer is None else _turned(recording.magnetometer, negate=""),
         start_position_m=float(odometry["position_m"].iloc[0]),
     )
 
@@ -261,4 +274,5 @@ def standing(recording: Recording) -> Recording:
         imu=held(recording.imu),
         odometry=odometry,
         encoder=None if recording.encoder is None else held(recording.encoder),
+        magnetometer=None if recording.magnetometer is None else held(recording.magnetometer),
     )

@@ -10,10 +10,10 @@ from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
-from simrail.recording_io import check_recording
+from simrail.recording_check import check_recording
 from simrail.rest import GUARD_S, at_rest_initially, first_motion_s
 from simrail.scenario.imu_file import load_grade
-from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.imu import EarthRate
 from simrail.track.design import Straight, TrackDesign
 from simrail.truth import Mount
@@ -74,6 +74,22 @@ def test_odometry_speaks_of_the_mount_and_is_honest(truth):
     assert recording.odometry["position_sd_m"].iloc[-1] == pytest.approx(
         200.0 * np.hypot(1e-3, 4e-3), rel=0.01
     )
+
+
+def test_a_slide_and_quadrature_reach_the_odometry(truth):
+    """At 10 m/s for 1.5 s less half of both ramps, 15 % too slow: the train believes 1.875 m less."""
+    slide = Slip(start_s=REST_S + 18.3, duration_s=1.5, creepage=-0.15)
+    for quadrature in (False, True):
+        plain, slid = (
+            record(truth, encoder=EncoderSpec("wheel", quadrature=quadrature, slip=slip, radius_error=0.0))
+            for slip in ((), (slide,))
+        )
+        speed = truth.motion(MOUNT)["speed_mps"].loc[slide.start_s : slide.start_s + 1.5]
+        np.testing.assert_allclose(speed, 10.0, rtol=1e-9)
+        lost = (plain.odometry["position_m"] - slid.odometry["position_m"]).iloc[-1]
+        assert lost == pytest.approx(0.15 * 10.0 * (1.5 - 0.25), abs=0.003)
+        assert plain.odometry["position_m"].iloc[-1] == pytest.approx(210.5, abs=0.005)
+        assert plain.encoder_sheet.pulses_per_revolution == (4096 if quadrature else 1024)
 
 
 def test_true_odometry_is_exact_and_labelled(truth):

@@ -10,16 +10,19 @@ from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.odometry import _predict, _update, encoder_odometry
 from simrail.profile import SpeedProfile
 from simrail.recording import EncoderSheet
-from simrail.sensors.encoder import sample_encoder
+from simrail.sensors.encoder import EncoderSpec, sample_encoder
 
 RADIUS = 0.29
 COLUMNS = [*ODOMETRY, *ODOMETRY_SD]
 
 
+def count(time, way, *, pulses=1024, rate_hz=250.0, draw=0):
+    spec = EncoderSpec("front.left", pulses_per_revolution=pulses, rate_hz=rate_hz)
+    return sample_encoder((way - way[0]) / RADIUS, time, spec, seed=1, draw=draw)
+
+
 def odometry_of(time, way, *, pulses=1024, draw=0, radius_error=0.0, rate_hz=250.0, times=None, **settings):
-    counts = sample_encoder(
-        (way - way[0]) / RADIUS, time, pulses_per_revolution=pulses, rate_hz=rate_hz, seed=1, draw=draw
-    )
+    counts = count(time, way, pulses=pulses, rate_hz=rate_hz, draw=draw)
     sheet = EncoderSheet("front.left", pulses, RADIUS * (1.0 + radius_error), rate_hz)
     wanted = time[28:-28:4] if times is None else times
     return encoder_odometry(counts, sheet, wanted, start_position_m=way[0], **settings)
@@ -89,9 +92,7 @@ def test_a_train_that_moves_when_the_recording_begins_is_followed_within_a_secon
 
 def test_backwards_is_the_exact_mirror_of_forwards():
     time, s, _, _ = ride()
-    counts = sample_encoder(
-        (s - s[0]) / RADIUS, time, pulses_per_revolution=1024, rate_hz=250.0, seed=1, draw=0
-    )
+    counts = count(time, s)
     sheet = EncoderSheet("front.left", 1024, RADIUS, 250.0)
     forth = encoder_odometry(counts, sheet, time[28::4], start_position_m=0.0)
     back = encoder_odometry(-counts, sheet, time[28::4], start_position_m=0.0)
@@ -101,9 +102,7 @@ def test_backwards_is_the_exact_mirror_of_forwards():
 
 def test_the_answer_at_a_time_uses_nothing_read_later():
     time, s, _, _ = ride(end=250.0)
-    counts = sample_encoder(
-        (s - s[0]) / RADIUS, time, pulses_per_revolution=1024, rate_hz=250.0, seed=1, draw=0
-    )
+    counts = count(time, s)
     sheet = EncoderSheet("front.left", 1024, RADIUS, 250.0)
     # Wanted between the readings as well as at them.
     wanted = np.sort(np.concatenate([time[28::4], time[1::7] + 0.0003]))

@@ -85,3 +85,15 @@ def test_a_bad_file_is_refused_with_its_field(tmp_path: Path, capsys: pytest.Cap
     mine.write_text(text.replace("friction = 0.3", "friction = -0.3"), encoding="utf-8")
     assert call(["vehicle", str(mine)]) == BAD_INPUT
     assert "mine.toml: friction" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_scale_vehicle_is_told_in_figures_of_its_size(capsys: pytest.CaptureFixture[str]) -> None:
+    """Three digits of grams and newtons; the conicity of S1002 at a tenth of 3 mm."""
+    assert call(["vehicle", "scale_vehicle"]) == DONE
+    text = " ".join(capsys.readouterr().out.split())
+    assert "in all 40 kg" in text and "axle_f1.left 0.04905" in text
+    assert "axle_f1 1.6 0.00695 5e-05 0.00695 0.045" in text
+    assert "wheel S1002 on rail 60E1 at 1:10, gauge 127 mm" in text
+    at_3_mm = re.search(r"equivalent conicity at 0.29 mm: (0\.\d+)", text)
+    assert at_3_mm and 0.15 < float(at_3_mm[1]) < 0.2

@@ -10,7 +10,7 @@ from simrail.report.vehicle_study import Conicity, VehicleStudy
 from simrail.report.vehicle_text import MOST_HZ
 from simrail.vehicle.contact_pair import incline
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.profile_files import rail_profile, wheel_profile
+from simrail.vehicle.profile_files import profiles_of
 from simrail.vehicle.stability import SLOWEST_HZ
 
 _LEFT, _RIGHT, _THIRD = "#0072B2", "#D55E00", "#009E73"
@@ -21,8 +21,8 @@ _MOST_HZ = 20.0
 def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     """The left wheel on its rail, to scale, in mm: seen from behind, the middle of the track to the right."""
     pair = model.wheel_rail
-    wheel = wheel_profile(pair.wheel_profile)
-    rail = rail_profile(pair.rail_profile)
+    wheel, rail = profiles_of(pair)
+    size = contact.scale
     head = incline(rail, pair.rail_inclination, gauge_depth_m=_GAUGE_DEPTH_M * contact.scale)
     # Abscissae from the tape circle, outward; the rail's from its own top.
     offset = pair.tape_circle_half_m - 0.5 * pair.gauge_m + head.gauge_abscissa_m
@@ -37,17 +37,25 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
         rail_z = -1e3 * (head.depth(e) - lift)
         wheel_z = -1e3 * (wheel.depth_m - touch)
         rail_y, wheel_y = -1e3 * (e - offset), -1e3 * wheel.lateral_m
-        floor, roof = min(rail_z.min(), wheel_z.min()) - 4.0, max(wheel_z.max(), 0.0) + 14.0
+        floor, roof = min(rail_z.min(), wheel_z.min()) - 4.0 * size, max(wheel_z.max(), 0.0) + 14.0 * size
         axis.fill_between(rail_y[::-1], rail_z[::-1], floor, color="#dfe4ea", lw=0)
         axis.plot(rail_y, rail_z, color=MUTED, lw=1.6)
         axis.fill_between(wheel_y[::-1], wheel_z[::-1], roof, color="#dbe9f4", lw=0)
         axis.plot(wheel_y, wheel_z, color=_LEFT, lw=1.6)
         axis.plot([-1e3 * at], [0.0], marker="o", ms=6, mfc="white", mec=_RIGHT, mew=1.6, zorder=5)
         axis.annotate(
-            f"wheel {wheel.name}", (float(wheel_y.min()) + 3.0, roof - 3.0), va="top", ha="left", color=_LEFT
+            f"wheel {wheel.name}",
+            (float(wheel_y.min()) + 3.0 * size, roof - 3.0 * size),
+            va="top",
+            ha="left",
+            color=_LEFT,
         )
         axis.annotate(
-            f"rail {rail.name}", (float(rail_y.mean()), floor + 3.0), va="bottom", ha="center", color=MUTED
+            f"rail {rail.name}",
+            (float(rail_y.mean()), floor + 3.0 * size),
+            va="bottom",
+            ha="center",
+            color=MUTED,
         )
         axis.set_aspect("equal", adjustable="datalim")
         axis.set_ylim(floor, roof)
@@ -85,7 +93,7 @@ def conicity_figure(contact: Conicity) -> str:
         at = 3.0 * contact.scale
         axis.axvline(at, color=MUTED, lw=0.9, ls=(0, (4, 3)))
         axis.annotate(
-            f"{contact.at_3_mm:.3f} at {at:g} mm",
+            f"{contact.at_3_mm:.3f} at {at:.2g} mm",
             (at, contact.at_3_mm),
             xytext=(8, -16),
             textcoords="offset points",

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from simrail.report.vehicle_figures import conicity_figure, locus_figure, pair_figure, shift_figure
 from simrail.report.vehicle_study import Conicity, VehicleStudy
-from simrail.report.vehicle_text import critical_words, listed
+from simrail.report.vehicle_text import amount, critical_words, listed
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import Mode
 
@@ -31,7 +31,7 @@ def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
         tiles=_tiles(study),
         bodies=_bodies(model),
         wheels=[
-            (wheel.name, f"{load / 1e3:.2f}", f"{wheel.radius_m:g}", _turns(model, wheel.spin))
+            (wheel.name, f"{load / 1e3:.4g}", f"{wheel.radius_m:g}", _turns(model, wheel.spin))
             for wheel, load in zip(model.wheels, study.wheel_load_n, strict=True)
         ],
         contact=_contact(model, study.conicity) if study.conicity else None,
@@ -53,8 +53,8 @@ def _tiles(study: VehicleStudy) -> list[tuple[str, str, str]]:
     slowest = listed(study.standstill)[:1]
     value, _, note = critical_words(study.critical).partition(" (")
     tiles = [
-        ("mass", f"{mass / 1e3:.2f} t", f"{len(study.model.bodies)} bodies"),
-        ("wheel load", f"{np.mean(load) / 1e3:.1f} kN", f"mean of {len(load)} wheels at rest"),
+        ("mass", f"{mass / 1e3:.4g} t", f"{len(study.model.bodies)} bodies"),
+        ("wheel load", f"{np.mean(load) / 1e3:.3g} kN", f"mean of {len(load)} wheels at rest"),
         ("critical speed", value, note.rstrip(")") or "no oscillation grows"),
     ]
     if slowest:
@@ -62,7 +62,7 @@ def _tiles(study: VehicleStudy) -> list[tuple[str, str, str]]:
         tiles.insert(2, ("lowest frequency", f"{mode.natural_frequency_hz:.2f} Hz", mode.words(most=1)))
     if study.conicity:
         contact = study.conicity
-        note = f"equivalent, at {3.0 * contact.scale:g} mm"
+        note = f"equivalent, at {3.0 * contact.scale:.2g} mm"
         tiles.insert(2, ("conicity", f"{contact.at_3_mm:.3f}", note))
     return tiles
 
@@ -71,8 +71,8 @@ def _bodies(model: VehicleModel) -> list[tuple[str, ...]]:
     return [
         (
             body.name,
-            f"{body.mass_kg:,.0f}",
-            *(f"{value:,.0f}" for value in body.inertia_kgm2),
+            amount(body.mass_kg),
+            *(amount(value) for value in body.inertia_kgm2),
             f"{body.position_m[0]:.3f}",
             f"{body.position_m[2]:.3f}",
         )
@@ -92,12 +92,13 @@ def _row(mode: Mode, frequency_hz: float) -> tuple[str, str, str]:
 def _contact(model: VehicleModel, contact: Conicity) -> dict[str, Any]:
     rest = contact.rest
     every = max(1, len(rest.y_m) // 30)
+    digits = 2 if contact.scale == 1.0 else 3
     rows = [
         (
-            f"{1e3 * rest.y_m[i]:.2f}",
-            *(f"{1e3 * value:.2f}" for value in contact.abscissa_m[i]),
+            f"{1e3 * rest.y_m[i]:.{digits}f}",
+            *(f"{1e3 * value:.{digits}f}" for value in contact.abscissa_m[i]),
             *(f"{np.rad2deg(np.arctan(abs(value))):.2f}" for value in contact.slope[i]),
-            f"{1e3 * (rest.radius_left_m[i] - rest.radius_right_m[i]):.3f}",
+            f"{1e3 * (rest.radius_left_m[i] - rest.radius_right_m[i]):.{digits + 1}f}",
         )
         for i in range(0, len(rest.y_m), every)
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from rich import box
 from rich.console import Console
@@ -12,6 +14,11 @@ from simrail.vehicle.stability import CriticalSpeed, Mode
 
 MOST_HZ = 40.0
 """Faster modes (wheels on their contact springs) are not listed."""
+
+
+def amount(value: float) -> str:
+    """A mass or an inertia: whole kilograms of a train, three digits of a model."""
+    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def critical_words(critical: CriticalSpeed) -> str:
@@ -39,14 +46,14 @@ def print_study(console: Console, study: VehicleStudy) -> None:
 
     bodies = _table("body", "mass\nkg", "roll\nkg m2", "pitch\nkg m2", "yaw\nkg m2", "height\nm")
     for body in model.bodies:
-        inertia = [f"{value:,.0f}" for value in body.inertia_kgm2]
-        bodies.add_row(body.name, f"{body.mass_kg:,.0f}", *inertia, f"{body.position_m[2]:.3f}")
+        inertia = [amount(value) for value in body.inertia_kgm2]
+        bodies.add_row(body.name, amount(body.mass_kg), *inertia, f"{body.position_m[2]:.3f}")
     console.print(bodies)
     mass = sum(body.mass_kg for body in model.bodies)
     loads = ", ".join(
-        f"{wheel.name} {load / 1e3:.2f}" for wheel, load in zip(model.wheels, study.wheel_load_n, strict=True)
+        f"{wheel.name} {load / 1e3:.4g}" for wheel, load in zip(model.wheels, study.wheel_load_n, strict=True)
     )
-    console.print(f"in all {mass:,.0f} kg; static wheel loads, kN: {loads}", highlight=False)
+    console.print(f"in all {amount(mass)} kg; static wheel loads, kN: {loads}", highlight=False)
 
     modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held", words=2)
     for mode in listed(study.standstill):
@@ -59,19 +66,21 @@ def print_study(console: Console, study: VehicleStudy) -> None:
         console.print("contact: prescribed and linear", highlight=False)
     else:
         told = ", ".join(
-            f"{1e3 * a:g} mm {value:.3f}"
+            f"{1e3 * a:.2g} mm {value:.3f}"
             for a, value in zip(study.conicity.amplitude_m, study.conicity.equivalent, strict=True)
             if np.isclose(a / study.conicity.scale % 1e-3, 0.0, atol=1e-6)
             or np.isclose(a / study.conicity.scale % 1e-3, 1e-3, atol=1e-6)
         )
+        size = "" if pair.profile_scale == 1.0 else f" at {_ratio(pair.profile_scale)}"
         console.print(
-            f"wheel {pair.wheel_profile} on rail {pair.rail_profile}, gauge {1e3 * pair.gauge_m:g} mm, "
-            f"inclination {_ratio(pair.rail_inclination)}, under static load",
+            f"wheel {Path(pair.wheel_profile).name} on rail {Path(pair.rail_profile).name}{size}, "
+            f"gauge {1e3 * pair.gauge_m:g} mm, inclination {_ratio(pair.rail_inclination)}, "
+            "under static load",
             highlight=False,
         )
         at = 3.0 * study.conicity.scale
         console.print(
-            f"equivalent conicity at {at:g} mm: [bold]{study.conicity.at_3_mm:.3f}[/bold]; over the "
+            f"equivalent conicity at {at:.2g} mm: [bold]{study.conicity.at_3_mm:.3f}[/bold]; over the "
             f"amplitude: {told}",
             highlight=False,
         )

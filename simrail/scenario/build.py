@@ -31,10 +31,12 @@ from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.grades import ImuGrade
+from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.truth import Mount
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.profile_files import profiles_digest
 
 _Part = TypeVar("_Part", bound=Part)
 
@@ -80,7 +82,9 @@ class Parts:
         if ("vehicle", name) not in self._read:
             with blame(self.scenario.file, "vehicle"):
                 part = self._load(VehicleFile, "vehicle", name)
-            self._read["vehicle", name] = part.model(Path(name).stem)
+            model = part.model(Path(name).stem)
+            self._content[f"profiles {name}"] = profiles_digest(model.wheel_rail)
+            self._read["vehicle", name] = model
         vehicle: VehicleModel = self._read["vehicle", name]
         return vehicle
 
@@ -154,7 +158,13 @@ def mount_of(cell: Cell) -> Mount:
 def encoder_of(cell: Cell) -> EncoderSpec | None:
     """Encoder of a cell, if its scenario has one."""
     part = cell.spec.encoder
-    return None if part is None else EncoderSpec(**part.model_dump())
+    return None if part is None else part.spec()
+
+
+def magnetometer_of(cell: Cell) -> MagnetometerSpec | None:
+    """Magnetometer of a cell, if its scenario has one; steel stands where the seed of the track puts it."""
+    part = cell.spec.magnetometer
+    return None if part is None else part.spec(cell.ride_seed)
 
 
 def estimator_of(scenario: Scenario, method: Method) -> Estimator:
@@ -168,12 +178,12 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
     """
     field = f"estimator[{method.index}]"
     with blame(scenario.file, f"{field}.method"):
-        known_class = _class_named(method.part.method, scenario.folder)
+        known_class = class_named(method.part.method, scenario.folder)
     with blame(scenario.file, f"{field}.options"):
-        return _construct(known_class, method.part.options)
+        return construct(known_class, method.part.options)
 
 
-def _class_named(name: str, folder: Path | None) -> type[Estimator]:
+def class_named(name: str, folder: Path | None) -> type[Estimator]:
     """Class of a method: a registered name, or ``"file.py:Class"`` for one's own file."""
     path_name, colon, class_name = name.rpartition(":")
     if not colon or not path_name.endswith(".py"):
@@ -210,7 +220,8 @@ def _class_named(name: str, folder: Path | None) -> type[Estimator]:
     return own
 
 
-def _construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:
+def construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:
+    """Make an estimator from its options, each judged against the type that its class declares."""
     if not dataclasses.is_dataclass(known_class):
         raise InputError(
             "is no dataclass, so its options cannot be judged",

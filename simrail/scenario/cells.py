@@ -21,7 +21,7 @@ from simrail.scenario.axes import Scalar, axes_of, expand
 from simrail.scenario.scenario import EstimatorPart, ImuPart, RidePart, Scenario, ScenarioFile
 
 WORLD = ("track", "vehicle", "engine", "step_s", "irregularity")
-SENSING = ("odometry", "encoder")
+SENSING = ("odometry", "encoder", "magnetometer")
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,25 @@ import numpy as np
 from simrail.errors import InputError
 from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
-from simrail.scenario.build import Parts, estimator_of, irregularity_of, profile_of
+from simrail.scenario.build import (
+    Parts,
+    encoder_of,
+    estimator_of,
+    irregularity_of,
+    magnetometer_of,
+    profile_of,
+)
 from simrail.scenario.cells import Cell, cells, count, methods
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 from simrail.sensors.decimation import decimation_factor
+from simrail.sensors.encoder import check_encoder
+from simrail.sensors.magnetometer import check_magnetometer
 from simrail.track.design import TrackDesign
-from simrail.track.irregularity import SAMPLES_PER_WAVE
 from simrail.track.laid import lay
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.step_limit import ACCURATE, contact_resonance
 
 WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5
@@ -33,7 +42,6 @@ LONGEST_RIDE_S = 7200.0
 MOST_CELLS = 1_000_000
 TRUTH_RATE_HZ = 1000.0
 GRAVITY_MPS2 = 9.81
-KNOT_STEP_M = 0.125
 
 
 @dataclass(frozen=True)
@@ -97,7 +105,12 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
         if cell.track_draw or cell.sensor_draw:
             continue
         ride_key = (cell.spec.track, cell.spec.vehicle, cell.spec.engine, repr(cell.ride))
-        sensor_key = (cell.spec.vehicle, cell.spec.engine, repr(cell.imu), repr(cell.spec.encoder))
+        sensor_key = (
+            cell.spec.vehicle,
+            cell.spec.engine,
+            repr(cell.imu),
+            *map(repr, (cell.spec.encoder, cell.spec.magnetometer)),
+        )
         if (*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)) not in judged_rides:
             judged_rides.add((*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)))
             _judge_irregularity(scenario, cell, parts.track(cell))
@@ -145,19 +158,9 @@ def _judge_estimators(scenario: Scenario) -> dict[str, Estimator]:
 
 def _judge_irregularity(scenario: Scenario, cell: Cell, track: TrackDesign) -> None:
     irregularity = irregularity_of(cell)
-    shortest = SAMPLES_PER_WAVE * KNOT_STEP_M
-    if not irregularity.wavelengths_m[0] >= shortest:
-        raise InputError(
-            "the shortest wave is too short for the table of the rails",
-            file=scenario.file,
-            field="irregularity.wavelengths_m",
-            value=irregularity.wavelengths_m,
-            limit=f">= {shortest:g} m",
-            remedy="take longer waves",
-        )
     # Laying the track is the judgement: it takes a moment and no rule can be forgotten.
     try:
-        lay(track, irregularity, seed=cell.ride_seed, table_step_m=KNOT_STEP_M)
+        lay(track, irregularity, seed=cell.ride_seed)
     except InputError as error:
         if error.file is None:
             error.file = scenario.file
@@ -193,7 +196,33 @@ def _judge_ride(scenario: Scenario, cell: Cell, parts: Parts) -> tuple[float, li
             limit=f"{LONGEST_RIDE_S:.0f} s",
             remedy="ride faster, shorter, or with less dwell time",
         )
-    return duration, _judge_dynamics(scenario, cell, track, profile)
+    warnings = _judge_step(scenario, cell, vehicle)
+    return duration, [*warnings, *_judge_dynamics(scenario, cell, track, profile)]
+
+
+def _judge_step(scenario: Scenario, cell: Cell, vehicle: VehicleModel) -> list[str]:
+    """Refuse a step that the vehicle's wheels on their rails make unstable; warn where it is inaccurate."""
+    if cell.spec.engine == "kinematic":
+        return []
+    step, resonance = cell.spec.step_s, contact_resonance(vehicle, gravity_mps2=GRAVITY_MPS2)
+    advised = f"step_s = {resonance.advised_step_s:.8g}"
+    frequency = f"{resonance.normal_radps / (2.0 * np.pi):.0f} Hz"
+    if step > resonance.longest_step_s:
+        raise InputError(
+            f"the integrator would be unstable: axles of {vehicle.name} swing on their rails at {frequency}",
+            file=scenario.file,
+            field="step_s",
+            value=step,
+            limit=f"{resonance.longest_step_s:.2g} s",
+            remedy=f"set {advised}",
+        )
+    if step * resonance.normal_radps > ACCURATE:
+        off = (step * resonance.normal_radps) ** 4 / 1.2
+        return [
+            f"step_s = {step:g} is long for {vehicle.name}, whose axles swing on their rails at {frequency}: "
+            f"it puts that off by {off:.0f} %; {advised} is within 1 %"
+        ]
+    return []
 
 
 def _judge_loads(vehicle: VehicleModel) -> None:
@@ -297,7 +326,11 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     grade = parts.grade(cell)
     with blame(scenario.file, f"{field}.grade"):
         decimation_factor(TRUTH_RATE_HZ, grade.rate_hz)
-    encoder = cell.spec.encoder
+    magnetometer = magnetometer_of(cell)
+    if magnetometer is not None:
+        with blame(scenario.file, "magnetometer"):
+            check_magnetometer(magnetometer)
+    encoder = encoder_of(cell)
     if encoder is None:
         if cell.spec.odometry == "encoder":
             raise InputError(
@@ -314,6 +347,18 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     _one_of(wheels, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel")
     with blame(scenario.file, "encoder"):
         decimation_factor(TRUTH_RATE_HZ, encoder.rate_hz)
+        check_encoder(encoder)
+    duration = profile_of(cell).duration_s
+    for i, event in enumerate(encoder.slip):
+        if event.start_s >= duration:
+            raise InputError(
+                f"the slip begins after the end of ride {cell.ride.name}",
+                file=scenario.file,
+                field=f"encoder.slip[{i}].start_s",
+                value=event.start_s,
+                limit=f"< {duration:.1f} s",
+                remedy="let it begin earlier, or put the ride into a scenario of its own",
+            )
 
 
 def _one_of(known: Iterable[str], name: str, file: str, field: str, problem: str) -> None:

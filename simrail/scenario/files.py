@@ -10,9 +10,11 @@ from __future__ import annotations
 import difflib
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from importlib.resources import files
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -109,11 +111,44 @@ def parse_toml(text: str, *, file: object) -> dict[str, Any]:
         ) from error
 
 
-def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
-    """Build a file model from raw TOML data; the first fault becomes an `InputError`."""
+def toml_text(data: Mapping[str, Any], *, prefix: str = "") -> str:
+    """TOML text of plain data: text, numbers, tuples or lists of them, tables and arrays of tables.
+
+    Numbers read back bit by bit. None is left out: TOML has no such value.
+    """
+    lines, tables = [], []
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            tables.append(f"\n[{prefix}{key}]\n" + toml_text(value, prefix=f"{prefix}{key}."))
+        elif isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
+            tables += [f"\n[[{prefix}{key}]]\n" + toml_text(item, prefix=f"{prefix}{key}.") for item in value]
+        elif value is not None:
+            lines.append(f"{key} = {_toml_value(value)}\n")
+    return "".join(lines) + "".join(tables)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Integral):
+        return str(int(value))
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_toml_value(item) for item in value)}]"
+    raise TypeError(f"no TOML for {type(value).__name__}")
+
+
+def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Path | None = None) -> _Part:
+    """Build a file model from raw TOML data; the first fault becomes an `InputError`.
+
+    ``folder`` is where files that the data names by a relative path are looked for.
+    """
     try:
         # JSON is the mode in which pydantic is strict about numbers and still takes arrays for tuples.
-        return model.model_validate_json(json.dumps(data, default=str))
+        return model.model_validate_json(json.dumps(data, default=str), context={"folder": folder})
     except ValidationError as error:
         raise _as_input_error(error, model, file) from None
 
@@ -121,7 +156,7 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object) -> _Part:
 def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None) -> _Part:
     """Find, read and judge one file."""
     path = find(kind, name, folder=folder)
-    return judge(model, read_toml(path), file=label(path))
+    return judge(model, read_toml(path), file=label(path), folder=path.parent)
 
 
 @contextmanager
@@ -139,7 +174,7 @@ def blame(file: object, field: str) -> Iterator[None]:
 def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
     faults = error.errors()
     # An unknown key is usually a misspelling that also leaves a required one missing: say it first.
-    first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
+    first = next((fault for fault in faults if fault["type"] in _UNKNOWN), faults[0])
     field = ""
     for step in first["loc"]:
         field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
@@ -149,7 +184,7 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         value = None
     context = first.get("ctx", {})
     kind = first["type"]
-    if kind == "extra_forbidden":
+    if kind in _UNKNOWN:
         allowed = _fields_at(model, first["loc"][:-1])
         near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
         problem = "unknown key"
@@ -194,6 +229,9 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
     return InputError(problem, file=file, field=field or None, value=value, limit=limit, remedy=remedy)
 
 
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""An unknown key, in a model and in a dataclass."""
+
 _TYPES = {
     "float_type": "a number",
     "float_parsing": "a number",
@@ -212,17 +250,19 @@ _TYPES = {
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """Names of the fields that are allowed at a place in a model."""
-    current: type[BaseModel] | None = model
+    current: type[Any] | None = model
     for step in location:
-        if isinstance(step, int) or current is None:
+        if isinstance(step, int) or current is None or not issubclass(current, BaseModel):
             continue
         annotation = current.model_fields.get(step)
         current = _model_in(annotation.annotation) if annotation else None
-    return list(current.model_fields) if current else []
+    if current is None:
+        return []
+    return list(current.model_fields) if issubclass(current, BaseModel) else [f.name for f in fields(current)]
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _model_in(annotation: Any) -> type[Any] | None:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
         found = _model_in(argument)

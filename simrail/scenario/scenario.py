@@ -18,6 +18,7 @@ from pydantic import Field, field_validator
 from simrail.scenario.axes import Axis, Listed
 from simrail.scenario.files import Part, find, judge, label, parse_toml, read_text
 from simrail.scenario.overrides import override
+from simrail.scenario.sensor_parts import EncoderPart, MagnetometerPart
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
 """A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
@@ -83,19 +84,6 @@ class ImuPart(Part):
         return value
 
 
-class EncoderPart(Part):
-    """``[encoder]``: pulses of one wheel, whose radius is known up to a relative error.
-
-    See `simrail.sensors.encoder.EncoderSpec` for the words that ``wheel`` and ``radius`` take.
-    """
-
-    wheel: Listed[str]
-    radius: Listed[Literal["drawing", "calibrated"]] = "drawing"
-    pulses_per_revolution: Listed[Annotated[int, Field(ge=1, le=1_000_000)]] = 1024
-    rate_hz: Listed[Annotated[float, Field(gt=0.0, le=1000.0)]] = 250.0
-    radius_error_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.0
-
-
 class EstimatorPart(Part):
     """``[[estimator]]``: a method under a name, with the keyword arguments of its class."""
 
@@ -130,6 +118,7 @@ class ScenarioFile(Part):
     ride: Annotated[list[RidePart], Field(min_length=1)]
     imu: Annotated[list[ImuPart], Field(min_length=1)]
     encoder: EncoderPart | None = None
+    magnetometer: MagnetometerPart | None = None
     estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
     score: ScorePart = ScorePart()
 

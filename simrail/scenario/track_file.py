@@ -13,7 +13,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from simrail.errors import InputError
-from simrail.scenario.files import Part, load
+from simrail.scenario.files import Part, load, toml_text
 from simrail.track.design import Curve, Element, Gradient, Straight, TrackDesign, Transition
 
 Length = Annotated[float, Field(gt=0.0)]
@@ -74,10 +74,14 @@ class TrackFile(Part):
     ----------
     title, source : str
         One line each: what it is, and where its numbers come from.
+    name : str, optional
+        What to call the track; the stem of the file where left out.
     synthetic : bool
         True if the numbers are made up, in whole or in part; tables and reports then say so.
     start_m : float
         s at the start of the first segment.
+    start_position_m, start_yaw_rad
+        Global place and heading there, as in `TrackDesign`.
     cant_ramp, vertical_radius_m, vertical_ramp_m
         As in `TrackDesign`.
     segment, gradient : tuple
@@ -87,7 +91,10 @@ class TrackFile(Part):
     title: str
     source: str
     synthetic: bool
+    name: str | None = None
     start_m: float = 0.0
+    start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_yaw_rad: float = 0.0
     cant_ramp: Literal["smooth", "linear"] = "smooth"
     vertical_radius_m: float | tuple[float, ...] = 2000.0
     vertical_ramp_m: float = Field(default=5.0, ge=0.0)
@@ -105,11 +112,11 @@ class TrackFile(Part):
         Parameters
         ----------
         name : str
-            What to call it; for a file, its stem.
+            What to call it if the file does not say; its stem.
         """
         elements: tuple[Element, ...] = tuple(part.element() for part in self.segment)
         return TrackDesign(
-            name,
+            name if self.name is None else self.name,
             self.start_m,
             elements,
             gradients=tuple(part.gradient() for part in self.gradient),
@@ -118,6 +125,8 @@ class TrackFile(Part):
             cant_ramp=self.cant_ramp,
             source=self.source,
             synthetic=self.synthetic,
+            start_position_m=self.start_position_m,
+            start_yaw_rad=self.start_yaw_rad,
         )
 
 
@@ -130,3 +139,52 @@ def track_by_name(name: str) -> TrackDesign:
         If there is no such file, or it describes no track.
     """
     return load(TrackFile, "track", name).design(Path(name).stem)
+
+
+def track_text(design: TrackDesign) -> str:
+    """Track file of a design, which reads back as an equal one, bit by bit.
+
+    Raises
+    ------
+    InputError
+        If a cant or a gradient is a number that no decimal in mm or permil gives exactly, as one in some
+        forty random ones is; every track that was read from a file has one.
+    """
+    head = {
+        "title": f"Track {design.name}",
+        "source": design.source,
+        "synthetic": design.synthetic,
+        "name": design.name,
+        "start_m": design.start_m,
+        "start_position_m": design.start_position_m,
+        "start_yaw_rad": design.start_yaw_rad,
+        "cant_ramp": design.cant_ramp,
+        "vertical_radius_m": design.vertical_radius_m,
+        "vertical_ramp_m": design.vertical_ramp_m,
+    }
+    segments = []
+    for i, element in enumerate(design.elements):
+        segment: dict[str, object] = {"kind": element.word, "length_m": element.length_m}
+        if isinstance(element, Curve):
+            segment["radius_m"] = element.radius_m
+            segment["cant_mm"] = _thousandths(element.cant_m, f"segment[{i}].cant_mm")
+        segments.append(segment)
+    gradients = [
+        {"from_m": gradient.from_m, "permil": _thousandths(gradient.slope, f"gradient[{i}].permil")}
+        for i, gradient in enumerate(design.gradients)
+    ]
+    return toml_text({**head, "segment": segments, **({"gradient": gradients} if gradients else {})})
+
+
+def _thousandths(value: float, field: str) -> float:
+    """The number that divided by 1000 gives a value exactly."""
+    middle = value * 1000.0
+    for candidate in (round(middle, 9), middle):
+        if candidate / 1000.0 == value:
+            return candidate
+    raise InputError(
+        "is a number that no decimal in mm or permil gives exactly",
+        field=field,
+        value=value,
+        remedy=f"take {middle!r} / 1000 instead: it differs in the last of its 53 bits",
+    )

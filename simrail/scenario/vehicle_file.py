@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from simrail.errors import InputError
 from simrail.scenario.files import Part
@@ -33,11 +34,11 @@ from simrail.vehicle.model import (
     Wheel,
     WheelRail,
 )
-from simrail.vehicle.profile_files import rail_profile, wheel_profile
+from simrail.vehicle.profile_files import profile_place, rail_profile, wheel_profile
 
 
 class VehicleFile(Part):
-    """A whole vehicle file."""
+    """A whole vehicle file; profiles that it names by a relative path lie beside it."""
 
     title: str
     source: str
@@ -46,6 +47,8 @@ class VehicleFile(Part):
     rail_inclination: Annotated[float, Field(ge=0, le=0.1)]
     wheel_profile: str
     rail_profile: str
+    profile_scale: Annotated[float, Field(ge=0.02, le=1.0)] = 1.0
+    contact_smoothing: Annotated[float, Field(ge=0.1, le=5.0)] = 0.22
     friction: Annotated[float, Field(gt=0, le=1.0)]
     axle: Annotated[list[AxleEntry], Field(min_length=1)]
     body: tuple[BodyEntry, ...] = ()
@@ -56,9 +59,11 @@ class VehicleFile(Part):
     linear_contact: LinearContactEntry | None = None
     gyroscopic: bool = True
     guide: GuideEntry
+    _folder: Path | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _consistent(self, info: ValidationInfo) -> Self:
+        self._folder = (info.context or {}).get("folder")
         names = [axle.name for axle in self.axle] + [body.name for body in self.body]
         twice = {name for name in names if names.count(name) > 1}
         if twice:
@@ -111,8 +116,8 @@ class VehicleFile(Part):
                     limit="first column rising, second not falling",
                 )
         # Each says itself what it cannot read.
-        wheel_profile(self.wheel_profile)
-        rail_profile(self.rail_profile)
+        wheel_profile(self.wheel_profile, self._folder)
+        rail_profile(self.rail_profile, self._folder)
 
     def _check_wheels(self) -> None:
         """Wheels must stand on the rails, all alike: one contact table serves them."""
@@ -207,8 +212,10 @@ class VehicleFile(Part):
             spin_inertia_kgm2=spins,
             guide=Guide(**self.guide.model_dump()),
             wheel_rail=WheelRail(
-                wheel_profile=self.wheel_profile,
-                rail_profile=self.rail_profile,
+                wheel_profile=profile_place(self.wheel_profile, self._folder),
+                rail_profile=profile_place(self.rail_profile, self._folder),
+                profile_scale=self.profile_scale,
+                smoothing=self.contact_smoothing,
                 gauge_m=self.gauge_m,
                 rail_inclination=self.rail_inclination,
                 friction=self.friction,

@@ -27,7 +27,7 @@ from simrail.track.spectra import SPECTRA
 PERIOD_M = 65536.0
 """Length after which a realisation repeats itself."""
 
-SHORTEST_WAVELENGTH_M = 0.5
+SHORTEST_WAVELENGTH_M = 0.25
 """Shortest wavelength that has a phase."""
 
 SAMPLES_PER_WAVE = 8

@@ -22,7 +22,7 @@ from simrail.columns import IRREGULARITY
 from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.track.design import TrackDesign
-from simrail.track.irregularity import PERIOD_M, Irregularity, fade, realise_all
+from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
 
 CHANNELS = (
     "x",
@@ -129,8 +129,14 @@ class LaidTrack:
         return 6.0 * c[..., 0] + 0.0 * t
 
 
+def knot_step_m(irregularity: Irregularity) -> float:
+    """Distance of the spline knots: 0.125 m, or the half, quarter, ... of it that shorter waves need."""
+    needed = irregularity.wavelengths_m[0] / SAMPLES_PER_WAVE
+    return 0.125 * 0.5 ** max(0, math.ceil(math.log2(0.125 / needed)))
+
+
 def lay(
-    design: TrackDesign, irregularity: Irregularity, *, seed: int, table_step_m: float = 0.125
+    design: TrackDesign, irregularity: Irregularity, *, seed: int, table_step_m: float | None = None
 ) -> LaidTrack:
     """Draw the irregularities and lay the track.
 
@@ -142,8 +148,8 @@ def lay(
         What to draw.
     seed : int
         Root seed; another seed is another track.
-    table_step_m : float
-        Distance of the spline knots; a divisor of 65536 m.
+    table_step_m : float, optional
+        Distance of the spline knots, a divisor of 65536 m; `knot_step_m` if not given.
 
     Raises
     ------
@@ -153,6 +159,7 @@ def lay(
     """
     design.check()
     irregularity.check()
+    table_step_m = table_step_m or knot_step_m(irregularity)
     if not 2.0 * irregularity.fade_m <= design.length_m <= PERIOD_M:
         raise InputError(
             "track and irregularity do not fit",

@@ -82,13 +82,25 @@ class Segment:
 def start_poses(
     model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravity_mps2: float
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Position (3,) and rotation (3, 3) of each body at rest at the profile's start, as the design lies."""
+    """Position (3,) and rotation (3, 3) of each body at rest at the profile's start, on the rails there.
+
+    A body stands as an axle would at its place: over the middle of the rails, and leaning with them.
+    Dropped onto irregular rails instead, wheels would bounce for seconds.
+    """
     drop = rest_drop_m(model, gravity_mps2=gravity_mps2)
+    half = model.wheel_rail.tape_circle_half_m
     for body in model.bodies:
-        frame = track.design.frame(np.array([profile.start_m + body.position_m[0]]))
-        rotation = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))[0]
+        s = np.array([profile.start_m + body.position_m[0]])
+        frame = track.design.frame(s)
+        y_left, z_left, y_right, z_right = track.rails(s)[0]
+        lean = frame.roll_rad + (z_left - z_right) / (2.0 * half)
+        design, rotation = (
+            rotation_matrix(np.column_stack([roll, frame.pitch_rad, frame.yaw_rad]))[0]
+            for roll in (frame.roll_rad, lean)
+        )
+        middle = design @ np.array([0.0, 0.5 * (y_left + y_right), 0.5 * (z_left + z_right)])
         offset = np.array([0.0, body.position_m[1], body.position_m[2] + drop])
-        yield frame.position[0] + rotation @ offset, rotation
+        yield frame.position[0] + middle + rotation @ offset, rotation
 
 
 def start_memo(model: VehicleModel, profile: SpeedProfile) -> FloatArray:

@@ -5,6 +5,12 @@ generic node with a diagonal mass; one object without mass on all nodes calls `s
 There are no joints and no constraints, so the explicit RK44 integrates it from standstill to
 standstill. This is the only file that imports exudyn.
 
+The springs can be Exudyn's own instead (``suspension="native"``): one `RigidBodySpringDamper` per spring,
+taken out of the kernel. That is a test of the kernel's definition of a spring against independent code,
+not another way to run: it is slower, and the motion is the same. Rotations, stops and series dampers stay
+in the kernel: Exudyn's rotational springs work on Tait-Bryan angles, another definition, and the other
+two are no item of its.
+
 Two choices make it fast and exact. The nodes are `NodeRigidBodyRotVecLG`: their rates are body rates, so
 the mass matrix is constant and factorised once (a third of the time per step of Rxyz nodes, whose
 matrix is factorised at every evaluation). And the nodes' axes are the body's axes turned by half a turn
@@ -17,15 +23,17 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import (
+    MarkerBodyRigid,
     NodeGenericODE2,
     NodeRigidBodyRotVecLG,
     ObjectGenericODE2,
     ObjectRigidBody,
+    RigidBodySpringDamper,
     SensorUserFunction,
 )
 from scipy.spatial.transform import Rotation
@@ -173,6 +181,8 @@ class ExudynEngine:
         Gravity.
     settle_s : float
         Time at rest before the ride, in which the springs come to rest; not part of the output.
+    suspension : {"hook", "native"}
+        Who computes the springs: the kernel, or Exudyn's own items (see the module).
     """
 
     def __init__(
@@ -185,11 +195,15 @@ class ExudynEngine:
         rate_hz: float = 1000.0,
         gravity_mps2: float = 9.81,
         settle_s: float = 4.0,
+        suspension: Literal["hook", "native"] = "hook",
     ) -> None:
         self.model, self.track, self.profile = model, track, profile
         self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
         self.gravity_mps2 = gravity_mps2
         data = pack(model, track, profile, gravity_mps2=gravity_mps2)
+        self._native = data.springs[:0]
+        if suspension == "native":
+            self._native, data = data.springs, data._replace(springs=data.springs[:0])
         bodies, axles = len(model.bodies), len(data.axles)
         self._states = states_of(data)
         self.size = 6 * bodies + len(data.spins) + self._states
@@ -243,18 +257,22 @@ class ExudynEngine:
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._nodes = []
+        objects = []
         poses = start_poses(model, self.track, self.profile, gravity_mps2=self.gravity_mps2)
         for body, (position, rotation) in zip(model.bodies, poses, strict=True):
             turn = Rotation.from_matrix(rotation * HALF_TURN).as_rotvec()
             node = self.mbs.AddNode(
                 NodeRigidBodyRotVecLG(initialCoordinates=[*position, *turn], initialVelocities=[0.0] * 6)
             )
-            self.mbs.AddObject(
-                ObjectRigidBody(
-                    mass=body.mass_kg, inertia=[*body.inertia_kgm2, 0.0, 0.0, 0.0], nodeNumber=node
+            objects.append(
+                self.mbs.AddObject(
+                    ObjectRigidBody(
+                        mass=body.mass_kg, inertia=[*body.inertia_kgm2, 0.0, 0.0, 0.0], nodeNumber=node
+                    )
                 )
             )
             self._nodes.append(node)
+        self._add_springs(objects)
         self.memo[:] = start_memo(model, self.profile)
         aux = len(self._spins) + self._states
         lumped = self.mbs.AddNode(
@@ -284,6 +302,32 @@ class ExudynEngine:
         self._settings.solution.file.write = False
         # At every step: half a step, lest rounding lets one slip.
         self._settings.solution.sensors.writePeriod = self.step_s / 2.0
+
+    def _add_springs(self, objects: list[Any]) -> None:
+        """Exudyn's own springs in place of the kernel's: rows as in `ForceData.springs`.
+
+        Markers and axes are given in the axes of the nodes, from which half a turn leads to the body's.
+        """
+        for row in self._native:
+            markers = [
+                self.mbs.AddMarker(
+                    MarkerBodyRigid(
+                        bodyNumber=objects[int(body)],
+                        localHT=exu.HT(  # type: ignore[call-arg]  # its stub has no constructor
+                            rotation=np.diag(HALF_TURN), translation=arm * HALF_TURN
+                        ),
+                    )
+                )
+                for body, arm in ((row[0], row[2:5]), (row[1], row[5:8]))
+            ]
+            self.mbs.AddObject(
+                RigidBodySpringDamper(
+                    markerNumbers=markers,
+                    stiffness=np.diag([*row[8:11], 0.0, 0.0, 0.0]),
+                    damping=np.diag([*row[11:14], 0.0, 0.0, 0.0]),
+                    offset=[*row[14:17], 0.0, 0.0, 0.0],
+                )
+            )
 
     def _callback(self) -> Any:
         """The force user function: everything bound in a closure, lists packed by struct.

@@ -17,7 +17,7 @@ from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.vehicle.contact import ContactTable, build_contact, static_height
 from simrail.vehicle.model import SeriesDamper, Tabled, VehicleModel
-from simrail.vehicle.profile_files import rail_profile, wheel_profile
+from simrail.vehicle.profile_files import profiles_of
 
 
 class ForceData(NamedTuple):
@@ -63,14 +63,14 @@ def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTab
     """Contact table of a vehicle's wheels at their mean static load."""
     pair = model.wheel_rail
     return build_contact(
-        wheel_profile(pair.wheel_profile),
-        rail_profile(pair.rail_profile),
+        *profiles_of(pair),
         gauge_m=pair.gauge_m,
         rail_inclination=pair.rail_inclination,
         wheel_radius_m=model.wheels[0].radius_m,
         tape_circle_half_m=pair.tape_circle_half_m,
         static_load_n=float(np.mean(model.wheel_load_n(gravity_mps2))),
         friction=pair.friction,
+        smoothing=pair.smoothing,
         creep_law=pair.creep,
     )
 

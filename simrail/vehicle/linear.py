@@ -41,8 +41,12 @@ _MIDDLE_M = 256.0
 _STEPS = {"place": 1e-6, "turn": 1e-6, "velocity": 1e-5, "rate": 1e-5, "spin": 1e-5, "inner": 1e-7}
 """Difference steps (m, rad, m/s, rad/s): small against a contact patch's penetration (0.1 mm) and the
 creepage that saturates it (3e-3), large against rounding."""
+_FULL_SIZE_RADIUS_M = 0.25
+"""No full-size wheel is smaller. A smaller one is a scale vehicle's: of like build, its contact gives way by
+the 5/3rd power of its size, and places step by less."""
 _BALANCED_MPS2 = 1e-6
-"""Acceleration that an equilibrium may leave: far above rounding, far below any motion."""
+"""Acceleration that an equilibrium may leave: far above rounding, far below any motion. A stiffer contact,
+as that of a scale vehicle, makes more of the same error of place."""
 
 
 def state_matrix(
@@ -101,10 +105,16 @@ class RunningVehicle:
     def steps(self) -> FloatArray:
         """Difference step (n,) of each state."""
         b = self.bodies
-        place = np.tile([_STEPS["place"]] * 3 + [_STEPS["turn"]] * 3, b)
+        place = np.tile([_STEPS["place"]] * 3 + [_STEPS["turn"]] * 3, b) * self._fineness
         motion = np.tile([_STEPS["velocity"]] * 3 + [_STEPS["rate"]] * 3, b)
         spins = np.full(len(self.data.spins), _STEPS["spin"])
         return np.concatenate([place, motion, spins, np.full(self.inner_states, _STEPS["inner"])])
+
+    @property
+    def _fineness(self) -> float:
+        """1 for a full-size vehicle, less for a scale one: how much less its contacts give way."""
+        smallest = min(wheel.radius_m for wheel in self.model.wheels)
+        return float(min(1.0, smallest / _FULL_SIZE_RADIUS_M) ** (5.0 / 3.0))
 
     def rates(self, state: FloatArray, speed_mps: float, *, base: FloatArray | None = None) -> FloatArray:
         """d(state)/dt (n,) at a speed.
@@ -170,11 +180,12 @@ class RunningVehicle:
             state[: 12 * self.bodies] = start[: 12 * self.bodies]  # the wheels' spins go with the speed
         # The inverse is kept while the steps shrink quickly: a Jacobian costs 150 evaluations.
         inverse, before, fresh = self._inverse(state, speed_mps), np.inf, True
+        fine = self._fineness
         for _ in range(60):
             step = -inverse @ self.rates(state, speed_mps)
             largest = np.abs(step[: 6 * self.bodies]).max()
             state = state + step * min(1.0, 1e-3 / max(largest, 1e-12))
-            if largest < 1e-11 or (largest < 1e-9 and largest > 0.5 * before):
+            if largest < 1e-11 * fine or (largest < 1e-9 * fine and largest > 0.5 * before):
                 break
             if largest > 0.2 * before and not fresh:
                 inverse, fresh = self._inverse(state, speed_mps), True
@@ -182,7 +193,7 @@ class RunningVehicle:
                 fresh = False
             before = largest
         left = np.abs(self.rates(state, speed_mps))[6 * self.bodies : 12 * self.bodies].max()
-        if not left < _BALANCED_MPS2:
+        if not left < _BALANCED_MPS2 / fine:
             raise InputError(
                 "does not run steadily on straight level track",
                 file=f"vehicle {self.model.name}",

@@ -145,7 +145,12 @@ class LinearContact:
 
 @dataclass(frozen=True)
 class WheelRail:
-    """Which profiles meet, and how slippery they are."""
+    """Which profiles meet, and how slippery they are.
+
+    Profiles are names or the paths of files (`simrail.vehicle.profile_files`); ``profile_scale`` is the
+    size that they have on this vehicle, 0.1 on one of 1:10 whose profiles are full-size ones made small.
+    ``smoothing`` is that of `simrail.vehicle.contact_geometry.build_contact`.
+    """
 
     wheel_profile: str
     rail_profile: str
@@ -155,6 +160,8 @@ class WheelRail:
     tape_circle_half_m: float = 0.75
     creep: CreepLaw = field(default_factory=CreepLaw)
     linear: LinearContact | None = None
+    profile_scale: float = 1.0
+    smoothing: float = 0.22
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ Not here: formulas of standard profiles (`simrail.vehicle.profiles`).
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +20,16 @@ from scipy.interpolate import CubicSpline
 
 from simrail.errors import InputError
 from simrail.jit import FloatArray
-from simrail.vehicle.profiles import RailProfile, WheelProfile, conical_wheel, rail_60e1, s1002, worn
+from simrail.vehicle.model import WheelRail
+from simrail.vehicle.profiles import (
+    RailProfile,
+    WheelProfile,
+    conical_wheel,
+    rail_60e1,
+    s1002,
+    scaled,
+    worn,
+)
 
 _FEWEST_POINTS = 8
 _LEAST_DISTANCE_M = 5e-5
@@ -38,6 +48,27 @@ class _Points(NamedTuple):
     z: FloatArray
     line: FloatArray
     header: dict[str, float]
+
+
+def profiles_of(pair: WheelRail) -> tuple[WheelProfile, RailProfile]:
+    """The two profiles that meet, at the scale of the vehicle; faults as in `wheel_profile`."""
+    wheel, rail = wheel_profile(pair.wheel_profile), rail_profile(pair.rail_profile)
+    return scaled(wheel, pair.profile_scale), scaled(rail, pair.profile_scale)
+
+
+def profiles_digest(pair: WheelRail) -> str:
+    """SHA-256 of the points of both profiles: a file may change under its name."""
+    wheel, rail = profiles_of(pair)
+    points = (wheel.lateral_m, wheel.depth_m, rail.lateral_m, rail.depth_m)
+    return hashlib.sha256(b"".join(part.tobytes() for part in points)).hexdigest()
+
+
+def profile_place(name_or_path: str, beside: Path | None) -> str:
+    """A profile's name as it is, or its file seen from the file or folder that names it."""
+    path = Path(name_or_path)
+    if path.suffix.lower() not in (".prw", ".prr", *_TEXT) or beside is None or path.is_absolute():
+        return name_or_path
+    return str((beside if beside.is_dir() else beside.parent) / path)
 
 
 def wheel_profile(name_or_path: str | Path, beside: Path | None = None) -> WheelProfile:
@@ -155,8 +186,7 @@ def _path(text: str, beside: Path | None, own: str, *, field: str, names: str) -
     path = Path(text)
     if path.suffix.lower() not in (own, *_TEXT):
         raise InputError("no such profile", field=field, value=text, limit=names)
-    if beside is not None and not path.is_absolute():
-        path = (beside if beside.is_dir() else beside.parent) / path
+    path = Path(profile_place(text, beside))
     if not path.is_file():
         raise InputError(
             "no such profile file",

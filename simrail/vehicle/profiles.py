@@ -12,7 +12,8 @@ that is `simrail.vehicle.contact_geometry`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +68,22 @@ class RailProfile:
     lateral_m: FloatArray
     depth_m: FloatArray
     source: str
+
+
+_Profile = TypeVar("_Profile", WheelProfile, RailProfile)
+
+
+def scaled(profile: _Profile, scale: float) -> _Profile:
+    """A profile of the same shape at another size, e.g. at 0.1 for a vehicle of 1:10."""
+    if scale == 1.0:
+        return profile
+    return replace(
+        profile,
+        name=f"{profile.name} at 1:{1.0 / scale:g}",
+        lateral_m=scale * profile.lateral_m,
+        depth_m=scale * profile.depth_m,
+        source=f"{profile.source}, at 1:{1.0 / scale:g}",
+    )
 
 
 def check_profile(profile: WheelProfile | RailProfile) -> None:

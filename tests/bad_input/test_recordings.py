@@ -1,6 +1,5 @@
 """Every fault of a recording gives one message with file, field, value, limit and remedy where they exist."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,7 +10,7 @@ import pytest
 from simrail.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.recording import EncoderSheet, ImuSheet, Recording
-from simrail.recording_io import check_recording, read_recording, write_recording
+from simrail.recording_check import check_recording
 from simrail.track.design import Straight, TrackDesign
 
 
@@ -146,54 +145,3 @@ def test_a_fault_is_refused_by_name(fault):
     assert "\n" not in message
     for word in words:
         assert word in message, message
-
-
-def test_a_fault_on_disk_names_the_folder(tmp_path):
-    folder = tmp_path / "ride"
-    write_recording(FAULTS["degrees"][0](sound()), folder)
-    with pytest.raises(InputError, match="degrees") as caught:
-        read_recording(folder)
-    assert str(folder) in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ("imu.parquet", "odometry.parquet", "encoder.parquet", "recording.json"))
-@pytest.mark.parametrize("damage", ("missing", "garbage", "empty"))
-def test_a_damaged_file_is_refused_by_name(tmp_path, name, damage):
-    folder = tmp_path / "ride"
-    write_recording(sound(), folder)
-    path = folder / name
-    if damage == "missing":
-        path.unlink()
-    else:
-        path.write_bytes(b"\x93 not this" if damage == "garbage" else b"")
-    with pytest.raises(InputError) as caught:
-        read_recording(folder)
-    assert name in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
-        (lambda plain: plain.pop("mount"), "mount"),
-        (lambda plain: plain.update(format="simrail recording 0"), "format"),
-        (lambda plain: plain.update(mount_position_m=[0.0, 0.6]), "cannot be understood"),
-        (lambda plain: plain.update(gravity_mps2="g"), "cannot be understood"),
-        (lambda plain: plain["imu_sheet"].pop("rate_hz"), "rate_hz"),
-        (lambda plain: plain["imu_sheet"].update(colour="blue"), "colour"),
-    ],
-)
-def test_a_damaged_description_is_refused(tmp_path, change, word):
-    folder = tmp_path / "ride"
-    write_recording(sound(), folder)
-    plain = json.loads((folder / "recording.json").read_text(encoding="utf-8"))
-    change(plain)
-    (folder / "recording.json").write_text(json.dumps(plain), encoding="utf-8")
-    with pytest.raises(InputError) as caught:
-        read_recording(folder)
-    assert word in str(caught.value)
-    assert "recording.json" in str(caught.value)
-
-
-def test_a_folder_that_is_no_recording(tmp_path):
-    with pytest.raises(InputError, match="cannot be read"):
-        read_recording(tmp_path / "nowhere")

@@ -121,8 +121,8 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     ),
     "waves too short for the track's table": (
         "wavelengths_m = [1.5, 100.0]",
-        "wavelengths_m = [0.6, 100.0]",
-        ["irregularity.wavelengths_m", "0.6", ">= 1 m", "longer waves"],
+        "wavelengths_m = [0.2, 100.0]",
+        ["irregularity.wavelengths_m", "0.2", "0.25 <= shortest"],
     ),
     "a fade longer than the track": (
         "fade_m = 40.0",
@@ -200,6 +200,66 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "radius_error_sd = 0.001",
         "rate_hz = 300.0",
         ["encoder", "300"],
+    ),
+    "an edge off by more than its pulse": (
+        "radius_error_sd = 0.001",
+        "edge_jitter_sd = 5.0",
+        ["encoder.edge_jitter_sd", "5.0", "<= 0.5"],
+    ),
+    "a negative rate of missed pulses": (
+        "radius_error_sd = 0.001",
+        "missed_rate = -1e-5",
+        ["encoder.missed_rate", "-1e-05", ">= 0"],
+    ),
+    "a slip faster than a locked wheel": (
+        "radius_error_sd = 0.001",
+        "[[encoder.slip]]\nstart_s = 15.0\nduration_s = 2.0\ncreepage = -1.5",
+        ["encoder.slip[0].creepage", "-1.5", ">= -1"],
+    ),
+    "a slip that only ramps": (
+        "radius_error_sd = 0.001",
+        "[[encoder.slip]]\nstart_s = 15.0\nduration_s = 2.0\ncreepage = -0.1\nramp_s = 1.5",
+        ["encoder.slip[0]", "ramp_s = 1.5", "half of duration_s = 2"],
+    ),
+    "a slip after the ride": (
+        "radius_error_sd = 0.001",
+        "[[encoder.slip]]\nstart_s = 500.0\nduration_s = 2.0\ncreepage = -0.1",
+        ["encoder.slip[0].start_s", "500.0", "end of ride out", "< 78"],
+    ),
+    "a slip with a typing error": (
+        "radius_error_sd = 0.001",
+        "[[encoder.slip]]\nstart_s = 15.0\nduration_s = 2.0\ncrepage = -0.1",
+        ["encoder.slip[0].crepage", "unknown key", "creepage?"],
+    ),
+    "a field in tesla": (
+        "[encoder]",
+        "[magnetometer]\nintensity_ut = 0.0\n\n[encoder]",
+        ["magnetometer.intensity_ut", "0.0", "> 0"],
+    ),
+    "a field in nanotesla": (
+        "[encoder]",
+        "[magnetometer]\nintensity_ut = 45000.0\n\n[encoder]",
+        ["magnetometer.intensity_ut", "45000.0", "< 100"],
+    ),
+    "a supply that is none": (
+        "[encoder]",
+        '[magnetometer.traction]\nsupply = "overhead"\n\n[encoder]',
+        ["magnetometer.traction.supply", "'overhead'", "catenary"],
+    ),
+    "steel in the vehicle's way": (
+        "[encoder]",
+        "[magnetometer.steel]\nbeside_m = [0.5, 3.0]\n\n[encoder]",
+        ["magnetometer.steel", "beside_m", "0.5", "1.5 m"],
+    ),
+    "iron that turns the field inside out": (
+        "[encoder]",
+        "[magnetometer.iron]\nsoft_iron = [[-2.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]\n\n[encoder]",
+        ["magnetometer.soft_iron", "-2.0"],
+    ),
+    "a magnetometer with a typing error": (
+        "[encoder]",
+        "[magnetometer]\ninclination = 55.0\n\n[encoder]",
+        ["magnetometer.inclination", "unknown key", "inclination_deg?"],
     ),
     "two rides of one name": (
         "[[imu]]",

@@ -1,5 +1,6 @@
 """Two engines, one vehicle, one track, one step: the same motion, so each is the proof of the other."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.truth import rotation_matrix
 from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.creep_laws import CreepLaw
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
@@ -23,19 +25,20 @@ FIELDS = ("time_s", "position", "rotation", "acceleration", "angular_acceleratio
 VEHICLES = sorted(file.stem for file in (Path(scenarios.__file__).parent / "vehicles").glob("*.toml"))
 
 
-def run(engine, vehicle, track, profile, *, duration_s):
+def run(engine, vehicle, track, profile, *, duration_s, rough=ROUGH, step_s=0.5e-3, law="she"):
     model = load(VehicleFile, "vehicle", vehicle).model(vehicle)
-    laid = lay(load(TrackFile, "track", track).design(track), ROUGH, seed=1)
-    solver = engine(model, laid, profile=profile, settle_s=1.0)
+    model = replace(model, wheel_rail=replace(model.wheel_rail, creep=CreepLaw(law)))
+    laid = lay(load(TrackFile, "track", track).design(track), rough, seed=1)
+    solver = engine(model, laid, profile=profile, settle_s=1.0, step_s=step_s)
     segments = list(solver.run(duration_s, segment_s=3.0))
     joined = {name: np.concatenate([getattr(part, name) for part in segments]) for name in FIELDS}
     return SimpleNamespace(**joined, loads_n=solver.wheel_loads_n(), model=model, laid=laid)
 
 
-def both(vehicle, track, profile, *, duration_s=None):
+def both(vehicle, track, profile, *, duration_s=None, **options):
     duration_s = duration_s or np.floor(profile.duration_s * 1000.0) / 1000.0
     engines = (CompiledEngine, ExudynEngine)
-    return tuple(run(engine, vehicle, track, profile, duration_s=duration_s) for engine in engines)
+    return tuple(run(engine, vehicle, track, profile, duration_s=duration_s, **options) for engine in engines)
 
 
 def rms(difference):
@@ -55,6 +58,10 @@ def lateral_shift_m(ride, body):
     across = np.sum((position - frame.position[nearest]) * left, axis=1)
     return float(np.abs(across - 0.5 * (rails[:, 0] + rails[:, 2])).max())
 
+
+SCALE_ROUGH = Irregularity("erri_b176_low", (0.3, 7.0), 3.0, 0.65)
+SCALE_RIDE = SpeedProfile(18.0, 40.0, 1.0, rest_s=0.3, final_rest_s=0.3, acceleration_mps2=0.8, jerk_mps3=4.0)
+SCALE_STEP_S = 0.125e-3
 
 FLANGE_M = 6e-3
 """Shift from which S1002 on 60E1 at 1435 mm touches with its flange (root: from 5 mm on)."""
@@ -88,6 +95,25 @@ def test_with_flange_contact():
     assert rms(compiled.acceleration - exudyn.acceleration) < 1e-4
 
 
+def test_a_scale_vehicle_in_its_curve():
+    """1e-6 m/s2 rms with axles that swing on their rails at 1.3 kHz, at the step that this needs."""
+    profile = replace(SCALE_RIDE, start_m=27.0, end_m=29.0)
+    compiled, exudyn = both(
+        "scale_vehicle", "scale_track", profile, duration_s=2.0, rough=SCALE_ROUGH, step_s=SCALE_STEP_S
+    )
+    assert rms(exudyn.acceleration) > 0.05
+    assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
+
+
+def test_with_fastsim():
+    """1e-6 m/s2 rms into the curve, creep forces by FASTSIM, which is another ride than by the default."""
+    profile, ride = SpeedProfile(180.0, 260.0, 12.0, **BRISK), ("metro_irw_bogie", "smooth_curve")
+    compiled, exudyn = both(*ride, profile, duration_s=5.0, law="fastsim")
+    assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
+    usual = run(CompiledEngine, *ride, profile, duration_s=5.0)
+    assert rms(compiled.acceleration - usual.acceleration) > 1e-4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_every_vehicle_of_the_library(vehicle):
@@ -97,8 +123,13 @@ def test_every_vehicle_of_the_library(vehicle):
     rounding errors grow to 1e-4.
     """
     model = load(VehicleFile, "vehicle", vehicle).model(vehicle)
-    if model.wheel_rail.gauge_m < 1.0:
-        pytest.skip("a scale vehicle runs on no track with full-size irregularities")
+    scale = model.wheel_rail.profile_scale
+    if scale < 1.0:
+        options = {"rough": SCALE_ROUGH, "step_s": SCALE_STEP_S}
+        compiled, exudyn = both(vehicle, "scale_track", SCALE_RIDE, duration_s=10.0, **options)
+        on_flange = max(lateral_shift_m(exudyn, i) for i in range(len(model.axle_names))) > FLANGE_M * scale
+        assert rms(compiled.acceleration - exudyn.acceleration) < (1e-4 if on_flange else 1e-6)
+        return
     # Prescribed linear contact has no flange to hold an axle in a curve.
     track = "level_straight" if model.wheel_rail.linear else "smooth_curve"
     compiled, exudyn = both(vehicle, track, SpeedProfile(120.0, 260.0, 12.0, **BRISK), duration_s=10.0)

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import tomllib
 from itertools import product
+from math import radians
 
 import pytest
 from pydantic import Field
 
 from simrail.errors import InputError
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
-from simrail.scenario.build import Parts, encoder_of, estimator_of, mount_of, profile_of
+from simrail.scenario.build import Parts, encoder_of, estimator_of, magnetometer_of, mount_of, profile_of
 from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.files import Part, judge, shipped
 from simrail.scenario.overrides import override
 from simrail.scenario.scenario import load_scenario, read_scenario
+from simrail.sensors.encoder import EncoderSpec, Slip
+from simrail.sensors.magnetic_surroundings import Steel, Traction
+from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 
@@ -246,3 +250,69 @@ def test_dwell_and_stops_count_in_the_plan() -> None:
     assert stop.simulated_s > base.simulated_s + 20.0
     draws = judge_scenario(load_scenario("quick_kinematic", overrides=["track_draws=3"]))
     assert draws.simulated_s == pytest.approx(3 * base.simulated_s) and draws.rides == 3
+
+
+SENSORS = """
+[encoder]
+wheel = "front.left"
+pulses_per_revolution = 100
+quadrature = [false, true]
+missed_rate = 1e-5
+radius_error = 0.002
+
+[[encoder.slip]]
+start_s = 20.0
+duration_s = 3.0
+creepage = -0.1
+
+[[encoder.slip]]
+start_s = 30.0
+duration_s = 1.0
+creepage = 0.2
+ramp_s = 0.5
+
+[magnetometer]
+x_axis_deg = 30.0
+declination_deg = -1.0
+
+[magnetometer.iron]
+[magnetometer.traction]
+supply = ["catenary", "third_rail"]
+mass_t = 60.0
+[magnetometer.steel]
+spacing_m = 30.0
+"""
+
+
+def test_encoder_and_magnetometer_say_in_text_what_their_specifications_are() -> None:
+    text = GOOD[: GOOD.index("[encoder]")] + SENSORS + GOOD[GOOD.index("[[estimator]]") :]
+    scenario = read_scenario(text, name="sensors", overrides=["track_draws=2"])
+    judge_scenario(scenario)
+    listed = list(cells(scenario))
+    assert len(listed) == 2 * 2 * 2 * 2 * 2  # quadrature, supply, grade, two draws each
+    first = listed[0]
+    assert first.settings["magnetometer.traction.supply"] == "catenary"
+    assert encoder_of(first) == EncoderSpec(
+        "front.left",
+        pulses_per_revolution=100,
+        missed_rate=1e-5,
+        radius_error=0.002,
+        slip=(Slip(20.0, 3.0, -0.1), Slip(30.0, 1.0, 0.2, ramp_s=0.5)),
+    )
+    assert magnetometer_of(first) == MagnetometerSpec(
+        field=EarthField(declination_rad=radians(-1.0), x_axis_rad=radians(30.0)),
+        iron=VehicleIron(),
+        traction=Traction(mass_kg=60e3),
+        steel=Steel(track_seed=first.ride_seed, spacing_m=30.0),
+    )
+    # Steel is the track's: the same for both sensor draws, another for another track.
+    seeds = {(cell.track_draw, magnetometer_of(cell).steel.track_seed) for cell in listed}  # type: ignore[union-attr]
+    assert len(seeds) == 2
+    assert {encoder_of(cell).counts_per_revolution for cell in listed} == {100, 400}  # type: ignore[union-attr]
+
+
+def test_an_empty_magnetometer_table_is_a_clean_field() -> None:
+    plain = next(cells(read_scenario(GOOD, name="plain")))
+    assert magnetometer_of(plain) is None
+    clean = magnetometer_of(next(cells(read_scenario(GOOD + "\n[magnetometer]\n", name="clean"))))
+    assert clean == MagnetometerSpec()

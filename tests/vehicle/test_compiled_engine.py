@@ -94,6 +94,9 @@ class Mirrored:
             position=position, yaw_rad=-f.yaw_rad, pitch_rad=f.pitch_rad, roll_rad=-f.roll_rad
         )
 
+    def on_track(self, s):
+        return self.design.on_track(s)
+
 
 @dataclass(frozen=True)
 class Turned:
@@ -106,6 +109,9 @@ class Turned:
         f = self.design.frame(self.total_m - s)
         yaw = f.yaw_rad + np.pi
         return SimpleNamespace(position=f.position, yaw_rad=yaw, pitch_rad=-f.pitch_rad, roll_rad=-f.roll_rad)
+
+    def on_track(self, s):
+        return self.total_m - self.design.on_track(self.total_m - s)
 
 
 # x y z, yaw pitch roll, then y and z of the left rail, y and z of the right one, which change places.

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from simrail.errors import InputError
+from simrail.scenario.files import load, shipped
+from simrail.scenario.vehicle_file import VehicleFile
 from simrail.vehicle.contact_geometry import build_contact
 from simrail.vehicle.contact_pair import incline
-from simrail.vehicle.profile_files import rail_profile, wheel_profile
-from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002, wheel_depth
+from simrail.vehicle.force_data import contact_of
+from simrail.vehicle.profile_files import profiles_digest, rail_profile, wheel_profile
+from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002, scaled, wheel_depth
 from simrail.vehicle.wheelset import conicity
 
 # Profiles of the Manchester contact benchmark (CONTACT, Apache-2.0), read where they lie beside the
@@ -229,3 +232,37 @@ def test_points_that_nearly_coincide_do_not_bend_the_profile(tmp_path):
     wheel = wheel_profile(simpack(tmp_path / "w.prw", y, z))
     at = np.linspace(-0.030, 0.055, 20000)
     assert np.abs(wheel_depth(wheel)(at, 1) - wheel_depth(s1002())(at, 1)).max() < 1e-3
+
+
+def test_a_vehicle_finds_its_profile_beside_its_file(tmp_path, monkeypatch):
+    """Whatever folder is worked in; and a changed profile is another ride and another scenario."""
+    wheel = s1002()
+    lines = [f"{1e3 * y:.4f} {1e3 * z:.6f}" for y, z in zip(wheel.lateral_m, wheel.depth_m, strict=True)]
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "my.txt").write_text("\n".join(lines), encoding="utf-8")
+    text = shipped("vehicle")["irw_axle"].read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace('"S1002"', '"./parts/my.txt"'), encoding="utf-8")
+    monkeypatch.chdir(tmp_path.parent)
+    model = load(VehicleFile, "vehicle", str(tmp_path / "mine.toml")).model("mine")
+    plain = load(VehicleFile, "vehicle", "irw_axle").model("irw_axle")
+    # The file's points are rounded to a nanometre.
+    own, shipped_one = (contact_of(each).coef[0, :, 0, 3] for each in (model, plain))
+    np.testing.assert_allclose(own, shipped_one, rtol=0.0, atol=2e-9)
+    before = profiles_digest(model.wheel_rail)
+    lines[600] = lines[600][:-1] + ("1" if lines[600][-1] != "1" else "2")
+    (tmp_path / "parts" / "my.txt").write_text("\n".join(lines), encoding="utf-8")
+    assert profiles_digest(model.wheel_rail) != before
+    (tmp_path / "parts" / "my.txt").unlink()
+    with pytest.raises(InputError, match=r"mine.toml|my.txt"):
+        load(VehicleFile, "vehicle", str(tmp_path / "mine.toml"))
+
+
+def test_profile_at_a_scale_is_the_same_shape():
+    """Contact at 1:10 with everything else at 1:10 too: shifts, abscissae and radii ten times smaller."""
+    wheel, rail = scaled(s1002(), 0.1), scaled(rail_60e1(), 0.1)
+    assert wheel.name == "S1002 at 1:10" and scaled(wheel, 1.0) is wheel
+    full = build_contact(s1002(), rail_60e1(), static_load_n=50e3)
+    sizes = {"gauge_m": 0.1435, "wheel_radius_m": 0.046, "tape_circle_half_m": 0.075}
+    small = build_contact(wheel, rail, static_load_n=500.0, **sizes)  # equal stress
+    np.testing.assert_allclose(small.smoothing_m, 0.1 * full.smoothing_m, rtol=1e-9)
+    np.testing.assert_allclose(small.coef[:, :, :6, 3], 0.1 * full.coef[:, :, :6, 3], rtol=1e-3, atol=2e-8)

@@ -1,0 +1,368 @@
+"""Ride files: one TOML file that says what the data files of a ride hold, and what the train knows.
+
+A ride of a real train maps its logger's columns, units and axes here; a ride that simrail wrote has its own
+column names in SI and needs no map. The models judge the text; `simrail.scenario.ride_reader` reads the
+data.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from simrail.errors import InputError
+from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet
+from simrail.resample import LONGEST_GAP_S
+from simrail.scenario.data_file import DataPart, near
+from simrail.scenario.files import Part
+from simrail.scenario.imu_file import ImuFile
+from simrail.signals import (
+    ENCODER_SIGNAL,
+    GAPS_SIGNAL,
+    IMU_SIGNAL,
+    MAGNETOMETER_SIGNAL,
+    ODOMETER_SIGNAL,
+    ODOMETRY_SIGNAL,
+    TIMES,
+    Signal,
+)
+
+DATE_TIMES = ("iso", "epoch_s", "epoch_ms", "epoch_us", "epoch_ns")
+"""Time stamps that are dates: text as ISO 8601 has it, or a count since 1970."""
+
+
+def _as_tuple(value: object) -> object:
+    return (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else value
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
+"""Column names: one text, or an array of them."""
+
+Positive = Annotated[float, Field(gt=0.0)]
+Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
+
+
+class SignalPart(DataPart):
+    """One signal: its data file, and the names and units of its columns there.
+
+    Attributes
+    ----------
+    columns : dict
+        Quantity -> column name (three for a vector, in the device's order x, y, z), and ``time``. Left
+        out are those that have simrail's own names.
+    units : dict
+        Quantity -> unit; SI where left out. ``"-g"`` is a logger that prints the negative.
+    rate_hz : float, optional
+        Rate of the samples, for a file without time stamps; beside time stamps, the rate they should have.
+    start_s : float
+        Time of the first sample of a file without time stamps.
+    """
+
+    columns: dict[str, Names] = Field(default_factory=dict)
+    units: dict[str, str] = Field(default_factory=dict)
+    rate_hz: Positive | None = None
+    start_s: float = 0.0
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _known_quantities(self) -> Self:
+        quantities = {quantity.key: quantity for quantity in self.signal().quantities}
+        keys = [*quantities, *(["time"] if self.signal().timed else [])]
+        for field, table in (("columns", self.columns), ("units", self.units)):
+            for key in table:
+                if key not in keys:
+                    raise InputError(
+                        "unknown key",
+                        field=f"{field}.{key}",
+                        limit="one of " + ", ".join(keys),
+                        remedy=near(key, keys) or "remove it",
+                    )
+        for key, names in self.columns.items():
+            count = len(quantities[key].columns) if key in quantities else 1
+            if len(names) != count:
+                wanted = "three column names, of the axes x, y, z" if count == 3 else "one column name"
+                raise InputError(
+                    "lacks an axis" if count == 3 else "names several columns",
+                    field=f"columns.{key}",
+                    value=list(names),
+                    limit=wanted,
+                    remedy='e.g. ["ax", "ay", "az"]' if count == 3 else None,
+                )
+        for key, unit in self.units.items():
+            known = [*quantities[key].units] if key in quantities else [*TIMES, *DATE_TIMES]
+            if unit.removeprefix("-" if key in quantities else "") not in known:
+                raise InputError(
+                    "is no unit of this quantity",
+                    field=f"units.{key}",
+                    value=unit,
+                    limit="one of " + ", ".join(known),
+                    remedy=near(unit, known),
+                )
+        return self
+
+
+class VectorPart(SignalPart):
+    """A signal of vectors: how the device sits on its body.
+
+    Attributes
+    ----------
+    axes : tuple of str
+        Which axis of the device points along X (forward), Y (left) and Z (up) of the body, e.g.
+        ``["x", "-y", "-z"]`` for a device turned upside down about its x axis.
+    roll_deg, pitch_deg, yaw_deg : float
+        Angles (ZYX) of the axes so named in the body, where the device does not sit square.
+    """
+
+    axes: tuple[str, str, str] = ("x", "y", "z")
+    roll_deg: Angle = 0.0
+    pitch_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
+    yaw_deg: Angle = 0.0
+
+    @field_validator("axes")
+    @classmethod
+    def _right_handed(cls, value: tuple[str, str, str]) -> tuple[str, str, str]:
+        letters = [axis.removeprefix("-") for axis in value]
+        if sorted(letters) != ["x", "y", "z"]:
+            raise InputError(
+                "does not name each axis of the device once",
+                value=list(value),
+                limit='x, y and z, each with or without "-"',
+                remedy='e.g. ["x", "-y", "-z"]',
+            )
+        order = ["xyz".index(letter) for letter in letters]
+        swaps = sum(order[i] > order[j] for i in range(3) for j in range(i + 1, 3))
+        minus = sum(axis.startswith("-") for axis in value)
+        if (swaps + minus) % 2:
+            raise InputError(
+                "is left-handed: no device can be mounted so",
+                value=list(value),
+                limit="a rotation: an even number of swaps and minus signs",
+                remedy="reverse one axis; if the device itself has left-handed axes, give one column "
+                "of its file the other sign",
+            )
+        return value
+
+
+class ImuSignalPart(VectorPart):
+    """``[imu]``: the IMU, where it sits, and its data sheet (one of three ways to give it).
+
+    Attributes
+    ----------
+    name, body : str
+        Name of the IMU, and of the body that carries it.
+    position_m : tuple of float
+        As `Recording.mount_position_m`.
+    delay_s : float
+        As `ImuSheet.delay_s`, where the sheet does not say it.
+    grade : str, optional
+        A shipped IMU, or the path of an IMU file.
+    datasheet : ImuFile, optional
+        The same figures here.
+    sheet : ImuSheet, optional
+        In SI, as simrail writes it.
+    """
+
+    name: str = "imu"
+    body: str
+    position_m: tuple[float, float, float]
+    delay_s: float = 0.0
+    grade: str | None = None
+    datasheet: ImuFile | None = None
+    sheet: ImuSheet | None = None
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return IMU_SIGNAL
+
+    @model_validator(mode="after")
+    def _one_sheet(self) -> Self:
+        given = [key for key in ("grade", "datasheet", "sheet") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise InputError(
+                "needs its data sheet, given once",
+                field="grade",
+                value=given or None,
+                limit="one of grade, [imu.datasheet], [imu.sheet]",
+                remedy="e.g. grade = \"lord_3dm_gx4_25\"; 'simrail list' shows all",
+            )
+        return self
+
+
+class EncoderSignalPart(SignalPart):
+    """``[encoder]``: pulses of a wheel, signed: falling while the train runs towards smaller s.
+
+    Attributes
+    ----------
+    sheet : EncoderSheet
+        What the train knows of it.
+    reverse : bool
+        True if the logger counts up while the train runs towards smaller s.
+    radius_relative_sd : float
+        Relative standard deviation of the rolling radius about the sheet's, for the odometry.
+    """
+
+    sheet: EncoderSheet
+    reverse: bool = False
+    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return ENCODER_SIGNAL
+
+    @field_validator("sheet")
+    @classmethod
+    def _counts(cls, value: EncoderSheet) -> EncoderSheet:
+        for field in ("pulses_per_revolution", "wheel_radius_m", "rate_hz"):
+            if getattr(value, field) <= 0:
+                raise InputError("is out of range", field=field, value=getattr(value, field), limit="> 0")
+        if not 0.05 <= value.wheel_radius_m <= 1.5:
+            raise InputError(
+                "is no wheel's",
+                field="wheel_radius_m",
+                value=value.wheel_radius_m,
+                limit="0.05 to 1.5 m",
+                remedy="give the radius in metres",
+            )
+        return value
+
+
+class MagnetometerSignalPart(VectorPart):
+    """``[magnetometer]``: the field at the IMU, and what is known of the Earth's.
+
+    At other times than the IMU's it is interpolated by straight lines.
+
+    Attributes
+    ----------
+    sheet : MagnetometerSheet
+        Its noise, and the Earth's field where the train runs.
+    """
+
+    sheet: MagnetometerSheet
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return MAGNETOMETER_SIGNAL
+
+
+class OdometerPart(SignalPart):
+    """``[odometer]``: the distance or the speed that the train's own odometer gives, instead of pulses.
+
+    Attributes
+    ----------
+    reverse : bool
+        True if the train ran towards smaller s, and the odometer does not say so.
+    resolution_m : float, optional
+        Step of the distance; needed with it.
+    speed_sd_mps : float
+        Standard deviation of a reading of the speed.
+    radius_relative_sd : float
+        Relative standard deviation of its scale.
+    """
+
+    reverse: bool = False
+    resolution_m: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+    speed_sd_mps: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
+    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return ODOMETER_SIGNAL
+
+    @model_validator(mode="after")
+    def _one_quantity(self) -> Self:
+        given = [key for key in ("distance", "speed") if key in self.columns]
+        if len(given) != 1:
+            raise InputError(
+                "needs a column of distance or of speed",
+                field="columns",
+                value=given or None,
+                limit="one of distance, speed",
+                remedy='e.g. columns = { time = "t", speed = "v" }',
+            )
+        if given == ["distance"] and self.resolution_m is None:
+            raise InputError(
+                "is required with a distance",
+                field="resolution_m",
+                remedy="give the odometer's step, e.g. 0.1",
+            )
+        return self
+
+
+class OdometrySignalPart(SignalPart):
+    """``[odometry]``: position, speed and acceleration of the IMU, made elsewhere by `source`.
+
+    At other times than the IMU's they are interpolated by straight lines: that looks ahead by up to one of
+    its intervals.
+    """
+
+    source: str
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return ODOMETRY_SIGNAL
+
+
+class GapsPart(SignalPart):
+    """``[gaps]``: where the IMU's samples had been lost before the file was written."""
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return GAPS_SIGNAL
+
+
+class RideFile(Part):
+    """A ride file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the ride.
+    track : str
+        A shipped track, or the path of a track file.
+    start_position_m : float
+        s of the IMU at its first sample.
+    gravity_mps2 : float
+        Local gravity.
+    longest_gap_s : float
+        Longest gap in a signal that is bridged by a straight line.
+    imu, encoder, magnetometer, odometer, odometry, gaps
+        Its signals. Without an odometry it is made from encoder or odometer.
+    """
+
+    name: str = Field(min_length=1, max_length=200)
+    track: str
+    start_position_m: float
+    gravity_mps2: Annotated[float, Field(ge=9.7, le=9.9)] = 9.81
+    longest_gap_s: Annotated[float, Field(gt=0.0, le=10.0)] = LONGEST_GAP_S
+    imu: ImuSignalPart
+    encoder: EncoderSignalPart | None = None
+    magnetometer: MagnetometerSignalPart | None = None
+    odometer: OdometerPart | None = None
+    odometry: OdometrySignalPart | None = None
+    gaps: GapsPart | None = None
+
+    @model_validator(mode="after")
+    def _knows_where_it_is(self) -> Self:
+        if self.encoder is not None and self.odometer is not None:
+            raise InputError(
+                "says twice how far the train went", field="odometer", remedy="remove [odometer] or [encoder]"
+            )
+        if self.encoder is None and self.odometer is None and self.odometry is None:
+            raise InputError(
+                "a ride needs to know where it is",
+                field="encoder",
+                limit="[encoder], [odometer] or [odometry]",
+                remedy="add the table of the one that was recorded",
+            )
+        return self
