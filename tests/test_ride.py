@@ -14,6 +14,7 @@ from simrail.scenario.files import load
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
+from simrail.track.rail_condition import RailCondition
 from simrail.truth import Mount
 from simrail.truth_files import load_truth, save_truth
 
@@ -70,6 +71,8 @@ def test_simulated_once_then_found(ride, monkeypatch):
         {"engine": "compiled"},
         {"irregularity": Irregularity("erri_b176_high", (3.0, 100.0), 20.0)},
         {"profile": SpeedProfile(30.0, 90.0, 11.0, rest_s=1.0, final_rest_s=0.5)},
+        {"drive": "wheels"},
+        {"conditions": (RailCondition(40.0, 60.0, 0.2),)},
     ],
     ids=lambda change: next(iter(change)),
 )
