@@ -62,7 +62,8 @@ def contact_resonance(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Res
     -----
     Per wheel the vertical stiffness is ``3/2 N0/d`` with d the static approach of Hertz, or the prescribed
     one; the tangential one f11/L0 with L0 the relaxation length, and f11 that of the centred wheelset. Of
-    the wheels' loads the greatest is taken, whose contact is the stiffest. Springs above the axle count for nothing.
+    the wheels' loads the greatest is taken, whose contact is the stiffest. Springs above the axle count
+    for nothing.
     """
     pair = model.wheel_rail
     table = contacts_of(model, gravity_mps2=gravity_mps2).tables[-1]

@@ -255,3 +255,12 @@ def test_wheels_without_traction_are_refused():
     model = replace(axle(), traction=None)
     with pytest.raises(InputError, match="without traction"):
         run(model, START, duration_s=1.0)
+
+
+@pytest.mark.parametrize(("rails", "spins"), [("left", 0), ("right", 1)])
+def test_leaves_on_one_rail_spin_that_rails_wheel(rails, spins):
+    """The wheel on leaves gains metres over the way, the other one centimetres."""
+    ride = run(axle(), START, conditions=(RailCondition(5.0, 190.0, LEAVES, rails),), duration_s=8.0)
+    excess = ride.rolled[-1] - ride.s[-1]
+    assert excess[spins] > 5.0
+    assert abs(excess[1 - spins]) < 0.1
