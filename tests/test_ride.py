@@ -158,7 +158,7 @@ def test_place_in_the_direction_of_travel(ride):
 
 
 def test_wheels_over_leaves_are_late_and_the_truth_knows_where(ride):
-    """The reference point is where the vehicle is, metres behind the profile; the mount's s agrees to 1 mm."""
+    """The reference point is where the vehicle is, metres behind the profile: the mount's s, to 1 mm."""
     late = replace(
         ride,
         engine="compiled",
