@@ -81,7 +81,7 @@ class TabledEntry(Part):
 class CreepEntry(Part):
     """How creep forces saturate: see `simrail.vehicle.creep_laws.CreepLaw`."""
 
-    law: Literal["she", "polach"] = "she"
+    law: Literal["she", "polach", "fastsim"] = "she"
     adhesion: Annotated[float, Field(gt=0, le=1)] = 1.0
     slip: Annotated[float, Field(gt=0, le=1)] = 1.0
     friction_floor: Annotated[float, Field(gt=0, le=1)] = 1.0

@@ -17,6 +17,7 @@ import numpy as np
 from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.contact_geometry import COLUMNS, CONSTANTS, ContactTable, build_contact
 from simrail.vehicle.creep_laws import fallen, saturation
+from simrail.vehicle.fastsim import fastsim
 
 __all__ = [
     "COLUMNS",
@@ -236,14 +237,25 @@ def wheel_force(
 
         x1 = z1 + taud * d1
         x2 = z2 + taud * d2
-        T1 = -f11 * x1
-        T2 = -f22 * x2 - turn
-        M = direction * f23 * x2 - f33 * spin * abs(per_speed)
-        q = np.sqrt(T1 * T1 + T2 * T2) / bound
-        factor = saturation(q, law, adhesion, slipping)
-        T1 *= factor
-        T2 *= factor
-        M *= factor
+        if law == 2.0:
+            a = (((c[10, 0] * x + c[10, 1]) * x + c[10, 2]) * x + c[10, 3]) * root
+            b = (((c[11, 0] * x + c[11, 1]) * x + c[11, 2]) * x + c[11, 3]) * root
+            twist = f23 * spin * abs(per_speed)
+            T1, T2, along, across = fastsim(
+                f11 * x1 / bound, f22 * x2 / bound, turn / bound, twist / bound, b / a
+            )
+            T1 *= bound
+            T2 *= bound
+            M = bound * (direction * a * along - b * across)
+        else:
+            T1 = -f11 * x1
+            T2 = -f22 * x2 - turn
+            M = direction * f23 * x2 - f33 * spin * abs(per_speed)
+            q = np.sqrt(T1 * T1 + T2 * T2) / bound
+            factor = saturation(q, law, adhesion, slipping)
+            T1 *= factor
+            T2 *= factor
+            M *= factor
 
         fy = cd * T2 - side * sd * N
         fz = side * sd * T2 + cd * N

@@ -37,6 +37,8 @@ COLUMNS = (
     "f22",
     "f23",
     "f33",
+    "semi_axis_along",
+    "semi_axis_across",
 )
 """What a patch's table holds, in the order of its columns (see `ContactTable.coef`)."""
 CONSTANTS = (
@@ -87,14 +89,15 @@ class ContactTable:
     ----------
     name : str
         Wheel, rail, inclination and gauge in words.
-    coef : ndarray, shape (2, n, 10, 4)
+    coef : ndarray, shape (2, n, 12, 4)
         Cubic pieces over the shift u (m, wheel outward on its rail): patch (tread, flange), interval,
         column (see `COLUMNS`), power. Value ``((c0 x + c1) x + c2) x + c3`` with x the distance from
         the interval's left end. Penetration P is vertical, at nominal height; roll_rise and spread
         are its first and second derivative in the roll that raises this wheel (the first without the
         tape circle's distance), yaw_rise its second derivative in yaw; abscissa s and depth F are
         those of the contact on the wheel; all in m. f11, f22, f23, f33 are linear creep
-        coefficients, to be multiplied by d, d, d^1.5, d^2 of the normal approach d.
+        coefficients, to be multiplied by d, d, d^1.5, d^2 of the normal approach d; the ellipse's semi-axes
+        (m) go with d^0.5.
     const : ndarray, shape (21,)
         See `CONSTANTS`.
     static_load_n : float
@@ -290,8 +293,8 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
 
 def _creep_factors(
     contact: SoftContact, pair: ContactPair, *, hertz: float, scale: float, modulus: float, poisson: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Kalker's linear creep coefficients per power of the normal approach d.
+) -> tuple[FloatArray, ...]:
+    """Kalker's linear creep coefficients and the ellipse's semi-axes per power of the normal approach d.
 
     The ellipse grows with N^(1/3) = (hertz)^(1/3) d^(1/2), so f11 and f22 go with d, f23 with
     d^1.5, f33 with d^2: the kernel needs no power of the load.
@@ -305,5 +308,7 @@ def _creep_factors(
         poisson_ratio=poisson,
     )
     c11, c22, c23, c33 = kalker_coefficients(ellipse.a / ellipse.b)
-    area = ellipse.a * ellipse.b * np.cbrt(hertz) ** 2
-    return modulus * area * c11, modulus * area * c22, modulus * area**1.5 * c23, modulus * area**2 * c33
+    a, b = ellipse.a * np.cbrt(hertz), ellipse.b * np.cbrt(hertz)
+    area = a * b
+    forces = modulus * area * c11, modulus * area * c22, modulus * area**1.5 * c23, modulus * area**2 * c33
+    return *forces, a, b

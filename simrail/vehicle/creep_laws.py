@@ -1,13 +1,16 @@
-"""How a creep force saturates at the friction limit: Shen-Hedrick-Elkins or Polach, and falling friction.
+"""How a creep force saturates at the friction limit: three laws; and falling friction.
 
-Both laws take Kalker's linear force and say which part of it the contact can give. With q = linear force
+The first two take Kalker's linear force and say which part of it the contact can give. With q = linear force
 over friction limit, the force over the friction limit is
 
     she      q - q^2/3 + q^3/27 for q < 3, then 1        (Shen, Hedrick, Elkins 1983)
     polach   (2/pi) (k_A e/(1 + (k_A e)^2) + arctan(k_S e)),  e = pi q/4      (Polach, Wear 258, 2005)
 
 Their slope at q = 0 is 1, Kalker's, for Polach with k_A = k_S = 1; smaller factors are his reduction for
-contaminated rails and make it (k_A + k_S)/2. Friction falls with the sliding speed w (Polach 2005):
+contaminated rails and make it (k_A + k_S)/2. The third, "fastsim", looks into the contact
+(`simrail.vehicle.fastsim`) and is the one to take where spin matters.
+
+Friction falls with the sliding speed w (Polach 2005):
 
     mu = mu0 ((1 - floor) exp(-decay w) + floor)
 
@@ -24,6 +27,9 @@ import numpy as np
 from simrail.errors import InputError
 from simrail.jit import njit_borrowed
 
+LAWS = ("she", "polach", "fastsim")
+"""Names of the laws; the kernel knows them by their places here."""
+
 
 @dataclass(frozen=True)
 class CreepLaw:
@@ -31,7 +37,7 @@ class CreepLaw:
 
     Attributes
     ----------
-    name : {"she", "polach"}
+    name : {"she", "polach", "fastsim"}
         See the module.
     adhesion, slip : float
         Polach's k_A and k_S, 0 < k_S <= k_A <= 1.
@@ -41,7 +47,7 @@ class CreepLaw:
         How fast it falls, s/m; 0 for constant friction.
     """
 
-    name: Literal["she", "polach"] = "she"
+    name: Literal["she", "polach", "fastsim"] = "she"
     adhesion: float = 1.0
     slip: float = 1.0
     friction_floor: float = 1.0
@@ -55,8 +61,8 @@ class CreepLaw:
         InputError
             For a value out of its range, naming the field.
         """
-        if self.name not in ("she", "polach"):
-            raise InputError("no such creep law", field="creep_law", value=self.name, limit="she or polach")
+        if self.name not in LAWS:
+            raise InputError("no such creep law", field="creep_law", value=self.name, limit=", ".join(LAWS))
         for field, value, low, high in (
             ("adhesion", self.adhesion, 0.0, 1.0),
             ("slip", self.slip, 0.0, self.adhesion),
@@ -68,15 +74,15 @@ class CreepLaw:
             raise InputError(
                 "out of range", field="friction_decay_spm", value=self.friction_decay_spm, limit=">= 0 s/m"
             )
-        polach = self.name == "polach"
         return {
-            "creep_law": float(polach),
+            "creep_law": float(LAWS.index(self.name)),
             "polach_adhesion": self.adhesion,
             "polach_slip": self.slip,
             "friction_floor": self.friction_floor,
             "friction_decay_spm": self.friction_decay_spm,
-            # Polach's force is within 1e-3 of its end there, the cubic law's at it.
-            "windup_onset": 10.0 / self.slip if polach else 3.0,
+            # The cubic law's force is at its end there, Polach's within 1e-3 of it. FASTSIM's is from
+            # 32/(3 pi) on, unless there is spin, which still turns it.
+            "windup_onset": {"she": 3.0, "polach": 10.0 / self.slip, "fastsim": 10.0}[self.name],
         }
 
 

@@ -1,10 +1,11 @@
-"""Time of one call of the contact kernel, creep and both patches included."""
+"""Time of one call of the contact kernel by each creep law, creep and both patches included."""
 
 import numpy as np
 import pytest
 
 from simrail.jit import njit
 from simrail.vehicle.contact import build_contact, wheel_force
+from simrail.vehicle.creep_laws import LAWS, CreepLaw
 from simrail.vehicle.profiles import rail_60e1, s1002
 
 
@@ -20,9 +21,10 @@ def many(coef, const, y, z, zeta, rate, out):
     return total
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("patches, first, last", [("tread", -5e-3, 4.5e-3), ("both", 6.4e-3, 6.7e-3)])
-def test_contact_kernel(benchmark, patches, first, last):
-    contact = build_contact(s1002(), rail_60e1(), static_load_n=53e3)
+def test_contact_kernel(benchmark, patches, first, last, law):
+    contact = build_contact(s1002(), rail_60e1(), static_load_n=53e3, creep_law=CreepLaw(law))
     y = np.random.default_rng(1).uniform(first, last, 20000)
     shift = y + 0.46e-4 - contact.const[0]
     i = (shift * contact.const[1]).astype(int)
@@ -37,4 +39,5 @@ def test_contact_kernel(benchmark, patches, first, last):
     )
     us = benchmark.stats.stats.min / y.size * 1e6
     benchmark.extra_info["us_per_call"] = us
-    assert us < 0.6
+    # FASTSIM looks at 64 points of each patch: a patch that sticks costs some 1 us, one that slides 6.
+    assert us < {"she": 0.6, "polach": 0.6, "fastsim": 20.0}[law]

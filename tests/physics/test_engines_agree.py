@@ -17,6 +17,7 @@ from simrail.track.laid import lay
 from simrail.track.rail_condition import RailCondition
 from simrail.truth import rotation_matrix
 from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.creep_laws import CreepLaw
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
@@ -26,9 +27,21 @@ VEHICLES = sorted(file.stem for file in (Path(scenarios.__file__).parent / "vehi
 
 
 def run(
-    engine, vehicle, track, profile, *, duration_s, rough=ROUGH, step_s=0.5e-3, conditions=(), drive="guide"
+    engine,
+    vehicle,
+    track,
+    profile,
+    *,
+    duration_s,
+    rough=ROUGH,
+    step_s=0.5e-3,
+    conditions=(),
+    drive="guide",
+    law=None,
 ):
     model = load(VehicleFile, "vehicle", vehicle).model(vehicle)
+    if law is not None:
+        model = replace(model, wheel_rail=replace(model.wheel_rail, creep=CreepLaw(law)))
     laid = lay(load(TrackFile, "track", track).design(track), rough, seed=1, conditions=conditions)
     solver = engine(model, laid, profile=profile, settle_s=1.0, step_s=step_s, drive=drive)
     segments = list(solver.run(duration_s, segment_s=3.0))
@@ -120,6 +133,15 @@ def test_a_scale_vehicle_in_its_curve():
     )
     assert rms(exudyn.acceleration) > 0.05
     assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
+
+
+def test_with_fastsim():
+    """1e-6 m/s2 rms into the curve, creep forces by FASTSIM, which is another ride than by the default."""
+    profile, ride = SpeedProfile(180.0, 260.0, 12.0, **BRISK), ("metro_irw_bogie", "smooth_curve")
+    compiled, exudyn = both(*ride, profile, duration_s=5.0, law="fastsim")
+    assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
+    usual = run(CompiledEngine, *ride, profile, duration_s=5.0)
+    assert rms(compiled.acceleration - usual.acceleration) > 1e-4
 
 
 @pytest.mark.slow

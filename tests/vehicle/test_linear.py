@@ -102,7 +102,7 @@ def test_no_crossing_and_one_from_the_start():
 
 
 def suspended(conicity, ky, kpsi):
-    """The shipped suspended wheelset at a stiffness pair and conicity, on a carrier that does not give way.
+    """The shipped suspended wheelset at a stiffness pair and conicity.
 
     Springs at +-a across: ky is their sum, kpsi = ky a^2 by their longitudinal stiffness.
     """
@@ -116,16 +116,10 @@ def suspended(conicity, ky, kpsi):
         )
         for spring in model.suspensions
     )
-    stiff = {
-        name: 100.0 * value
-        for name, value in vars(model.guide).items()
-        if "stiffness" in name and value > 0.0
-    }
     linear = replace(model.wheel_rail.linear, conicity=conicity)
     return replace(
         model,
         suspensions=springs,
-        guide=replace(model.guide, **stiff),
         wheel_rail=replace(model.wheel_rail, linear=linear),
     )
 
