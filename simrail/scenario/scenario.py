@@ -67,6 +67,20 @@ class RidePart(Part):
     stops: tuple[StopPart, ...] = ()
     drive: Listed[Literal["guide", "wheels"]] = "guide"
 
+    @model_validator(mode="after")
+    def _goes_or_stands(self) -> RidePart:
+        if (self.end_m is None) != (self.speed_kmh is None):
+            missing = "end_m" if self.end_m is None else "speed_kmh"
+            raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")
+        if self.end_m is None and self.stops:
+            raise ValueError("a standstill, without end_m, has no stops on the way")
+        return self
+
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle does not move."""
+        return self.end_m is None
+
 
 class RailConditionPart(Part):
     """``[[rail_condition]]``: what lies on the rails, by a name or by its friction coefficient."""
@@ -94,20 +108,6 @@ class RailConditionPart(Part):
         """What lies there, for reports."""
         what = self.condition or f"friction {self.friction:g}"
         return what if self.rails == "both" else f"{what}, {self.rails} rail"
-
-    @model_validator(mode="after")
-    def _goes_or_stands(self) -> RidePart:
-        if (self.end_m is None) != (self.speed_kmh is None):
-            missing = "end_m" if self.end_m is None else "speed_kmh"
-            raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")
-        if self.end_m is None and self.stops:
-            raise ValueError("a standstill, without end_m, has no stops on the way")
-        return self
-
-    @property
-    def stands(self) -> bool:
-        """Whether the vehicle does not move."""
-        return self.end_m is None
 
 
 class ImuPart(Part):
