@@ -114,21 +114,21 @@ class CurveMatchedOdometry:
     smoothed: bool = False
     start_sd_m: float = 0.05
     radius_sd: float = 0.01
-    tread_sd: float = 0.0015
+    tread_sd: float = 0.001
     tread_length_m: float = 40.0
     turn_sd_m: float = 1.0
-    wheel_walk_m: float = 1e-6
+    wheel_walk_m: float = 2e-6
     jerk_m2ps5: float = 0.01
     force_m2ps3: float = 3e-5
     push_sd_mps2: float = 0.05
     push_walk_m2ps5: float = 1e-6
     lag_sd_m: float = 1.0
-    lag_walk_m: float = 1e-5
+    lag_walk_m: float = 1e-6
     lead_sd_m: float = 1.0
-    sway_sd_rad: float = 6e-4
+    sway_sd_rad: float = 5e-4
     sway_length_m: float = 4.0
     heading_sd_rad: float = 2e-4
-    gate: float = 5.0
+    gate: float = 7.0
 
     @property
     def causal(self) -> bool:
@@ -247,7 +247,7 @@ class CurveMatchedOdometry:
                 sheet.gyro_noise_radpsqrts**2 + 1e-12,
                 # Of a Markov process that wanders by its bias instability within some 300 s.
                 2.0 * drift**2 / 300.0 + 1e-16,
-                0.0,
+                sheet.gyro_scale_error / math.sqrt(3.0),
                 self.sway_sd_rad,
                 self.sway_length_m,
                 self.lag_walk_m,

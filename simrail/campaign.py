@@ -25,6 +25,7 @@ from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
 from simrail.example import CellResult
 from simrail.interrupts import Check, interruptible
+from simrail.line_odometry import with_odometry
 from simrail.measure import measure
 from simrail.recording import Recording
 from simrail.ride import is_cached, simulate
@@ -289,19 +290,20 @@ def _run_cell(
 
 def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
     """Measure a cell: its sensors on its ride."""
-    return measure(
+    recording = measure(
         truth,
         name=cell.ride.name,
         mount=mount_of(cell),
         grade=parts.grade(cell),
         encoder=encoder_of(cell),
         magnetometer=magnetometer_of(cell),
-        odometry=cell.spec.odometry,
+        odometry="truth" if cell.spec.odometry == "truth" else "encoder",
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,
         earth_rate=earth_of(cell),
         temperature=temperature_of(cell),
     )
+    return with_odometry(recording, cell.spec.odometry)
 
 
 def _note_not_finite(cell: Cell, name: str, estimate: Estimate, ledger: _Ledger) -> None:

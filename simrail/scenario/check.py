@@ -349,12 +349,12 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
             check_magnetometer(magnetometer)
     encoder = encoder_of(cell)
     if encoder is None:
-        if cell.spec.odometry == "encoder":
+        if cell.spec.odometry != "truth":
             raise InputError(
                 "the odometry needs an encoder",
                 file=scenario.file,
                 field="odometry",
-                value="encoder",
+                value=cell.spec.odometry,
                 remedy='add an [encoder], or set odometry = "truth" for an ablation',
             )
         return

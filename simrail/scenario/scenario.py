@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from simrail.errors import InputError
+from simrail.line_odometry import OdometryName
 from simrail.scenario.axes import Axis, Listed
 from simrail.scenario.files import Part, find, judge, label, parse_toml, read_text
 from simrail.scenario.overrides import override
@@ -179,7 +180,7 @@ class ScenarioFile(Part):
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=1000.0)]] = 1000.0
     track_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     sensor_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
-    odometry: Listed[Literal["encoder", "truth"]] = "encoder"
+    odometry: Listed[OdometryName] = "curve_matched"
     irregularity: IrregularityPart | None = None
     rail_condition: tuple[RailConditionPart, ...] = ()
     ride: Annotated[list[RidePart], Field(min_length=1)]
