@@ -41,7 +41,7 @@ def recordings(scenario):
             mount=mount_of(cell),
             grade=parts.grade(cell),
             encoder=encoder_of(cell),
-            odometry="encoder",
+            odometry="truth" if cell.spec.encoder is None else "encoder",
             seed=cell.sensor_seed,
             draw=cell.sensor_draw,
             earth_rate=earth_of(cell),
