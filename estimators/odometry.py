@@ -28,7 +28,7 @@ metre or two behind. They are found along the way because the train knows where 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
 wheel's way starts anew when both agree on the speed again.
 
-Not here: the loops (`estimators.kernels.odometry`), and odometry from the encoder alone
+Not here: the loops (`estimators.kernels.odometry`, `estimators.kernels.smoothing`), and odometry from the encoder alone
 (`simrail.odometry`).
 """
 
@@ -41,7 +41,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from estimators.kernels.odometry import SCALE, STATES, UPDATES, A, S, V, curve_matched, smooth
+from estimators.kernels.odometry import SCALE, STATES, UPDATES, A, S, V, curve_matched
+from estimators.kernels.smoothing import smooth
 from simrail.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.estimate import Estimate

@@ -1,4 +1,4 @@
-"""Compiled loops of the curve-matched odometry: a Kalman filter along the line, and its smoother.
+"""Compiled loop of the curve-matched odometry: a Kalman filter along the line.
 
 Arrays in, arrays out; nothing here knows of recordings or data frames. What the states are, and how their
 noise is chosen, stands in `estimators.odometry`.
@@ -189,7 +189,8 @@ def curve_matched(
     flags : ndarray (n, 2), output
         1 where the wheel is not believed; 1 where the train stands.
     before, before_covariance, transition : ndarray (n, 13), (n, 13, 13), (n, 13, 13), output
-        Predicted state and covariance, and F of the step, for `smooth`; of no rows where no smoother follows.
+        Predicted state and covariance, and F of the step, for `estimators.kernels.smoothing`;
+        of no rows where no smoother follows.
     rows, gains : ndarray (n, 4, 13), output
         Row of the Jacobian and gain of each scalar update.
     scaled : ndarray (n, 8), output
@@ -286,58 +287,3 @@ def curve_matched(
         states[k], covariance[k] = x, p
         flags[k, 0] = 1.0 if slipping else 0.0
         flags[k, 1] = 1.0 if resting else 0.0
-
-
-@njit
-def smooth(
-    before: FloatArray,
-    before_covariance: FloatArray,
-    transition: FloatArray,
-    rows: FloatArray,
-    gains: FloatArray,
-    scaled: FloatArray,
-    states: FloatArray,
-    covariance: FloatArray,
-) -> None:
-    """Smoothed states and covariances from what the filter kept: modified Bryson-Frazier, no inverse.
-
-    Backwards through each update with row h, gain K, innovation e of variance s, then through F:
-
-        lam <- lam - h (K lam + e/s),   Lam <- (I - h K') Lam (I - K h') + h h'/s
-        x = x^- - P^- lam,              P = P^- - P^- Lam P^-
-        lam <- F' lam,                  Lam <- F' Lam F
-
-    Parameters
-    ----------
-    before ... scaled : ndarray
-        As `curve_matched` wrote them.
-    states, covariance : ndarray (n, 13), (n, 13, 13), output
-        Smoothed.
-    """
-    steps, n = before.shape
-    lam, v = np.zeros(n), np.zeros(n)
-    info = np.zeros((n, n))
-    for k in range(steps - 1, -1, -1):
-        for m in range(UPDATES - 1, -1, -1):
-            inverse = scaled[k, UPDATES + m]
-            if inverse == 0.0:
-                continue
-            h, gain = rows[k, m], gains[k, m]
-            dot = scaled[k, m]
-            square = inverse
-            for i in range(n):
-                dot += gain[i] * lam[i]
-                total = 0.0
-                for j in range(n):
-                    total += info[i, j] * gain[j]
-                v[i] = total
-                square += gain[i] * total
-            for i in range(n):
-                lam[i] -= h[i] * dot
-                for j in range(n):
-                    info[i, j] += h[i] * h[j] * square - h[i] * v[j] - v[i] * h[j]
-        p, f = before_covariance[k], transition[k]
-        states[k] = before[k] - p @ lam
-        covariance[k] = p - p @ info @ p
-        lam = f.T @ lam
-        info = f.T @ info @ f

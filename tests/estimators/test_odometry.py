@@ -21,8 +21,8 @@ from estimators.kernels.odometry import (
     V,
     curve_matched,
     predict,
-    smooth,
 )
+from estimators.kernels.smoothing import smooth
 from estimators.odometry import CurveMatchedOdometry, line_table
 from simrail.columns import GYRO
 from simrail.errors import InputError
