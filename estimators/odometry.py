@@ -28,8 +28,8 @@ metre or two behind. They are found along the way because the train knows where 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
 wheel's way starts anew when both agree on the speed again.
 
-Not here: the loops (`estimators.kernels.odometry`, `estimators.kernels.smoothing`), and odometry from the encoder alone
-(`simrail.odometry`).
+Not here: the loops (`estimators.kernels.odometry`, `estimators.kernels.smoothing`), and odometry from the
+encoder alone (`simrail.odometry`).
 """
 
 from __future__ import annotations
