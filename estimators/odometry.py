@@ -55,6 +55,8 @@ RATE_HZ = 50.0
 
 _PLACES_PER_M = 4.0
 _STILL_S = 0.5
+_STILL_SD = 1e-3
+"""Sd of the speed (m/s) and of the acceleration (m/s2) of a train that is known to stand."""
 
 
 class Trace(NamedTuple):
@@ -155,8 +157,8 @@ class CurveMatchedOdometry:
         columns = [S, V, A]
         found = trace.states[:, columns]
         sd = np.sqrt(np.diagonal(trace.covariance, axis1=1, axis2=2)[:, columns])
-        start = np.zeros((1, 6))
-        start[0, [0, 3]] = recording.start_position_m, self.start_sd_m
+        # Until the filter's first step: standing at the start.
+        start = np.array([[recording.start_position_m, 0.0, 0.0, self.start_sd_m, _STILL_SD, _STILL_SD]])
         found[trace.resting, 1:] = 0.0
         known = np.vstack([start, np.hstack([found, sd])])
         times = np.concatenate([[-np.inf], trace.time_s])
@@ -265,8 +267,8 @@ class CurveMatchedOdometry:
         sd = np.array(
             [
                 self.start_sd_m,
-                1e-3,
-                1e-3,
+                _STILL_SD,
+                _STILL_SD,
                 pulse / math.sqrt(12.0),
                 self.radius_sd,
                 self.tread_sd,

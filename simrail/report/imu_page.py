@@ -56,11 +56,13 @@ def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
 
 
 def allan_figure(grade: ImuGrade, *, seed: int) -> str:
-    """Allan deviation of one simulated hour, each axis, beside the closed form."""
+    """Allan deviation of one simulated hour, each axis, beside the closed form; "" if it shows nothing."""
     whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * HOUR_S * grade.rate_hz, 36)))
     tau: FloatArray = whole / grade.rate_hz
     analytic = grade.allan(tau)
     frame = at_rest(grade, seconds=HOUR_S, seed=seed)
+    if not (frame[list(IMU)].to_numpy() != frame[list(IMU)].iloc[0].to_numpy()).any():
+        return ""
     units = {"gyro": FIGURES["gyro_bias_instability_degph"], "accel": FIGURES["accel_bias_instability_ug"]}
     with look():
         figure, axes = panels([2.6, 2.6])
