@@ -91,7 +91,8 @@ Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Replace the sce
 def run(
     scenario: Scenario,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder of the results; results/<name> if not given.")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder of the results; results/<name> if not given."),
     ] = None,
     seed: Seed = None,
     settings: Settings = None,
@@ -170,7 +171,8 @@ def estimate(
         str, typer.Option("--estimator", metavar="NAME", help="A registered estimator, or FILE.py:CLASS.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Its folder; results/<ride>_<estimator> if not given.")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Its folder; results/<ride>_<estimator> if not given."),
     ] = None,
     form: Form = "csv",
     settings: Annotated[

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from simrail.columns import ACCEL, GYRO, IMU
 from simrail.jit import FloatArray
 from simrail.report.imu_text import device_rows, triad_rows
+from simrail.report.page_file import write_page
 from simrail.report.style import INK, log_ticks, look, panels, to_svg
 from simrail.scenario.imu_file import ImuHead
 from simrail.sensors.allan import overlapping_allan
@@ -40,10 +41,7 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
         triads=triad_rows(grade),
         figure=Markup(allan_figure(grade, seed=seed)),
     )
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{grade.name}.html"
-    path.write_text(text, encoding="utf-8")
-    return path
+    return write_page(folder, grade.name, text)
 
 
 def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:

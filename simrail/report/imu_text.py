@@ -79,7 +79,9 @@ def _words(grade: ImuGrade, key: str) -> str:
 
 def print_imu(console: Console, file: ImuHead, grade: ImuGrade) -> None:
     """Print a grade: title, source, figures, and what was assumed."""
-    console.print(f"[bold]{escape(file.title)}[/bold]  ({grade.name}{', synthetic' if file.synthetic else ''})")
+    console.print(
+        f"[bold]{escape(file.title)}[/bold]  ({grade.name}{', synthetic' if file.synthetic else ''})"
+    )
     # Text of a person may hold brackets, e.g. [earth], which are no markup.
     console.print(f"source: {grade.source}", highlight=False, markup=False)
     for term, words in device_rows(grade):

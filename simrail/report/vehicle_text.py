@@ -58,7 +58,8 @@ def print_study(console: Console, study: VehicleStudy) -> None:
 
     modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held", words=2)
     for mode in listed(study.standstill):
-        modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", mode.words())
+        words = mode.words().replace(" %", "%")  # or a line may begin with the sign
+        modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", words)
     if modes.row_count:
         console.print(modes)
 

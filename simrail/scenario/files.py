@@ -207,7 +207,11 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         key = next(key for key in sign if key in context)
         problem, limit = "is out of range", f"{sign[key]} {context[key]}"
         counted = isinstance(context[key], int)  # a count has no unit
-        remedy = "give a number within the limit" if counted else "mind the unit, which is in the name of the field"
+        remedy = (
+            "give a number within the limit"
+            if counted
+            else "mind the unit, which is in the name of the field"
+        )
     elif kind in _TYPES:
         problem, limit = "has the wrong type", _TYPES[kind]
         remedy = (

@@ -187,7 +187,7 @@ class RunningVehicle:
             step = -inverse @ slope
             largest = np.abs(step[: 6 * self.bodies]).max()
             state = state + step * min(1.0, 1e-3 / max(largest, 1e-12))
-            # Places that hold still are not enough: from a start nearby it is the wheels that find their spin.
+            # Places that hold still are not enough: from a start nearby it is the spins that are found.
             balanced = np.abs(slope[6 * self.bodies : 12 * self.bodies]).max() < _BALANCED_MPS2 / fine
             still = largest < 1e-11 * fine or (largest < 1e-9 * fine and largest > 0.5 * before)
             if still and balanced:
