@@ -192,8 +192,8 @@ def test_slip_is_detected_and_bridged(creepage):
 
 
 def test_wheels_that_spin_and_slide_on_leaves():
-    """Traction through the encoder's own wheel, its axle pitched by the motor: below 2 m where the wheel makes
-    up to 11 m, and within what the odometry claims."""
+    """Traction through the encoder's own wheel, its axle pitched by the motor: at most 3 m off, and within
+    what the odometry claims."""
     scenario = load_scenario("leaves", overrides=["odometry='curve_matched'", "imu.grade='lord_3dm_gx4_25'"])
     parts, cell = Parts(scenario), next(cells(scenario))
     truth = simulate(parts.ride(cell))
@@ -205,9 +205,8 @@ def test_wheels_that_spin_and_slide_on_leaves():
     slipping = CurveMatchedOdometry().trace(recording)
     sheet = recording.encoder_sheet
     way = recording.encoder["pulse_count"] * 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
-    wheel = np.interp(recording.imu.index, way.index, way) - (
-        motion["position_m"] - motion["position_m"].iloc[0]
-    )
+    run = motion["position_m"] - motion["position_m"].iloc[0]
+    wheel = np.interp(recording.imu.index, way.index, way) - run
     assert np.max(np.abs(wheel)) > 5.0
     assert 6.0 < 0.02 * np.sum(slipping.slipping) < 14.0
 
