@@ -17,7 +17,7 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pandas as pd
 
-from simrail.columns import COLUMNS, INNOVATION
+from simrail.columns import COLUMNS, INNOVATION, IRREGULARITY, IRREGULARITY_SD
 from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
 from simrail.rest import at_rest_initially, rest_periods
@@ -150,8 +150,20 @@ def require_well_formed(estimate: Estimate, recording: Recording) -> None:
     if estimate.covariance is not None:
         _require_covariance(estimate, len(index))
     if estimate.geometry is not None:
-        assert estimate.geometry.index.name == "position_m", "geometry is not indexed by position_m"
-        assert np.isfinite(estimate.geometry.to_numpy(dtype=np.float64)).all(), "geometry is not finite"
+        _require_geometry(estimate.geometry)
+
+
+def _require_geometry(geometry: pd.DataFrame) -> None:
+    assert geometry.index.name == "position_m", "geometry is not indexed by position_m"
+    missing = [name for name in IRREGULARITY if name not in geometry]
+    assert not missing, f"geometry lacks {', '.join(missing)} (NaN throughout says: not observable)"
+    unknown = [str(name) for name in geometry if name not in (*IRREGULARITY, *IRREGULARITY_SD)]
+    assert not unknown, f"geometry has other columns than irregularities: {', '.join(unknown)}"
+    step = np.diff(geometry.index.to_numpy(dtype=np.float64))
+    assert len(step) == 0 or (step[0] > 0.0 and np.ptp(step) < 1e-6 * step[0]), "geometry is not uniform"
+    for name in geometry:
+        known = np.isfinite(geometry[name].to_numpy(dtype=np.float64))
+        assert known.all() or not known.any(), f"geometry is not finite in {name}, here and there"
 
 
 def _require_covariance(estimate: Estimate, n: int) -> None:

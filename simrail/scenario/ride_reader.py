@@ -30,6 +30,7 @@ from simrail.resample import (
     resample,
     uniform_times,
 )
+from simrail.rotation import rotation_matrix
 from simrail.scenario.data_file import column_names, line_of, read_columns
 from simrail.scenario.files import blame, judge, label, load, read_toml
 from simrail.scenario.imu_file import load_grade
@@ -44,7 +45,6 @@ from simrail.scenario.ride_file import (
 from simrail.scenario.track_file import TrackFile
 from simrail.sheets import imu_sheet
 from simrail.signals import TIMES, Quantity
-from simrail.truth import rotation_matrix
 
 RIDE_FILE = "ride.toml"
 """Name of the ride file in a folder that simrail wrote."""

@@ -18,13 +18,14 @@ from simrail.errors import InputError
 from simrail.odometry import speed_odometry
 from simrail.profile import SpeedProfile
 from simrail.recording import Recording
+from simrail.rotation import rotation_matrix
 from simrail.scenario.files import judge, parse_toml
 from simrail.scenario.ride_file import ImuSignalPart
 from simrail.scenario.ride_reader import _Reader, read_ride
 from simrail.scenario.track_file import track_by_name
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
 from simrail.signals import FORCES, LENGTHS, RATES, SPEEDS, TIMES
-from simrail.truth import Mount, Truth, rotation_matrix
+from simrail.truth import Mount, Truth
 from simrail.vehicle.kinematic_engine import kinematic_truth
 
 MOUNT = Mount("axle", "body", (0.0, 0.0, 0.6))
