@@ -1,10 +1,10 @@
 """What the rails look like, from the trajectory of a body: the four irregularities over the track.
 
-With a sensor that sees the rails from the body, each rail is where the body is plus what the sensor sees
-(EQUATIONS section 3; FACTS of the track-geometry measuring systems of Escalona et al. and of paper 001).
-Without one the body itself is the probe: its points that nominally stand on the rails are taken for the rails.
-For a sensor on a wheelset that is what a contact would keep true, with the wheelset's own play left in; for one
-on a bogie or a body the motion of the suspensions stays in as well. Gauge is then not observable.
+With a sensor that sees the rails from the body, each rail is where the body is plus what the sensor sees: the
+measuring system of Gonzalez-Carbajal et al. 2023 (paper 001), whose camera is numbers here. Without one the
+body itself is the probe: its points that nominally stand on the rails are taken for the rails. For an IMU on
+a wheelset the contact keeps that true but for the wheelset's own play between the rails; for one on a bogie
+or a body the motion of the suspensions stays in as well. Gauge is then not observable.
 
 It has no filter of its own: the trajectory is smoothed before, and wavelength bands are cut out after
 (`simrail.bands`).
@@ -188,7 +188,7 @@ class OverSpace(NamedTuple):
         Whole multiples of the step.
     values : ndarray (g, m)
     variance : ndarray (g, m), optional
-        That of the samples there: errors of a trajectory hardly change over a step, so no mean makes them less.
+        That of the samples there: errors of a trajectory hardly change over a step, no mean lessens them.
     noise_gain : ndarray (g,)
         Variance that is left of white noise of variance 1 in the samples.
     """

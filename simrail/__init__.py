@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from simrail.scenario.ride_writer import write_ride
     from simrail.scenario.scenario import Scenario, load_scenario
     from simrail.score import score, score_odometry
+    from simrail.score_geometry import score_geometry
     from simrail.sensors.encoder import EncoderSpec
     from simrail.sensors.grades import ImuGrade
     from simrail.sensors.magnetometer import MagnetometerSpec
@@ -96,6 +97,7 @@ _HOMES = {
     "scenario.ride_writer": ("write_ride",),
     "scenario.scenario": ("Scenario", "load_scenario"),
     "score": ("score", "score_odometry"),
+    "score_geometry": ("score_geometry",),
     "sensors.encoder": ("EncoderSpec",),
     "sensors.grades": ("ImuGrade",),
     "sensors.magnetometer": ("MagnetometerSpec",),
@@ -136,6 +138,7 @@ __all__ = [
     "read_ride",
     "run",
     "score",
+    "score_geometry",
     "score_odometry",
     "simulate",
     "with_odometry",

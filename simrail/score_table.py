@@ -245,7 +245,7 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
 
 def _categorical(name: str, column: pd.Series, bands: Sequence[str]) -> pd.Series:
     words = [str(word) for word in column.unique()]
-    known = (*_CLOSED.get(name, ()), *(bands if name == "band" else ()))
+    known = tuple(dict.fromkeys((*_CLOSED.get(name, ()), *(bands if name == "band" else ()))))
     extra = sorted(word for word in words if word not in known)
     is_open = name in LABEL_COLUMNS or name == "status"
     if not is_open:
