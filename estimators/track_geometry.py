@@ -31,7 +31,10 @@ GAUGE = IRREGULARITY.index("gauge_m")
 FINE = 8
 """Cells per step in which samples are averaged before the step's own low-pass."""
 
-_LOW_PASS = signal.firwin(20 * FINE + 1, 1.0 / FINE, window=("kaiser", 5.0))
+_REACH = 10
+"""Steps that the low-pass sees on either side."""
+
+_LOW_PASS = signal.firwin(2 * _REACH * FINE + 1, 1.0 / FINE, window=("kaiser", 5.0))
 """Passes waves longer than 2.5 steps to 0.2 % and stops those shorter than 1.7 to 1 %."""
 
 OUTLIER_SDS = 5.0
@@ -205,8 +208,8 @@ def over_space(
     """Bring samples (n, m) taken at places (n,), in any order, to uniform places.
 
     They are averaged in cells of an eighth of the step, a cubic spline joins the means at the mean places,
-    and a symmetric low-pass thins the spline out to the step. Over the ten steps at each end the low-pass
-    sees the line turned about its end point.
+    and a symmetric low-pass thins the spline out to the step. Over the ten steps at each end it sees the line
+    turned about its end point.
     """
     first, last = (np.ceil(place.min() / step_m - 1e-9), np.floor(place.max() / step_m + 1e-9))
     if last - first < 1:
@@ -227,11 +230,19 @@ def over_space(
     position = np.arange(first, last + 1) * step_m
     fine = first * step_m + cell_m * np.arange((len(position) - 1) * FINE + 1)
     line = CubicSpline(at, mean(values))(np.clip(fine, at[0], at[-1]))
-    line = signal.resample_poly(line, 1, FINE, axis=0, window=_LOW_PASS, padtype="antireflect")
+    line = _thinned(line, _LOW_PASS, odd=True)
     density = count * cell_m / np.gradient(at)  # samples per cell; below one where the train is fast
-    spread = np.interp(fine, at, 1.0 / density)
-    gain = signal.resample_poly(spread, 1, FINE, window=_LOW_PASS**2, padtype="edge")
+    spread = np.interp(fine, at, 1.0 / density)[:, None]
+    gain = _thinned(spread, _LOW_PASS**2, odd=False)[:, 0]
     if variance is not None:
         means = mean(variance)
         variance = np.stack([np.interp(position, at, column) for column in means.T], axis=-1)
     return OverSpace(position, line, variance, np.minimum(gain, 1.0))
+
+
+def _thinned(line: FloatArray, taps: FloatArray, *, odd: bool) -> FloatArray:
+    """Low-pass a line (n, m) and keep every `FINE`-th sample; beyond its ends it is turned or mirrored."""
+    beyond = ((_REACH * FINE, _REACH * FINE), (0, 0))
+    longer = np.pad(line, beyond, mode="reflect", reflect_type="odd" if odd else "even")
+    passed: FloatArray = signal.upfirdn(taps, longer, up=1, down=FINE, axis=0)
+    return passed[2 * _REACH : 2 * _REACH + (len(line) - 1) // FINE + 1]

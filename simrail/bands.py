@@ -22,6 +22,8 @@ ORDER = 4
 SAMPLES_PER_WAVE = 2.5
 """Samples that the shortest wave of a band needs."""
 
+TOO_SHORT, TOO_COARSE = "line too short for the band", "step too coarse for the band"
+
 
 @dataclass(frozen=True)
 class Band:
@@ -86,13 +88,15 @@ def margin_m(edges_m: tuple[float, float]) -> float:
 
 
 def why_not(edges_m: tuple[float, float], *, count: int, step_m: float) -> str:
-    """Why a line of `count` samples has nothing in a band; empty if it has."""
-    if step_m * SAMPLES_PER_WAVE > edges_m[0]:
-        return f"step of {step_m:g} m too coarse for waves of {edges_m[0]:g} m"
-    length, needed = (count - 1) * step_m, 2.0 * margin_m(edges_m) + edges_m[1]
-    if length < needed:
-        return f"line of {max(length, 0.0):.4g} m too short for waves of {edges_m[1]:g} m: needs {needed:g} m"
-    return ""
+    """Why a line of `count` samples has nothing in a band: `TOO_SHORT` or `TOO_COARSE`; empty if it has."""
+    if (count - 1) * step_m < _shortest_line_m(edges_m):
+        return TOO_SHORT
+    return TOO_COARSE if step_m * SAMPLES_PER_WAVE > edges_m[0] else ""
+
+
+def _shortest_line_m(edges_m: tuple[float, float]) -> float:
+    """Both margins, and one longest wave between them."""
+    return 2.0 * margin_m(edges_m) + edges_m[1]
 
 
 def band_pass(values: FloatArray, edges_m: tuple[float, float], *, step_m: float) -> FloatArray:
@@ -123,7 +127,13 @@ def band_pass(values: FloatArray, edges_m: tuple[float, float], *, step_m: float
     """
     reason = why_not(edges_m, count=len(values), step_m=step_m)
     if reason:
-        raise InputError("cannot be cut out", field="band", value=edges_m, limit=reason)
+        shortest, coarsest = _shortest_line_m(edges_m), edges_m[0] / SAMPLES_PER_WAVE
+        raise InputError(
+            reason,
+            field="band",
+            value=f"{edges_m[0]:g} to {edges_m[1]:g} m on {len(values)} places, {step_m:g} m apart",
+            limit=f"a line of {shortest:g} m and more, a step of {coarsest:g} m and less",
+        )
     pad = min(len(values) - 1, round(3.0 * edges_m[1] / step_m))
     passed: FloatArray = signal.sosfiltfilt(_sections(edges_m, step_m), values, padtype="odd", padlen=pad)
     crop = int(np.ceil(margin_m(edges_m) / step_m - 1e-9))

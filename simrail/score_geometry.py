@@ -23,13 +23,11 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.score_metrics import Row, Series, figures
+from simrail.score_table import NO_TWIST, UNOBSERVABLE
 from simrail.score_windows import chosen_windows, kept_metrics, table_of, windows_of
 
 TWIST_BASE_M = 3.0
 """Base of the twist, unless a scenario says otherwise."""
-
-UNOBSERVABLE = "not observable by this method"
-"""Status of an irregularity that an estimate leaves open: its column is NaN throughout."""
 
 _NO_PLACE_METRICS = ("final", "nis", "us_per_sample")
 
@@ -73,7 +71,7 @@ def score_geometry(
     -------
     pandas.DataFrame
         Columns `simrail.score_table.FIGURE_COLUMNS`: alignment, vertical_profile, cross_level, gauge and
-        twist, in mm. What is not observable, or too short for a band, is a row whose status says so.
+        twist, in mm. For what is not observable, or has nothing in a band, one row says why.
 
     Raises
     ------
@@ -95,7 +93,8 @@ def score_geometry(
         band.check()
     rows: list[Row] = []
     for series, counts in _series(geometry, rails.irregularities(position), step, bands, twist_base_m):
-        inside = {name: at[counts[at]] for name, at in chosen.items()}
+        told = list(chosen)[:1] if series.reason else chosen  # a reason is told once
+        inside = {name: chosen[name][counts[chosen[name]]] for name in told}
         rows += figures(series, inside, keep)
     return table_of(rows, bands=[band.name for band in bands])
 
@@ -128,7 +127,7 @@ def _series(
         sd_name = f"{quantity}_sd_m"
         sd = 1e3 * geometry[sd_name].to_numpy(dtype=np.float64) if sd_name in geometry else None
         yield Series(quantity, "truth", error, sd, unknown), everywhere
-        in_bands = [(band.name, *_filtered(error, band, quantity, step_m, unknown)) for band in bands]
+        in_bands = [(band.name, *_filtered(error, band, quantity, step_m)) for band in bands if not unknown]
         for band_name, filtered, reason in in_bands:
             yield Series(quantity, "truth", filtered, None, reason, band_name), _counts(filtered, reason)
         if quantity != "cross_level":
@@ -138,11 +137,10 @@ def _series(
             yield Series("twist", "truth", turned, None, why, band_name), _counts(turned, why)
 
 
-def _filtered(
-    error: FloatArray, band: Band, quantity: str, step_m: float, reason: str
-) -> tuple[FloatArray, str]:
+def _filtered(error: FloatArray, band: Band, quantity: str, step_m: float) -> tuple[FloatArray, str]:
+    """Error in a band, and the reason if it has none."""
     edges = band.edges_m(quantity)
-    reason = reason or why_not(edges, count=len(error), step_m=step_m)
+    reason = why_not(edges, count=len(error), step_m=step_m)
     if reason or not np.isfinite(error).all():
         return error, reason
     return band_pass(error, edges, step_m=step_m), ""
@@ -153,8 +151,8 @@ def _twisted(levels: FloatArray, base_m: float, step_m: float, reason: str) -> t
         return levels, reason
     try:
         return twist(levels, base_m=base_m, step_m=step_m), ""
-    except InputError as error:
-        return levels, f"base of {base_m:g} m {error.problem}"
+    except InputError:
+        return levels, NO_TWIST
 
 
 def _counts(values: FloatArray, reason: str) -> np.ndarray:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import is_dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -84,13 +85,14 @@ def leaves_the_recording_alone(estimator: Estimator, recording: Recording) -> No
     """No signal, no odometry, no piece of knowledge is changed."""
     own = copy.deepcopy(recording)
     estimator.estimate(own)
-    for field in ("imu", "odometry", "encoder", "magnetometer"):
+    for field in ("imu", "odometry", "encoder", "magnetometer", "rail_displacement"):
         before, after = getattr(recording, field), getattr(own, field)
         assert before is None or (before.equals(after) and list(before) == list(after)), f"changed {field}"
     for field in (
         "imu_sheet",
         "encoder_sheet",
         "magnetometer_sheet",
+        "rail_sensor_sheet",
         "track",
         "mount_position_m",
         "start_position_m",
@@ -225,8 +227,14 @@ def prefix(recording: Recording, n: int) -> Recording:
         imu=recording.imu.iloc[:n].copy(),
         odometry=recording.odometry.iloc[:n].copy(),
         encoder=None if encoder is None else encoder.loc[: recording.imu.index[n - 1]].copy(),
-        magnetometer=None if recording.magnetometer is None else recording.magnetometer.iloc[:n].copy(),
+        **_beside_imu(recording, lambda frame: frame.iloc[:n].copy()),
     )
+
+
+def _beside_imu(recording: Recording, change: Callable[[pd.DataFrame], pd.DataFrame]) -> dict[str, Any]:
+    """The other signals that are sampled at the IMU's times, changed; those that there are."""
+    frames = {name: getattr(recording, name) for name in ("magnetometer", "rail_displacement")}
+    return {name: change(frame) for name, frame in frames.items() if frame is not None}
 
 
 def first_samples(estimate: Estimate, n: int) -> Estimate:
@@ -257,7 +265,7 @@ def time_reversed(recording: Recording) -> Recording:
         imu=imu,
         odometry=odometry,
         encoder=encoder,
-        magnetometer=None if recording.magnetometer is None else _turned(recording.magnetometer, negate=""),
+        **_beside_imu(recording, lambda frame: _turned(frame, negate="")),
         start_position_m=float(odometry["position_m"].iloc[0]),
     )
 
@@ -286,5 +294,5 @@ def standing(recording: Recording) -> Recording:
         imu=held(recording.imu),
         odometry=odometry,
         encoder=None if recording.encoder is None else held(recording.encoder),
-        magnetometer=None if recording.magnetometer is None else held(recording.magnetometer),
+        **_beside_imu(recording, held),
     )

@@ -23,6 +23,7 @@ from simrail.scenario.build import (
     irregularity_of,
     magnetometer_of,
     profile_of,
+    rail_sensor_of,
 )
 from simrail.scenario.cells import Cell, cells, count, methods
 from simrail.scenario.check_wheels import judge_wheels
@@ -32,6 +33,7 @@ from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
 from simrail.sensors.encoder import check_encoder
 from simrail.sensors.magnetometer import check_magnetometer
+from simrail.sensors.rail_sensor import check_rail_sensor
 from simrail.track.design import TrackDesign
 from simrail.track.laid import lay
 from simrail.vehicle.model import VehicleModel
@@ -115,7 +117,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
             cell.spec.vehicle,
             cell.spec.engine,
             repr(cell.imu),
-            *map(repr, (cell.spec.encoder, cell.spec.magnetometer)),
+            *map(repr, (cell.spec.encoder, cell.spec.magnetometer, cell.spec.rail_sensor)),
         )
         if (*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)) not in judged_rides:
             judged_rides.add((*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)))
@@ -347,6 +349,10 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     if magnetometer is not None:
         with blame(scenario.file, "magnetometer"):
             check_magnetometer(magnetometer)
+    rail_sensor = rail_sensor_of(cell)
+    if rail_sensor is not None:
+        with blame(scenario.file, "rail_sensor"):
+            check_rail_sensor(rail_sensor)
     encoder = encoder_of(cell)
     if encoder is None:
         if cell.spec.odometry != "truth":
