@@ -1,4 +1,4 @@
-"""Indicators of track quality in the manner of EN 13848-5: standard deviations and isolated defects per section.
+"""Indicators of track quality in the manner of EN 13848-5: standard deviation and isolated defects.
 
 They are computed alike from estimated and from true geometry. Limits are the caller's: no limit is built in,
 since the standard's own were not at hand.

@@ -46,7 +46,7 @@ def test_isolated_defects_are_counted_once_each_and_placed():
 
 
 def test_band_and_twist_and_what_is_not_known():
-    levels = 2e-3 * np.sin(2 * np.pi * S / 12.0)
+    levels = 2e-3 * np.sin(2 * np.pi * S / 10.0)
     long_wave = levels + 20e-3 * np.sin(2 * np.pi * S / 200.0)
     frame = geometry(cross_level_m=long_wave, gauge_m=np.full(len(S), np.nan))
     found = section_indicators(frame, band=BANDS["D1"], twist_base_m=3.0)
@@ -54,7 +54,7 @@ def test_band_and_twist_and_what_is_not_known():
     middle = found[found["start_m"] == 400.0].set_index("quantity")
     assert middle.loc["cross_level", "sd_m"] == pytest.approx(2e-3 / np.sqrt(2.0), rel=0.01)
     # A sine of wavelength L has the twist 2 sin(pi base / L) times its amplitude.
-    short, long = 2e-3 * 2 * np.sin(np.pi * 3 / 12), 20e-3 * 2 * np.sin(np.pi * 3 / 200)
+    short, long = 2e-3 * 2 * np.sin(np.pi * 3 / 10), 20e-3 * 2 * np.sin(np.pi * 3 / 200)
     assert middle.loc["twist", "sd_m"] == pytest.approx(np.hypot(short, long) / np.sqrt(2.0), rel=0.01)
 
 
