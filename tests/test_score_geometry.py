@@ -6,14 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from estimators.track_geometry import track_geometry
 from simrail import bands as band_module
 from simrail.bands import BANDS, TOO_SHORT, Band
 from simrail.campaign import run_campaign
-from simrail.columns import IRREGULARITY, ODOMETRY, ODOMETRY_SD
+from simrail.columns import ATTITUDE, IRREGULARITY, ODOMETRY, ODOMETRY_SD, RELATIVE_POSITION
 from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.recording import ImuSheet, Recording
-from simrail.ride import rails_of
+from simrail.ride import rails_of, simulate
 from simrail.scenario.build import Parts, bands_of
 from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
@@ -23,6 +24,7 @@ from simrail.score_table import FIGURE_COLUMNS, NO_TWIST, OK, UNOBSERVABLE, aggr
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
+from simrail.truth import Mount
 
 LINE = TrackDesign(
     "line",
@@ -236,3 +238,19 @@ def test_rails_are_laid_once_and_are_those_of_the_ride(scenario):
     first = parts.rails(cell)
     assert parts.rails(cell) is first
     np.testing.assert_array_equal(first.table, rails_of(parts.ride(cell)).table)
+
+
+def test_a_kinematic_ride_of_a_vehicle_gives_its_rails_back(scenario):
+    """Every body leans over the middle of the rails, at whatever height it has its centre of gravity."""
+    parts, cell = Parts(scenario), next(iter(cells(scenario)))
+    truth = simulate(parts.ride(cell))
+    mount = Mount("axle", "front", (0.0, 0.0, 0.6))
+    motion = truth.motion(mount).iloc[::4]
+    odometry = motion[list(ODOMETRY)].assign(**dict.fromkeys(ODOMETRY_SD, 0.0))
+    recording = replace(RECORDING, track=truth.track, imu=motion, odometry=odometry)
+    known = Estimate(motion[[*ATTITUDE, *RELATIVE_POSITION]], "axle")
+    known = replace(known, geometry=track_geometry(known, recording))
+    rows = score_geometry(known, parts.rails(cell), recording, bands=[BANDS["D1"]], windows=["whole"])
+    worst = rows[(rows["metric"] == "max") & (rows["status"] == OK)]
+    assert set(worst["quantity"]) == {"alignment", "vertical_profile", "cross_level", "twist"}
+    assert worst["value"].max() < 0.05
