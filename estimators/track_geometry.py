@@ -193,7 +193,8 @@ class OverSpace(NamedTuple):
     variance : ndarray (g, m), optional
         That of the samples there: errors of a trajectory hardly change over a step, no mean lessens them.
     noise_gain : ndarray (g,)
-        Variance that is left of white noise of variance 1 in the samples.
+        Variance that is left of white noise of variance 1 in the samples; too small over the last few
+        steps at each end, unless the train stood there.
     """
 
     position_m: FloatArray

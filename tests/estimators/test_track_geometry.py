@@ -243,10 +243,10 @@ def test_a_fast_train_is_interpolated_without_loss():
 
 def test_jitter_about_the_border_of_two_cells_makes_no_spike():
     rng = np.random.default_rng(5)
-    there = np.linspace(0.0, 20.0, 2000)
-    place = np.concatenate([there[:1000], 10.0 + 1e-9 * rng.standard_normal(4000), there[1000:]])
+    there = np.arange(0.05, 20.0, 0.1)
+    place = np.concatenate([there[:100], 10.0 + 1e-7 * rng.standard_normal(4000), there[100:]])
     values = rng.standard_normal((len(place), 1))
-    assert np.abs(over_space(place, values, step_m=0.25).values).max() < 2.0
+    assert np.abs(over_space(place, values, step_m=0.25).values).max() < 5.0
 
 
 def test_a_train_that_stands_says_nothing_of_the_rails():
