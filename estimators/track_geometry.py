@@ -92,7 +92,8 @@ def track_geometry(
     states = estimate.states
     require(states, (*ATTITUDE, *RELATIVE_POSITION), what="states")
     sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
-    base = rail_base_m or (RAIL_BASE_M if sheet is None else sheet.rail_base_m)
+    known_base = RAIL_BASE_M if sheet is None else sheet.rail_base_m
+    base = known_base if rail_base_m is None else rail_base_m
     for name, value in (("step_m", step_m), ("rail_base_m", base)):
         if not 0.0 < value < np.inf:
             raise InputError("is out of range", field=name, value=value, limit="> 0 m")

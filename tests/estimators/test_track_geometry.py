@@ -265,7 +265,7 @@ def test_bad_input_is_named():
     with pytest.raises(InputError, match="step_m"):
         track_geometry(estimate, recording, step_m=0.0)
     with pytest.raises(InputError, match="rail_base_m"):
-        track_geometry(estimate, recording, rail_base_m=-1.5)
+        track_geometry(estimate, recording, rail_base_m=0.0)
     with pytest.raises(InputError, match="not finite"):
         track_geometry(replace(estimate, states=estimate.states.assign(roll_rad=np.nan)), recording)
     with pytest.raises(InputError, match="not at the recording's times"):
