@@ -38,6 +38,9 @@ from simrail.truth import Mount
 STANDSTILL_MPS = 0.01
 """Below this true speed the vehicle counts as standing."""
 
+CROP_S = 2.0
+"""What the window ``cropped`` leaves out at either end, as Briales et al. 2021 (section 7.1) do."""
+
 
 class HasMotion(Protocol):
     """A truth: anything that gives the motion of a mount."""
@@ -114,7 +117,8 @@ def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Refer
     position = motion["position_m"].to_numpy()
     frame = recording.track.frame(position)
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
-    return Reference(motion, design, _windows(recording, position, motion["speed_mps"].to_numpy()))
+    speed = motion["speed_mps"].to_numpy()
+    return Reference(motion, design, _windows(recording, position=position, speed=speed))
 
 
 def score(
@@ -242,11 +246,13 @@ def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[Series
             yield Series("distance_relative", "truth", (error - error[0]) / max(run, 1.0), None, reason)
 
 
-def _windows(recording: Recording, position: FloatArray, speed: FloatArray) -> dict[str, IntArray]:
+def _windows(recording: Recording, *, position: FloatArray, speed: FloatArray) -> dict[str, IntArray]:
+    time = recording.imu.index.to_numpy(dtype=np.float64)
     moving = np.abs(speed) >= STANDSTILL_MPS
     kind = recording.track.kind(position)
     masks = {
         "whole": np.ones(len(position), dtype=bool),
+        "cropped": (time >= time[0] + CROP_S) & (time <= time[-1] - CROP_S),
         "straight": moving & (kind == STRAIGHT),
         "transition": moving & (kind == TRANSITION),
         "curve": moving & (kind == CURVE),

@@ -72,7 +72,7 @@ METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us
 
 BANDS = ("full", "D0", "D1", "D2", "D3")
 REFERENCES = ("truth", "design")
-WINDOWS = ("whole", "straight", "transition", "curve", "standstill", "moving")
+WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 OK = "ok"
 NO_SAMPLES = "no samples"

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimators.ahrs import Vqf
+from estimators.ahrs import Imufusion, Vqf
 from estimators.attitude_ekf import AttitudeEkf
 from estimators.attitude_gda import AttitudeGda
 from estimators.baselines import DesignAngles
@@ -58,6 +58,8 @@ OURS = [
     DesignAngles(),
     Vqf(),
     Vqf(compensated=True),
+    Imufusion(),
+    Imufusion(compensated=True, rest_bias=False),
 ]
 
 
@@ -66,7 +68,9 @@ def test_ours_pass(estimator: Estimator) -> None:
     check_estimator(estimator, ride())
 
 
-@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda(), Vqf()], ids=["ekf", "gda", "vqf"])
+@pytest.mark.parametrize(
+    "estimator", [AttitudeEkf(), AttitudeGda(), Vqf(), Imufusion()], ids=["ekf", "gda", "vqf", "imufusion"]
+)
 def test_ours_pass_backwards_and_with_a_perfect_imu(estimator: Estimator) -> None:
     check_estimator(estimator, ride(-1, "ideal"))
 
