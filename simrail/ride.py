@@ -21,9 +21,11 @@ from simrail.profile import SpeedProfile
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.truth import Truth
-from simrail.truth_files import create_arrays, load_truth, save_truth, write_header
+from simrail.track.rail_condition import RailCondition
+from simrail.truth import Truth, abeam
+from simrail.truth_files import create_arrays, let_go, load_truth, save_truth, write_header
 from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.engine import Segment
 from simrail.vehicle.kinematic_engine import kinematic_truth, rail_following
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.profile_files import profiles_digest
@@ -63,6 +65,10 @@ class Ride:
         Output rate.
     gravity_mps2 : float
         Gravity.
+    drive : {"guide", "wheels"}
+        Whether the guide pulls the vehicle along, or its wheels drive and brake it.
+    conditions : tuple of RailCondition
+        What lies on the rails.
     """
 
     name: str
@@ -75,6 +81,8 @@ class Ride:
     step_s: float = 0.5e-3
     rate_hz: float = 1000.0
     gravity_mps2: float = 9.81
+    drive: Literal["guide", "wheels"] = "guide"
+    conditions: tuple[RailCondition, ...] = ()
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this ride from every other, versions and sources included."""
@@ -90,6 +98,8 @@ class Ride:
             "step_s": self.step_s,
             "rate_hz": self.rate_hz,
             "gravity_mps2": self.gravity_mps2,
+            "drive": self.drive,
+            "conditions": [asdict(condition) for condition in self.conditions],
             "versions": {package: version(package) for package in packages},
             "sources": ride_cache.source_hash(*_SOURCES),
         }
@@ -181,7 +191,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     model, profile = ride.vehicle, ride.profile
     duration = np.floor(profile.duration_s * ride.rate_hz) / ride.rate_hz
     rows = round(duration * ride.rate_hz) + 1
-    laid = lay(ride.track, ride.irregularity, seed=ride.track_seed)
+    laid = lay(ride.track, ride.irregularity, seed=ride.track_seed, conditions=ride.conditions)
     engine = _engine_of(ride.engine)(
         model,
         laid,
@@ -189,11 +199,12 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         step_s=ride.step_s,
         rate_hz=ride.rate_hz,
         gravity_mps2=ride.gravity_mps2,
+        drive=ride.drive,
     )
     bodies, wheels = len(model.bodies), len(model.wheels)
     arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4)
-    arrays["time_s"][:] = np.arange(rows) / ride.rate_hz
-    arrays["reference_position_m"][:] = profile.motion(arrays["time_s"])[0]
+    at = arrays["reference_position_m"]
+    place, led = profile.start_m, model.body_names.index(model.guide.body)
     spins = list(model.spin_inertia_kgm2)
     turned = np.zeros(wheels)
     yaw = np.zeros(bodies)
@@ -201,12 +212,19 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     ready = time.perf_counter()
     for segment in engine.run(duration):
         here = slice(done, done + len(segment.time_s))
+        arrays["time_s"][here] = np.arange(done, here.stop) / ride.rate_hz
         for b in range(bodies):
             motion = segment.body(b)
             # The heading is continuous over the segments, too.
             motion[:, 11] += 2.0 * np.pi * np.round((yaw[b] - motion[0, 11]) / (2.0 * np.pi))
             yaw[b] = motion[-1, 11]
             arrays[f"body_{b}"][here] = motion
+        # Where the wheels drive, the vehicle is where they have brought it.
+        if ride.drive == "wheels":
+            at[here] = _places(ride, place, segment, led)
+            place = float(at[here.stop - 1])
+        else:
+            at[here] = profile.motion(arrays["time_s"][here])[0]
         for w, wheel in enumerate(model.wheels):
             axle = arrays[f"body_{model.body_names.index(wheel.axle)}"]
             spin = spins.index(wheel.spin)
@@ -217,11 +235,13 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
             arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
             arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
         done = here.stop
+        let_go(arrays)
         if progress is not None:
-            at = float(segment.time_s[-1])
-            progress(at, float(duration), float(profile.motion(at)[1]))
+            now = float(segment.time_s[-1])
+            progress(now, float(duration), float(profile.motion(now)[1]))
     for w in range(wheels):
         arrays[f"wheel_{w}"][:] -= arrays[f"wheel_{w}"][0]
+        let_go(arrays)
     wall = time.perf_counter() - ready
     for array in arrays.values():
         array.flush()  # type: ignore[attr-defined]
@@ -235,6 +255,8 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
             "ride": ride.name,
             "engine": ride.engine,
             "vehicle": model.name,
+            "drive": ride.drive,
+            "conditions": [asdict(condition) for condition in ride.conditions],
             "step_s": ride.step_s,
             "rate_hz": ride.rate_hz,
             "simulated_s": float(duration),
@@ -244,6 +266,15 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
             "versions": ride.describe()["versions"],
         },
     )
+
+
+def _places(ride: Ride, begin: float, segment: Segment, led: int) -> np.ndarray:
+    """Where the vehicle's reference point is, s (n,), from the guide's body; ``begin`` is just before."""
+    model, step = ride.vehicle, 1.0 / ride.rate_hz
+    offset = model.bodies[led].position_m[0]
+    ahead = np.einsum("nk,nk->n", segment.velocity[:, led], segment.rotation[:, led, :, 0])
+    guess = begin + offset + np.cumsum(ahead) * step
+    return abeam(ride.track, guess, segment.position[:, led])[4] - offset
 
 
 def _integral(rate: np.ndarray, slope: np.ndarray, step: float) -> np.ndarray:

@@ -85,7 +85,8 @@ class Truth:
     track : TrackDesign
         The design track.
     reference_position_m : ndarray (n,)
-        Where the driver wants the vehicle's reference point: s along the track.
+        Where the driver wants the vehicle's reference point, s along the track; where its wheels drive it,
+        where it is.
     bodies : dict of str to BodyMotion
         By body name.
     wheel_angles : dict of str to ndarray (n,)
@@ -237,17 +238,31 @@ def _track_rotation(frame: TrackFrame) -> FloatArray:
     return rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
 
 
-def _along_track(
-    track: TrackDesign,
-    guess: FloatArray,
-    position: FloatArray,
-    velocity: FloatArray,
-    acceleration: FloatArray,
-) -> tuple[TrackFrame, FloatArray, FloatArray, FloatArray]:
-    """Track frame abeam of points, with ds/dt, d2s/dt2 and the (lateral, vertical) place in it.
+def abeam(
+    track: TrackDesign, guess: FloatArray, position: FloatArray
+) -> tuple[TrackFrame, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Track frame abeam of points: the one whose plane normal to its X axis holds the point.
 
-    The frame is the one whose plane normal to its X axis holds the point: rho_x = 0, found by
-    Newton's method; the rates follow by differentiating that condition (EQUATIONS 1.1).
+    Parameters
+    ----------
+    track : TrackDesign
+        The design.
+    guess : ndarray (n,)
+        Places s to begin from, within some metres.
+    position : ndarray (n, 3)
+        The points, global.
+
+    Returns
+    -------
+    frame : TrackFrame
+    rotation : ndarray (n, 3, 3)
+        Of the frame.
+    rho : ndarray (n, 3)
+        The points in it; rho_x = 0, found by Newton's method.
+    stretch : ndarray (n,)
+        d(rho_x)/ds with the sign turned.
+    s : ndarray (n,)
+        The places.
     """
     s = guess
     for _ in range(4):
@@ -260,6 +275,21 @@ def _along_track(
         s = s + step
         if np.max(np.abs(step)) < 1e-9:
             break
+    return frame, rotation, rho, stretch, s
+
+
+def _along_track(
+    track: TrackDesign,
+    guess: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+) -> tuple[TrackFrame, FloatArray, FloatArray, FloatArray]:
+    """Track frame abeam of points, with ds/dt, d2s/dt2 and the (lateral, vertical) place in it.
+
+    The rates follow by differentiating the condition of `abeam` (EQUATIONS 1.1).
+    """
+    frame, rotation, rho, stretch, _ = abeam(track, guess, position)
     v = np.einsum("nji,nj->ni", rotation, velocity)
     a = np.einsum("nji,nj->ni", rotation, acceleration)
     k, dk = frame.k, frame.dk

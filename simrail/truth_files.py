@@ -7,6 +7,7 @@ is said in `simrail.truth`; which rides are kept, in `simrail.ride_cache`.
 from __future__ import annotations
 
 import json
+import mmap
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,14 @@ def create_arrays(
         name: np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=np.float64, shape=shape)
         for name, shape in shapes.items()
     }
+
+
+def let_go(arrays: dict[str, FloatArray]) -> None:
+    """Drop the pages of arrays on disk from this process; the system writes out what was changed."""
+    for array in arrays.values():
+        mapped = getattr(array, "_mmap", None)
+        if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
+            mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def write_header(

@@ -14,6 +14,7 @@ from simrail.scenario.files import load
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
+from simrail.track.rail_condition import RailCondition
 from simrail.truth import Mount
 from simrail.truth_files import load_truth, save_truth
 
@@ -70,6 +71,8 @@ def test_simulated_once_then_found(ride, monkeypatch):
         {"engine": "compiled"},
         {"irregularity": Irregularity("erri_b176_high", (3.0, 100.0), 20.0)},
         {"profile": SpeedProfile(30.0, 90.0, 11.0, rest_s=1.0, final_rest_s=0.5)},
+        {"drive": "wheels"},
+        {"conditions": (RailCondition(40.0, 60.0, 0.2),)},
     ],
     ids=lambda change: next(iter(change)),
 )
@@ -152,3 +155,21 @@ def test_place_in_the_direction_of_travel(ride):
     assert truth.wheel_at("front.left") == "front.left"
     back = simulate(replace(ride, profile=SpeedProfile(90.0, 30.0, 10.0)))
     assert back.wheel_at("leading.left") == "rear.left"
+
+
+def test_wheels_over_leaves_are_late_and_the_truth_knows_where(ride):
+    """The reference point is where the vehicle is, metres behind the profile: the mount's s, to 1 mm."""
+    late = replace(
+        ride,
+        engine="compiled",
+        drive="wheels",
+        conditions=(RailCondition(20.0, 80.0, 0.05 / 0.3),),
+        profile=SpeedProfile(30.0, 90.0, 10.0, rest_s=1.0, final_rest_s=0.5, acceleration_mps2=1.2),
+    )
+    truth = simulate(late)
+    planned = late.profile.motion(truth.time_s)[0]
+    assert np.max(planned - truth.reference_position_m) > 3.0
+    there = truth.motion(Mount("body", "body", (0.0, 0.0, 1.45)))["position_m"].to_numpy()
+    np.testing.assert_allclose(truth.reference_position_m, there, rtol=0.0, atol=1e-3)
+    assert truth.manifest["drive"] == "wheels"
+    assert truth.manifest["conditions"][0]["start_m"] == 20.0

@@ -28,7 +28,7 @@ from simrail.report.tables import Table, consistency_table, error_table, odometr
 from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
 from simrail.scenario.cells import methods
-from simrail.scenario.scenario import Scenario
+from simrail.scenario.scenario import RailConditionPart, Scenario
 from simrail.score_table import NO_SAMPLES, OK
 
 MOST_RIDES = 6
@@ -96,7 +96,9 @@ def write_report(
     """
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
-    rides = [_ride(example, all_cases, styles) for example in examples[:MOST_RIDES]]
+    rides = [
+        _ride(example, all_cases, styles, scenario.spec.rail_condition) for example in examples[:MOST_RIDES]
+    ]
     environment = Environment(
         loader=PackageLoader("simrail.report", "."),
         autoescape=select_autoescape(default=True),
@@ -123,7 +125,12 @@ def write_report(
     path.write_text(text, encoding="utf-8")
 
 
-def _ride(example: CellResult, all_cases: list[Figures], styles: list[MethodStyle]) -> RideView:
+def _ride(
+    example: CellResult,
+    all_cases: list[Figures],
+    styles: list[MethodStyle],
+    conditions: Sequence[RailConditionPart],
+) -> RideView:
     name = example.recording.name
     drawn = [style for style in styles if style.name in example.estimates]
     case = of_cell(all_cases, example.cell)
@@ -145,7 +152,7 @@ def _ride(example: CellResult, all_cases: list[Figures], styles: list[MethodStyl
         facts=_ride_facts(example),
         tiles=tiles(case, styles) if case else [],
         findings=said,
-        speed=Markup(speed_figure(example)),
+        speed=Markup(speed_figure(example, conditions=conditions)),
         imu=Markup(imu_figure(example)),
         attitude=Markup(attitude_figure(example, first or drawn, what=f"Attitude, {name}"))
         if drawn

@@ -14,6 +14,7 @@ from simrail.scenario.files import load
 from simrail.scenario.imu_file import ImuFile
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.vehicle_file import VehicleFile
+from simrail.track.rail_condition import FRICTION
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,15 @@ def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult
         source = f"random draw from the spectrum, wavelengths {shortest:g} to {longest:g} m"
         spectrum = str(irregularity.spectrum)
         result["irregularity", spectrum] = Part("irregularity", spectrum, "synthetic", source)
+    for at in scenario.spec.rail_condition:
+        where = f"{at.words}, {at.start_m:g} to {at.end_m:g} m"
+        if at.condition is None:
+            source = "friction as the scenario says"
+        elif at.condition == "dry":
+            source = "friction as the vehicle file says"
+        else:
+            source = f"friction {FRICTION[at.condition]:g}, a nominal value of this project"
+        result["rail condition", where] = Part("rail condition", where, "synthetic", source)
     for name in _names(cells, "vehicle"):
         try:
             vehicle = load(VehicleFile, "vehicle", name, folder=scenario.folder)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
@@ -9,6 +11,7 @@ from simrail.columns import ACCEL, GYRO
 from simrail.example import CellResult
 from simrail.report.decimate import Bins
 from simrail.report.style import INK, distance_axis, legend_above, look, panels, shade_track, to_svg
+from simrail.scenario.scenario import RailConditionPart
 
 _TINTS = ("#0072B2", "#009E73", "#D55E00")
 
@@ -27,8 +30,8 @@ def limits_of(example: CellResult) -> tuple[float, float]:
     return low - room, high + room
 
 
-def speed_figure(example: CellResult) -> str:
-    """True speed over distance."""
+def speed_figure(example: CellResult, *, conditions: Sequence[RailConditionPart] = ()) -> str:
+    """True speed over distance, and where something lay on the rails."""
     with look():
         position = example.motion["position_m"].to_numpy()
         bins = Bins(position)
@@ -37,6 +40,9 @@ def speed_figure(example: CellResult) -> str:
         axis.plot(*bins.line(speed), color=INK, lw=1.3)
         axis.set_ylim(0.0, 1.3 * max(float(speed.max()), 1.0))
         axis.set_ylabel("speed, km/h")
+        for at in conditions:
+            axis.axvspan(at.start_m, at.end_m, ymax=0.06, color="#b5651d", alpha=0.55, lw=0)
+            axis.annotate(at.words, (at.start_m, 0.08), xycoords=axis.get_xaxis_transform(), fontsize=7.2)
         shade_track([axis], example.recording.track, limits=limits_of(example))
         distance_axis(axis, direction=direction_of(example))
         return to_svg(figure, description=f"Speed of ride {example.recording.name} over distance")

@@ -13,7 +13,7 @@ import numpy as np
 from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.vehicle.contact import ContactTable
-from simrail.vehicle.force_data import contact_of
+from simrail.vehicle.contact_tables import contacts_of
 from simrail.vehicle.linear import running_vehicle
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import (
@@ -45,7 +45,7 @@ class Conicity:
     Attributes
     ----------
     table : ContactTable
-        The contact of one wheel.
+        The contact of the first axle's wheels.
     rest : WheelsetAtRest
         The wheelset pushed sideways.
     abscissa_m, slope : ndarray (n, 2)
@@ -154,7 +154,8 @@ def study_vehicle(
 
 def contact_over_shift(model: VehicleModel, *, gravity_mps2: float, say: Progress) -> Conicity:
     """Contact and conicity over the lateral shift, as far as the flange lets the wheelset go."""
-    table = contact_of(model, gravity_mps2=gravity_mps2)
+    contacts = contacts_of(model, gravity_mps2=gravity_mps2)
+    table = contacts.tables[contacts.of_wheel[0]]
     radius = model.wheels[0].radius_m
     scale = 1.0 if radius > 0.15 else radius / _FULL_SCALE_RADIUS_M
     y = np.linspace(-_SHIFT_M, _SHIFT_M, 151) * scale

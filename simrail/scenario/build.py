@@ -34,6 +34,7 @@ from simrail.sensors.grades import ImuGrade
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
+from simrail.track.rail_condition import FRICTION, RailCondition
 from simrail.truth import Mount
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.profile_files import profiles_digest
@@ -114,6 +115,8 @@ class Parts:
             profile=profile_of(cell),
             engine=cell.spec.engine,
             step_s=cell.spec.step_s,
+            drive=cell.ride.drive,
+            conditions=conditions_of(cell, self.vehicle(cell)),
         )
 
 
@@ -139,6 +142,20 @@ def irregularity_of(cell: Cell) -> Irregularity:
         return NO_IRREGULARITY
     return Irregularity(
         spectrum=part.spectrum, wavelengths_m=part.wavelengths_m, fade_m=part.fade_m, scale=part.scale
+    )
+
+
+def conditions_of(cell: Cell, vehicle: VehicleModel) -> tuple[RailCondition, ...]:
+    """What lies on the rails of a cell; a coefficient counts in relation to the vehicle's own."""
+    clean = vehicle.wheel_rail.friction
+    return tuple(
+        RailCondition(
+            start_m=part.start_m,
+            end_m=part.end_m,
+            factor=(part.friction or FRICTION.get(part.condition or "dry", clean)) / clean,
+            rails=part.rails,
+        )
+        for part in cell.spec.rail_condition
     )
 
 

@@ -25,6 +25,7 @@ from simrail.scenario.build import (
     profile_of,
 )
 from simrail.scenario.cells import Cell, cells, count, methods
+from simrail.scenario.check_wheels import judge_wheels
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
@@ -184,6 +185,7 @@ def _judge_ride(scenario: Scenario, cell: Cell, parts: Parts) -> tuple[float, li
             remedy="end_m > start_m runs forward, end_m < start_m backward",
         )
     _judge_places(scenario, cell, track, vehicle.reach_m)
+    judge_wheels(scenario, cell, track, vehicle)
     profile = profile_of(cell)
     with blame(scenario.file, field):
         duration = profile.duration_s

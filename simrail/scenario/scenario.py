@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
+from simrail.errors import InputError
 from simrail.scenario.axes import Axis, Listed
 from simrail.scenario.files import Part, find, judge, label, parse_toml, read_text
 from simrail.scenario.overrides import override
@@ -61,6 +62,35 @@ class RidePart(Part):
     rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 20.0
     final_rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 5.0
     stops: tuple[StopPart, ...] = ()
+    drive: Listed[Literal["guide", "wheels"]] = "guide"
+
+
+class RailConditionPart(Part):
+    """``[[rail_condition]]``: what lies on the rails, by a name or by its friction coefficient."""
+
+    start_m: float
+    end_m: float
+    condition: Literal["dry", "wet", "leaves"] | None = None
+    friction: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    rails: Literal["both", "left", "right"] = "both"
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.condition is None) == (self.friction is None):
+            raise InputError(
+                "needs either a condition or a friction coefficient",
+                field="condition",
+                value=None if self.condition is None else f"{self.condition}, friction {self.friction:g}",
+                limit="dry, wet or leaves",
+                remedy='give condition = "leaves" or friction = 0.05',
+            )
+        return self
+
+    @property
+    def words(self) -> str:
+        """What lies there, for reports."""
+        what = self.condition or f"friction {self.friction:g}"
+        return what if self.rails == "both" else f"{what}, {self.rails} rail"
 
 
 class ImuPart(Part):
@@ -119,6 +149,7 @@ class ScenarioFile(Part):
     sensor_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     odometry: Listed[Literal["encoder", "truth"]] = "encoder"
     irregularity: IrregularityPart | None = None
+    rail_condition: tuple[RailConditionPart, ...] = ()
     ride: Annotated[list[RidePart], Field(min_length=1)]
     imu: Annotated[list[ImuPart], Field(min_length=1)]
     encoder: EncoderPart | None = None

@@ -9,7 +9,7 @@ from typing import Annotated, Self
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from simrail.errors import InputError
-from simrail.scenario.files import Part
+from simrail.scenario.files import Part, blame
 from simrail.scenario.vehicle_parts import (
     AxleEntry,
     BodyEntry,
@@ -19,6 +19,7 @@ from simrail.scenario.vehicle_parts import (
     RotationEntry,
     SuspensionEntry,
     TabledEntry,
+    TractionEntry,
     ends_of,
 )
 from simrail.vehicle.creep_laws import CreepLaw
@@ -35,6 +36,7 @@ from simrail.vehicle.model import (
     WheelRail,
 )
 from simrail.vehicle.profile_files import profile_place, rail_profile, wheel_profile
+from simrail.vehicle.traction import Traction
 
 
 class VehicleFile(Part):
@@ -59,6 +61,7 @@ class VehicleFile(Part):
     linear_contact: LinearContactEntry | None = None
     gyroscopic: bool = True
     guide: GuideEntry
+    traction: TractionEntry | None = None
     _folder: Path | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
@@ -94,6 +97,7 @@ class VehicleFile(Part):
         self._check_elements()
         self._check_wheels()
         self._check_held(names)
+        self._check_traction(names)
         return self
 
     def _check_elements(self) -> None:
@@ -157,11 +161,49 @@ class VehicleFile(Part):
                     remedy="mount it with a [[suspension]]",
                 )
 
+    def _check_traction(self, names: list[str]) -> None:
+        if self.traction is None:
+            return
+        wheels, _ = self._wheels()
+        with blame(None, "traction"):
+            for kind in ("driven", "braked"):
+                self.traction.shares(kind, wheels)
+            if self.traction.reaction not in ("axle", *names):
+                raise InputError(
+                    "no such body",
+                    field="reaction",
+                    value=self.traction.reaction,
+                    limit="axle, or one of " + ", ".join(names),
+                )
+
+    def _wheels(self) -> tuple[list[Wheel], dict[str, float]]:
+        """The wheels, and the inertia of each spin."""
+        wheels: list[Wheel] = []
+        spins: dict[str, float] = {}
+        for axle in self.axle:
+            for side, word in ((1, "left"), (-1, "right")):
+                wheel = f"{axle.name}.{word}"
+                spin = wheel if axle.wheels == "independent" else axle.name
+                spins[spin] = spins.get(spin, 0.0) + axle.wheel_spin_inertia_kgm2
+                wheels.append(
+                    Wheel(name=wheel, axle=axle.name, side=side, spin=spin, radius_m=axle.wheel_radius_m)
+                )
+        return wheels, spins
+
+    def _traction(self, wheels: list[Wheel]) -> Traction | None:
+        made = self.traction
+        if made is None:
+            return None
+        return Traction(
+            driven=tuple(made.shares("driven", wheels).items()),
+            braked=tuple(made.shares("braked", wheels).items()),
+            **made.model_dump(exclude={"driven", "braked"}),
+        )
+
     def model(self, name: str) -> VehicleModel:
         """Build the vehicle that the file describes."""
         bodies: list[Body] = []
-        wheels: list[Wheel] = []
-        spins: dict[str, float] = {}
+        wheels, spins = self._wheels()
         for axle in self.axle:
             # The wheels ride on the bridge at the tape circles: their mass and transverse inertia count.
             carried = 2.0 * (axle.wheel_mass_kg * axle.wheel_y_m[0] ** 2 + axle.wheel_transverse_inertia_kgm2)
@@ -174,13 +216,6 @@ class VehicleFile(Part):
                     position_m=(axle.x_m, 0.0, axle.wheel_radius_m),
                 )
             )
-            for side, word in ((1, "left"), (-1, "right")):
-                wheel = f"{axle.name}.{word}"
-                spin = wheel if axle.wheels == "independent" else axle.name
-                spins[spin] = spins.get(spin, 0.0) + axle.wheel_spin_inertia_kgm2
-                wheels.append(
-                    Wheel(name=wheel, axle=axle.name, side=side, spin=spin, radius_m=axle.wheel_radius_m)
-                )
         bodies += [Body(**entry.model_dump()) for entry in self.body]
         springs: list[Suspension] = []
         series: list[SeriesDamper] = []
@@ -245,4 +280,5 @@ class VehicleFile(Part):
                 for ends in ends_of(entry)
             ),
             gyroscopic=self.gyroscopic,
+            traction=self._traction(wheels),
         )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from simrail.errors import InputError
 from simrail.scenario.files import Part
+from simrail.vehicle.model import Wheel
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -127,6 +129,53 @@ class GuideEntry(Part):
     vertical_damping_nspm: NotNegative = 0.0
     roll_stiffness_nmprad: NotNegative = 0.0
     roll_damping_nmsprad: NotNegative = 0.0
+
+
+class TractionEntry(Part):
+    """What drives and brakes the wheels: see `simrail.vehicle.model.Traction`.
+
+    ``driven`` and ``braked`` give axles (both wheels alike) or single wheels their shares.
+    """
+
+    driven: Annotated[dict[str, Positive], Field(min_length=1)]
+    braked: Annotated[dict[str, Positive], Field(min_length=1)]
+    tractive_effort_n: Positive
+    power_w: Positive
+    braking_effort_n: Positive
+    speed_gain_nspm: Positive
+    position_gain_1ps: Positive
+    catch_up_mps: Positive
+    slide_protection_creepage: NotNegative = 0.0
+    reaction: str = "axle"
+
+    def shares(self, kind: Literal["driven", "braked"], wheels: Sequence[Wheel]) -> dict[str, float]:
+        """Share of each spin of a vehicle.
+
+        Raises
+        ------
+        InputError
+            For an axle or a wheel that is none, a wheelset that is given twice, or shares that do not
+            sum to 1.
+        """
+        given: dict[str, float] = getattr(self, kind)
+        shares: dict[str, float] = {}
+        for name, share in given.items():
+            spins = list(dict.fromkeys(w.spin for w in wheels if name in (w.axle, w.name)))
+            if not spins:
+                known = dict.fromkeys([w.axle for w in wheels] + [w.name for w in wheels])
+                raise InputError(
+                    "no such axle or wheel", field=kind, value=name, limit="one of " + ", ".join(known)
+                )
+            for spin in spins:
+                if spin in shares:
+                    raise InputError(
+                        "a wheel has its share twice", field=kind, value=name, remedy="name it once"
+                    )
+                shares[spin] = share / len(spins)
+        total = sum(shares.values())
+        if abs(total - 1.0) > 1e-6:
+            raise InputError("the shares do not sum to 1", field=kind, value=f"{total:g}", limit="1")
+        return shares
 
 
 def ends_of(entry: SuspensionEntry | TabledEntry) -> list[dict[str, Any]]:

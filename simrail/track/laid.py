@@ -1,9 +1,9 @@
 """The track as it lies: the design and one realisation of its irregularities, as one table of splines.
 
-The table holds what an engine needs at every wheel and every step: the design line and the deviations of
-both rails, as C2 cubic splines on a uniform grid. C2, because the second derivative of a rail is what
-shakes an axle: a piecewise-linear table puts 0.4 m/s^2 of facet noise on it. The splines *are* the rails:
-truth and references are read from the same table.
+The table holds what an engine needs at every wheel and every step: the design line, the deviations of both
+rails and their friction, as C2 cubic splines on a uniform grid. C2, because the second derivative of a
+rail is what shakes an axle: a piecewise-linear table puts 0.4 m/s^2 of facet noise on it. The splines *are*
+the rails: truth and references are read from the same table.
 
 This module knows nothing of wheels.
 """
@@ -11,6 +11,7 @@ This module knows nothing of wheels.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
+from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
 
 CHANNELS = (
     "x",
@@ -35,8 +37,11 @@ CHANNELS = (
     "z_left",
     "y_right",
     "z_right",
+    "friction_left",
+    "friction_right",
 )
-"""Columns of the table: design line (global, m and rad), then rail deviations in the track frame (m)."""
+"""Columns of the table: design line (global, m and rad), rail deviations in the track frame (m), friction
+of each rail over that of a clean one."""
 
 RAILS = slice(6, 10)
 """The rail deviations among the channels."""
@@ -57,7 +62,9 @@ class LaidTrack:
     table_start_m, table_step_m : float
         Knot i stands at table_start_m + i table_step_m; knots are whole multiples of the step, so the
         first lies at most one step before the track's start and the last one after its end.
-    table : ndarray (n_intervals, 10, 4)
+    conditions : tuple of RailCondition
+        What lies on the rails.
+    table : ndarray (n_intervals, 12, 4)
         Cubic coefficients of `CHANNELS`, C-contiguous, read-only. In interval i with
         t = s - s_i: value = ((c0 t + c1) t + c2) t + c3.
     """
@@ -68,6 +75,7 @@ class LaidTrack:
     table_start_m: float
     table_step_m: float
     table: FloatArray
+    conditions: tuple[RailCondition, ...] = ()
 
     def channels(self, s: npt.ArrayLike, *, derivative: int = 0) -> FloatArray:
         """All channels, or their derivative with respect to s, at places s.
@@ -81,7 +89,7 @@ class LaidTrack:
 
         Returns
         -------
-        ndarray (..., 10)
+        ndarray (..., 12)
             In the order of `CHANNELS`.
 
         Raises
@@ -136,7 +144,12 @@ def knot_step_m(irregularity: Irregularity) -> float:
 
 
 def lay(
-    design: TrackDesign, irregularity: Irregularity, *, seed: int, table_step_m: float | None = None
+    design: TrackDesign,
+    irregularity: Irregularity,
+    *,
+    seed: int,
+    table_step_m: float | None = None,
+    conditions: Sequence[RailCondition] = (),
 ) -> LaidTrack:
     """Draw the irregularities and lay the track.
 
@@ -150,16 +163,19 @@ def lay(
         Root seed; another seed is another track.
     table_step_m : float, optional
         Distance of the spline knots, a divisor of 65536 m; `knot_step_m` if not given.
+    conditions : sequence of RailCondition
+        What lies on the rails, and where.
 
     Raises
     ------
     InputError
         If the design makes no line, the irregularity cannot be drawn, the track is shorter than both
-        fades, or longer than the period of the irregularity.
+        fades, or longer than the period of the irregularity, or a rail condition does not fit.
     """
     design.check()
     irregularity.check()
     table_step_m = table_step_m or knot_step_m(irregularity)
+    check_conditions(conditions, design.start_m, design.end_m)
     if not 2.0 * irregularity.fade_m <= design.length_m <= PERIOD_M:
         raise InputError(
             "track and irregularity do not fit",
@@ -175,10 +191,16 @@ def lay(
     period = realise_all(irregularity, seed=seed, step_m=table_step_m)
     drawn = period[knots % period.shape[0]]
     drawn *= fade(s, design.start_m, end_m=design.end_m, length_m=irregularity.fade_m)[:, None]
-    table = np.concatenate([_design_splines(design, s), _coefficients(CubicSpline(s, _rails(drawn)))], axis=1)
+    splines = (
+        _design_splines(design, s),
+        _coefficients(CubicSpline(s, _rails(drawn))),
+        _coefficients(CubicSpline(s, friction_factors(conditions, s))),
+    )
+    table = np.concatenate(splines, axis=1)
     table = np.ascontiguousarray(table)
     table.flags.writeable = False
-    return LaidTrack(design, irregularity, int(seed), float(s[0]), float(table_step_m), table)
+    start = float(s[0])
+    return LaidTrack(design, irregularity, int(seed), start, float(table_step_m), table, tuple(conditions))
 
 
 def _rails(drawn: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ is the test of the other. It needs no Exudyn.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -47,6 +48,8 @@ class CompiledEngine:
         Gravity.
     settle_s : float
         Time at rest before the ride, in which the springs come to rest; not part of the output.
+    drive : {"guide", "wheels"}
+        Whether the guide pulls the vehicle along or its wheels drive and brake it.
     """
 
     def __init__(
@@ -59,18 +62,20 @@ class CompiledEngine:
         rate_hz: float = 1000.0,
         gravity_mps2: float = 9.81,
         settle_s: float = 4.0,
+        drive: Literal["guide", "wheels"] = "guide",
     ) -> None:
         self.model = model
         self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
-        self.data = pack(model, track, profile, gravity_mps2=gravity_mps2)
+        self.data = pack(model, track, profile, gravity_mps2=gravity_mps2, drive=drive)
         self.memo = start_memo(model, profile)
         self._inertia = np.array([[body.mass_kg, *body.inertia_kgm2] for body in model.bodies])
+        self._spin_inertia = self.data.spins[:, 0].copy()
         self._turned = BODY * len(model.bodies)
         self._first_state = self._turned + 2 * len(self.data.spins)
         self.state = np.zeros(self._first_state + states_of(self.data))
         bodies = len(model.bodies)
         self._scratch = (
-            np.zeros((3, len(self.state))), np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(42)
+            np.zeros((3, len(self.state))), np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(34)
         )  # fmt: skip
         poses = start_poses(model, track, profile, gravity_mps2=gravity_mps2)
         for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
@@ -120,7 +125,7 @@ class CompiledEngine:
 
     def _march(self, first: int, rows: FloatArray) -> int:
         return march(
-            first, self.step_s, self.state, rows, self._inertia, self.data.spins, self.memo,
+            first, self.step_s, self.state, rows, self._inertia, self._spin_inertia, self.memo,
             *self._scratch, tuple(self.data),
         )  # fmt: skip
 

@@ -121,6 +121,7 @@ def build_contact(
     rail: RailProfile,
     *,
     static_load_n: float,
+    grid_load_n: float | None = None,
     gauge_m: float = 1.435,
     rail_inclination: float = 1.0 / 40.0,
     wheel_radius_m: float = 0.46,
@@ -144,6 +145,9 @@ def build_contact(
         Cross-sections.
     static_load_n : float
         Vertical load of this wheel at rest; it sets the smoothing.
+    grid_load_n : float, optional
+        Load that sets the step of the grid instead: the lightest of a vehicle's, so that all its tables
+        lie on one grid.
     gauge_m, gauge_depth_m : float
         Distance of the rail heads, and how far below their top it is measured (14 mm at full scale).
     rail_inclination : float
@@ -215,7 +219,8 @@ def build_contact(
     eps = smoothing * (static_load_n / hertz) ** (2.0 / 3.0)
 
     derailed, split_at = _limits(pair, scale)
-    step = min(_SHIFT_STEP_M * scale, _SHIFT_STEPS_PER_SMOOTHING * eps)
+    finest = smoothing * ((grid_load_n or static_load_n) / hertz) ** (2.0 / 3.0)
+    step = min(_SHIFT_STEP_M * scale, _SHIFT_STEPS_PER_SMOOTHING * finest)
     count = round((2.0 * derailed + 0.009 * scale) / step)
     u: FloatArray = np.linspace(0.0, (count - 1) * step, count) - (derailed + 0.008 * scale)
     masks = [pair.s >= (pair.s[0] if split_at is None else split_at)]

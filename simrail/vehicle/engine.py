@@ -21,13 +21,13 @@ from simrail.jit import FloatArray
 from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
 from simrail.truth import euler_angles, rotation_matrix
-from simrail.vehicle.force_data import rest_drop_m
+from simrail.vehicle.contact_tables import rest_drops_m
 from simrail.vehicle.model import VehicleModel
 
 _DIFFERENCE = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
 _REACH = len(_DIFFERENCE)
 
-_MEMO_HEAD, _MEMO_AXLE = 1, 5
+_MEMO_HEAD, _MEMO_AXLE = 2, 5
 """Layout of the memory of `simrail.vehicle.forces.forces`: its head, then five numbers per axle."""
 
 
@@ -87,9 +87,9 @@ def start_poses(
     A body stands as an axle would at its place: over the middle of the rails, and leaning with them.
     Dropped onto irregular rails instead, wheels would bounce for seconds.
     """
-    drop = rest_drop_m(model, gravity_mps2=gravity_mps2)
+    drops = rest_drops_m(model, gravity_mps2=gravity_mps2)
     half = model.wheel_rail.tape_circle_half_m
-    for body in model.bodies:
+    for body, drop in zip(model.bodies, drops, strict=True):
         s = np.array([profile.start_m + body.position_m[0]])
         frame = track.design.frame(s)
         y_left, z_left, y_right, z_right = track.rails(s)[0]
@@ -106,6 +106,7 @@ def start_poses(
 def start_memo(model: VehicleModel, profile: SpeedProfile) -> FloatArray:
     """Memory of the force kernel at the start: every axle looks for its place on the track from here."""
     memo = np.zeros(_MEMO_HEAD + _MEMO_AXLE * len(model.axle_names))
+    memo[1] = profile.start_m + model.body(model.guide.body).position_m[0]
     memo[_MEMO_HEAD::_MEMO_AXLE] = [
         profile.start_m + model.body(name).position_m[0] for name in model.axle_names
     ]

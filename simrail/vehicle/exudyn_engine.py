@@ -88,7 +88,8 @@ def generalized_forces(
     """Forces in Exudyn's coordinates.
 
     ``state`` (3 n,) holds coordinates, rates and, as the output, generalised forces, each n = 6 b + p +
-    4 w + d long. Rates and moments of a node are in its own axes: the body's, half a turn about X.
+    the number of first-order states long. Rates and moments of a node are in its own axes: the body's,
+    half a turn about X.
     """
     nb = bodies.shape[0]
     n = state.shape[0] // 3
@@ -127,8 +128,10 @@ def generalized_forces(
 @njit
 def part_of(arena: FloatArray, i: int) -> FloatArray:
     """The i-th part of an arena (see `simrail.vehicle.force_data.spread`), flat."""
-    at = int(arena[5 * i])
-    n = int(arena[5 * i + 1] * arena[5 * i + 2] * arena[5 * i + 3] * arena[5 * i + 4])
+    at = int(arena[6 * i])
+    n = 1
+    for k in range(1, 6):
+        n *= int(arena[6 * i + k])
     return arena[at : at + n]
 
 
@@ -140,21 +143,21 @@ def generalized_forces_of(t: float, arena: FloatArray) -> None:
         t,
         part_of(arena, 0),
         part_of(arena, 1).reshape(-1, 1),
-        part_of(arena, 2).reshape(int(arena[11]), 17),
-        part_of(arena, 3).reshape(int(arena[16]), 11),
-        part_of(arena, 4).reshape(int(arena[21]), 8),
-        part_of(arena, 5).reshape(int(arena[26]), 12),
-        part_of(arena, 6).reshape(int(arena[31]), 5),
-        part_of(arena, 7).reshape(-1, 4),
-        part_of(arena, 8),
+        part_of(arena, 2).reshape(int(arena[13]), 17),
+        part_of(arena, 3).reshape(int(arena[19]), 11),
+        part_of(arena, 4).reshape(int(arena[25]), 8),
+        part_of(arena, 5).reshape(int(arena[31]), 12),
+        part_of(arena, 6).reshape(int(arena[37]), 5),
+        part_of(arena, 7).reshape(-1, 6),
+        part_of(arena, 8).reshape(-1, 6),
         part_of(arena, 9).reshape(-1, 2),
         part_of(arena, 10),
         part_of(arena, 11),
         part_of(arena, 12).reshape(-1, 5),
         part_of(arena, 13),
-        part_of(arena, 14).reshape(-1, 10, 4),
-        coef.reshape(2, int(arena[77]), int(arena[78]), 4),
-        part_of(arena, 16),
+        part_of(arena, 14).reshape(-1, 12, 4),
+        coef.reshape(int(arena[91]), 2, int(arena[93]), int(arena[94]), 4),
+        part_of(arena, 16).reshape(int(arena[97]), -1),
         part_of(arena, 17).reshape(-1, 18),
         part_of(arena, 18).reshape(-1, 6),
         part_of(arena, 19),
@@ -183,6 +186,8 @@ class ExudynEngine:
         Time at rest before the ride, in which the springs come to rest; not part of the output.
     suspension : {"hook", "native"}
         Who computes the springs: the kernel, or Exudyn's own items (see the module).
+    drive : {"guide", "wheels"}
+        Whether the guide pulls the vehicle along or its wheels drive and brake it.
     """
 
     def __init__(
@@ -196,20 +201,21 @@ class ExudynEngine:
         gravity_mps2: float = 9.81,
         settle_s: float = 4.0,
         suspension: Literal["hook", "native"] = "hook",
+        drive: Literal["guide", "wheels"] = "guide",
     ) -> None:
         self.model, self.track, self.profile = model, track, profile
         self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
         self.gravity_mps2 = gravity_mps2
-        data = pack(model, track, profile, gravity_mps2=gravity_mps2)
+        data = pack(model, track, profile, gravity_mps2=gravity_mps2, drive=drive)
         self._native = data.springs[:0]
         if suspension == "native":
             self._native, data = data.springs, data._replace(springs=data.springs[:0])
         bodies, axles = len(model.bodies), len(data.axles)
         self._states = states_of(data)
         self.size = 6 * bodies + len(data.spins) + self._states
-        scratch = (np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(1 + 5 * axles), np.zeros(42))
+        scratch = (np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(2 + 5 * axles), np.zeros(34))
         self._arena, views = spread([np.zeros(3 * self.size), *data, *scratch])
-        self._state, self.memo, self._spins = views[0], views[-2], data.spins
+        self._state, self.memo, self._spins = views[0], views[-2], data.spins[:, 0]
         # Compiled now, so that no clock of a ride counts it.
         generalized_forces_of.compile("void(float64, float64[::1])")  # type: ignore[attr-defined]
         self._build()

@@ -7,17 +7,20 @@ when a global changes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.profile import SpeedProfile
 from simrail.track.laid import LaidTrack
-from simrail.vehicle.contact import ContactTable, build_contact, static_height
+from simrail.vehicle.contact_tables import contacts_of, rest_drops_m
 from simrail.vehicle.model import SeriesDamper, Tabled, VehicleModel
-from simrail.vehicle.profile_files import profiles_of
+
+DRIVER = 18
+"""Where in `ForceData.guide` the constants of `simrail.vehicle.traction_forces` begin."""
 
 
 class ForceData(NamedTuple):
@@ -27,13 +30,19 @@ class ForceData(NamedTuple):
     damping (3), rest deflection (3). series (d, 11): inner, outer, inner arm (3), outer arm (3), axis,
     stiffness, damping. turns (r, 8): inner, outer, stiffness (3), damping (3). stops (q, 12): inner,
     outer, inner arm (3), outer arm (3), axis, 1 if over the rate, first row in laws, rows. laws (l, 5):
-    start and cubic, highest power first. wheels (w, 4): axle, side, spin, radius. spins (p,): inertia.
-    axles (a, 2): body, first wheel. guide (18,): body, offset, stiffness and damping along, pitch, yaw,
-    gravity, profile pieces, stiffness and damping lateral, vertical, roll, height at rest, weight
-    carried. switches (12,): 1 if spins are gyroscopic, 1 if the contact is prescribed, then f11, f22,
+    start and cubic, highest power first. wheels (w, 6): axle, side, spin, radius, contact table, static
+    load. spins (p, 6): inertia, axle, wheel radius, share of traction, share of braking, body that
+    carries motor and brake. axles (a, 2): body, first wheel. guide (29,): body, offset, stiffness and
+    damping along, pitch, yaw, gravity, profile pieces, stiffness and damping lateral, vertical, roll,
+    height at rest, weight carried; then the driver's: 1 if the wheels drive and not the guide, direction
+    of travel, greatest tractive effort, power, braking effort, gain on the speed's error, gain on the
+    place's, catch-up speed, creepage of the slide protection (0: none), windup angle and damping time of
+    the brakes. switches (11,): 1 if spins are gyroscopic, 1 if the contact is prescribed, then f11, f22,
     f23, f33, conicity, vertical stiffness and damping, lateral and yaw gravitational stiffness per
-    wheel, static load. drive (n, 5): start time and cubic of s(t), highest power first.
-    grid (2,): start and step of `table`, the laid track. coef, const: the contact table.
+    wheel. drive (n, 5): start time and cubic of s(t), highest power first. grid (2,): start and step of
+    `table`, the laid track. coef (k, 2, n, 10, 4), const (k, 21): the contact tables.
+
+    Whoever adds an array here adds to every call of the kernel: two more made it a third slower.
     """
 
     bodies: FloatArray
@@ -55,28 +64,26 @@ class ForceData(NamedTuple):
 
 
 def states_of(data: ForceData) -> int:
-    """Number of first-order states: four creep states per wheel, then one per series damper."""
-    return int(4 * data.wheels.shape[0] + data.series.shape[0])
+    """Number of first-order states: four creep states per wheel, one per series damper, one per brake."""
+    brakes = data.spins.shape[0] if data.guide[DRIVER] else 0
+    return int(4 * data.wheels.shape[0] + data.series.shape[0] + brakes)
 
 
-def contact_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> ContactTable:
-    """Contact table of a vehicle's wheels at their mean static load."""
-    pair = model.wheel_rail
-    return build_contact(
-        *profiles_of(pair),
-        gauge_m=pair.gauge_m,
-        rail_inclination=pair.rail_inclination,
-        wheel_radius_m=model.wheels[0].radius_m,
-        tape_circle_half_m=pair.tape_circle_half_m,
-        static_load_n=float(np.mean(model.wheel_load_n(gravity_mps2))),
-        friction=pair.friction,
-        smoothing=pair.smoothing,
-        creep_law=pair.creep,
-    )
+def pack(
+    model: VehicleModel,
+    track: LaidTrack,
+    profile: SpeedProfile,
+    *,
+    gravity_mps2: float,
+    drive: Literal["guide", "wheels"] = "guide",
+) -> ForceData:
+    """Lay a vehicle, a track and a speed profile out as the arrays that `forces` takes.
 
-
-def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravity_mps2: float) -> ForceData:
-    """Lay a vehicle, a track and a speed profile out as the arrays that `forces` takes."""
+    Raises
+    ------
+    InputError
+        If the wheels shall drive a vehicle that has no traction.
+    """
     names, wheel_names = model.body_names, model.wheel_names
     preload = model.preload_n(gravity_mps2)
     springs = np.zeros((len(model.suspensions), 17))
@@ -89,8 +96,13 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
         # At rest the spring is already shortened by what it carries.
         row[16] = force / spring.stiffness_npm[2] if spring.stiffness_npm[2] > 0.0 else 0.0
     spin_names = list(model.spin_inertia_kgm2)
+    contacts = contacts_of(model, gravity_mps2=gravity_mps2)
+    loads = model.wheel_load_n(gravity_mps2)
     wheels = np.array(
-        [[names.index(w.axle), w.side, spin_names.index(w.spin), w.radius_m] for w in model.wheels]
+        [
+            [names.index(w.axle), w.side, spin_names.index(w.spin), w.radius_m, kind, load]
+            for w, kind, load in zip(model.wheels, contacts.of_wheel, loads, strict=True)
+        ]
     )
     first = [wheel_names.index(next(w.name for w in model.wheels if w.axle == a)) for a in model.axle_names]
     axles = np.array([[names.index(a), i] for a, i in zip(model.axle_names, first, strict=True)], dtype=float)
@@ -98,7 +110,8 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
     guide = model.guide
     held = model.body(guide.body)
     stops, laws = _stops(model)
-    contact = contact_of(model, gravity_mps2=gravity_mps2)
+    drop = rest_drops_m(model, gravity_mps2=gravity_mps2)[names.index(guide.body)]
+    traction, spins = _traction(model, profile, drive)
     return ForceData(
         bodies=np.array([[body.mass_kg] for body in model.bodies]),
         springs=springs,
@@ -107,7 +120,7 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
         stops=stops,
         laws=laws,
         wheels=np.ascontiguousarray(wheels, dtype=float),
-        spins=np.array(list(model.spin_inertia_kgm2.values())),
+        spins=spins,
         axles=axles,
         guide=np.array(
             [
@@ -127,28 +140,54 @@ def pack(model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravit
                 guide.vertical_damping_nspm,
                 guide.roll_stiffness_nmprad,
                 guide.roll_damping_nmsprad,
-                held.position_m[2] + _drop(model, contact),
+                held.position_m[2] + drop,
                 model.guide_load_n(gravity_mps2),
+                *traction,
             ]
         ),
-        switches=_switches(model, contact.static_load_n),
+        switches=_switches(model),
         drive=np.ascontiguousarray(np.column_stack([times[:-1], cubics])),
         grid=np.array([track.table_start_m, track.table_step_m]),
         table=track.table,
-        coef=contact.coef,
-        const=contact.const,
+        coef=np.stack([table.coef for table in contacts.tables]),
+        const=np.stack([table.const for table in contacts.tables]),
     )
 
 
-def rest_drop_m(model: VehicleModel, *, gravity_mps2: float) -> float:
-    """How much lower (negative) the wheels stand at rest than their nominal radius says."""
-    if model.wheel_rail.linear is not None:
-        return 0.0
-    return static_height(contact_of(model, gravity_mps2=gravity_mps2))
-
-
-def _drop(model: VehicleModel, contact: ContactTable) -> float:
-    return 0.0 if model.wheel_rail.linear is not None else static_height(contact)
+def _traction(model: VehicleModel, profile: SpeedProfile, drive: str) -> tuple[FloatArray, FloatArray]:
+    """The driver's part of the guide, all zero if the guide itself drives, and the rows of the spins."""
+    traction, spins = np.zeros(11), np.zeros((len(model.spin_inertia_kgm2), 6))
+    spins[:, 0] = list(model.spin_inertia_kgm2.values())
+    if drive == "guide":
+        return traction, spins
+    made = model.traction
+    if made is None:
+        raise InputError(
+            "the wheels cannot drive a vehicle without traction",
+            file=f"vehicle {model.name}",
+            field="traction",
+            remedy='give it a [traction], or ride with drive = "guide"',
+        )
+    traction[:] = (
+        1.0,
+        profile.direction,
+        made.tractive_effort_n,
+        made.power_w,
+        made.braking_effort_n,
+        made.speed_gain_nspm,
+        made.position_gain_1ps,
+        made.catch_up_mps,
+        made.slide_protection_creepage,
+        made.brake_windup_rad,
+        made.brake_damping_s,
+    )
+    driven, braked = dict(made.driven), dict(made.braked)
+    for row, spin in zip(spins, model.spin_inertia_kgm2, strict=True):
+        wheel = next(w for w in model.wheels if w.spin == spin)
+        axle = model.body_names.index(wheel.axle)
+        carrier = axle if made.reaction == "axle" else model.body_names.index(made.reaction)
+        row[1:] = axle, wheel.radius_m, driven.get(spin, 0.0), braked.get(spin, 0.0), carrier
+    return traction, spins
 
 
 def _ends(model: VehicleModel, element: SeriesDamper | Tabled) -> list[float]:
@@ -192,9 +231,9 @@ def _stops(model: VehicleModel) -> tuple[FloatArray, FloatArray]:
     return np.array(rows, dtype=float).reshape(-1, 12), np.vstack([np.zeros((0, 5)), *laws])
 
 
-def _switches(model: VehicleModel, static_load_n: float) -> FloatArray:
+def _switches(model: VehicleModel) -> FloatArray:
     linear = model.wheel_rail.linear
-    switches = np.zeros(12)
+    switches = np.zeros(11)
     switches[0] = float(model.gyroscopic)
     if linear is not None:
         switches[1:] = (
@@ -208,7 +247,6 @@ def _switches(model: VehicleModel, static_load_n: float) -> FloatArray:
             linear.vertical_damping_nspm,
             0.5 * linear.gravitational_stiffness_npm,
             0.5 * linear.gravitational_yaw_stiffness_nmprad,
-            static_load_n,
         )
     return switches
 
@@ -222,16 +260,16 @@ def spread(parts: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
     Returns
     -------
     arena : ndarray (m,)
-        Header of five numbers per part (offset, then the shape padded with ones to four), then the parts.
+        Header of six numbers per part (offset, then the shape padded with ones to five), then the parts.
     views : list of ndarray
         The parts, as views into the arena.
     """
-    head = 5 * len(parts)
+    head = 6 * len(parts)
     arena = np.zeros(head + sum(part.size for part in parts))
     views = []
     at = head
     for i, part in enumerate(parts):
-        arena[5 * i : 5 * i + 5] = at, *part.shape, *(1,) * (4 - part.ndim)
+        arena[6 * i : 6 * i + 6] = at, *part.shape, *(1,) * (5 - part.ndim)
         views.append(arena[at : at + part.size].reshape(part.shape))
         views[-1][...] = part
         at += part.size

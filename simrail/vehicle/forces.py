@@ -12,7 +12,7 @@ import numpy as np
 from simrail.jit import FloatArray, njit_borrowed
 from simrail.vehicle.contact import wheel_force
 from simrail.vehicle.linear_contact import linear_wheel_force
-from simrail.vehicle.lookup import track_at
+from simrail.vehicle.lookup import find_on_track
 from simrail.vehicle.suspension_forces import (
     guide_force,
     series_forces,
@@ -20,6 +20,7 @@ from simrail.vehicle.suspension_forces import (
     stop_forces,
     turn_forces,
 )
+from simrail.vehicle.traction_forces import traction_forces
 
 
 @njit_borrowed
@@ -50,19 +51,7 @@ def axle_forces(
     """
     i, first = int(axle[0]), int(axle[1])
     b, wr = pose[i], wrench[i]
-    s = memo[0]
-    x = y = z = speed = 0.0
-    for _ in range(8):
-        track_at(table, grid, s, f)
-        dx, dy, dz = b[0] - f[0], b[1] - f[1], b[2] - f[2]
-        x = f[3] * dx + f[6] * dy + f[9] * dz
-        y = f[4] * dx + f[7] * dy + f[10] * dz
-        z = f[5] * dx + f[8] * dy + f[11] * dz
-        stretch = f[15] - f[14] * y + f[13] * z
-        step = x / stretch
-        if abs(step) < 1e-12 * (1.0 + abs(s)):
-            break
-        s += step
+    s, y, z = find_on_track(table, grid, b, memo[0], f)
     memo[0] = s
     vx = f[3] * b[3] + f[6] * b[4] + f[9] * b[5]
     vy = f[4] * b[3] + f[7] * b[4] + f[10] * b[5]
@@ -83,19 +72,21 @@ def axle_forces(
     for n in range(2):
         wheel = wheels[first + n]
         k = int(wheel[2])
+        kind = int(wheel[4])
         rail = 0 if wheel[1] > 0.0 else 2
         if switches[1] > 0.0:
             flag = linear_wheel_force(
-                switches, const, wheel[1], y, z - wheel[3], phi, psi, f[16 + rail], f[17 + rail],
+                switches, const[kind], wheel[5], wheel[1], y, z - wheel[3], phi, psi,
+                f[16 + rail], f[17 + rail],
                 speed, vx, y_dot, z_dot, phi_dot, psi_dot, spin[k], f[14], f[20 + rail], f[21 + rail],
                 zeta[4 * (first + n) : 4 * (first + n) + 4],
                 zeta_rate[4 * (first + n) : 4 * (first + n) + 4], o,
             )  # fmt: skip
         else:
             flag = wheel_force(
-                coef, const, wheel[1], y, z - wheel[3], phi, psi, f[16 + rail], f[17 + rail],
+                coef[kind], const[kind], wheel[1], y, z - wheel[3], phi, psi, f[16 + rail], f[17 + rail],
                 speed, vx, y_dot, z_dot, phi_dot, psi_dot, spin[k], f[14], f[20 + rail], f[21 + rail],
-                const[5], zeta[4 * (first + n) : 4 * (first + n) + 4],
+                const[kind, 5] * f[24 + rail // 2], zeta[4 * (first + n) : 4 * (first + n) + 4],
                 zeta_rate[4 * (first + n) : 4 * (first + n) + 4], o,
             )  # fmt: skip
         # Before 0 the vehicle is still being set down on its rails: where it then stands counts.
@@ -111,7 +102,7 @@ def axle_forces(
         about = mx * ex + my * ey + mz * ez
         torque[k] += about
         # Half of the gyroscopic moment -omega x h goes with each wheel of the spin's inertia.
-        h = switches[0] * spins[k] * spin[k] * (0.5 if wheels[first, 2] == wheels[first + 1, 2] else 1.0)
+        h = switches[0] * spins[k, 0] * spin[k] * (0.5 if wheels[first, 2] == wheels[first + 1, 2] else 1.0)
         wr[0] += gx
         wr[1] += gy
         wr[2] += gz
@@ -159,35 +150,42 @@ def forces(
         Per body: position (3), velocity (3), rotation matrix by rows (9), angular rate (3); global.
     spin : ndarray (p,)
         Absolute rate of each spin about its axle, rad/s.
-    zeta : ndarray (4 w + d,)
-        Creep states of each wheel (see `simrail.vehicle.contact`), then the force of each series damper.
+    zeta : ndarray (4 w + d,), or (4 w + d + p,) where the wheels drive
+        Creep states of each wheel (see `simrail.vehicle.contact`), then the force of each series damper,
+        then the state of each spin's brake (see `simrail.vehicle.traction_forces`).
     bodies ... const : ndarray
         `ForceData`.
     wrench : ndarray (b, 6), output
         Force and moment about the centre of gravity, global axes.
     torque : ndarray (p,), output
         Moment about the axle of each spin.
-    zeta_rate : ndarray (4 w + d,), output
+    zeta_rate : ndarray, shape of zeta, output
         d(zeta)/dt.
-    memo : ndarray (1 + 5 a,)
-        Memory between calls: profile piece; per axle s, derailed flag, s of derailment, and the wheel
-        loads of the last call.
-    work : ndarray (42,)
+    memo : ndarray (2 + 5 a,)
+        Memory between calls: profile piece, s of the guide's body; per axle s, derailed flag, s of
+        derailment, and the wheel loads of the last call.
+    work : ndarray (34,)
         Scratch.
     """
     wrench[:] = 0.0
     torque[:] = 0.0
     for b in range(bodies.shape[0]):
         wrench[b, 2] = -bodies[b, 0] * guide[8]
-    f, o = work[:34], work[34:]
+    f, o = work[:26], work[26:]
     spring_forces(springs, pose, wrench)
     creep = 4 * wheels.shape[0]
-    series_forces(series, pose, zeta[creep:], wrench, zeta_rate[creep:])
+    brakes = creep + series.shape[0]
+    series_forces(series, pose, zeta[creep:brakes], wrench, zeta_rate[creep:brakes])
     turn_forces(turns, pose, wrench)
     stop_forces(stops, laws, pose, wrench)
-    guide_force(t, guide, drive, grid, table, pose, wrench, memo, f)
+    behind, wanted, speed = guide_force(t, guide, drive, grid, table, pose, wrench, memo, f)
+    if guide[18] > 0.0:
+        traction_forces(
+            behind, wanted, speed, guide[18:], spins, pose, spin, zeta[brakes:], wrench, torque,
+            zeta_rate[brakes:],
+        )  # fmt: skip
     for a in range(axles.shape[0]):
         axle_forces(
             t, axles[a], wheels, spin, zeta, spins, switches, grid, table, coef, const,
-            pose, wrench, torque, zeta_rate, memo[1 + 5 * a : 6 + 5 * a], f, o,
+            pose, wrench, torque, zeta_rate, memo[2 + 5 * a : 7 + 5 * a], f, o,
         )  # fmt: skip

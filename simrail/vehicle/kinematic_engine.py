@@ -16,7 +16,7 @@ from scipy.interpolate import PPoly
 from simrail.jit import FloatArray
 from simrail.profile import SpeedProfile
 from simrail.track.design import TrackDesign
-from simrail.track.laid import LaidTrack
+from simrail.track.laid import RAILS, LaidTrack
 from simrail.truth import BodyMotion, Truth, euler_angles, rotation_matrix
 
 Channel = Callable[
@@ -56,7 +56,7 @@ def along(function: Callable[[FloatArray, int], FloatArray]) -> Channel:
 def rail_following(laid: LaidTrack) -> dict[str, Channel]:
     """Channels of a body that keeps to the irregular rails: alignment, profile and cross-level."""
     knots = laid.table_start_m + laid.table_step_m * np.arange(laid.table.shape[0] + 1)
-    rails = PPoly(laid.table[:, 6:].transpose(2, 0, 1), knots)
+    rails = PPoly(laid.table[:, RAILS].transpose(2, 0, 1), knots)
     half = 0.5
     base = 1.5
 

@@ -30,7 +30,8 @@ from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.vehicle.force_data import ForceData, pack, rest_drop_m, states_of
+from simrail.vehicle.contact_tables import rest_drops_m
+from simrail.vehicle.force_data import ForceData, pack, states_of
 from simrail.vehicle.forces import forces
 from simrail.vehicle.model import VehicleModel
 
@@ -89,7 +90,7 @@ class RunningVehicle:
     _nominal: FloatArray = field(repr=False)
     _mass: FloatArray = field(repr=False)
     _inertia: FloatArray = field(repr=False)
-    _drop_m: float
+    _drops_m: FloatArray = field(repr=False)
 
     @property
     def bodies(self) -> int:
@@ -142,8 +143,8 @@ class RunningVehicle:
         pose[:, 15:] = motion[:, 3:]
         wrench, torque, inner = np.zeros((b, 6)), np.zeros(spins), np.zeros(self.inner_states)
         axles = self.data.axles
-        memo, work = np.zeros(1 + 5 * len(axles)), np.zeros(42)
-        memo[1::5] = self._nominal[axles[:, 0].astype(int), 0]
+        memo, work = np.zeros(2 + 5 * len(axles)), np.zeros(34)
+        memo[2::5] = self._nominal[axles[:, 0].astype(int), 0]
         data = self.data._replace(drive=np.array([[0.0, 0.0, 0.0, speed_mps, _MIDDLE_M]]))
         spin = np.ascontiguousarray(state[12 * b : 12 * b + spins])
         zeta = np.ascontiguousarray(state[12 * b + spins :])
@@ -158,7 +159,7 @@ class RunningVehicle:
         out = np.empty((b, 6))
         out[:, :3] = wrench[:, :3] / self._mass[:, None]
         out[:, 3:] = np.einsum("bij,bj->bi", rotation, slope)
-        return np.concatenate([motion.ravel(), out.ravel(), torque / self.data.spins, inner])
+        return np.concatenate([motion.ravel(), out.ravel(), torque / self.data.spins[:, 0], inner])
 
     def equilibrium(self, speed_mps: float, *, start: FloatArray | None = None) -> FloatArray:
         """State (n,) of steady running at a speed, by Newton's method.
@@ -244,7 +245,7 @@ class RunningVehicle:
     def _at_rest(self, speed_mps: float) -> FloatArray:
         """Every body at its nominal height less the wheels' penetration, the wheels rolling."""
         state = np.zeros(self.size)
-        state[2 : 6 * self.bodies : 6] = self._drop_m
+        state[2 : 6 * self.bodies : 6] = self._drops_m
         names = list(self.model.spin_inertia_kgm2)
         for wheel in self.model.wheels:
             state[12 * self.bodies + names.index(wheel.spin)] = speed_mps / wheel.radius_m
@@ -268,5 +269,5 @@ def running_vehicle(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Runni
         _nominal=nominal,
         _mass=np.array([body.mass_kg for body in model.bodies]),
         _inertia=np.array([body.inertia_kgm2 for body in model.bodies]),
-        _drop_m=rest_drop_m(model, gravity_mps2=gravity_mps2),
+        _drops_m=rest_drops_m(model, gravity_mps2=gravity_mps2),
     )

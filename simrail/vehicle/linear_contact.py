@@ -14,6 +14,7 @@ from simrail.jit import FloatArray, njit_borrowed
 def linear_wheel_force(
     switches: FloatArray,
     const: FloatArray,
+    load: float,
     side: float,
     y: float,
     z: float,
@@ -37,8 +38,8 @@ def linear_wheel_force(
 ) -> int:
     """Force and moment of a rail on a wheel, and the rates of its creep states.
 
-    Arguments, units and output as in `simrail.vehicle.contact.wheel_force`; only the first two creep
-    states are used. Returns 0 off the rail, 1 on it, -1 beyond the flange's place.
+    Arguments, units and output as in `simrail.vehicle.contact.wheel_force`, and the static load, N; only
+    the first two creep states are used. Returns 0 off the rail, 1 on it, -1 beyond the flange's place.
     """
     half, r0 = const[2], const[3]
     length0, tau, taud, v_spin = const[7], const[8], const[9], const[10]
@@ -52,7 +53,7 @@ def linear_wheel_force(
     Y = side * half
     pen = z_rail - z - Y * phi
     rise = V * dz_rail - z_dot - Y * phi_dot
-    N = switches[11] + switches[7] * pen + switches[8] * rise
+    N = load + switches[7] * pen + switches[8] * rise
     if not N > 0.0:
         zeta_dot[0] = -zeta[0] * speed / length
         zeta_dot[1] = -zeta[1] * speed / length

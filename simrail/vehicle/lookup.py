@@ -12,10 +12,11 @@ from simrail.jit import FloatArray, njit_borrowed
 
 @njit_borrowed
 def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> None:
-    """Track frame and rails at s into f (34,), from the C2 splines of the laid track.
+    """Track frame and rails at s into f (26,), from the C2 splines of the laid track.
 
     f: position 0-2, rotation (rows) 3-11, k 12-14, stretch of the centreline 1/cos(pitch) 15,
-    rails y_left, z_left, y_right, z_right 16-19, their derivatives by s 20-23.
+    rails y_left, z_left, y_right, z_right 16-19, their derivatives by s 20-23, friction factors of the
+    left and right rail 24-25.
     """
     at = (s - grid[0]) / grid[1]
     i = int(at)
@@ -36,6 +37,8 @@ def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> No
     for j in range(4):
         f[16 + j] = ((c[6 + j, 0] * t + c[6 + j, 1]) * t + c[6 + j, 2]) * t + c[6 + j, 3]
         f[20 + j] = (3.0 * c[6 + j, 0] * t + 2.0 * c[6 + j, 1]) * t + c[6 + j, 2]
+    for j in range(2):
+        f[24 + j] = ((c[10 + j, 0] * t + c[10 + j, 1]) * t + c[10 + j, 2]) * t + c[10 + j, 3]
     cy, sy = np.cos(yaw), np.sin(yaw)
     cp, sp = np.cos(pitch), np.sin(pitch)
     cr, sr = np.cos(roll), np.sin(roll)
@@ -46,6 +49,29 @@ def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> No
     f[13] = cr * pitch1 + sr * cp * yaw1
     f[14] = -sr * pitch1 + cr * cp * yaw1
     f[15] = 1.0 / cp
+
+
+@njit_borrowed
+def find_on_track(
+    table: FloatArray, grid: FloatArray, b: FloatArray, s: float, f: FloatArray
+) -> tuple[float, float, float]:
+    """Where on the track a body is: s, and its lateral and vertical place in the track frame there.
+
+    ``b`` is the pose of the body, ``s`` where to begin; the frame at the place found is left in ``f``.
+    """
+    y = z = 0.0
+    for _ in range(8):
+        track_at(table, grid, s, f)
+        dx, dy, dz = b[0] - f[0], b[1] - f[1], b[2] - f[2]
+        x = f[3] * dx + f[6] * dy + f[9] * dz
+        y = f[4] * dx + f[7] * dy + f[10] * dz
+        z = f[5] * dx + f[8] * dy + f[11] * dz
+        stretch = f[15] - f[14] * y + f[13] * z
+        step = x / stretch
+        if abs(step) < 1e-12 * (1.0 + abs(s)):
+            break
+        s += step
+    return s, y, z
 
 
 @njit_borrowed

@@ -16,6 +16,7 @@ import numpy as np
 from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.vehicle.creep_laws import CreepLaw
+from simrail.vehicle.traction import Traction
 
 
 @dataclass(frozen=True)
@@ -194,6 +195,8 @@ class VehicleModel:
         Bump stops and nonlinear dampers.
     gyroscopic : bool
         Whether the spinning wheels resist being turned.
+    traction : Traction or None
+        What drives it if its wheels do.
     """
 
     name: str
@@ -210,6 +213,7 @@ class VehicleModel:
     rotations: tuple[Rotation, ...] = ()
     tabled: tuple[Tabled, ...] = ()
     gyroscopic: bool = True
+    traction: Traction | None = None
 
     @property
     def body_names(self) -> list[str]:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simrail.vehicle.contact import COLUMNS, CONSTANTS, static_height
-from simrail.vehicle.force_data import contact_of
+from simrail.vehicle.contact_tables import contacts_of
 from simrail.vehicle.model import VehicleModel
 
 STABLE = 2.5
@@ -62,10 +62,11 @@ def contact_resonance(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Res
     -----
     Per wheel the vertical stiffness is ``3/2 N0/d`` with d the static approach of Hertz, or the prescribed
     one; the tangential one f11/L0 with L0 the relaxation length, and f11 that of the centred wheelset. Of
-    the wheels' load the mean is taken, as in the contact table. Springs above the axle count for nothing.
+    the wheels' loads the greatest is taken, whose contact is the stiffest. Springs above the axle count
+    for nothing.
     """
     pair = model.wheel_rail
-    table = contact_of(model, gravity_mps2=gravity_mps2)
+    table = contacts_of(model, gravity_mps2=gravity_mps2).tables[-1]
     const = dict(zip(CONSTANTS, table.const, strict=True))
     if pair.linear is None:
         at = -const["first_shift_m"]

@@ -115,7 +115,7 @@ def march(
         Memory of `simrail.vehicle.forces.forces`.
     scratch : ndarray (3, n)
         Scratch of this function.
-    pose, wrench, work : ndarray (b, 18), (b, 6), (42,)
+    pose, wrench, work : ndarray (b, 18), (b, 6), (34,)
         Scratch of `simrail.vehicle.forces.forces`.
     data : tuple of ndarray
         `simrail.vehicle.force_data.ForceData`.
@@ -161,7 +161,7 @@ def march(
         for k in range(n):
             stage[k] = state[k]
             rows[row, k] = state[k]
-        for k in range(2, memo.shape[0], 5):
+        for k in range(3, memo.shape[0], 5):
             if memo[k] != 0.0:
                 return row
     return rows.shape[0]

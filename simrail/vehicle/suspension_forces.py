@@ -68,18 +68,43 @@ def guide_force(
     wrench: FloatArray,
     memo: FloatArray,
     f: FloatArray,
-) -> None:
-    """Add the guide's forces and moments on its body, in the axes of the track where it should be."""
-    s, speed = driven(t, drive, memo)
-    track_at(table, grid, s + guide[1], f)
+) -> tuple[float, float, float]:
+    """Add the guide's forces and moments on its body, in the axes of the track where it should be.
+
+    Where the wheels drive it does not push along, and its axes are those of
+    the track where the body is: a vehicle that lost time is still held upright and along its own place.
+
+    Returns
+    -------
+    behind, wanted, speed : float
+        Where the wheels drive: distance to the place that the profile asks for, its speed, and the
+        body's speed along the track; else nothing that means anything.
+    """
+    s, wanted = driven(t, drive, memo)
+    speed, behind = wanted, 0.0
     i = int(guide[0])
     b, w = pose[i], wrench[i]
-    dx, dy, dz = b[0] - f[0], b[1] - f[1], b[2] - f[2]
-    x = f[3] * dx + f[6] * dy + f[9] * dz
-    y = f[4] * dx + f[7] * dy + f[10] * dz
-    z = f[5] * dx + f[8] * dy + f[11] * dz
+    searched = guide[18] > 0.0
+    place = s + guide[1]
+    at = memo[1] if searched else place
+    x = y = z = stretch = 0.0
+    for _ in range(8):
+        track_at(table, grid, at, f)
+        dx, dy, dz = b[0] - f[0], b[1] - f[1], b[2] - f[2]
+        x = f[3] * dx + f[6] * dy + f[9] * dz
+        y = f[4] * dx + f[7] * dy + f[10] * dz
+        z = f[5] * dx + f[8] * dy + f[11] * dz
+        stretch = f[15] - f[14] * y + f[13] * z
+        if not searched or abs(x) < 1e-12 * (1.0 + abs(at)):
+            break
+        at += x / stretch
+    memo[1] = at
     v = f[3] * b[3] + f[6] * b[4] + f[9] * b[5]
-    along = -guide[2] * x - guide[3] * (v - speed * (f[15] - f[14] * y + f[13] * z))
+    along = 0.0
+    if searched:
+        behind, speed = place - at, v / stretch
+    else:
+        along = -guide[2] * x - guide[3] * (v - speed * stretch)
     # Small relative rotation: the antisymmetric part of C_t^T A.
     xz = f[3] * b[8] + f[6] * b[11] + f[9] * b[14]
     zx = f[5] * b[6] + f[8] * b[9] + f[11] * b[12]
@@ -104,6 +129,7 @@ def guide_force(
         for j in range(3):
             w[j] += f[4 + 3 * j] * side + f[5 + 3 * j] * up
             w[3 + j] += f[3 + 3 * j] * roll
+    return behind, wanted, speed
 
 
 @njit_borrowed

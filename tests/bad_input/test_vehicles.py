@@ -39,6 +39,36 @@ FAULTS = {
         '[creep]\nlaw = "polach"\nadhesion = 0.4\nslip = 0.6\n\n[guide]',
         ["creep.slip", "0.6", "0.4"],
     ),
+    "shares that do not sum to 1": (
+        BOGIE,
+        "driven = { front = 0.5, rear = 0.5 }",
+        "driven = { front = 0.5, rear = 0.4 }",
+        ["traction.driven", "0.9", "sum to 1"],
+    ),
+    "a driven axle that is none": (
+        BOGIE,
+        "driven = { front = 0.5, rear = 0.5 }",
+        "driven = { front = 0.5, reer = 0.5 }",
+        ["traction.driven", "reer", "front.left"],
+    ),
+    "a wheel braked twice": (
+        BOGIE,
+        "braked = { front = 0.5, rear = 0.5 }",
+        'braked = { front = 0.5, rear = 0.25, "front.left" = 0.25 }',
+        ["traction.braked", "front.left", "twice"],
+    ),
+    "a reaction on nothing": (
+        BOGIE,
+        "catch_up_mps = 0.8",
+        'catch_up_mps = 0.8\nreaction = "bogie"',
+        ["traction.reaction", "bogie", "axle, or one of"],
+    ),
+    "no braking effort": (
+        BOGIE,
+        "braking_effort_n = 24.0e3",
+        "braking_effort_n = 0.0",
+        ["traction.braking_effort_n", "> 0"],
+    ),
     "body that nothing holds": (BOGIE, "[guide]", LOOSE, ["body[2].name", "toolbox", "[[suspension]]"]),
     "axle that nothing holds": (
         BOGIE,

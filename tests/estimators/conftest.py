@@ -95,7 +95,7 @@ def bend_truth(speed_mps: float = 15.0, direction: int = 1, rest_s: float = 2.0)
 def following(laid: LaidTrack) -> dict[str, Channel]:
     """Keeps to the irregular rails, and points along them: lateral', -vertical' as yaw and pitch."""
     knots = laid.table_start_m + laid.table_step_m * np.arange(laid.table.shape[0] + 1)
-    rails = PPoly(laid.table[:, 6:].transpose(2, 0, 1), knots)
+    rails = PPoly(laid.table[:, 6:10].transpose(2, 0, 1), knots)
     channels = rail_following(laid)
 
     def mean_of_rails(first: int, sign: float) -> Channel:

@@ -23,7 +23,7 @@ from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
 from simrail.track.irregularity import Irregularity
 from simrail.truth import Mount
-from simrail.vehicle.force_data import contact_of
+from simrail.vehicle.contact_tables import contacts_of
 from simrail.vehicle.wheelset import contact_state
 from simrail.wheel_speed import counted_way_m
 
@@ -55,7 +55,7 @@ def wheels_in_curve(name: str, radius_m: float, speed_mps: float) -> dict[str, W
     )
     irregularity = Irregularity("none", (1.5, 100.0), 0.0)
     truth = simulate(Ride("curve", track, irregularity, 1, model, profile, engine="compiled"))
-    table = contact_of(model)
+    table = contacts_of(model).tables[0]
     found = {}
     for wheel in model.wheels:
         body = truth.bodies[wheel.axle]

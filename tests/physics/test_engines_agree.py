@@ -14,6 +14,7 @@ from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
+from simrail.track.rail_condition import RailCondition
 from simrail.truth import rotation_matrix
 from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.creep_laws import CreepLaw
@@ -25,11 +26,24 @@ FIELDS = ("time_s", "position", "rotation", "acceleration", "angular_acceleratio
 VEHICLES = sorted(file.stem for file in (Path(scenarios.__file__).parent / "vehicles").glob("*.toml"))
 
 
-def run(engine, vehicle, track, profile, *, duration_s, rough=ROUGH, step_s=0.5e-3, law="she"):
+def run(
+    engine,
+    vehicle,
+    track,
+    profile,
+    *,
+    duration_s,
+    rough=ROUGH,
+    step_s=0.5e-3,
+    conditions=(),
+    drive="guide",
+    law=None,
+):
     model = load(VehicleFile, "vehicle", vehicle).model(vehicle)
-    model = replace(model, wheel_rail=replace(model.wheel_rail, creep=CreepLaw(law)))
-    laid = lay(load(TrackFile, "track", track).design(track), rough, seed=1)
-    solver = engine(model, laid, profile=profile, settle_s=1.0, step_s=step_s)
+    if law is not None:
+        model = replace(model, wheel_rail=replace(model.wheel_rail, creep=CreepLaw(law)))
+    laid = lay(load(TrackFile, "track", track).design(track), rough, seed=1, conditions=conditions)
+    solver = engine(model, laid, profile=profile, settle_s=1.0, step_s=step_s, drive=drive)
     segments = list(solver.run(duration_s, segment_s=3.0))
     joined = {name: np.concatenate([getattr(part, name) for part in segments]) for name in FIELDS}
     return SimpleNamespace(**joined, loads_n=solver.wheel_loads_n(), model=model, laid=laid)
@@ -85,6 +99,22 @@ def test_on_the_tread_in_an_irregular_curve(profile):
     np.testing.assert_allclose(compiled.spin_rad, exudyn.spin_rad, rtol=0.0, atol=1e-5)
     np.testing.assert_allclose(compiled.states, exudyn.states, rtol=0.0, atol=1e-6)
     np.testing.assert_allclose(compiled.loads_n, exudyn.loads_n, rtol=1e-5)
+
+
+# One wheel of a conventional wheelset does not slide while the other holds.
+@pytest.mark.parametrize(("vehicle", "rails"), [("metro_irw_bogie", "left"), ("metro_car_gz18", "both")])
+def test_driven_and_braked_by_the_wheels_over_leaves(vehicle, rails):
+    """1e-6 m/s2 rms from a start that spins to a stop that slides, on irregular rails, off the flange."""
+    profile = SpeedProfile(120.0, 160.0, 6.0, **BRISK)
+    leaves = (RailCondition(105.0, 134.0, 0.05 / 0.3), RailCondition(139.0, 170.0, 0.05 / 0.3, rails))
+    compiled, exudyn = both(vehicle, "level_straight", profile, conditions=leaves, drive="wheels")
+    slip = np.diff(exudyn.spin_rad[:, 0] * exudyn.model.wheels[0].radius_m - exudyn.position[:, 0, 0])
+    assert slip.max() > 0.1e-3  # more than 0.1 m/s
+    assert slip.min() < -0.1e-3
+    assert max(lateral_shift_m(exudyn, i) for i in range(2)) < FLANGE_M
+    assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
+    assert rms(compiled.angular_acceleration - exudyn.angular_acceleration) < 1e-6
+    np.testing.assert_allclose(compiled.states, exudyn.states, rtol=0.0, atol=1e-5)
 
 
 def test_with_flange_contact():

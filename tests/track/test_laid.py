@@ -13,6 +13,7 @@ from simrail.seeds import stream
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
 from simrail.track.irregularity import PERIOD_M, Irregularity, fade, realise_all
 from simrail.track.laid import CHANNELS, LaidTrack, lay
+from simrail.track.rail_condition import RailCondition
 from simrail.track.spectra import SPECTRA
 
 ROUGH = Irregularity("erri_b176_high", (1.5, 100.0), fade_m=40.0)
@@ -34,11 +35,13 @@ CURVED = TrackDesign(
 
 @pytest.fixture(scope="module")
 def laid() -> LaidTrack:
-    return lay(CURVED, ROUGH, seed=11)
+    # Leaves on both rails, wet on one, so that no column of the table is a constant.
+    conditions = (RailCondition(100.0, 140.0, 0.2), RailCondition(150.0, 170.0, 0.5, "left"))
+    return lay(CURVED, ROUGH, seed=11, conditions=conditions)
 
 
 def test_table_has_the_agreed_form(laid: LaidTrack) -> None:
-    assert laid.table.shape[1:] == (10, 4)
+    assert laid.table.shape[1:] == (12, 4)
     assert laid.table.dtype == np.float64
     assert laid.table.flags.c_contiguous
     assert not laid.table.flags.writeable
@@ -68,7 +71,7 @@ def test_readers_equal_the_table(laid: LaidTrack) -> None:
         assert values.shape == (50, 20, len(CHANNELS))
         expected = reference(s, derivative)
         assert np.abs(values - expected).max() <= 1e-12 * np.abs(expected).max()
-        assert np.array_equal(laid.rails(s, derivative=derivative), values[..., 6:])
+        assert np.array_equal(laid.rails(s, derivative=derivative), values[..., 6:10])
     assert laid.rails(0.0).shape == (4,)
     assert np.array_equal(laid.rails(s[0, 0]), laid.rails(s)[0, 0])
     y_left, z_left, y_right, z_right = laid.rails(s[0]).T

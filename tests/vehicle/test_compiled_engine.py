@@ -114,10 +114,10 @@ class Turned:
         return self.total_m - self.design.on_track(self.total_m - s)
 
 
-# x y z, yaw pitch roll, then y and z of the left rail, y and z of the right one, which change places.
-OTHER_RAIL = [0, 1, 2, 3, 4, 5, 8, 9, 6, 7]
-IN_THE_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0])
-TURNED = np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0, -1.0, 1.0])
+# x y z, yaw pitch roll, y and z of the left rail and of the right one, their frictions; rails change places.
+OTHER_RAIL = [0, 1, 2, 3, 4, 5, 8, 9, 6, 7, 11, 10]
+IN_THE_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+TURNED = np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
 
 
 def mirrored(laid):

@@ -15,7 +15,7 @@ from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.vehicle.force_data import contact_of
+from simrail.vehicle.contact_tables import contacts_of
 from simrail.vehicle.linear import running_vehicle, state_matrix
 from simrail.vehicle.model import Body, Guide, Suspension, VehicleModel, Wheel, WheelRail
 from simrail.vehicle.stability import (
@@ -202,7 +202,7 @@ def test_free_wheelset_has_the_wavelength_of_klingel(inclination, least):
     """Within 5 % for three conicities at 1 m/s, the conicity read from the contact; IRW: no oscillation."""
     model = alone(inclination)
     shift = 1e-5
-    left, right = rolling_radius_difference(contact_of(model), np.array([shift, -shift]))
+    left, right = rolling_radius_difference(contacts_of(model).tables[0], np.array([shift, -shift]))
     slope = (left - right) / (4.0 * shift)
     assert slope > least
     wavelength = 2.0 * np.pi * np.sqrt(B * 0.46 / slope)
@@ -249,7 +249,8 @@ def test_steady_running_is_steady_and_carries_the_weight(bogie):
     assert spins == pytest.approx(20.0 / 0.29, rel=2e-3)
     with pytest.raises(InputError, match="does not run steadily"):
         lost = replace(bogie.model, suspensions=bogie.model.suspensions[:8])
-        object.__setattr__(lost, "_statics", bogie.model._statics[: 8 + 4])
+        statics = bogie.model._statics
+        object.__setattr__(lost, "_statics", np.concatenate([statics[:8], statics[-5:]]))
         running_vehicle(lost).equilibrium(20.0)
 
 

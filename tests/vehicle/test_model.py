@@ -13,7 +13,8 @@ from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.vehicle.contact_geometry import CONSTANTS
-from simrail.vehicle.force_data import contact_of, pack, states_of
+from simrail.vehicle.contact_tables import contacts_of
+from simrail.vehicle.force_data import pack, states_of
 from simrail.vehicle.forces import forces
 from simrail.vehicle.linear_contact import linear_wheel_force
 from simrail.vehicle.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
@@ -151,12 +152,12 @@ def evaluate(data, spin, rates):
     # High over the rails: no contact.
     pose[:, 0], pose[:, 2] = 100.0, 5.0
     pose[0, 15:] = rates
-    wrench, memo = np.zeros((len(pose), 6)), np.zeros(1 + 5 * len(data.axles))
-    memo[1::5] = 100.0
+    wrench, memo = np.zeros((len(pose), 6)), np.zeros(2 + 5 * len(data.axles))
+    memo[2::5] = 100.0
     states = np.zeros(states_of(data))
     forces(
         0.0, pose, np.full(len(data.spins), spin), states, *data, wrench, np.zeros(len(data.spins)),
-        states.copy(), memo, np.zeros(42),
+        states.copy(), memo, np.zeros(34),
     )  # fmt: skip
     return wrench[0]
 
@@ -195,7 +196,8 @@ def test_prescribed_contact_has_its_gravitational_stiffness():
     for side in (1.0, -1.0):
         out = np.zeros(8)
         flag = linear_wheel_force(
-            switches, data.const, side, 1e-3, 0.0, 0.0, 2e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+            switches, data.const[0], data.wheels[0, 5], side, 1e-3, 0.0, 0.0, 2e-3,
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
             0.0, 0.0, 0.0, np.zeros(4), np.zeros(4), out,
         )  # fmt: skip
         assert flag == 1
@@ -210,7 +212,7 @@ def test_creep_law_of_the_file_reaches_the_contact():
     text = shipped("vehicle")["metro_irw_bogie"].read_text(encoding="utf-8")
     chosen = text.replace("[guide]", '[creep]\nlaw = "polach"\nslip = 0.4\n\n[guide]')
     plain, polach = (
-        contact_of(judge(VehicleFile, parse_toml(one, file="v"), file="v").model("v")).const
+        contacts_of(judge(VehicleFile, parse_toml(one, file="v"), file="v").model("v")).tables[0].const
         for one in (text, chosen)
     )
     law, slip = CONSTANTS.index("creep_law"), CONSTANTS.index("polach_slip")

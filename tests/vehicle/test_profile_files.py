@@ -10,7 +10,7 @@ from simrail.scenario.files import load, shipped
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.vehicle.contact_geometry import build_contact
 from simrail.vehicle.contact_pair import incline
-from simrail.vehicle.force_data import contact_of
+from simrail.vehicle.contact_tables import contacts_of
 from simrail.vehicle.profile_files import profiles_digest, rail_profile, wheel_profile
 from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002, scaled, wheel_depth
 from simrail.vehicle.wheelset import conicity
@@ -246,7 +246,7 @@ def test_a_vehicle_finds_its_profile_beside_its_file(tmp_path, monkeypatch):
     model = load(VehicleFile, "vehicle", str(tmp_path / "mine.toml")).model("mine")
     plain = load(VehicleFile, "vehicle", "irw_axle").model("irw_axle")
     # The file's points are rounded to a nanometre.
-    own, shipped_one = (contact_of(each).coef[0, :, 0, 3] for each in (model, plain))
+    own, shipped_one = (contacts_of(each).tables[0].coef[0, :, 0, 3] for each in (model, plain))
     np.testing.assert_allclose(own, shipped_one, rtol=0.0, atol=2e-9)
     before = profiles_digest(model.wheel_rail)
     lines[600] = lines[600][:-1] + ("1" if lines[600][-1] != "1" else "2")

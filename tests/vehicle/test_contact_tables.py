@@ -1,0 +1,93 @@
+"""One contact table per static wheel load: shared where loads are alike, right where they are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simrail.profile import SpeedProfile
+from simrail.scenario.files import load
+from simrail.scenario.vehicle_file import VehicleFile
+from simrail.track.design import Straight, TrackDesign
+from simrail.track.irregularity import Irregularity
+from simrail.track.laid import lay
+from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.contact import build_contact, static_height
+from simrail.vehicle.contact_tables import contacts_of, rest_drops_m
+from simrail.vehicle.profiles import rail_60e1, s1002
+
+LEVEL = TrackDesign("level", 0.0, (Straight(60.0),))
+
+
+def bogie(body_at_m=0.0):
+    """The metro bogie, its carried body moved forward."""
+    model = load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie")
+    bodies = list(model.bodies)
+    bodies[-1] = replace(bodies[-1], position_m=(body_at_m, 0.0, 1.45))
+    # The secondary springs and the traction rod go with the body, so that the frame tips, not the body.
+    springs = tuple(
+        replace(s, position_m=(s.position_m[0] + body_at_m, *s.position_m[1:])) if s.outer == "body" else s
+        for s in model.suspensions
+    )
+    return replace(model, bodies=tuple(bodies), suspensions=springs)
+
+
+def at_rest(model):
+    """Heights of the axles less their nominal ones, and wheel loads, after 8 s at rest."""
+    laid = lay(LEVEL, Irregularity("none", fade_m=0.0), seed=0)
+    engine = CompiledEngine(model, laid, profile=SpeedProfile(20.0, 40.0, 5.0, rest_s=5.0), settle_s=8.0)
+    segment = next(iter(engine.run(0.5)))
+    nominal = [model.body(name).position_m[2] for name in model.axle_names]
+    return segment.position[-1, : len(nominal), 2] - nominal, engine.wheel_loads_n()
+
+
+def test_two_axle_loads_stand_at_their_own_heights_with_their_own_loads_to_1e_3():
+    model = bogie(body_at_m=0.4)
+    loads = model.wheel_load_n(9.81)
+    assert loads[0] > 1.5 * loads[2]
+    contacts = contacts_of(model)
+    assert contacts.of_wheel == (1, 1, 0, 0)
+    light, heavy = contacts.tables
+    np.testing.assert_allclose([light.static_load_n, heavy.static_load_n], loads[[2, 0]])
+    assert light.coef.shape == heavy.coef.shape
+    np.testing.assert_array_equal(light.const[[0, 1, 12, 13]], heavy.const[[0, 1, 12, 13]])  # one grid
+    heights, found = at_rest(model)
+    np.testing.assert_allclose(found, loads, rtol=1e-3)
+    # A table made alone for each axle's load, on a grid of its own.
+    alone = [
+        static_height(
+            build_contact(
+                s1002(), rail_60e1(), static_load_n=float(at), wheel_radius_m=0.29, rail_inclination=0.025
+            )
+        )
+        for at in loads[[0, 2]]
+    ]
+    assert abs(alone[0] - alone[1]) > 10e-6
+    np.testing.assert_allclose(heights, alone, rtol=1e-3)
+    np.testing.assert_allclose(rest_drops_m(model, gravity_mps2=9.81)[:2], alone, rtol=1e-5)
+
+
+def test_equal_loads_share_the_one_table_of_their_load_bit_by_bit():
+    model = bogie()
+    (table,) = contacts_of(model).tables
+    alone = build_contact(
+        s1002(), rail_60e1(), static_load_n=float(np.mean(model.wheel_load_n(9.81))), wheel_radius_m=0.29,
+        rail_inclination=0.025,
+    )  # fmt: skip
+    np.testing.assert_array_equal(table.coef, alone.coef)
+    np.testing.assert_array_equal(table.const, alone.const)
+
+
+@pytest.mark.parametrize(("shift_m", "tables"), [(0.005, 1), (0.02, 2)])
+def test_loads_within_2_percent_share_a_table(shift_m, tables):
+    """Loads 0.8 % and 3.3 % apart."""
+    model = bogie(body_at_m=shift_m)
+    loads = model.wheel_load_n(9.81)
+    assert (loads.max() / loads.min() - 1.0 < 0.02) == (tables == 1)
+    assert len(contacts_of(model).tables) == tables
+
+
+def test_a_table_is_built_once():
+    assert contacts_of(bogie()).tables[0] is contacts_of(bogie()).tables[0]
+    rough = replace(bogie(), wheel_rail=replace(bogie().wheel_rail, friction=0.2))
+    assert contacts_of(rough).tables[0] is not contacts_of(bogie()).tables[0]
