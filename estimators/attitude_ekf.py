@@ -68,6 +68,10 @@ class AttitudeEkf:
         Process noise in place of the tuning's, rad2/s (rad2 if read per step).
     accel_sd_mps2 : float, optional
         Standard deviation of one sample of specific force in place of the tuning's.
+    doubt : float
+        How far a specific force that is longer or shorter than gravity is doubted: adds doubt (|z| - g)^2 to
+        its variance. Paper 000, Fig. 3 does so after Yuan et al.; how exactly is not printed, this is our
+        reading. 0 for none.
     vibration : float
         For the recommended tuning: velocity sd of the body in the track frame over train speed.
     start_sd_rad, start_yaw_sd_rad : float
@@ -82,6 +86,7 @@ class AttitudeEkf:
     backend: str = "compiled"
     gyro_intensity_rad2ps: float | None = None
     accel_sd_mps2: float | None = None
+    doubt: float = 0.0
     vibration: float = SWING_PER_SPEED
     start_sd_rad: float = math.radians(1.0)
     start_yaw_sd_rad: float = math.radians(0.3)
@@ -97,12 +102,13 @@ class AttitudeEkf:
         for name in (
             "gyro_intensity_rad2ps",
             "accel_sd_mps2",
+            "doubt",
             "vibration",
             "start_sd_rad",
             "start_yaw_sd_rad",
         ):
             value = getattr(self, name)
-            lowest_allowed = name in ("vibration", "start_yaw_sd_rad", "gyro_intensity_rad2ps")
+            lowest_allowed = name in ("doubt", "vibration", "start_yaw_sd_rad", "gyro_intensity_rad2ps")
             if value is not None and not (0.0 < value < math.inf or (lowest_allowed and value == 0.0)):
                 raise InputError(
                     "is out of range", field=name, value=value, limit=">= 0" if lowest_allowed else "> 0"
@@ -132,11 +138,13 @@ class AttitudeEkf:
         noise = self._noise(recording, rest, frame)
         first = design_frame(recording, count=1)
         sd = np.array([self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad])
+        force = gravity_force(recording, frame, compensated=self.compensated, printed=self.printed)
+        excess = np.linalg.norm(force, axis=1) - recording.gravity_mps2
         arrays = _Arrays(
             rate=step_rates(recording, rest.bias),
-            force=gravity_force(recording, frame, compensated=self.compensated, printed=self.printed),
+            force=force,
             process=noise.process,
-            noise=noise.force,
+            noise=noise.force + self.doubt * excess[:, None] ** 2,
             start=np.array([first.roll_rad[0], first.pitch_rad[0], first.yaw_rad[0]]),
             start_variance=sd**2,
             step_s=1.0 / recording.imu_sheet.rate_hz,
@@ -155,11 +163,6 @@ class AttitudeEkf:
         if self.accel_sd_mps2 is not None:
             noise = noise._replace(force=np.full_like(noise.force, self.accel_sd_mps2**2))
         return noise
-
-
-def _require(name: str, value: float | None, *, above: float, limit: str) -> None:
-    if value is not None and not above < value < math.inf:
-        raise InputError("is out of range", field=name, value=value, limit=limit)
 
 
 class _EulerEkf(ExtendedKalmanFilter):

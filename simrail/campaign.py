@@ -25,13 +25,21 @@ from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
 from simrail.example import CellResult
 from simrail.interrupts import Check, interruptible
+from simrail.line_odometry import with_odometry
 from simrail.measure import measure
 from simrail.recording import Recording
 from simrail.ride import is_cached, simulate
-from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of
+from simrail.scenario.build import (
+    Parts,
+    earth_of,
+    encoder_of,
+    magnetometer_of,
+    mount_of,
+    temperature_of,
+)
 from simrail.scenario.cells import Cell, Method, cells, methods
 from simrail.scenario.check import Plan, judge_scenario
-from simrail.scenario.scenario import Scenario
+from simrail.scenario.scenario import RidePart, Scenario
 from simrail.score import reference_of, score, score_odometry, truth_at_imu
 from simrail.score_table import concat_scores, failed_figures, labelled
 from simrail.truth import Mount, Truth
@@ -102,15 +110,16 @@ class CampaignResult:
 
 @dataclass(frozen=True)
 class _RememberedTruth(Truth):
-    """A truth that works out the motion of each mount once: all draws of a ride ask for it again."""
+    """A truth that works out the motion of each place once: all draws of a ride ask for it again."""
 
     remembered: dict[Mount, pd.DataFrame] = field(default_factory=dict)
 
     def motion(self, mount: Mount) -> pd.DataFrame:
-        """See `Truth.motion`."""
-        if mount not in self.remembered:
-            self.remembered[mount] = super().motion(mount)
-        return self.remembered[mount]
+        """See `Truth.motion`; IMUs of any name in one place share it."""
+        place = replace(mount, name="")
+        if place not in self.remembered:
+            self.remembered[place] = super().motion(mount)
+        return self.remembered[place]
 
 
 @dataclass
@@ -281,17 +290,20 @@ def _run_cell(
 
 def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
     """Measure a cell: its sensors on its ride."""
-    return measure(
+    recording = measure(
         truth,
         name=cell.ride.name,
         mount=mount_of(cell),
         grade=parts.grade(cell),
         encoder=encoder_of(cell),
         magnetometer=magnetometer_of(cell),
-        odometry=cell.spec.odometry,
+        odometry="truth" if cell.spec.odometry == "truth" else "encoder",
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,
+        earth_rate=earth_of(cell),
+        temperature=temperature_of(cell),
     )
+    return with_odometry(recording, cell.spec.odometry)
 
 
 def _note_not_finite(cell: Cell, name: str, estimate: Estimate, ledger: _Ledger) -> None:
@@ -350,10 +362,17 @@ def _cell_record(cell: Cell) -> dict[str, object]:
         "sensor_draw": cell.sensor_draw,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
-        "speed_kmh": cell.ride.speed_kmh,
-        "direction": "forward" if cell.ride.end_m > cell.ride.start_m else "backward",
+        "speed_kmh": cell.ride.speed_kmh or 0.0,
+        "direction": _direction(cell.ride),
     }
     return record | {name: value for name, value in cell.settings.items() if name not in record}
+
+
+def _direction(ride: RidePart) -> str:
+    """Whether a ride runs towards larger s, smaller s, or not at all."""
+    if ride.end_m is None:
+        return "standing"
+    return "forward" if ride.end_m > ride.start_m else "backward"
 
 
 def _reason(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""The command line: ``simrail run | list | check | export | estimate | vehicle | new | cache``.
+"""The command line: ``simrail run | list | check | export | estimate | vehicle | imu | new | cache``.
 
 Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
 imports stand inside the commands, so that those that need little answer at once.
@@ -255,6 +255,31 @@ def vehicle(
         from simrail.report.vehicle_page import write_vehicle_page
 
         print(f"wrote {write_vehicle_page(out, study)}")
+    return DONE
+
+
+@app.command()
+def imu(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", help="A shipped IMU, or the path of a TOML file.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Write an HTML page with its Allan deviation there, too."),
+    ] = None,
+) -> int:
+    """Show an IMU grade in the units of data sheets, and what was assumed."""
+    from rich.console import Console
+
+    from simrail.report.imu_text import print_imu
+    from simrail.scenario.imu_file import load_imu
+
+    file, grade = load_imu(name)
+    print_imu(Console(), file, grade)
+    if out is not None:
+        from simrail.report.imu_page import write_imu_page
+
+        print(f"wrote {write_imu_page(out, file, grade)}")
     return DONE
 
 

@@ -129,7 +129,7 @@ def _record(name: str, cell: Cell, draw: int) -> dict[str, object]:
         "vehicle": cell.spec.vehicle,
         "engine": cell.spec.engine,
         "odometry": cell.spec.odometry,
-        "speed_kmh": cell.ride.speed_kmh,
+        "speed_kmh": cell.ride.speed_kmh or 0.0,
         "sensor_draw": draw,
     }
     return labels | {key: value for key, value in cell.settings.items() if key not in labels}

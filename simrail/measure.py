@@ -15,9 +15,11 @@ from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.odometry import encoder_odometry
 from simrail.recording import EncoderSheet, MagnetometerSheet, Recording
+from simrail.resample import resample
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.grades import ImuGrade
-from simrail.sensors.imu import EarthRate, sample_imu
+from simrail.sensors.imu import EarthRate, arrived, sample_imu
+from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 from simrail.sheets import imu_sheet
 from simrail.truth import Mount, Truth
@@ -35,6 +37,7 @@ def measure(
     seed: int,
     draw: int,
     earth_rate: EarthRate | None = None,
+    temperature: Temperature | None = None,
 ) -> Recording:
     """Record a ride.
 
@@ -58,11 +61,14 @@ def measure(
         Seed of the scenario and number of the sensor draw: a new draw is a new set of sensors.
     earth_rate : EarthRate, optional
         Rotation of the Earth; None for an Earth at rest.
+    temperature : Temperature, optional
+        Temperature of the IMU over the ride; None for that of its calibration.
 
     Returns
     -------
     Recording
-        Its odometry speaks of the mount; the train knows where the mount stood at time 0.
+        Its odometry speaks of the mount; the train knows where the mount stood at time 0. Samples of the
+        IMU that got lost are filled by straight lines and listed in `Recording.gaps`.
 
     Raises
     ------
@@ -70,7 +76,19 @@ def measure(
         If body, wheel or odometry is unknown, or a rate does not divide the truth's.
     """
     motion = truth.motion(mount)
-    imu, delay_s = sample_imu(motion, grade, seed=seed, draw=draw, name=mount.name, earth=earth_rate or None)
+    imu, delay_s = sample_imu(
+        motion,
+        grade,
+        seed=seed,
+        draw=draw,
+        name=mount.name,
+        earth=earth_rate,
+        temperature=temperature,
+    )
+    gaps = None
+    if grade.dropped_fraction > 0.0:
+        came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
+        imu, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
     start_m = float(motion["position_m"].iloc[0])
     counts, sheet = None, None
     if encoder is not None:
@@ -131,6 +149,7 @@ def measure(
         odometry=frame,
         odometry_source=odometry,
         gravity_mps2=truth.gravity_mps2,
+        gaps=gaps,
         magnetometer=magnetic,
         magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
     )

@@ -18,8 +18,8 @@ from simrail.profile import SpeedProfile
 from simrail.scenario.imu_file import load_grade
 from simrail.scenario.track_file import track_by_name
 from simrail.seeds import stream
+from simrail.sensors.datasheet import STANDARD_GRAVITY_MPS2
 from simrail.sensors.encoder import EncoderSpec
-from simrail.sensors.grades import STANDARD_GRAVITY_MPS2
 from simrail.truth import Mount
 from simrail.vehicle.kinematic_engine import kinematic_truth
 

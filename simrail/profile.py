@@ -26,9 +26,10 @@ class SpeedProfile:
     Attributes
     ----------
     start_m, end_m : float
-        Where the vehicle's reference point stands at first and at last (s along the track).
+        Where the vehicle's reference point stands at first and at last (s along the track); if they are
+        the same, without stops, it does not move.
     speed_mps : float
-        Cruise speed, > 0.
+        Cruise speed, > 0; of no matter where nothing moves.
     acceleration_mps2, jerk_mps3 : float
         Limits of traction and braking alike, > 0.
     rest_s, final_rest_s : float
@@ -74,7 +75,11 @@ class SpeedProfile:
         points = [self.start_m, *(position for position, _ in self.stops), self.end_m]
         dwells = [*(dwell for _, dwell in self.stops), self.final_rest_s]
         pieces: list[tuple[float, float]] = [(self.rest_s, 0.0)]
+        stands = self.end_m == self.start_m and not self.stops
         for begin, end, dwell in zip(points[:-1], points[1:], dwells, strict=True):
+            if stands:
+                pieces.append((dwell, 0.0))
+                continue
             distance = sign * (end - begin)
             if distance <= 0.0:
                 raise InputError(
@@ -86,6 +91,8 @@ class SpeedProfile:
             pieces += _leg(distance, self.speed_mps, self.acceleration_mps2, self.jerk_mps3)
             pieces.append((dwell, 0.0))
         pieces = [piece for piece in pieces if piece[0] > 0.0]
+        if not pieces:
+            raise InputError("the ride takes no time", field="rest_s", value=self.rest_s, limit="> 0 s")
         times = np.concatenate([[0.0], np.cumsum([duration for duration, _ in pieces])])
         coefficients = np.empty((4, len(pieces)))
         position, speed, acceleration = self.start_m, 0.0, 0.0

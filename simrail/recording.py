@@ -38,6 +38,25 @@ class ImuSheet:
         In-run bias instability B (Allan floor / 0.664).
     gyro_turn_on_bias_radps, accel_turn_on_bias_mps2 : float
         Bound of the bias at switch-on.
+    lag_s : float
+        Age of what a sample says at its time stamp, for slow motion: response of the device and its
+        averaging, which the time stamps do not correct.
+    bandwidth_hz : float, optional
+        -3 dB frequency of its response; None where the sheet is silent.
+    gyro_bias_correlation_s, accel_bias_correlation_s : float, optional
+        Correlation time of the wandering bias; None where nothing is known.
+    gyro_random_walk_radpspsqrts, accel_random_walk_mps2psqrts : float
+        Rate random walk K, rad/s/sqrt(s) and m/s2/sqrt(s).
+    gyro_scale_error, accel_scale_error : float
+        Bound of the relative error of the scale factor.
+    package_misalignment_rad : float
+        Bound of the turns of the package about its axes.
+    gyro_resolution_radps, accel_resolution_mps2 : float
+        Size of one count; 0 for none.
+    gyro_range_radps, accel_range_mps2 : float, optional
+        Largest magnitude that is measured; None for no limit.
+    clock_drift : float
+        Bound of the relative error of the device's second.
     """
 
     grade: str
@@ -49,6 +68,20 @@ class ImuSheet:
     accel_bias_instability_mps2: float
     gyro_turn_on_bias_radps: float
     accel_turn_on_bias_mps2: float
+    lag_s: float = 0.0
+    bandwidth_hz: float | None = None
+    gyro_bias_correlation_s: float | None = None
+    accel_bias_correlation_s: float | None = None
+    gyro_random_walk_radpspsqrts: float = 0.0
+    accel_random_walk_mps2psqrts: float = 0.0
+    gyro_scale_error: float = 0.0
+    accel_scale_error: float = 0.0
+    package_misalignment_rad: float = 0.0
+    gyro_resolution_radps: float = 0.0
+    accel_resolution_mps2: float = 0.0
+    gyro_range_radps: float | None = None
+    accel_range_mps2: float | None = None
+    clock_drift: float = 0.0
 
 
 @dataclass(frozen=True)

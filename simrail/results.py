@@ -119,6 +119,8 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
         "settings": list(scenario.overrides),
         "command": f"simrail run {scenario.name}{settings}",
         "engine": sorted({str(ride["engine"]) for ride in campaign.rides}),
+        "earth": "at rest" if spec.earth is None else spec.earth.model_dump(mode="json", warnings=False),
+        "temperature": spec.temperature and spec.temperature.model_dump(mode="json", warnings=False),
         "real_time_factor": min(factors) if factors else None,
         "rides": campaign.rides,
         "cells": len(campaign.cells),

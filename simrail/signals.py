@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import pi
 
 from simrail.columns import ACCEL, EDGE_TIME, ENCODER, GYRO, MAGNETIC, ODOMETRY, ODOMETRY_SD
-from simrail.sensors.grades import STANDARD_GRAVITY_MPS2
+from simrail.sensors.datasheet import STANDARD_GRAVITY_MPS2
 
 Factor = tuple[float, float]
 """A unit in SI as (multiply by, divide by): 1/1000 is no binary number, so milliseconds are divided."""

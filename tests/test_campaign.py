@@ -48,7 +48,7 @@ def test_table_has_the_fixed_columns_and_no_failure(two_draws: CampaignResult) -
     assert two_draws.failures == []
     assert len(two_draws.cells) == 2
     assert set(two_draws.scores["estimator"].astype(str)) == {
-        "odometry:encoder",
+        "odometry:curve_matched",
         "ekf_compensated",
         "ekf_uncompensated",
         "design_angles",
@@ -77,17 +77,17 @@ def test_a_cell_does_not_depend_on_its_neighbours(two_draws: CampaignResult) -> 
     more = short(
         "sensor_draws=3",
         "ride.speed_kmh=[30.0, 50.0]",
-        "odometry=['truth', 'encoder']",
+        "odometry=['truth', 'curve_matched']",
         "estimator[0].options.rest_bias=[false, true]",
     )
     found = run_campaign(more)
     assert len(found.cells) == 2 * 2 * 3
-    wanted = found.cells.query("speed_kmh == 50 and odometry == 'encoder' and sensor_draw < 2")
+    wanted = found.cells.query("speed_kmh == 50 and odometry == 'curve_matched' and sensor_draw < 2")
     keys = ["sensor_draw", "quantity", "reference", "window", "metric"]
     for name, theirs_name in (
         ("ekf_compensated", "ekf_compensated[rest_bias=True]"),
         ("ekf_uncompensated", "ekf_uncompensated"),
-        ("odometry:encoder", "odometry:encoder"),
+        ("odometry:curve_matched", "odometry:curve_matched"),
     ):
         ours = without_time(two_draws.scores[two_draws.scores["estimator"] == name])
         theirs = without_time(

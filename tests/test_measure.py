@@ -6,15 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ODOMETRY, ODOMETRY_SD
+from simrail.columns import IMU, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
 from simrail.recording_check import check_recording
 from simrail.rest import GUARD_S, at_rest_initially, first_motion_s
 from simrail.scenario.imu_file import load_grade
+from simrail.scenario.ride_reader import read_ride
+from simrail.scenario.ride_writer import write_parts
 from simrail.sensors.encoder import EncoderSpec, Slip
-from simrail.sensors.imu import EarthRate
+from simrail.sensors.imu import EarthRate, streams_of
+from simrail.sensors.imu_response import Temperature
 from simrail.track.design import Straight, TrackDesign
 from simrail.truth import Mount
 from simrail.vehicle.kinematic_engine import kinematic_truth
@@ -125,6 +128,77 @@ def test_the_earth_turns_only_if_asked(truth):
     turning = record(truth, grade=ideal, earth_rate=EarthRate(np.radians(37.3)))
     difference = (turning.imu - still.imu).iloc[:1000, :3].to_numpy()
     assert np.linalg.norm(difference, axis=1) == pytest.approx(7.292115e-5, rel=1e-9)
+
+
+def test_lost_samples_are_filled_by_straight_lines_and_listed(truth):
+    whole = record(truth)
+    lossy = record(truth, grade=replace(LORD, dropped_fraction=0.05, dropped_burst=2.0))
+    assert whole.gaps is None
+    check_recording(lossy)
+    pd.testing.assert_index_equal(lossy.imu.index, whole.imu.index)
+    assert list(lossy.gaps.columns) == ["start_s", "end_s", "missing"]
+    lost = np.zeros(len(whole.imu), dtype=bool)
+    for gap in lossy.gaps.itertuples():
+        inside = (whole.imu.index > gap.start_s) & (whole.imu.index < gap.end_s)
+        assert inside.sum() == gap.missing
+        lost |= inside
+    assert lost.mean() == pytest.approx(0.05, abs=0.02)
+    pd.testing.assert_frame_equal(lossy.imu[~lost], whole.imu[~lost], check_exact=True)
+    filled = {c: np.interp(whole.imu.index, whole.imu.index[~lost], whole.imu[c][~lost]) for c in IMU}
+    np.testing.assert_allclose(lossy.imu[lost], pd.DataFrame(filled)[lost], rtol=1e-12)
+
+
+def test_the_sheet_says_what_an_estimator_may_know(truth):
+    grade = replace(
+        LORD,
+        bandwidth_hz=50.0,
+        oversampling=4,
+        gyro_random_walk_radpspsqrts=1e-6,
+        accel_scale_error=1e-3,
+        package_misalignment_rad=2e-3,
+    )
+    sheet = record(truth, grade=grade).imu_sheet
+    assert sheet.lag_s == pytest.approx(np.sqrt(2.0) / (2.0 * np.pi * 50.0) + 0.0015)
+    assert sheet.bandwidth_hz == 50.0
+    assert sheet.delay_s == 0.0, "internal samples at the truth's rate need no filter"
+    assert sheet.gyro_random_walk_radpspsqrts == 1e-6
+    assert sheet.accel_scale_error == 1e-3
+    assert sheet.package_misalignment_rad == 2e-3
+    assert sheet.gyro_range_radps == LORD.gyro_range_radps
+    assert record(truth, grade=load_grade("ideal")).imu_sheet.gyro_range_radps is None
+
+
+def test_sheet_and_gaps_survive_the_files(truth, tmp_path):
+    grade = replace(
+        LORD, dropped_fraction=0.05, clock_jitter_s=1e-5, bandwidth_hz=100.0, gyro_scale_error=0.01
+    )
+    recording = record(truth, grade=grade)
+    write_parts(recording, tmp_path, format="csv")
+    again = read_ride(tmp_path / "ride.toml")
+    assert again.imu_sheet == recording.imu_sheet
+    pd.testing.assert_frame_equal(again.gaps, recording.gaps, check_exact=True)
+    pd.testing.assert_frame_equal(again.imu, recording.imu, check_exact=True)
+
+
+def test_a_turned_package_is_a_turned_mount(truth):
+    """The package's angles are those of the sensor's axes in the mount's, as a mount's own are."""
+    crooked = replace(load_grade("ideal"), package_misalignment_rad=0.1)
+    angles = streams_of(2, 0, "axle")("package_misalignment").uniform(-1.0, 1.0, 3) * 0.1
+    assert np.abs(angles).min() > 1e-3
+    by_mount = replace(MOUNT, **dict(zip(("roll_rad", "pitch_rad", "yaw_rad"), angles, strict=True)))
+    one, other = (
+        record(truth, grade=crooked),
+        record(truth, grade=load_grade("ideal"), mount=by_mount),
+    )
+    np.testing.assert_allclose(one.imu, other.imu, atol=1e-12)
+
+
+def test_temperature_acts_only_if_given(truth):
+    grade = replace(LORD, gyro_bias_temperature_radpspk=1e-4)
+    cold = record(truth, grade=grade)
+    pd.testing.assert_frame_equal(cold.imu, record(truth).imu, check_exact=True)
+    warm = record(truth, grade=grade, temperature=Temperature(45.0, 45.0))
+    assert np.abs(warm.imu["gyro_x_radps"] - cold.imu["gyro_x_radps"]).mean() > 1e-5
 
 
 def test_rest_is_found_from_the_encoder(truth):

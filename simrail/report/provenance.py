@@ -98,6 +98,8 @@ _WORDS = {
     "seed": "seed",
     "settings": "settings",
     "engine": "engine",
+    "earth": "Earth",
+    "temperature": "temperature of the IMUs",
     "real_time_factor": "real-time factor of the simulation",
     "cells": "cells",
     "failed": "failed",

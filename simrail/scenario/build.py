@@ -31,6 +31,8 @@ from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.grades import ImuGrade
+from simrail.sensors.imu import EarthRate
+from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
@@ -95,7 +97,7 @@ class Parts:
         if ("imu", name) not in self._read:
             with blame(self.scenario.file, f"imu[{cell.imu_index}].grade"):
                 part = self._load(ImuFile, "imu", name)
-            self._read["imu", name] = part.grade(Path(name).stem)
+                self._read["imu", name] = part.grade(Path(name).stem)
         grade: ImuGrade = self._read["imu", name]
         return grade
 
@@ -115,6 +117,7 @@ class Parts:
             profile=profile_of(cell),
             engine=cell.spec.engine,
             step_s=cell.spec.step_s,
+            rate_hz=cell.spec.truth_rate_hz,
             drive=cell.ride.drive,
             conditions=conditions_of(cell, self.vehicle(cell)),
         )
@@ -125,8 +128,8 @@ def profile_of(cell: Cell) -> SpeedProfile:
     ride = cell.ride
     return SpeedProfile(
         start_m=ride.start_m,
-        end_m=ride.end_m,
-        speed_mps=ride.speed_kmh / 3.6,
+        end_m=ride.start_m if ride.end_m is None else ride.end_m,
+        speed_mps=0.0 if ride.speed_kmh is None else ride.speed_kmh / 3.6,
         acceleration_mps2=ride.acceleration_mps2,
         jerk_mps3=ride.jerk_mps3,
         rest_s=ride.rest_s,
@@ -182,6 +185,18 @@ def magnetometer_of(cell: Cell) -> MagnetometerSpec | None:
     """Magnetometer of a cell, if its scenario has one; steel stands where the seed of the track puts it."""
     part = cell.spec.magnetometer
     return None if part is None else part.spec(cell.ride_seed)
+
+
+def earth_of(cell: Cell) -> EarthRate | None:
+    """Rotation of the Earth in a cell; None for an Earth at rest."""
+    part = cell.spec.earth
+    return None if part is None else EarthRate(radians(part.latitude_deg), radians(part.x_axis_deg))
+
+
+def temperature_of(cell: Cell) -> Temperature | None:
+    """Temperature of the IMU of a cell; None for that of its calibration."""
+    part = cell.spec.temperature
+    return None if part is None else Temperature(part.start_c, part.ambient_c, part.time_constant_s)
 
 
 def estimator_of(scenario: Scenario, method: Method) -> Estimator:

@@ -20,8 +20,8 @@ from typing import Any
 from simrail.scenario.axes import Scalar, axes_of, expand
 from simrail.scenario.scenario import EstimatorPart, ImuPart, RidePart, Scenario, ScenarioFile
 
-WORLD = ("track", "vehicle", "engine", "step_s", "irregularity")
-SENSING = ("odometry", "encoder", "magnetometer")
+WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
+SENSING = ("odometry", "encoder", "magnetometer", "earth", "temperature")
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from simrail.scenario.check_wheels import judge_wheels
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
-from simrail.sensors.decimation import decimation_factor
+from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
 from simrail.sensors.encoder import check_encoder
 from simrail.sensors.magnetometer import check_magnetometer
 from simrail.track.design import TrackDesign
@@ -41,7 +41,6 @@ WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5
 LONGEST_RIDE_S = 7200.0
 MOST_CELLS = 1_000_000
-TRUTH_RATE_HZ = 1000.0
 GRAVITY_MPS2 = 9.81
 
 
@@ -105,7 +104,13 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
     for cell in cells(scenario):
         if cell.track_draw or cell.sensor_draw:
             continue
-        ride_key = (cell.spec.track, cell.spec.vehicle, cell.spec.engine, repr(cell.ride))
+        ride_key = (
+            cell.spec.track,
+            cell.spec.vehicle,
+            cell.spec.engine,
+            repr(cell.spec.truth_rate_hz),
+            repr(cell.ride),
+        )
         sensor_key = (
             cell.spec.vehicle,
             cell.spec.engine,
@@ -194,12 +199,14 @@ def _judge_ride(scenario: Scenario, cell: Cell, parts: Parts) -> tuple[float, li
             "the ride takes too long",
             file=scenario.file,
             field=f"{field}.speed_kmh",
-            value=f"{ride.speed_kmh:g} km/h, {duration:.0f} s",
+            value="standing" if ride.speed_kmh is None else f"{ride.speed_kmh:g} km/h, {duration:.0f} s",
             limit=f"{LONGEST_RIDE_S:.0f} s",
             remedy="ride faster, shorter, or with less dwell time",
         )
     warnings = _judge_step(scenario, cell, vehicle)
-    return duration, [*warnings, *_judge_dynamics(scenario, cell, track, profile)]
+    if not ride.stands:
+        warnings += _judge_dynamics(scenario, cell, track, profile)
+    return duration, warnings
 
 
 def _judge_step(scenario: Scenario, cell: Cell, vehicle: VehicleModel) -> list[str]:
@@ -244,7 +251,8 @@ def _judge_places(scenario: Scenario, cell: Cell, track: TrackDesign, ahead: tup
     """Refuse a ride whose vehicle would leave the track, or that stops beyond its end."""
     ride = cell.ride
     low, high = track.start_m - ahead[0], track.end_m - ahead[1]
-    for name, position in (("start_m", ride.start_m), ("end_m", ride.end_m)):
+    places = {"start_m": ride.start_m} | ({} if ride.end_m is None else {"end_m": ride.end_m})
+    for name, position in places.items():
         if not low <= position <= high:
             raise InputError(
                 f"the ride is not on track {track.name!r}",
@@ -255,7 +263,7 @@ def _judge_places(scenario: Scenario, cell: Cell, track: TrackDesign, ahead: tup
                 + (", the axles reach out from the reference point)" if any(ahead) else ")"),
                 remedy="shorten the ride or lengthen the track",
             )
-    first, last = sorted((ride.start_m, ride.end_m))
+    first, last = min(places.values()), max(places.values())
     for i, stop in enumerate(ride.stops):
         if not first < stop.position_m < last:
             raise InputError(
@@ -271,6 +279,7 @@ def _judge_places(scenario: Scenario, cell: Cell, track: TrackDesign, ahead: tup
 def _judge_dynamics(scenario: Scenario, cell: Cell, track: TrackDesign, profile: SpeedProfile) -> list[str]:
     """Refuse a speed that a curve cannot hold; warn where it is uncomfortable, or never reached."""
     field, ride = f"ride[{cell.ride_index}]", cell.ride
+    assert ride.speed_kmh is not None
     times = np.arange(0.0, profile.duration_s, 0.1)
     s, v, _ = profile.motion(times)
     frame = track.frame(np.clip(s, track.start_m, track.end_m))
@@ -314,7 +323,10 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     field = f"imu[{cell.imu_index}]"
     _one_of(vehicle.body_names, cell.imu.body, scenario.file, f"{field}.body", "the vehicle has no such body")
     offset = cell.imu.position_m[0] + vehicle.body(cell.imu.body).position_m[0]
-    for name, position in (("start_m", cell.ride.start_m), ("end_m", cell.ride.end_m)):
+    ends = {"start_m": cell.ride.start_m, "end_m": cell.ride.end_m}
+    for name, position in ends.items():
+        if position is None:
+            continue
         if not track.start_m <= position + offset <= track.end_m:
             raise InputError(
                 f"the IMU would leave track {track.name!r} at the {name.removesuffix('_m')} "
@@ -326,20 +338,23 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
                 remedy="shorten the ride or lengthen the track",
             )
     grade = parts.grade(cell)
+    truth_rate = cell.spec.truth_rate_hz
     with blame(scenario.file, f"{field}.grade"):
-        decimation_factor(TRUTH_RATE_HZ, grade.rate_hz)
+        sampling_of(truth_rate, grade.rate_hz, grade.oversampling)
+        if grade.bandwidth_hz is not None:
+            check_bandwidth(grade.bandwidth_hz, truth_rate)
     magnetometer = magnetometer_of(cell)
     if magnetometer is not None:
         with blame(scenario.file, "magnetometer"):
             check_magnetometer(magnetometer)
     encoder = encoder_of(cell)
     if encoder is None:
-        if cell.spec.odometry == "encoder":
+        if cell.spec.odometry != "truth":
             raise InputError(
                 "the odometry needs an encoder",
                 file=scenario.file,
                 field="odometry",
-                value="encoder",
+                value=cell.spec.odometry,
                 remedy='add an [encoder], or set odometry = "truth" for an ablation',
             )
         return
@@ -348,7 +363,7 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     wheels = [*vehicle.wheel_names, *places]
     _one_of(wheels, encoder.wheel, scenario.file, "encoder.wheel", "the vehicle has no such wheel")
     with blame(scenario.file, "encoder"):
-        decimation_factor(TRUTH_RATE_HZ, encoder.rate_hz)
+        decimation_factor(truth_rate, encoder.rate_hz)
         check_encoder(encoder)
     duration = profile_of(cell).duration_s
     for i, event in enumerate(encoder.slip):
@@ -361,6 +376,14 @@ def _judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
                 limit=f"< {duration:.1f} s",
                 remedy="let it begin earlier, or put the ride into a scenario of its own",
             )
+    if cell.ride.stands and encoder.radius == "calibrated":
+        raise InputError(
+            "no wheel can be calibrated at a standstill",
+            file=scenario.file,
+            field="encoder.radius",
+            value=encoder.radius,
+            remedy='set radius = "drawing", or let the ride move',
+        )
 
 
 def _one_of(known: Iterable[str], name: str, file: str, field: str, problem: str) -> None:

@@ -188,7 +188,8 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         allowed = _fields_at(model, first["loc"][:-1])
         near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
         problem = "unknown key"
-        limit = "one of " + ", ".join(allowed) if allowed else None
+        # A guess is worth more than a list that nobody reads.
+        limit = "one of " + ", ".join(allowed) if allowed and not (near and len(allowed) > 25) else None
         remedy = f"did you mean {near[0]}?" if near else "remove it"
     elif kind == "missing":
         problem, value, remedy = "is required", None, "add it"

@@ -1,50 +1,65 @@
 """IMU files: the figures of a data sheet, in its own units, as TOML.
 
-A figure that the sheet does not state is left out and is then zero (errors), infinite (ranges) or the
-stated default; `assumed` says in words what was assumed.
+A file holds a title, a source, how the device samples, and any of the figures of
+`simrail.sensors.datasheet.FIGURES`, each with its unit in its name, e.g. ``gyro_noise_degpsqrthz = 0.005``. A
+figure that the sheet does not state is left out and is then zero (errors), infinite (ranges) or the stated
+default; `assumed` says in words what was assumed.
 """
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
-from simrail.scenario.files import Part, load
+from simrail.errors import InputError
+from simrail.scenario.files import Part, find, judge, label, read_toml
+from simrail.sensors.datasheet import FIGURES, grade_from_datasheet
 from simrail.sensors.grades import ImuGrade
 
+_HEAD = ("title", "synthetic")
 
-class ImuFile(Part):
-    """One IMU. The unit is in each name: deg/s/sqrt(Hz), ug/sqrt(Hz), deg/h, mg, deg/s, g, Hz, s."""
+
+class ImuHead(Part):
+    """What an IMU file says besides the figures of the sheet."""
 
     title: str
     source: str
     assumed: str = ""
+    synthetic: bool = False
     rate_hz: float = Field(gt=0)
-    bandwidth_hz: float | None = Field(default=None, gt=0)
-    gyro_noise_degpsqrthz: float = Field(default=0.0, ge=0)
-    gyro_bias_instability_degph: float = Field(default=0.0, ge=0)
-    gyro_bias_correlation_s: float = Field(default=300.0, gt=0)
-    gyro_turn_on_bias_degps: float = Field(default=0.0, ge=0)
-    gyro_range_degps: float | None = Field(default=None, gt=0)
-    gyro_resolution_degps: float = Field(default=0.0, ge=0)
-    accel_noise_ugpsqrthz: float = Field(default=0.0, ge=0)
-    accel_bias_instability_mg: float = Field(default=0.0, ge=0)
-    accel_bias_correlation_s: float = Field(default=300.0, gt=0)
-    accel_turn_on_bias_mg: float = Field(default=0.0, ge=0)
-    accel_range_g: float | None = Field(default=None, gt=0)
-    accel_resolution_mg: float = Field(default=0.0, ge=0)
+    noise_reading: Literal["allan", "one_sided_density"] = "allan"
+    bias_process: Literal["gauss_markov", "flicker"] = "gauss_markov"
+    flicker_range_s: tuple[float, float] = (1.0, 1000.0)
+    oversampling: int = Field(default=1, ge=1, le=1000)
+    output: Literal["rates", "increments"] = "rates"
 
     def grade(self, name: str) -> ImuGrade:
         """The grade in SI units; `name` is the stem of the file."""
-        figures = self.model_dump(exclude={"title", "assumed", "gyro_range_degps", "accel_range_g"})
-        return ImuGrade.from_datasheet(
-            name,
-            gyro_range_degps=math.inf if self.gyro_range_degps is None else self.gyro_range_degps,
-            accel_range_g=math.inf if self.accel_range_g is None else self.accel_range_g,
-            **figures,
-        )
+        return grade_from_datasheet(name, **self.model_dump(exclude=set(_HEAD)))
+
+
+def _limits(name: str) -> Any:
+    """Type of a figure: above 0 where 0 means nothing, otherwise not negative."""
+    above = name.endswith(("_s", "_hz")) or "range" in name
+    return Annotated[float | None, Field(gt=0) if above else Field(ge=0)]
+
+
+if TYPE_CHECKING:
+
+    class ImuFile(ImuHead):
+        """One IMU: `ImuHead`, and every figure of `FIGURES`, each of which may be left out."""
+
+else:
+    _figures: dict[str, Any] = {name: (_limits(name), None) for name in FIGURES}
+    ImuFile = create_model(
+        "ImuFile",
+        __base__=ImuHead,
+        __module__=__name__,
+        __doc__="One IMU: `ImuHead`, and every figure of `FIGURES`, each of which may be left out.",
+        **_figures,
+    )
 
 
 def load_grade(name: str, *, folder: Path | None = None) -> ImuGrade:
@@ -55,5 +70,15 @@ def load_grade(name: str, *, folder: Path | None = None) -> ImuGrade:
     InputError
         If there is no such file, or it says something impossible.
     """
-    file = load(ImuFile, "imu", name, folder=folder)
-    return file.grade(Path(name).stem)
+    return load_imu(name, folder=folder)[1]
+
+
+def load_imu(name: str, *, folder: Path | None = None) -> tuple[ImuHead, ImuGrade]:
+    """IMU file and its grade; see `load_grade`."""
+    path = find("imu", name, folder=folder)
+    file = judge(ImuFile, read_toml(path), file=label(path))
+    try:
+        return file, file.grade(path.stem)
+    except InputError as error:
+        error.file = label(path) if error.file is None else error.file
+        raise

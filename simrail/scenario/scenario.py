@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from simrail.errors import InputError
+from simrail.line_odometry import OdometryName
 from simrail.scenario.axes import Axis, Listed
 from simrail.scenario.files import Part, find, judge, label, parse_toml, read_text
 from simrail.scenario.overrides import override
@@ -51,18 +52,35 @@ class StopPart(Part):
 
 
 class RidePart(Part):
-    """``[[ride]]``: one ride over the track. It runs backwards if ``end_m < start_m``."""
+    """``[[ride]]``: one ride over the track. It runs backwards if ``end_m < start_m``.
+
+    Without ``end_m`` and ``speed_kmh`` the vehicle stands where it is, for ``rest_s + final_rest_s``.
+    """
 
     name: Name
     start_m: Listed[float]
-    end_m: Listed[float]
-    speed_kmh: Listed[Annotated[float, Field(gt=0.0, le=400.0)]]
+    end_m: Listed[float] | None = None
+    speed_kmh: Listed[Annotated[float, Field(gt=0.0, le=400.0)]] | None = None
     acceleration_mps2: Listed[Annotated[float, Field(gt=0.0, le=3.0)]] = 0.6
     jerk_mps3: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = 0.4
     rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 20.0
     final_rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 5.0
     stops: tuple[StopPart, ...] = ()
     drive: Listed[Literal["guide", "wheels"]] = "guide"
+
+    @model_validator(mode="after")
+    def _goes_or_stands(self) -> RidePart:
+        if (self.end_m is None) != (self.speed_kmh is None):
+            missing = "end_m" if self.end_m is None else "speed_kmh"
+            raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")
+        if self.end_m is None and self.stops:
+            raise ValueError("a standstill, without end_m, has no stops on the way")
+        return self
+
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle does not move."""
+        return self.end_m is None
 
 
 class RailConditionPart(Part):
@@ -114,6 +132,24 @@ class ImuPart(Part):
         return value
 
 
+class EarthPart(Part):
+    """``[earth]``: the Earth turns. Without it, it is at rest.
+
+    ``x_axis_deg`` is the direction of the track's X axis, counter-clockwise from east.
+    """
+
+    latitude_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]]
+    x_axis_deg: Listed[Annotated[float, Field(ge=-360.0, le=360.0)]] = 0.0
+
+
+class TemperaturePart(Part):
+    """``[temperature]``: of the IMUs, from ``start_c`` to ``ambient_c``. Without it, that of calibration."""
+
+    start_c: Listed[Annotated[float, Field(ge=-60.0, le=120.0)]]
+    ambient_c: Listed[Annotated[float, Field(ge=-60.0, le=120.0)]]
+    time_constant_s: Listed[Positive] = 600.0
+
+
 class EstimatorPart(Part):
     """``[[estimator]]``: a method under a name, with the keyword arguments of its class."""
 
@@ -145,15 +181,18 @@ class ScenarioFile(Part):
     vehicle: Listed[str]
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
     step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
+    truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=1000.0)]] = 1000.0
     track_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     sensor_draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
-    odometry: Listed[Literal["encoder", "truth"]] = "encoder"
+    odometry: Listed[OdometryName] = "curve_matched"
     irregularity: IrregularityPart | None = None
     rail_condition: tuple[RailConditionPart, ...] = ()
     ride: Annotated[list[RidePart], Field(min_length=1)]
     imu: Annotated[list[ImuPart], Field(min_length=1)]
     encoder: EncoderPart | None = None
     magnetometer: MagnetometerPart | None = None
+    earth: EarthPart | None = None
+    temperature: TemperaturePart | None = None
     estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
     score: ScorePart = ScorePart()
 
@@ -163,6 +202,14 @@ class ScenarioFile(Part):
         for step in value if isinstance(value, Axis) else (value,):
             if abs(0.001 / float(step) - round(0.001 / float(step))) > 1e-6:
                 raise ValueError(f"does not divide the output interval of 0.001 s: {step}; try 0.0005")
+        return value
+
+    @field_validator("truth_rate_hz")
+    @classmethod
+    def _whole_milliseconds(cls, value: float | Axis) -> float | Axis:
+        for rate in value if isinstance(value, Axis) else (value,):
+            if abs(1000.0 / float(rate) - round(1000.0 / float(rate))) > 1e-9:
+                raise ValueError(f"is not 1000 Hz divided by a whole number: {rate}; try 250.0")
         return value
 
     @field_validator("ride", "imu", "estimator")

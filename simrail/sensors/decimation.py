@@ -13,18 +13,19 @@ Only filters live here; what a device adds to the signal is in `simrail.sensors.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from scipy import signal
 
 from simrail.errors import InputError
-from simrail.jit import FloatArray
+from simrail.jit import FloatArray, njit
 
 PASS_EDGE, STOP_EDGE = 0.3, 0.6
 """Edges of the decimation filter, in output rates."""
 
-_STOP_DB = 63.0
+STOP_DB = 63.0
 
 
 @lru_cache(maxsize=32)
@@ -32,13 +33,13 @@ def _taps(factor: int) -> tuple[float, ...]:
     if factor == 1:
         return (1.0,)
     width = (STOP_EDGE - PASS_EDGE) / factor
-    order = (_STOP_DB - 7.95) / (2.285 * 2.0 * np.pi * width)
+    order = (STOP_DB - 7.95) / (2.285 * 2.0 * np.pi * width)
     # Half the length is a whole number of output samples: the delay is one, too.
     half = factor * int(np.ceil(0.5 * order / factor))
     taps = signal.firwin(
         2 * half + 1,
         PASS_EDGE + STOP_EDGE,
-        window=("kaiser", signal.kaiser_beta(_STOP_DB)),
+        window=("kaiser", signal.kaiser_beta(STOP_DB)),
         fs=2.0 * factor,
     )
     return tuple(taps / np.sum(taps))
@@ -93,22 +94,96 @@ def decimate(samples: FloatArray, factor: int) -> tuple[FloatArray, int]:
     InputError
         If the input is shorter than the filter.
     """
-    if factor == 1:
-        return samples.copy(), 0
     taps = decimation_taps(factor)
-    delay = len(taps) // 2
-    if len(samples) < len(taps):
+    return sample_on_time(samples, Sampling(factor, taps, len(taps) // 2))
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a device takes one output sample out of the truth's samples.
+
+    Attributes
+    ----------
+    factor : int
+        Truth's rate over output rate.
+    taps : ndarray (m,)
+        Coefficients of a causal filter: its output at truth sample i is the output sample stamped i - delay.
+    delay : int
+        Truth samples after its stamp that an output sample needs.
+    """
+
+    factor: int
+    taps: FloatArray
+    delay: int
+
+    @property
+    def first(self) -> int:
+        """First truth sample, a multiple of the factor, at which an output sample is complete."""
+        behind = len(self.taps) - 1 - self.delay
+        return self.factor * -(-behind // self.factor)
+
+
+def sampling_of(truth_rate_hz: float, output_rate_hz: float, oversampling: int = 1) -> Sampling:
+    """Filter between the truth and a device that samples `oversampling` times as fast and averages.
+
+    The internal samples are decimated as usual; an output sample is the mean of the last `oversampling`
+    of them, stamped at the last one.
+
+    Raises
+    ------
+    InputError
+        If the truth's rate is not a multiple of the internal rate.
+    """
+    factor = decimation_factor(truth_rate_hz, output_rate_hz)
+    if factor % oversampling:
         raise InputError(
-            "the ride is too short for the sensor's filter",
-            field="rate_hz",
-            value=f"{len(samples)} samples",
-            limit=f"at least {len(taps)} samples",
-            remedy="simulate a longer ride or choose a faster sensor",
+            "does not divide the number of samples of the truth between two of the device",
+            field="oversampling",
+            value=oversampling,
+            limit=f"a divisor of {factor}",
+            remedy="choose another oversampling, or another rate",
         )
-    count = (len(samples) - len(taps)) // factor + 1
-    # The causal convolution is complete for the first time after 2 * delay inputs.
-    filtered = signal.upfirdn(taps, samples, up=1, down=factor, axis=0)
-    return np.ascontiguousarray(filtered[2 * delay // factor :][:count]), delay
+    inner = factor // oversampling
+    taps = decimation_taps(inner)
+    delay = len(taps) // 2
+    if oversampling > 1:
+        comb = np.zeros((oversampling - 1) * inner + 1)
+        comb[::inner] = 1.0 / oversampling
+        taps = np.convolve(taps, comb)
+    return Sampling(factor, taps, delay)
+
+
+def sample_on_time(samples: FloatArray, sampling: Sampling) -> tuple[FloatArray, int]:
+    """Sample at the very stamps; see `decimate`, which this is without oversampling.
+
+    Returns
+    -------
+    output : ndarray (k, m)
+        Output sample j is stamped at input sample ``first + j * factor``.
+    first : int
+    """
+    taps, factor = sampling.taps, sampling.factor
+    if len(taps) == 1 and factor == 1:
+        return samples.copy(), 0
+    first = sampling.first
+    count = (len(samples) - 1 - sampling.delay - first) // factor + 1
+    if count < 1:
+        raise _too_short(len(samples), len(taps))
+    # A filter delayed by whole output samples can be evaluated at those only.
+    later = -sampling.delay % factor
+    filtered = signal.upfirdn(np.pad(taps, (later, 0)), samples, up=1, down=factor, axis=0)
+    begin = (first + sampling.delay + later) // factor
+    return np.ascontiguousarray(filtered[begin : begin + count]), first
+
+
+def _too_short(found: int, needed: int) -> InputError:
+    return InputError(
+        "the ride is too short for the sensor's filter",
+        field="rate_hz",
+        value=f"{found} samples",
+        limit=f"at least {needed} samples",
+        remedy="simulate a longer ride or choose a faster sensor",
+    )
 
 
 def second_order(samples: FloatArray, *, bandwidth_hz: float, rate_hz: float) -> FloatArray:
@@ -129,6 +204,19 @@ def second_order(samples: FloatArray, *, bandwidth_hz: float, rate_hz: float) ->
         Lags the input by about ``sqrt(2) / (2 pi bandwidth)`` s at low frequency: a real device does
         not correct this, so neither do the time stamps.
     """
+    check_bandwidth(bandwidth_hz, rate_hz)
+    b, a = signal.butter(2, bandwidth_hz, fs=rate_hz)
+    return _biquad(np.ascontiguousarray(samples, dtype=np.float64), b, a)
+
+
+def check_bandwidth(bandwidth_hz: float, rate_hz: float) -> None:
+    """Refuse a bandwidth that the truth's rate cannot show.
+
+    Raises
+    ------
+    InputError
+        If it is not below half the rate.
+    """
     if bandwidth_hz >= 0.5 * rate_hz:
         raise InputError(
             "cannot be simulated at the rate of the truth",
@@ -137,7 +225,24 @@ def second_order(samples: FloatArray, *, bandwidth_hz: float, rate_hz: float) ->
             limit=f"< {0.5 * rate_hz:g} Hz",
             remedy="leave the bandwidth out: the truth holds nothing faster",
         )
-    sections = signal.butter(2, bandwidth_hz, fs=rate_hz, output="sos")
-    initial = signal.sosfilt_zi(sections)[:, :, None] * samples[None, :1, :]
-    filtered: FloatArray = signal.sosfilt(sections, samples, axis=0, zi=initial)[0]
-    return filtered
+
+
+@njit
+def _biquad(samples: FloatArray, b: FloatArray, a: FloatArray) -> FloatArray:
+    """Second-order filter of each column (transposed direct form II), steady in the first sample at first."""
+    count, channels = samples.shape
+    output = np.empty((count, channels))
+    b0, b1, b2, a1, a2 = b[0], b[1], b[2], a[1], a[2]
+    gain = (b0 + b1 + b2) / (1.0 + a1 + a2)
+    one, two = np.empty(channels), np.empty(channels)
+    for j in range(channels):
+        two[j] = (b2 - a2 * gain) * samples[0, j]
+        one[j] = (b1 - a1 * gain) * samples[0, j] + two[j]
+    for k in range(count):
+        for j in range(channels):
+            x = samples[k, j]
+            y = b0 * x + one[j]
+            one[j] = b1 * x - a1 * y + two[j]
+            two[j] = b2 * x - a2 * y
+            output[k, j] = y
+    return output

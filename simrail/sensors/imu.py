@@ -1,8 +1,14 @@
 """An IMU: what it would have recorded of a motion, with the errors of its grade.
 
-In order: response of the device, decimation to its rate, bias at switch-on, wandering bias, white
-noise, range and resolution. Every random term of every sensor has its own named stream, so that a new
-sensor, a new term or a longer ride changes no sample of another.
+The chain, in the order of a device: response of second order; sampling, at the stamps or at the times of
+a wrong clock (`simrail.sensors.decimation`, `simrail.sensors.clock`); scale, axes, g-sensitivity,
+vibration and temperature (`simrail.sensors.imu_response`); bias and noise (`simrail.sensors.imu_noise`);
+range and resolution. Every random term of every sensor has its own named stream, so that a new sensor, a
+new term or a longer ride changes no sample of another.
+
+A device that sends increments is recorded as rates again: the increment over an interval, divided by it.
+The angle increment is the plain sum of the internal samples times their interval, without a correction for
+coning (nor the velocity increment one for sculling), so it differs from rates only in how it is counted.
 
 The motion (rates and specific force at the mount) comes from the truth; this module knows neither
 vehicle nor track.
@@ -14,13 +20,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy import signal
 
 from simrail.columns import ATTITUDE, IMU, VELOCITY
 from simrail.jit import FloatArray
 from simrail.seeds import stream
-from simrail.sensors.decimation import decimate, decimation_factor, second_order
-from simrail.sensors.grades import ImuGrade, bias_sd
+from simrail.sensors.clock import lost_samples, sample_by_clock
+from simrail.sensors.decimation import sample_on_time, sampling_of, second_order
+from simrail.sensors.grades import ImuGrade
+from simrail.sensors.imu_noise import Streams, add_noise
+from simrail.sensors.imu_response import (
+    Temperature,
+    digitise,
+    draw_response,
+    mean_square_vibration,
+    respond,
+)
 
 EARTH_RATE_RADPS = 7.292115e-5
 """Sidereal rotation of the Earth (WGS 84)."""
@@ -42,6 +56,11 @@ class EarthRate:
     x_axis_rad: float = 0.0
 
 
+def streams_of(seed: int, draw: int, name: str) -> Streams:
+    """Random streams of one device, by the name of the term."""
+    return lambda term: stream(seed, "sensor", draw, "imu", name, term)
+
+
 def sample_imu(
     motion: pd.DataFrame,
     grade: ImuGrade,
@@ -51,8 +70,9 @@ def sample_imu(
     name: str,
     errors: bool = True,
     earth: EarthRate | None = None,
+    temperature: Temperature | None = None,
 ) -> tuple[pd.DataFrame, float]:
-    """Sample a motion with an IMU.
+    """Sample a motion with an IMU; those that get lost on the way are left to `arrived`.
 
     Parameters
     ----------
@@ -60,15 +80,17 @@ def sample_imu(
         Indexed by ``time_s`` (uniform), with columns `simrail.columns.IMU` of a perfect sensor; with
         `earth` also attitude and velocity.
     grade : ImuGrade
-        The device. Its rate must divide the rate of the motion.
+        The device. Its rate, times its oversampling, must divide the rate of the motion.
     seed, draw : int
         Seed of the scenario and number of the sensor draw.
     name : str
         Name of the sensor: with seed and draw it names the random streams.
     errors : bool
-        False leaves out every error of the grade and keeps its rate and bandwidth.
+        False leaves out every error of the grade and keeps its rate, bandwidth and oversampling.
     earth : EarthRate, optional
         Adds the rotation of the Earth (gyro) and the Coriolis acceleration (accelerometer).
+    temperature : Temperature, optional
+        Temperature over the ride; None for that of the calibration.
 
     Returns
     -------
@@ -80,80 +102,49 @@ def sample_imu(
     Raises
     ------
     InputError
-        If the rates do not divide, or the motion is shorter than the filter.
+        If the rates do not divide, the bandwidth is not below half the rate of the motion, or the motion
+        is shorter than the filter.
     """
     time = motion.index.to_numpy(dtype=np.float64)
     truth_rate = float(round((len(time) - 1) / (time[-1] - time[0]), 6))
-    factor = decimation_factor(truth_rate, grade.rate_hz)
+    sampling = sampling_of(truth_rate, grade.rate_hz, grade.oversampling)
     perfect = motion[list(IMU)].to_numpy(dtype=np.float64)
     if earth is not None:
         perfect = perfect + _earth_terms(motion, earth)
+    felt = perfect
     if grade.bandwidth_hz is not None:
-        perfect = second_order(perfect, bandwidth_hz=grade.bandwidth_hz, rate_hz=truth_rate)
-    samples, delay = decimate(perfect, factor)
-    if errors:
-        for kind, columns in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
-            samples[:, columns] += _errors(grade, kind, len(samples), (seed, draw, name))
-            samples[:, columns] = _digitise(grade, kind, samples[:, columns])
-    stamps = pd.Index(time[delay : delay + factor * len(samples) : factor], name="time_s")
-    return pd.DataFrame(samples, index=stamps, columns=list(IMU)), delay / truth_rate
-
-
-def gauss_markov(
-    generator: np.random.Generator, count: int, *, sd: float, correlation_s: float, rate_hz: float
-) -> FloatArray:
-    """Three independent stationary first-order Gauss-Markov sequences.
-
-    b[k+1] = a b[k] + sqrt(1 - a^2) sd w[k], a = exp(-1/(T rate)), and b[0] of standard deviation sd:
-    exact at any rate, stationary from the first sample.
-
-    Returns
-    -------
-    ndarray (count, 3)
-    """
-    decay = float(np.exp(-1.0 / (correlation_s * rate_hz)))
-    white = generator.standard_normal((count, 3))
-    white[0] *= sd
-    white[1:] *= sd * np.sqrt(1.0 - decay**2)
-    sequence: FloatArray = signal.lfilter([1.0], [1.0, -decay], white, axis=0)
-    return sequence
-
-
-def _errors(grade: ImuGrade, kind: str, count: int, identity: tuple[int, int, str]) -> FloatArray:
-    """Sum (count, 3) of the additive errors of one triad."""
-    seed, draw, name = identity
-    unit, root = ("radps", "radpsqrts") if kind == "gyro" else ("mps2", "mpsqrts")
-
-    def term(stem: str) -> np.random.Generator:
-        return stream(seed, "sensor", draw, "imu", name, f"{kind}_{stem}")
-
-    bound = getattr(grade, f"{kind}_turn_on_bias_{unit}")
-    total = np.tile(term("turn_on_bias").uniform(-1.0, 1.0, 3) * bound, (count, 1))
-    wandering = bias_sd(getattr(grade, f"{kind}_bias_instability_{unit}"))
-    if wandering > 0.0:
-        total += gauss_markov(
-            term("bias_instability"),
-            count,
-            sd=wandering,
-            correlation_s=getattr(grade, f"{kind}_bias_correlation_s"),
-            rate_hz=grade.rate_hz,
+        felt = second_order(perfect, bandwidth_hz=grade.bandwidth_hz, rate_hz=truth_rate)
+    streams = streams_of(seed, draw, name)
+    if errors and (grade.clock_jitter_s > 0.0 or grade.clock_drift > 0.0):
+        samples, first, places = sample_by_clock(
+            felt, sampling, grade, truth_rate_hz=truth_rate, streams=streams
         )
-    density = getattr(grade, f"{kind}_noise_{root}")
-    if density > 0.0:
-        # Row by row: a longer ride begins with the samples of the shorter one.
-        total += term("white").standard_normal((count, 3)) * (density * np.sqrt(grade.rate_hz))
-    return total
+    else:
+        samples, first = sample_on_time(felt, sampling)
+        places = first + sampling.factor * np.arange(len(samples), dtype=np.float64)
+    stamps = time[first : first + sampling.factor * len(samples) : sampling.factor]
+    if errors:
+        gyro, accel = (draw_response(grade, kind, streams) for kind in ("gyro", "accel"))
+        vibration = None
+        if np.any(gyro.rectification) or np.any(accel.rectification):
+            vibration = mean_square_vibration(
+                np.ascontiguousarray(perfect[:, 3:]), truth_rate, grade.vibration_averaging_s, places
+            )
+        above_k = None if temperature is None else temperature.above_reference_k(stamps)
+        respond(samples, gyro, accel, vibration=vibration, above_k=above_k)
+        for kind, columns in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
+            add_noise(samples[:, columns], grade, kind, streams)
+            samples[:, columns] = digitise(
+                samples[:, columns], grade.triad(kind), increments=grade.output == "increments"
+            )
+    index = pd.Index(stamps, name="time_s")
+    return pd.DataFrame(samples, index=index, columns=list(IMU)), sampling.delay / truth_rate
 
 
-def _digitise(grade: ImuGrade, kind: str, samples: FloatArray) -> FloatArray:
-    """Round to whole counts and clip at the last count within the range."""
-    unit = "radps" if kind == "gyro" else "mps2"
-    limit = getattr(grade, f"{kind}_range_{unit}")
-    count = getattr(grade, f"{kind}_resolution_{unit}")
-    if count == 0.0:
-        return np.clip(samples, -limit, limit)
-    last = np.floor(limit / count * (1.0 + 1e-12))
-    return np.clip(np.rint(samples / count), -last, last) * count
+def arrived(imu: pd.DataFrame, grade: ImuGrade, *, seed: int, draw: int, name: str) -> pd.DataFrame:
+    """The samples of `sample_imu` that reach the logger; the first and the last two always do."""
+    lost = lost_samples(grade, len(imu), streams_of(seed, draw, name))
+    return imu[~lost] if lost.any() else imu
 
 
 def _earth_terms(motion: pd.DataFrame, earth: EarthRate) -> FloatArray:

@@ -275,7 +275,11 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "an estimator that is none": (
         'method = "DesignAngles"',
         'method = "DesignAngle"',
-        ["estimator[2].method", "'DesignAngle'", "AttitudeEkf, AttitudeGda, DesignAngles"],
+        [
+            "estimator[2].method",
+            "'DesignAngle'",
+            "AttitudeEkf, AttitudeGda, CurveMatchedOdometry, DesignAngles",
+        ],
     ),
     "an estimator file that is missing": (
         'method = "DesignAngles"',

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from simrail.errors import InputError
-from simrail.sensors.decimation import decimate, decimation_factor, decimation_taps, second_order
+from simrail.sensors.decimation import (
+    decimate,
+    decimation_factor,
+    decimation_taps,
+    sample_on_time,
+    sampling_of,
+    second_order,
+)
 
 FACTORS = (2, 4, 10, 40)
 
@@ -109,3 +116,28 @@ def test_device_response_has_its_bandwidth_and_starts_settled():
     assert t[-1] - ramp[-1, 0] == pytest.approx(np.sqrt(2.0) / (2.0 * np.pi * 50.0), rel=0.02)
     with pytest.raises(InputError, match="bandwidth"):
         second_order(samples, bandwidth_hz=500.0, rate_hz=1000.0)
+
+
+@pytest.mark.parametrize(("factor", "times"), [(4, 2), (4, 4), (8, 2), (10, 5), (6, 3)])
+def test_averaging_is_the_plain_mean_of_internal_samples(factor, times):
+    rng = np.random.default_rng(4)
+    samples = rng.standard_normal((60 * factor, 2))
+    sampling = sampling_of(1000.0, 1000.0 / factor, times)
+    output, first = sample_on_time(samples, sampling)
+    assert first % factor == 0
+    inner = factor // times
+    fast, delay = decimate(samples, inner)
+    for k in range(len(output)):
+        last = (first + k * factor - delay) // inner
+        by_hand = fast[last - times + 1 : last + 1].mean(axis=0)
+        np.testing.assert_allclose(output[k], by_hand, atol=1e-13)
+    # Every sample that is complete is there, and no other.
+    end = first + len(output) * factor + sampling.delay
+    assert len(samples) - 1 < end
+
+
+def test_averaging_that_does_not_divide_is_refused():
+    with pytest.raises(InputError, match="does not divide") as caught:
+        sampling_of(1000.0, 250.0, 3)
+    assert "oversampling" in str(caught.value)
+    assert "divisor of 4" in str(caught.value)

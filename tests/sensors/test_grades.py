@@ -10,14 +10,14 @@ from scipy.optimize import minimize_scalar
 from simrail.errors import InputError
 from simrail.scenario.files import judge, shipped
 from simrail.scenario.imu_file import ImuFile, load_grade
-from simrail.sensors.grades import (
+from simrail.sensors.allan import (
     FLICKER_FLOOR,
     GAUSS_MARKOV_PEAK,
     GAUSS_MARKOV_PEAK_AT,
-    ImuGrade,
     bias_sd,
     gauss_markov_allan,
 )
+from simrail.sensors.grades import ImuGrade
 
 
 def test_data_sheet_units_by_hand():
