@@ -20,7 +20,7 @@ from simrail.example import CellResult
 from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.findings import Finding, findings
 from simrail.report.methods import MethodStyle, method_styles
-from simrail.report.paper_000 import paper_view
+from simrail.report.paper_000.section import paper_view
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.provenance import facts, parts
 from simrail.report.ride_figures import direction_of, imu_figure, odometry_figure, speed_figure

@@ -1,15 +1,11 @@
-"""What Briales et al. 2021 printed, which of our methods stand for theirs, and access to our figures.
-
-E. Briales, P. Urda, J. L. Escalona: Track frame approach for heading and attitude estimation in operating
-railways using on-board MEMS sensor and encoder. Here "the paper".
-"""
+"""Which of our methods stand for which of the paper's, and access to their figures ride by ride."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,29 +13,6 @@ from simrail.errors import InputError
 from simrail.estimate import estimator_class
 from simrail.report.pivot import Figures
 from simrail.scenario.cells import Method
-
-QUANTITIES = ("roll", "pitch", "yaw")
-
-
-class Printed(NamedTuple):
-    """A figure of the paper: mean and standard deviation over its rides, degrees."""
-
-    mean: float
-    sd: float
-
-
-TABLE_3: dict[str, tuple[Printed, Printed, Printed]] = {
-    "commercial": (Printed(0.331, 0.525), Printed(0.397, 0.52), Printed(52.4, 37.3)),
-    "madgwick": (Printed(0.226, 0.208), Printed(0.284, 0.35), Printed(8.25, 5.43)),
-    "ekf": (Printed(0.277, 0.215), Printed(0.608, 0.499), Printed(8.31, 5.45)),
-}
-"""Table 3: rms of the difference to the design angles (roll, pitch, yaw), by the paper's method."""
-
-PRINTED_TERMS = {"relative": 2.81e-1, "coriolis": 1.96e-5, "angular": 1.11e-6, "track": 2.93e-1}
-"""Section 8: standard deviation over ride go20A of the terms of its Eq. 14, m/s2."""
-
-TERMS_RIDE = "go20A"
-"""The ride that `PRINTED_TERMS` speak of."""
 
 PARTS: dict[str, tuple[str, str]] = {
     "vqf_magnetometer": ("commercial AHRS: VQF with magnetometer", "commercial"),
@@ -98,8 +71,8 @@ def _options(method: Method) -> dict[str, Any]:
         known = estimator_class(method.part.method)
     except InputError:
         return dict(method.part.options)
-    fields = dataclasses.fields(known) if dataclasses.is_dataclass(known) else ()
-    return {entry.name: entry.default for entry in fields} | dict(method.part.options)
+    defaults = {entry.name: entry.default for entry in dataclasses.fields(known)}  # type: ignore[arg-type]
+    return defaults | dict(method.part.options)
 
 
 @dataclass(frozen=True)
@@ -137,9 +110,7 @@ class Rides:
         self, case: Figures, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"
     ) -> float:
         """Rms on one ride, mean over its draws."""
-        return case.get(
-            self.names.get(part, ""), quantity, "rms", window=window, reference=reference
-        ).value
+        return case.get(self.names.get(part, ""), quantity, "rms", window=window, reference=reference).value
 
     def mean(
         self, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"

@@ -1,4 +1,4 @@
-"""Our versions of Figs. 12 to 22 of Briales et al. 2021: rms per ride, compensation, and repeatability of roll."""
+"""Our versions of the paper's Figs. 12 to 22: rms per ride, compensation, and repeatability of roll."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simrail.jit import FloatArray
 from simrail.report.attitude_figures import angle_error
 from simrail.report.decimate import Bins
 from simrail.report.methods import MethodStyle
-from simrail.report.paper_000_data import is_fast
+from simrail.report.paper_000.rides import is_fast
 from simrail.report.pivot import Figures
 from simrail.report.ride_figures import direction_of, limits_of
 from simrail.report.style import (
@@ -37,6 +37,9 @@ _RIDE_COLOURS = {
 }
 """By (forward, fast): colours of the rides of a class."""
 
+_MARKERS = "os^vD"
+"""Methods of one colour differ in their marks."""
+
 _GRID_STEP_M = 1.0
 
 
@@ -55,7 +58,10 @@ def rides_figure(cases: Sequence[Figures], styles: Sequence[MethodStyle]) -> str
                 1.0 - (top + bottom) / height,
             )
             axis = figure.add_axes(box)
+            used: list[str] = []
             for order, style in enumerate(styles):
+                marker = _MARKERS[used.count(style.colour) % len(_MARKERS)]
+                used.append(style.colour)
                 found = [
                     c.get(style.name, quantity, "rms", window="cropped", reference="design") for c in cases
                 ]
@@ -63,7 +69,7 @@ def rides_figure(cases: Sequence[Figures], styles: Sequence[MethodStyle]) -> str
                 sd = np.nan_to_num([f.sd for f in found])
                 x = np.arange(len(cases)) + (order + 0.5) * step - 0.4
                 face = "white" if style.baseline else style.colour
-                mark: dict[str, Any] = {"fmt": "D" if style.baseline else "o", "ms": 4.2, "mfc": face, "lw": 1.0}
+                mark: dict[str, Any] = {"fmt": marker, "ms": 4.6, "mfc": face, "lw": 1.0}
                 low = np.minimum(sd, 0.7 * value)
                 axis.errorbar(x, value, [low, sd], color=style.colour, mew=1.1, label=style.label, **mark)
             for place in range(1, len(cases)):
@@ -147,8 +153,8 @@ def repeatability_figure(examples: Sequence[CellResult], styles: Sequence[Method
 def spread_of(examples: Sequence[CellResult], name: str) -> float:
     """Spread between rides of a method's roll error at the same place, rms along the line, degrees.
 
-    The error, not the roll: on one irregular track the true roll differs from ride to ride as well. Errors are
-    averaged over each metre that all rides passed.
+    The error, not the roll: on one irregular track the true roll differs from ride to ride as well. Errors
+    are averaged over each metre that all rides passed.
     """
     per_ride = []
     low = max(float(e.motion["position_m"].min()) for e in examples)
