@@ -137,7 +137,8 @@ def repeatability_figure(examples: Sequence[CellResult], styles: Sequence[Method
                 colour = _RIDE_COLOURS[kind][seen.get(kind, 0) % 2]
                 seen[kind] = seen.get(kind, 0) + 1
                 x, y = bins.line(_roll(example, style))
-                axis.plot(x, y, color=colour, lw=0.9, label=example.recording.name)
+                behind = 2 if kind[1] else 4  # the fast rides swing most and would hide the others
+                axis.plot(x, y, color=colour, lw=0.9, label=example.recording.name, zorder=behind)
                 lines.append(y)
             frame = examples[0].recording.track.frame(np.sort(bins.x))
             y = np.rad2deg(frame.roll_rad)

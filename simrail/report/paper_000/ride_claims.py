@@ -97,9 +97,7 @@ def _backward_gda(rides: Rides) -> Claim:
 
 
 def _backward_ekf(rides: Rides, wrong_sign_deg: float) -> Claim:
-    said = (
-        "Sections 7.3 and 7.5, Figs. 18 and 22: the EKF fails on backward rides, worst in curves of back70."
-    )
+    said = "Sections 7.3, 7.5, Figs. 18 and 22: the EKF fails on backward rides, worst in curves of back70."
     pairs = _pairs(rides)
     if not pairs or not rides.has("ekf_per_step"):
         return Claim(
