@@ -19,7 +19,7 @@ from simrail.report.paper_000.figures import spread_of
 from simrail.report.paper_000.method_claims import method_claims
 from simrail.report.paper_000.printed import TABLE_3, TIME_CONSTANTS_S
 from simrail.report.paper_000.ride_claims import ride_claims
-from simrail.report.paper_000.rides import PARTS, Rides, part_of
+from simrail.report.paper_000.rides import GENERAL_PURPOSE, PARTS, Rides, part_of, rides_of
 from simrail.report.paper_000.section import PaperView, paper_view
 from simrail.report.pivot import Figure, Figures, cases
 from simrail.scenario.build import profile_of
@@ -143,7 +143,7 @@ def only(part: str, quantity: str, factor: float, *, rides: str = "") -> Change:
         ("general_purpose", only("yuan", "roll", 0.3, rides="back20B")),
         ("gda_slightly_better", only("gda_paper", "roll", 1.3)),
         ("gda_slightly_better", only("ekf_per_step", "pitch", 0.3)),
-        ("gda_slightly_better", only("ekf_per_step", "roll", 1.5)),
+        ("gda_slightly_better", only("ekf_per_step", "roll", 1.8)),
         ("same_yaw", only("ekf_per_step", "yaw", 1.1)),
         ("yaw_size", only("gda_paper", "yaw", 0.3)),
         ("size_commercial", only("vqf_magnetometer", "roll", 2.1)),
@@ -178,25 +178,25 @@ def test_the_figures_of_a_sentence_are_looked_up() -> None:
 # ---- rides -------------------------------------------------------------------------------------
 
 
-def some_rides(names: tuple[str, ...]) -> Scenario:
-    """The scenario with some of its rides, two draws."""
+def some_rides(names: tuple[str, ...], draws: int) -> Scenario:
+    """The scenario with some of its rides, and fewer draws."""
     text = load_scenario("metro_table3").text
     head, *parts = re.split(r"(?m)^(?=\[\[ride\]\]|\[\[imu\]\])", text)
     kept = [part for part in parts if "[[ride]]" not in part or any(f'"{n}"' in part for n in names)]
-    return read_scenario(head + "".join(kept), name="metro_table3", overrides=["sensor_draws=2"])
+    return read_scenario(head + "".join(kept), name="metro_table3", overrides=[f"sensor_draws={draws}"])
 
 
 @lru_cache
-def campaign(names: tuple[str, ...]) -> tuple[Scenario, CampaignResult]:
+def campaign(names: tuple[str, ...], draws: int = 2) -> tuple[Scenario, CampaignResult]:
     """Run it."""
-    scenario = some_rides(names)
+    scenario = some_rides(names, draws)
     return scenario, run_campaign(scenario)
 
 
 @lru_cache
-def view_of(names: tuple[str, ...]) -> PaperView:
+def view_of(names: tuple[str, ...], draws: int = 2) -> PaperView:
     """The section of a campaign."""
-    scenario, result = campaign(names)
+    scenario, result = campaign(names, draws)
     listed = methods(scenario)
     view = paper_view(
         cases(result.scores, result.cells), listed, list(method_styles(listed).values()), result.examples
@@ -256,7 +256,9 @@ def test_spread_of_planted_errors() -> None:
 
 @pytest.mark.slow
 def test_claims_on_all_rides() -> None:
-    view = view_of(tuple(MEAN_KMH))
+    # Ten draws: the accelerometer's bias, which differs between draws, is the floor of every roll error.
+    names = tuple(MEAN_KMH)
+    view = view_of(names, 10)
     found = {claim.key: claim for claim in view.claims}
     assert {key for key, claim in found.items() if claim.holds} == {
         "commercial_yaw",
@@ -270,3 +272,14 @@ def test_claims_on_all_rides() -> None:
         "repeatability",
     }
     assert len(view.figures) == 7
+    scenario, result = campaign(names, 10)
+    rides = rides_of(cases(result.scores, result.cells), methods(scenario))
+    for case in rides.cases:
+        worse = max(rides.one(case, part, "roll", window="curve") for part in ("ekf", "gda"))
+        for part in GENERAL_PURPOSE:
+            times = rides.one(case, part, "roll", window="curve") / worse
+            assert times > (4.0 if "70" in case.labels["ride"] else 3.0), (case.labels["ride"], part)
+    for part in ("ekf", "gda"):
+        for go, back in (("go20A", "back20A"), ("go70", "back70")):
+            errors = [rides.one(c, part, "roll") for c in rides.cases if c.labels["ride"] in (go, back)]
+            assert abs(errors[0] - errors[1]) < 0.03

@@ -12,9 +12,6 @@ from simrail.report.paper_000.rides import Rides
 HELPS_FACTOR = 1.5
 """A method that helps makes the error at least this many times smaller."""
 
-SLIGHTLY_FACTOR = 1.5
-"""Slightly worse is above 1 and at most this many times the error."""
-
 SAME_YAW, SAME_YAW_DEG = 0.05, 0.1
 """Two yaw errors are the same if they differ by less than this share or angle."""
 

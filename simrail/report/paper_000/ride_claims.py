@@ -90,8 +90,8 @@ def _backward_gda(rides: Rides) -> Claim:
     apart = {part: _apart(rides, part, pairs) for part in rides.present(("gda_paper", "gda"))}
     listed = "; ".join(f"{PARTS[part][0]} {degrees(value)}" for part, value in apart.items())
     found = (
-        "Roll errors against the truth, backward and forward, whole rides of one speed, differ by at most: "
-        f"{listed} (holds for the paper's settings if at most {SAME_DIRECTION_DEG:g}\u00b0)."
+        "Roll errors against the truth, backward and forward, whole rides of one speed, differ by at "
+        f"most: {listed} (holds for the paper's settings if at most {SAME_DIRECTION_DEG:g}\u00b0)."
     )
     return Claim("backward_gda", said, apart["gda_paper"] <= SAME_DIRECTION_DEG, found)
 
@@ -115,17 +115,15 @@ def _backward_ekf(rides: Rides, wrong_sign_deg: float) -> Claim:
     fails = ratios["ekf_per_step"] >= FAILS_BACKWARD_FACTOR
     found = (
         f"Backward over forward roll error in curves, at most: {listed} (holds if the EKF with the paper's "
-        "settings, Q "
-        f"per step, has {FAILS_BACKWARD_FACTOR:g})."
+        f"settings, Q per step, has {FAILS_BACKWARD_FACTOR:g})."
     )
     cause = ""
     if not fails:
         cause = (
             "The filter has no way to tell directions apart: V changes sign, V\u00b2k does not. A "
-            "compensation of the wrong "
-            "sign, as from a curvature taken in the direction of travel, would leave "
-            f"{degrees(wrong_sign_deg)} of roll "
-            "in the sharpest curve of our fastest backward ride: a sign is the likelier cause of theirs."
+            "compensation of the wrong sign, as from a curvature taken in the direction of travel, would "
+            f"leave {degrees(wrong_sign_deg)} of roll in the sharpest curve of our fastest backward ride: "
+            "a sign is the likelier cause of theirs."
         )
     return Claim("backward_ekf", said, fails, found, cause)
 
@@ -161,9 +159,8 @@ def _repeatability(rides: Rides, spread: dict[str, float]) -> Claim:
     ratio = spread["ekf_per_step"] / spread["gda_paper"]
     found = (
         "Spread of the roll error between the rides at the same place, rms along the line, first draw: "
-        f"{listed}. The EKF with the "
-        f"paper's settings spreads {significant(ratio)} times as much as the GDA (holds if "
-        f"{REPEATS_FACTOR:g} times)."
+        f"{listed}. The EKF with the paper's settings spreads {significant(ratio)} times as much as the "
+        f"GDA (holds if {REPEATS_FACTOR:g} times)."
     )
     cause = ""
     if "ekf" in spread and "gda" in spread and spread["ekf"] <= spread["gda"]:

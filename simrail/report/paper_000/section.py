@@ -146,12 +146,10 @@ def _notes(rides: Rides) -> list[str]:
             own = rides.mean(part, "roll")[0]
             (lost if own > floor else won).append(f"{PARTS[part][0]} ({degrees(own)})")
         notes.append(
-            "The paper scores against the design angles, where 'design angles only', a method that uses no "
-            "IMU at all, "
-            f"would err by nothing but its odometry. Against the truth it errs by {degrees(floor)} rms in "
-            "roll, mean "
-            f"over the rides. Worse than that: {'; '.join(lost) or 'none'}. Better: "
-            f"{'; '.join(won) or 'none'}."
+            "The paper scores against the design angles, where 'design angles only', a method that uses "
+            "no IMU at all, would err by nothing but its odometry. Against the truth it errs by "
+            f"{degrees(floor)} rms in roll, mean over the rides. Worse than that: "
+            f"{'; '.join(lost) or 'none'}. Better: {'; '.join(won) or 'none'}."
         )
     costs = [
         f"{own.upper()} from {degrees(rides.mean(own, 'roll')[0])} to "
@@ -195,11 +193,9 @@ def _figures(
     shown = drawn([part for part in PARTS if not part.endswith("_printed")])
     if shown:
         text = (
-            "As Fig. 12: rms difference to the design angles of each method on each ride, on a logarithmic "
-            "axis; hollow: "
-            "baselines and methods that do not know the track. Strokes: one standard deviation between "
-            "draws of the "
-            "sensors, where there are several."
+            "As Fig. 12: rms difference to the design angles of each method on each ride, on a "
+            "logarithmic axis; hollow: baselines and methods that do not know the track. Strokes: one "
+            "standard deviation between draws of the sensors, where there are several."
         )
         figures.append((text, rides_figure(rides.cases, shown)))
     main = next((e for e in examples if e.recording.name == TERMS_RIDE), examples[0] if examples else None)
@@ -207,8 +203,7 @@ def _figures(
     if main and first:
         text = (
             f"As Fig. 11, ride {main.recording.name}: EKF and GDA with the paper's settings, and a "
-            "general-purpose filter "
-            "with magnetometer, which stands in for the commercial one."
+            "general-purpose filter with magnetometer, which stands in for the commercial one."
         )
         figures.append((text, attitude_figure(main, first, what=text)))
     pairs = [
@@ -220,9 +215,9 @@ def _figures(
     chosen = [e for e in (_first(forward, fast=False), _first(forward, fast=True)) if e]
     if pairs and chosen:
         text = (
-            "As Figs. 13 and 14: roll with and without compensation, slow and fast. What the uncompensated "
-            "filters miss is "
-            "the lateral acceleration of the curves, which grows with the square of speed."
+            "As Figs. 13 and 14: roll with and without compensation, slow and fast. What the "
+            "uncompensated filters miss is the lateral acceleration of the curves, which grows with the "
+            "square of speed."
         )
         figures.append((text, compensation_figure(chosen, pairs)))
     repeated = drawn(_REPEATED)

@@ -90,11 +90,10 @@ def _terms_text(sizes: dict[str, FloatArray]) -> str:
     small = [key for key in ("coriolis", "angular") if share[key] < OTHERS_LIMIT]
     text = (
         "As a share of the track's acceleration on this ride: relative acceleration "
-        f"{100 * share['relative']:.0f} % "
-        f"(the paper: {100 * PRINTED_TERMS['relative'] / PRINTED_TERMS['track']:.0f} %), its part below "
+        f"{100 * share['relative']:.0f} % (the paper: "
+        f"{100 * PRINTED_TERMS['relative'] / PRINTED_TERMS['track']:.0f} %), its part below "
         f"{SLOW_PART_HZ:g} Hz {100 * share['slow']:.1f} %, Coriolis {100 * share['coriolis']:.2g} %, "
-        "angular terms "
-        f"{100 * share['angular']:.2g} %. "
+        f"angular terms {100 * share['angular']:.2g} %. "
     )
     text += (
         f"The second and third hypotheses hold (each below {100 * OTHERS_LIMIT:g} %). "
@@ -107,8 +106,7 @@ def _terms_text(sizes: dict[str, FloatArray]) -> str:
     moves = share["relative"] > FIRST_LIMIT
     text += (
         "The first, that the body does not accelerate in the track frame, "
-        f"{'does not hold' if moves else 'holds'} "
-        f"(limit {100 * FIRST_LIMIT:g} %)"
+        f"{'does not hold' if moves else 'holds'} (limit {100 * FIRST_LIMIT:g} %)"
     )
     text += ", as in the paper" if moves == (printed > FIRST_LIMIT) else ", unlike in the paper"
     if moves:
@@ -118,7 +116,6 @@ def _terms_text(sizes: dict[str, FloatArray]) -> str:
     ratio = sizes["angular"][3] / PRINTED_TERMS["angular"]
     return text + (
         f" The printed angular term is {ratio:.0f} times below ours with r = the IMU's place; with r as "
-        "the small "
-        "displacement that the paper integrates, ours is "
+        "the small displacement that the paper integrates, ours is "
         f"{sizes['deviation'][3] / PRINTED_TERMS['angular']:.1f} times it."
     )
