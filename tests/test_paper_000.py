@@ -170,6 +170,16 @@ def test_what_was_not_run_is_not_judged() -> None:
     assert "after Yuan" in found["yuan"].found
 
 
+def test_a_method_that_failed_on_a_ride_is_not_judged() -> None:
+    found = verdicts(planted(only("gda_paper", "roll", np.nan, rides="back70")))
+    unasked = {key for key, claim in found.items() if claim.holds is None}
+    assert unasked == {"gda_slightly_better", "same_yaw", "yaw_size", "size_madgwick", "backward_gda"}
+
+
+def test_without_scores_there_is_no_section() -> None:
+    assert paper_view([], methods(load_scenario("metro_table3")), [], []) is None
+
+
 def test_the_figures_of_a_sentence_are_looked_up() -> None:
     found = verdicts(planted(only("vqf_magnetometer", "yaw", 0.5)))["commercial_yaw"].found
     assert "26.2\u00b0" in found and "52.4\u00b0 \u00b1 37.3\u00b0" in found

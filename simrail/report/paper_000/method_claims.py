@@ -29,7 +29,7 @@ def _asked(
 ) -> Claim:
     if not rides.has(*parts):
         missing = ", ".join(PARTS[part][0] for part in parts if not rides.has(part))
-        return Claim(key, said, None, f"Not run: {missing}.")
+        return Claim(key, said, None, f"Not run on every ride: {missing}.")
     return Claim(key, said, *judge(rides))
 
 

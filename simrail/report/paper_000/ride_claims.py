@@ -66,7 +66,7 @@ def _size(rides: Rides, row: str, part: str) -> Claim:
         + " rms."
     )
     if not rides.has(part):
-        return Claim(key, said, None, f"Not run: {PARTS[part][0]}.")
+        return Claim(key, said, None, f"Not run on every ride: {PARTS[part][0]}.")
     own = [cropped(rides, part, q) for q in QUANTITIES]
     factors = {q: o / p.mean for q, o, p in zip(QUANTITIES, own, printed, strict=True)}
     off = [q for q, factor in factors.items() if not 1.0 / SIZE_FACTOR <= factor <= SIZE_FACTOR]

@@ -91,13 +91,13 @@ class Rides:
     names: dict[str, str]
 
     def has(self, *parts: str) -> bool:
-        """Whether all parts were run and have a roll error on some ride."""
+        """Whether all parts were run and have a roll error on every ride: only then they are judged."""
         return bool(self.cases) and all(
-            part in self.names and any(np.isfinite(self.each(part, "roll"))) for part in parts
+            part in self.names and bool(np.isfinite(self.each(part, "roll")).all()) for part in parts
         )
 
     def present(self, parts: Sequence[str]) -> list[str]:
-        """Those of some parts that were run."""
+        """Those of some parts that can be judged."""
         return [part for part in parts if self.has(part)]
 
     def each(

@@ -109,7 +109,7 @@ def _table(rides: Rides, looks: dict[str, MethodStyle], *, reference: str) -> Ta
     windows = ("cropped", "whole")
     beside = reference == "design"
     rows = []
-    for part in rides.present(list(PARTS)):
+    for part in (part for part in PARTS if part in rides.names):
         label, printed_row = PARTS[part]
         cells = []
         if beside:
