@@ -142,9 +142,9 @@ def is_fast(labels: dict[str, Any]) -> bool:
 
 
 def rides_of(all_cases: Sequence[Figures], methods: Sequence[Method]) -> Rides:
-    """Gather the first case of every ride, and the parts that the methods play."""
+    """Gather the first case of every ride, an ideal IMU last, and the parts that the methods play."""
     first: dict[str, Figures] = {}
-    for case in all_cases:
+    for case in sorted(all_cases, key=lambda case: case.labels["imu"] == "ideal"):
         first.setdefault(case.labels["ride"], case)
     names: dict[str, str] = {}
     for method in methods:
