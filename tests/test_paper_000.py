@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ import pytest
 
 from simrail.campaign import CampaignResult, run_campaign
 from simrail.errors import InputError
+from simrail.report import write_report
 from simrail.report.methods import method_styles
 from simrail.report.paper_000.claim import Claim
 from simrail.report.paper_000.figures import spread_of
@@ -22,6 +24,7 @@ from simrail.report.paper_000.ride_claims import ride_claims
 from simrail.report.paper_000.rides import GENERAL_PURPOSE, PARTS, Rides, part_of, rides_of
 from simrail.report.paper_000.section import PaperView, paper_view
 from simrail.report.pivot import Figure, Figures, cases
+from simrail.results import describe
 from simrail.scenario.build import profile_of
 from simrail.scenario.cells import cells, methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
@@ -245,6 +248,21 @@ def test_figures_that_need_more_rides_are_left_out() -> None:
     view = view_of(FAST)
     assert len(view.figures) == 4  # no two slow or two forward rides: Figs. 15 to 20 are left out
     assert all(svg.startswith("<svg") for _, svg in view.figures)
+
+
+def test_the_section_stands_on_the_page(tmp_path: Path) -> None:
+    scenario, result = campaign(FAST)
+    write_report(
+        tmp_path / "report.html",
+        scenario=scenario,
+        scores=result.scores,
+        cells=result.cells,
+        examples=result.examples[:1],
+        manifest=describe(scenario, result),
+    )
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert '<h2 id="paper">Beside Briales et al. 2021</h2>' in text
+    assert "8.25" in text and "Does not reproduce." in text and "track acceleration" in text
 
 
 def test_claims_on_the_fast_rides() -> None:

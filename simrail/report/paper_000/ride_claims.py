@@ -118,7 +118,7 @@ def _backward_ekf(rides: Rides, wrong_sign_deg: float) -> Claim:
         f"settings, Q per step, has {FAILS_BACKWARD_FACTOR:g})."
     )
     cause = ""
-    if not fails:
+    if not fails and wrong_sign_deg > 0.0:  # NaN without a backward ride to look at
         cause = (
             "The filter has no way to tell directions apart: V changes sign, V\u00b2k does not. A "
             "compensation of the wrong sign, as from a curvature taken in the direction of travel, would "
