@@ -26,7 +26,18 @@ from simrail.report.page import write_report
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.score_table import aggregate
 
-PACKAGES = ("simrail", "exudyn", "numpy", "scipy", "pandas", "numba", "pyarrow", "filterpy", "vqf")
+PACKAGES = (
+    "simrail",
+    "exudyn",
+    "numpy",
+    "scipy",
+    "pandas",
+    "numba",
+    "pyarrow",
+    "filterpy",
+    "vqf",
+    "imufusion",
+)
 MANIFEST = "manifest.json"
 
 

@@ -2,8 +2,9 @@
 
     pytest tests/benchmarks/test_estimators.py --benchmark-only
 
-Every kernel gets arrays that are ready; `estimate` is timed too, from recording to data frame. The
-estimators of `ahrs` and `imufusion` are timed where these packages are installed.
+Every kernel gets arrays that are ready; `estimate` is timed too, from recording to data frame. Those of
+`ahrs` are timed where it is installed. The limits are for one idle core of a machine of 2024; ratios are
+taken in one run, so they hold on others as well.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable
 from functools import lru_cache
 
+import imufusion
 import numpy as np
 import pytest
 from vqf import VQF
@@ -112,13 +114,12 @@ def ahrs_madgwick_us() -> float:
 
 
 def imufusion_us() -> float:
-    imufusion = pytest.importorskip("imufusion", reason="imufusion is not installed")
     rate, force = signals()
     degrees, g = np.degrees(rate[:SLOW]), force[:SLOW] / 9.81
 
     def run() -> None:
         ahrs = imufusion.Ahrs()
-        ahrs.set_sample_period(0.004)  # since imufusion 1.3
+        ahrs.set_sample_period(0.004)
         for w, z in zip(degrees, g, strict=True):
             ahrs.update_no_magnetometer(w, z)
 
@@ -139,8 +140,10 @@ def test_ekf_kernel(benchmark: Callable) -> None:
         len(arguments[0]),
         ratio_to_filterpy=filterpy_us(),
         ratio_to_vqf=vqf_us(),
+        ratio_to_imufusion=imufusion_us(),
     )
-    assert us < 0.5
+    assert us <= 0.15
+    assert benchmark.extra_info["ratio_to_filterpy"] >= 250.0
 
 
 def test_gda_kernel(benchmark: Callable) -> None:
@@ -151,18 +154,15 @@ def test_gda_kernel(benchmark: Callable) -> None:
         len(arguments[0]),
         ratio_to_filterpy=filterpy_us(),
         ratio_to_vqf=vqf_us(),
+        ratio_to_imufusion=imufusion_us(),
     )
-    assert us < 0.3
+    assert us <= 0.08
+    assert benchmark.extra_info["ratio_to_vqf"] >= 3.0
 
 
 def test_gda_beside_ahrs_madgwick(benchmark: Callable) -> None:
     arguments = gda_arguments()
     report(benchmark, lambda: attitude_gda(*arguments), len(arguments[0]), ratio_to_ahrs=ahrs_madgwick_us())
-
-
-def test_gda_beside_imufusion(benchmark: Callable) -> None:
-    arguments = gda_arguments()
-    report(benchmark, lambda: attitude_gda(*arguments), len(arguments[0]), ratio_to_imufusion=imufusion_us())
 
 
 @pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda()], ids=["ekf", "gda"])

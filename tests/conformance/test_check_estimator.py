@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimators.ahrs import Vqf
+from estimators.ahrs import Imufusion, Vqf
 from estimators.attitude_ekf import AttitudeEkf
 from estimators.attitude_gda import AttitudeGda
 from estimators.baselines import DesignAngles
@@ -52,12 +52,18 @@ OURS = [
     AttitudeEkf(compensated=False),
     AttitudeEkf(tuning="paper_final"),
     AttitudeEkf(tuning="paper_initial", process_noise="per_step", rest_bias=False),
+    AttitudeEkf(tuning="paper_final", process_noise="per_step", rest_bias=False),
     AttitudeEkf(printed=True),
+    AttitudeEkf(compensated=False, doubt=100.0),
     AttitudeGda(),
+    AttitudeGda(tuning="paper", rest_bias=False),
+    AttitudeGda(printed=True),
     AttitudeGda(compensated=False, tuning="paper"),
     DesignAngles(),
     Vqf(),
     Vqf(compensated=True),
+    Imufusion(),
+    Imufusion(compensated=True, rest_bias=False),
 ]
 
 
@@ -66,7 +72,9 @@ def test_ours_pass(estimator: Estimator) -> None:
     check_estimator(estimator, ride())
 
 
-@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda(), Vqf()], ids=["ekf", "gda", "vqf"])
+@pytest.mark.parametrize(
+    "estimator", [AttitudeEkf(), AttitudeGda(), Vqf(), Imufusion()], ids=["ekf", "gda", "vqf", "imufusion"]
+)
 def test_ours_pass_backwards_and_with_a_perfect_imu(estimator: Estimator) -> None:
     check_estimator(estimator, ride(-1, "ideal"))
 
