@@ -124,7 +124,7 @@ def model_of(
     return Model(
         signals=np.ascontiguousarray(signals),
         track=track_terms(recording, frame, printed=printed),
-        slips=_slips(frame, speed) if printed else np.empty((0, 3)),
+        slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
         process=np.concatenate(
             [q[np.triu_indices(len(q))] for q in process_noise(parameters, 1.0 / sheet.rate_hz)]
         ),
@@ -177,7 +177,7 @@ def beyond_first_order(frame: TrackFrame, speed: FloatArray, gravity: float) -> 
     return np.hstack([rates - np.column_stack(first), forces])
 
 
-def _slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
+def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
     """See `estimators.kernels.trajectory.misprint`."""
     _, v, h = frame.rates.T
     return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
