@@ -1,11 +1,11 @@
-"""The model of the trajectory smoother: what its kernels take of a recording, and the same filter by filterpy.
+"""Model of the trajectory smoother: what its kernels take of a recording, and the same filter by filterpy.
 
 Gonzalez-Carbajal et al. 2023 (paper 001), sections 2 and 3 and appendix 1, with the errata of EQUATIONS 1.3.
 The state is
 
     x = [roll, roll', pitch, pitch', yaw, yaw', y, y', y'', z, z', z'']
 
-with the angles of the body in the global frame, its place (0, y, z) in the design track frame, and ' for d/dt.
+with the angles of the body in the global frame, its place (0, y, z) in the design track frame, ' for d/dt.
 
 Not here: the loops (`estimators.kernels.trajectory`), the noise (`estimators.trajectory_noise`).
 """
@@ -20,7 +20,8 @@ from filterpy.kalman import ExtendedKalmanFilter, rts_smoother
 from scipy.linalg import block_diag
 
 from estimators.compensation import design_frame, track_motion
-from estimators.kernels.trajectory import PACKED, STATES
+from estimators.kernels.trajectory import PACKED
+from estimators.kernels.trajectory_equations import STATES
 from estimators.rest_bias import rest_bias
 from estimators.trajectory_noise import Hyperparameters
 from simrail.columns import ACCEL, GYRO
@@ -138,7 +139,7 @@ def model_of(
 
 
 def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
-    """`estimators.kernels.trajectory.TERMS` at every sample, (n, 15).
+    """`estimators.kernels.trajectory_equations.TERMS` at every sample, (n, 15).
 
     Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
     (paper 001, appendix 1, g4C, g5C, g6C).
@@ -178,7 +179,7 @@ def beyond_first_order(frame: TrackFrame, speed: FloatArray, gravity: float) -> 
 
 
 def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
-    """See `estimators.kernels.trajectory.misprint`."""
+    """See `estimators.kernels.trajectory_equations.misprint`."""
     _, v, h = frame.rates.T
     return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
 
@@ -247,7 +248,8 @@ def filterpy_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> 
         states[k], covariances[k] = ekf.x, ekf.P
         e, s = ekf.y, ekf.S
         innovations[k, :6], innovations[k, 6] = e[:6], e[:6] @ np.linalg.solve(s[:6, :6], e[:6])
-        likelihood -= 0.5 * (e @ np.linalg.solve(s, e) + np.linalg.slogdet(s)[1] + 8.0 * math.log(2 * math.pi))
+        spread = np.linalg.slogdet(s)[1] + len(e) * math.log(2.0 * math.pi)
+        likelihood -= 0.5 * (e @ np.linalg.solve(s, e) + spread)
     if smoothed:
         states, covariances, _, _ = rts_smoother(states, covariances, [f] * n, [ekf.Q] * n)
     packed = covariances[:, *upper] if with_covariance else np.empty((0, PACKED))

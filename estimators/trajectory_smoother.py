@@ -3,8 +3,8 @@
 Gonzalez-Carbajal et al. 2023 (paper 001): gyro, accelerometer, odometry and the design track give the angles
 of the body and its place (y, z) in the track frame; virtual measurements that say "where it belongs, more or
 less" keep the place from drifting. Forwards it is an extended Kalman filter, backwards a fixed-interval
-smoother, and the first alone is to be had as a causal filter. It works at standstill and backwards, since speed
-enters the measurements only, with its sign.
+smoother, and the first alone is to be had as a causal filter. It works at standstill and backwards, since
+speed enters the measurements only, with its sign.
 
 The model stands in `estimators.trajectory_model`, the noise in `estimators.trajectory_noise`.
 """
@@ -12,13 +12,14 @@ The model stands in `estimators.trajectory_model`, the noise in `estimators.traj
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 
-from estimators.kernels.trajectory import PACKED, ROWS, STATES, trajectory_filter
+from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_back import trajectory_back
+from estimators.kernels.trajectory_equations import ROWS, STATES
 from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
 from estimators.trajectory_noise import Hyperparameters, read_hyperparameters
 from simrail.columns import (
@@ -73,7 +74,7 @@ class TrajectorySmoother:
     """
 
     smoothed: bool = True
-    hyperparameters: Hyperparameters = Hyperparameters()
+    hyperparameters: Hyperparameters = field(default_factory=Hyperparameters)
     tuning: str = ""
     rest_bias: bool = True
     second_order: bool = True
@@ -93,9 +94,7 @@ class TrajectorySmoother:
                 raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
         if self.tuning:
             if self.hyperparameters != Hyperparameters():
-                raise InputError(
-                    "a file and values cannot both be given", field="tuning", value=self.tuning
-                )
+                raise InputError("a file and values cannot both be given", field="tuning", value=self.tuning)
             read_hyperparameters(self.tuning)
 
     @property
@@ -117,9 +116,7 @@ class TrajectorySmoother:
         return Estimate(
             states=pd.DataFrame(np.hstack(columns), index=index, columns=names),
             mount=recording.mount,
-            innovations=pd.DataFrame(
-                found.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]
-            ),
+            innovations=pd.DataFrame(found.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
             covariance=covariance,
             covariance_of=(*ATTITUDE, *RELATIVE_POSITION) if self.with_covariance else (),
         )

@@ -1,13 +1,14 @@
-"""Compiled filter of the trajectory smoother: an extended Kalman filter of twelve states, arrays in, arrays out.
+"""Compiled filter of the trajectory smoother: an extended Kalman filter of twelve states.
 
-Gonzalez-Carbajal et al. 2023 (paper 001), section 3, with the errata of EQUATIONS 1.3. What makes it fast is
-its structure: the transition is block upper triangular, so that the prediction is a few sums of rows and
-columns; the noise of the eight measurements is independent, so that they are taken one by one, each with the
-few entries that its row of the Jacobian has (35 of 96); and there is no inverse. The covariance has rows of
-`WIDTH` numbers of which the last four are always zero: loops of sixteen fill the vector registers.
+Gonzalez-Carbajal et al. 2023 (paper 001), section 3, with the errata of EQUATIONS 1.3. Arrays in, arrays out.
+What makes it fast is its structure: the transition is block upper triangular, so that the prediction is a few
+sums of rows and columns; the noise of the eight measurements is independent, so that they are taken one by
+one, each with the few entries that its row of the Jacobian has (35 of 96); and there is no inverse. The
+covariance has rows of `WIDTH` numbers of which the last four are always zero: loops of sixteen fill the
+vector registers.
 
-What happens along the track comes as `TERMS` of each sample (`estimators.trajectory_model`), so nothing here
-knows of tracks, recordings or data frames. The way back is `estimators.kernels.trajectory_back`.
+Not here: the equations (`estimators.kernels.trajectory_equations`) and the way back
+(`estimators.kernels.trajectory_back`).
 """
 
 from __future__ import annotations
@@ -16,13 +17,25 @@ import math
 
 import numpy as np
 
+from estimators.kernels.trajectory_equations import (
+    PITCH,
+    PITCH_RATE,
+    ROLL,
+    ROLL_RATE,
+    ROWS,
+    STATES,
+    YAW,
+    YAW_RATE,
+    YD,
+    YDD,
+    ZD,
+    ZDD,
+    Y,
+    Z,
+    measured,
+    misprint,
+)
 from simrail.jit import FloatArray, njit, njit_borrowed
-
-STATES = 12
-ROLL, ROLL_RATE, PITCH, PITCH_RATE, YAW, YAW_RATE, Y, YD, YDD, Z, ZD, ZDD = range(STATES)
-
-ROWS = 8
-"""Measurements: three of the gyro, three of the accelerometer, two virtual positions."""
 
 PACKED = STATES * (STATES + 1) // 2
 """Entries of a covariance's upper triangle, row by row."""
@@ -30,80 +43,17 @@ PACKED = STATES * (STATES + 1) // 2
 WIDTH = 16
 """Length of a row of the covariance in the loops."""
 
-TERMS = (
-    "roll_rad",
-    "pitch_rad",
-    "yaw_rad",
-    "ax_mps2",
-    "ay_mps2",
-    "az_mps2",
-    "ax_of_y",
-    "ay_of_y",
-    "az_of_y",
-    "ax_of_z",
-    "ay_of_z",
-    "az_of_z",
-    "turn_x",
-    "turn_y",
-    "turn_z",
-)
-"""What the filter takes of the track at each sample, in this order: angles of the track frame (rad), its
-acceleration (m/s2), acceleration per m of y and of z in it (1/s2), and twice its angular rate (rad/s)."""
-
 
 @njit_borrowed
-def measured(x: FloatArray, track: FloatArray, k: int, gravity: float, g: FloatArray, j: FloatArray) -> None:
-    """What gyro and accelerometer should show in state x, and how that depends on x (EQUATIONS 3.2, 3.3).
+def mirror(p: FloatArray) -> None:
+    """Lower triangle from the upper one.
 
-    Parameters
-    ----------
-    x : ndarray (12,)
-        State.
-    track : ndarray (n, 15), k : int
-        `TERMS` of all samples, and which sample.
-    gravity : float
-        m/s2.
-    g : ndarray (6,), out
-        Angular rate and specific force, body axes.
-    j : ndarray (3, 8), out
-        Jacobian of the specific force. Columns: the first and the second of the angles that the row
-        depends on (X: pitch, yaw; Y: roll, yaw; Z: roll, pitch), then y, yd, ydd, z, zd, zdd. The rows of
-        the gyro are so simple that they stand where they are used.
+    Rounding leaves a part that is not symmetric, which no update ever takes away and every prediction lets
+    grow: without this the filter breaks down after some hundred thousand samples.
     """
-    d, e, f = x[ROLL] - track[k, 0], x[PITCH] - track[k, 1], x[YAW] - track[k, 2]
-    xy, yy, zy = track[k, 6], track[k, 7], track[k, 8]
-    xz, yz, zz = track[k, 9], track[k, 10], track[k, 11]
-    t, v, h = track[k, 12], track[k, 13], track[k, 14]
-    y, yd, ydd, z, zd, zdd = x[Y], x[YD], x[YDD], x[Z], x[ZD], x[ZDD]
-    ax = track[k, 3] + xy * y + xz * z - h * yd + v * zd
-    ay = track[k, 4] + yy * y + yz * z - t * zd + ydd
-    az = track[k, 5] + zy * y + zz * z + t * yd + zdd
-    g[0] = x[ROLL_RATE] - x[PITCH] * x[YAW_RATE]
-    g[1] = x[PITCH_RATE] + x[ROLL] * x[YAW_RATE]
-    g[2] = x[YAW_RATE] - x[ROLL] * x[PITCH_RATE]
-    g[3] = ax + f * ay - e * az - gravity * x[PITCH]
-    g[4] = ay - f * ax + d * az + gravity * x[ROLL]
-    g[5] = az + e * ax - d * ay + gravity
-    j[0, 0], j[0, 1] = -az - gravity, ay
-    j[0, 2], j[0, 3], j[0, 4] = xy + f * yy - e * zy, -h - e * t, f
-    j[0, 5], j[0, 6], j[0, 7] = xz + f * yz - e * zz, v - f * t, -e
-    j[1, 0], j[1, 1] = az + gravity, -ax
-    j[1, 2], j[1, 3], j[1, 4] = yy - f * xy + d * zy, f * h + d * t, 1.0
-    j[1, 5], j[1, 6], j[1, 7] = yz - f * xz + d * zz, -t - f * v, d
-    j[2, 0], j[2, 1] = -ay, ax
-    j[2, 2], j[2, 3], j[2, 4] = zy + e * xy - d * yy, t - e * h, -d
-    j[2, 5], j[2, 6], j[2, 7] = zz + e * xz - d * yz, e * v + d * t, 1.0
-
-
-@njit_borrowed
-def misprint(x: FloatArray, track: FloatArray, slips: FloatArray, k: int, j: FloatArray) -> None:
-    """Spoil the Jacobian as the appendix of paper 001 prints it: J43, J5,10 and J61 (EQUATIONS 1.3).
-
-    ``slips`` (n, 3): v V - v V^2, h^2, h^2 V^2 with V the speed and v, h the curvatures.
-    """
-    j[0, 0] += slips[k, 0]
-    j[1, 5] += slips[k, 1] + (x[ROLL] - track[k, 0]) * slips[k, 2]
-    j[2, 0] += 2.0 * x[YDD]
+    for i in range(12):
+        for c in range(i + 1, 12):
+            p[c, i] = p[i, c]
 
 
 @njit_borrowed
@@ -134,23 +84,22 @@ def predict(x: FloatArray, p: FloatArray, q: FloatArray, dt: float) -> None:
         a, b = 2 * block, 3 * block
         p[a, a] += q[b]
         p[a, a + 1] += q[b + 1]
-        p[a + 1, a] += q[b + 1]
         p[a + 1, a + 1] += q[b + 2]
     for block in range(2):
         a, b = 6 + 3 * block, 9 + 6 * block
         p[a, a] += q[b]
         p[a, a + 1] += q[b + 1]
-        p[a + 1, a] += q[b + 1]
         p[a, a + 2] += q[b + 2]
-        p[a + 2, a] += q[b + 2]
         p[a + 1, a + 1] += q[b + 3]
         p[a + 1, a + 2] += q[b + 4]
-        p[a + 2, a + 1] += q[b + 4]
         p[a + 2, a + 2] += q[b + 5]
+    mirror(p)
 
 
 @njit_borrowed
-def take(p: FloatArray, v: FloatArray, dx: FloatArray, error: float, inverse: float, gain: FloatArray) -> None:
+def take(
+    p: FloatArray, v: FloatArray, dx: FloatArray, error: float, inverse: float, gain: FloatArray
+) -> None:
     """Scalar update: K = v/s, dx += K e, P -= K v', with v = P h and ``inverse`` = 1/s."""
     width = p.shape[1]
     for i in range(12):
@@ -225,7 +174,7 @@ def trajectory_filter(
     n = signals.shape[0]
     x, p = start.copy(), np.zeros((STATES, WIDTH))
     v, dx, gain = np.zeros(WIDTH), np.zeros(STATES), np.zeros(STATES)
-    g, j, weight = np.zeros(6), np.zeros((3, 8)), np.zeros(2)
+    g, j = np.zeros(6), np.zeros((3, 8))
     nis = likelihood = 0.0
     first, second = (PITCH, ROLL, ROLL), (YAW, YAW, PITCH)
     for i in range(STATES):

@@ -1,22 +1,22 @@
 """Compiled backward pass of the trajectory smoother: modified Bryson-Frazier, without any inverse.
 
-It uses what `estimators.kernels.trajectory.trajectory_filter` left behind and replaces it, in place: a ride of
-an hour then needs no second copy of its covariances. It equals the Rauch-Tung-Striebel smoother because the
-transition is linear.
+It uses what `estimators.kernels.trajectory.trajectory_filter` left behind and replaces it, in place: a ride
+of an hour then needs no second copy of its covariances. It equals the Rauch-Tung-Striebel smoother because
+the transition is linear.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from estimators.kernels.trajectory import (
+from estimators.kernels.trajectory import WIDTH, mirror
+from estimators.kernels.trajectory_equations import (
     PITCH,
     PITCH_RATE,
     ROLL,
     ROLL_RATE,
     ROWS,
     STATES,
-    WIDTH,
     YAW,
     YAW_RATE,
     Y,
@@ -73,6 +73,7 @@ def information_predict(info: FloatArray, dt: float) -> None:
         info[i, 7] += dt * info[i, 6]
         info[i, 11] += dt * info[i, 10] + half * info[i, 9]
         info[i, 10] += dt * info[i, 9]
+    mirror(info)
 
 
 @njit_borrowed
@@ -97,7 +98,9 @@ def give_back(info: FloatArray, h: FloatArray, gain: FloatArray, inverse: float,
 
 
 @njit_borrowed
-def shrink(info: FloatArray, p: FloatArray, work: FloatArray, packed: FloatArray, k: int) -> None:
+def shrink(
+    info: FloatArray, p: FloatArray, work: FloatArray, v: FloatArray, packed: FloatArray, k: int
+) -> None:
     """Row k of ``packed`` becomes P - P Lam P."""
     width = p.shape[1]
     for r in range(12):
@@ -109,11 +112,14 @@ def shrink(info: FloatArray, p: FloatArray, work: FloatArray, packed: FloatArray
                 work[r, i] += a * p[c, i]
     at = 0
     for r in range(12):
+        for i in range(width):
+            v[i] = 0.0
+        for c in range(12):
+            a = p[r, c]
+            for i in range(width):
+                v[i] += a * work[c, i]
         for c in range(r, 12):
-            total = 0.0
-            for i in range(12):
-                total += p[r, i] * work[i, c]
-            packed[k, at] -= total
+            packed[k, at] -= v[c]
             at += 1
 
 
@@ -188,7 +194,7 @@ def trajectory_back(
                 at += 1
         if with_covariance:
             unpack(covariance, k, p)
-            shrink(info, p, work, covariance, k)
+            shrink(info, p, work, v, covariance, k)
             information_predict(info, step_s)
         for i in range(STATES):
             states[k, i] -= out[i]

@@ -15,8 +15,8 @@ import pandas as pd
 import pytest
 import sympy as sp
 
-from estimators.kernels.trajectory import TERMS, measured, misprint
 from estimators.kernels.trajectory_back import jacobian_rows
+from estimators.kernels.trajectory_equations import TERMS, measured, misprint
 from estimators.trajectory_model import beyond_first_order, jacobian_slips, track_terms
 from estimators.trajectory_model import measured as measured_by_vectors
 
@@ -142,7 +142,9 @@ def frame() -> SimpleNamespace:
 def recording() -> SimpleNamespace:
     columns = [sp.lambdify(t, RIDE.diff(t, order), "numpy") for order in range(3)]
     data = np.array([[column(time) for column in columns] for time in TIMES])
-    return SimpleNamespace(odometry=pd.DataFrame(data, columns=["position_m", "speed_mps", "acceleration_mps2"]))
+    return SimpleNamespace(
+        odometry=pd.DataFrame(data, columns=["position_m", "speed_mps", "acceleration_mps2"])
+    )
 
 
 def test_terms_of_the_track_give_the_acceleration_of_a_body_that_moves_in_it() -> None:
@@ -170,7 +172,10 @@ def test_what_is_beyond_first_order_makes_the_design_exact() -> None:
     beyond = beyond_first_order(frame(), speed, 9.81)
     for k in range(len(TIMES)):
         x = np.zeros(12)
-        x[:6:2], x[1:6:2] = (frame().roll_rad[k], frame().pitch_rad[k], frame().yaw_rad[k]), speed[k] * frame().rates[k]
+        x[:6:2], x[1:6:2] = (
+            (frame().roll_rad[k], frame().pitch_rad[k], frame().yaw_rad[k]),
+            speed[k] * frame().rates[k],
+        )
         value, _ = kernel_at(x, np.array([*x[:6:2], *np.zeros(12)]))
         c = np.array(rotation(*x[:6:2]), dtype=float)
         np.testing.assert_allclose(value[:3] + beyond[k, :3], speed[k] * frame().k[k], rtol=0, atol=1e-13)
