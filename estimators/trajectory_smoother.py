@@ -6,6 +6,9 @@ less" keep the place from drifting. Forwards it is an extended Kalman filter, ba
 smoother, and the first alone is to be had as a causal filter. It works at standstill and backwards, since
 speed enters the measurements only, with its sign.
 
+The model has no sensor bias: what an offset of the accelerometer does to roll and pitch, and one of the gyro
+to yaw, is not in the standard deviations. Place is another matter: the virtual measurements hold it.
+
 The model stands in `estimators.trajectory_model`, the noise in `estimators.trajectory_noise`.
 """
 
@@ -88,6 +91,13 @@ class TrajectorySmoother:
         if self.backend not in BACKENDS:
             raise InputError(
                 "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
+            )
+        if not isinstance(self.hyperparameters, Hyperparameters):
+            raise InputError(
+                "are no Hyperparameters",
+                field="hyperparameters",
+                value=self.hyperparameters,
+                remedy="in a scenario, name a file of them in the option tuning",
             )
         for name in ("start_sd_rad", "start_yaw_sd_rad"):
             if not 0.0 < getattr(self, name) < math.inf:
