@@ -242,8 +242,10 @@ def curve_matched(
         wheel_speed += 0.1 * (change * pulse / dt - wheel_speed)
         idle += dt
         moving += dt
+        # A train that comes to rest sways to and fro: that is no change of direction.
+        if abs(x[V]) > 0.2 or direction == 0.0:
+            direction = np.sign(x[V])
         if change != 0.0:
-            direction = 1.0 if change > 0.0 else -1.0
             idle = 0.0
             if resting:
                 # It left less than a pulse ago, with a jerk of some 0.5 m/s3, held to be standing.
@@ -254,7 +256,7 @@ def curve_matched(
         error[0] = measured - x[WAY]
         if abs(change) == 1.0:
             width = min(pulse, max(0.1 * pulse, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
-            error[0] -= 0.5 * direction * (pulse - width)
+            error[0] -= 0.5 * change * (pulse - width)
         elif change == 0.0:
             # No pulse: the wheel is at most at the edge.
             beyond = abs(error[0]) - 0.5 * pulse

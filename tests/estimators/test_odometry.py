@@ -52,7 +52,7 @@ BIAS_RADPS = np.radians(0.05)
 
 
 @lru_cache
-def truth_of(speed_kmh: float, start_m: float, end_m: float) -> Truth:
+def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> Truth:
     """The metro bogie on the line, irregular rails, compiled engine."""
     return simulate(
         Ride(
@@ -61,7 +61,7 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float) -> Truth:
             irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 40.0),
             track_seed=1,
             vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
-            profile=SpeedProfile(start_m, end_m, speed_kmh / 3.6),
+            profile=SpeedProfile(start_m, end_m, speed_kmh / 3.6, stops=tuple((s, 15.0) for s in stops)),
             engine="compiled",
         )
     )
@@ -189,6 +189,22 @@ def test_slip_is_detected_and_bridged(creepage):
     assert np.max(np.abs(error - without)) < 0.6
     blind, _ = errors(truth, slipped, replace(method, gate=1e6))
     assert np.max(np.abs(blind - without)) > 0.1 * lost
+
+
+def test_a_stop_in_a_sharp_curve_is_no_change_of_direction():
+    """A train sways as it comes to rest; taken for running back, that turned the lag of its heading over."""
+    truth = truth_of(50.0, 330.0, 900.0, 500.0)
+    recording = record(truth, 0)
+    method = CurveMatchedOdometry()
+    error, _ = errors(truth, recording, method)
+    trace = method.trace(recording)
+    position = np.interp(
+        trace.time_s, recording.imu.index, truth.motion(AXLE).loc[recording.imu.index, "position_m"]
+    )
+    before, after = np.searchsorted(position, (495.0, 520.0))
+    assert trace.states[before, LAG] == pytest.approx(trace.states[after, LAG], abs=0.3)
+    assert abs(trace.states[before, LAG]) > 0.8
+    assert rms(error) < 1.0
 
 
 def test_wheels_that_spin_and_slide_on_leaves():
