@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from simrail.campaign import Watcher
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.results import Results
 from simrail.scenario.cells import methods
 from simrail.score_table import OK
+from simrail.watcher import Watcher
 
 COLUMNS = (
     ("roll", "truth", "whole"),
