@@ -39,10 +39,9 @@ from exudyn.itemInterface import (
 from scipy.spatial.transform import Rotation
 
 from simrail.jit import FloatArray
-from simrail.profile import SpeedProfile
-from simrail.track.laid import LaidTrack
 from simrail.vehicle.engine import (
     Segment,
+    Setup,
     refuse_derailed,
     start_memo,
     start_poses,
@@ -50,8 +49,7 @@ from simrail.vehicle.engine import (
     wheel_loads_n,
 )
 from simrail.vehicle.exudyn_forces import HALF_TURN, generalized_forces_of, spread
-from simrail.vehicle.force_data import pack, states_of
-from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.force_data import states_of
 
 _NOTHING = [0.0]
 
@@ -61,43 +59,15 @@ class ExudynEngine:
 
     Parameters
     ----------
-    model : VehicleModel
-        The vehicle.
-    track : LaidTrack
-        The track.
-    profile : SpeedProfile
-        How it is driven.
-    step_s : float
-        Step of the integrator.
-    rate_hz : float
-        Output rate; its period must be a multiple of the step.
-    gravity_mps2 : float
-        Gravity.
-    settle_s : float
-        Time at rest before the ride, in which the springs come to rest; not part of the output.
+    setup : Setup
+        What runs, where and how.
     suspension : {"hook", "native"}
         Who computes the springs: the kernel, or Exudyn's own items (see the module).
-    drive : {"guide", "wheels"}
-        Whether the guide pulls the vehicle along or its wheels drive and brake it.
     """
 
-    def __init__(
-        self,
-        model: VehicleModel,
-        track: LaidTrack,
-        *,
-        profile: SpeedProfile,
-        step_s: float = 0.5e-3,
-        rate_hz: float = 1000.0,
-        gravity_mps2: float = 9.81,
-        settle_s: float = 4.0,
-        suspension: Literal["hook", "native"] = "hook",
-        drive: Literal["guide", "wheels"] = "guide",
-    ) -> None:
-        self.model, self.track, self.profile = model, track, profile
-        self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
-        self.gravity_mps2 = gravity_mps2
-        data = pack(model, track, profile, gravity_mps2=gravity_mps2, drive=drive)
+    def __init__(self, setup: Setup, *, suspension: Literal["hook", "native"] = "hook") -> None:
+        self.setup, model = setup, setup.model
+        data = setup.pack()
         self._native = data.springs[:0]
         if suspension == "native":
             self._native, data = data.springs, data._replace(springs=data.springs[:0])
@@ -119,14 +89,12 @@ class ExudynEngine:
         DerailedError
             If a wheel leaves the rail beyond its flange tip.
         """
-        bodies, spins = len(self.model.bodies), len(self._spins)
+        bodies, spins = len(self.setup.model.bodies), len(self._spins)
         for time_s, rows, slopes in stretches(
+            self.setup,
             self._solve,
             lambda steps: steps[:, 1, : 6 * bodies].reshape(-1, bodies, 6),
             duration_s=duration_s,
-            settle_s=self.settle_s,
-            step_s=self.step_s,
-            rate_hz=self.rate_hz,
             segment_s=segment_s,
         ):
             places = rows[:, 0, : 6 * bodies].reshape(-1, bodies, 6)
@@ -149,13 +117,13 @@ class ExudynEngine:
         return wheel_loads_n(self.memo)
 
     def _build(self) -> None:
-        model = self.model
+        model = self.setup.model
         exu.config.printToConsole = False  # its hints (lists allocated by callbacks) are no news here
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._nodes = []
         objects = []
-        poses = start_poses(model, self.track, self.profile, gravity_mps2=self.gravity_mps2)
+        poses = start_poses(self.setup)
         for body, (position, rotation) in zip(model.bodies, poses, strict=True):
             turn = Rotation.from_matrix(rotation * HALF_TURN).as_rotvec()
             node = self.mbs.AddNode(
@@ -170,7 +138,7 @@ class ExudynEngine:
             )
             self._nodes.append(node)
         self._add_springs(objects)
-        self.memo[:] = start_memo(model, self.profile)
+        self.memo[:] = start_memo(self.setup)
         aux = len(self._spins) + self._states
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
@@ -198,7 +166,7 @@ class ExudynEngine:
         self._settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
         self._settings.solution.file.write = False
         # At every step: half a step, lest rounding lets one slip.
-        self._settings.solution.sensors.writePeriod = self.step_s / 2.0
+        self._settings.solution.sensors.writePeriod = self.setup.step_s / 2.0
 
     def _add_springs(self, objects: list[Any]) -> None:
         """Exudyn's own springs in place of the kernel's: rows as in `ForceData.springs`.
@@ -236,7 +204,7 @@ class ExudynEngine:
         view = memoryview(self._state.data).cast("B")
         put = struct.Struct(f"{2 * n}d").pack_into
         get = self._state[2 * n :].tolist
-        arena, settle = self._arena, self.settle_s
+        arena, settle = self._arena, self.setup.settle_s
 
         def user_function(mbs: Any, t: float, item: int, q: list[float], v: list[float]) -> list[float]:
             put(view, 0, *q, *v)
@@ -248,10 +216,10 @@ class ExudynEngine:
 
     def _sensor(self) -> Any:
         """Copies coordinates and rates into the rows of the present solution, step by step."""
-        system = self.mbs.systemData
+        system, step = self.mbs.systemData, self.setup.step_s
 
         def user_function(mbs: Any, t: float, numbers: Any, factors: Any, configuration: Any) -> list[float]:
-            row = self._rows[round((t - self._rows_start_s) / self.step_s)]
+            row = self._rows[round((t - self._rows_start_s) / step)]
             row[0] = system.GetODE2Coordinates()
             row[1] = system.GetODE2Coordinates_t()
             return _NOTHING
@@ -262,16 +230,16 @@ class ExudynEngine:
         """Integrate from the present state; coordinates and rates (steps + 1, 2, n) at every step."""
         integration = self._settings.timeIntegration
         # Exudyn knows no negative times: its clock starts with the settling.
-        integration.startTime = first * self.step_s + self.settle_s
-        integration.endTime = last * self.step_s + self.settle_s
+        integration.startTime = first * self.setup.step_s + self.setup.settle_s
+        integration.endTime = last * self.setup.step_s + self.setup.settle_s
         integration.numberOfSteps = last - first
         self._rows = np.full((last - first + 1, 2, self.size), np.nan)
         self._rows_start_s = integration.startTime
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
         )
-        refuse_derailed(self.memo, self.model)
+        refuse_derailed(self.memo, self.setup.model)
         if not solved or np.isnan(self._rows).any():
-            begin, end = first * self.step_s, last * self.step_s
+            begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")
         return self._rows
