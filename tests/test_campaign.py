@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +19,7 @@ from simrail.watcher import Watcher
 
 SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
 
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Rides of these tests go into a cache of their own."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def short(*settings: str) -> Scenario:
