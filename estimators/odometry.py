@@ -8,14 +8,15 @@ this together, so that no curve entry has to be found and no two signals have to
 The idea of matching the measured with the design curvature is that of Escalona, Urda and Munoz (Sensors
 21(3) 683, 2021), named in Briales et al. 2021, section 6; the formulation is ours.
 
-States, in this order:
+The accelerometer drives the model, the wheel and the line correct it. States, in this order:
 
-    s, V, A     position, speed and acceleration along the track (white jerk)
+    s, V        position and speed along the track
     way         way that the wheel should show, d(way) = (1 + scale + tread + turn k3) ds
     scale       relative error of the nominal wheel radius (constant)
     tread       wandering of the rolling radius: the wheel runs off its tape circle (Markov in distance)
     turn        m, how the way depends on curvature: the wheel's own path, and its taper in curves
     push        m/s2, offset of the accelerometer along X (random walk)
+    squat       relative: a body that pitches under traction and braking feels more than there is
     lead        m, the slope that the body has is the design's this far behind
     yaw         heading of the body
     drift       rad/s, gyro bias (random walk)
@@ -40,8 +41,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy import signal
 
-from estimators.kernels.odometry import SCALE, STATES, UPDATES, A, S, V, curve_matched
+from estimators.kernels.odometry import SCALE, STATES, UPDATES, YAW, S, V, curve_matched
 from estimators.kernels.smoothing import smooth
 from simrail.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
@@ -52,6 +54,12 @@ from simrail.track.design import TrackDesign
 
 RATE_HZ = 50.0
 """Rate of the filter. A train's jerk is limited: between two steps nothing happens along the track."""
+
+CALM_HZ = 1.0
+"""Up to here an acceleration is the train's."""
+
+ACCELERATION_SD_MPS2 = 0.03
+"""Of that acceleration: what the body's pitching leaves in it."""
 
 _PLACES_PER_M = 4.0
 _STILL_S = 0.5
@@ -66,6 +74,8 @@ class Trace(NamedTuple):
         Ends of the steps.
     states, covariance : ndarray (n, 13), (n, 13, 13)
         See the module.
+    acceleration : ndarray (n,)
+        Along the track, over the step; it shakes with the body.
     slipping, resting : ndarray (n,) of bool
         Where the wheel was not believed, and where the train stood.
     """
@@ -73,6 +83,7 @@ class Trace(NamedTuple):
     time_s: FloatArray
     states: FloatArray
     covariance: FloatArray
+    acceleration: FloatArray
     slipping: np.ndarray
     resting: np.ndarray
 
@@ -96,12 +107,13 @@ class CurveMatchedOdometry:
         Standard deviation of `turn`: half the distance of the wheels, 0.75 m, and some taper.
     wheel_walk_m : float
         Random walk of the wheel's way against the track, m2 per m: creep.
-    jerk_m2ps5 : float
-        Intensity of the model's white jerk.
     force_m2ps3 : float
         Intensity of what disturbs the accelerometer along X besides its own noise: the body pitches.
     push_sd_mps2, push_walk_m2ps5 : float
         Its offset at first, besides the turn-on bias: a body that leans; and how that wanders.
+    squat_sd, unsteady_s05 : float
+        Of `squat`: a body that pitches by 1 deg at 1 m/s2 has 0.17. And how unsteady that is:
+        what it feels, times `unsteady_s05`, is the density, per sqrt(Hz), of what disturbs it.
     lag_sd_m, lag_walk_m, lead_sd_m : float
         Of lag and lead, and the random walk of lag, m2 per m.
     sway_sd_rad, sway_length_m : float
@@ -119,10 +131,11 @@ class CurveMatchedOdometry:
     tread_length_m: float = 40.0
     turn_sd_m: float = 1.0
     wheel_walk_m: float = 2e-6
-    jerk_m2ps5: float = 0.01
     force_m2ps3: float = 3e-5
     push_sd_mps2: float = 0.05
     push_walk_m2ps5: float = 1e-6
+    squat_sd: float = 0.1
+    unsteady_s05: float = 0.03
     lag_sd_m: float = 1.0
     lag_walk_m: float = 1e-6
     lead_sd_m: float = 1.0
@@ -152,9 +165,9 @@ class CurveMatchedOdometry:
         """
         trace = self.trace(recording)
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
-        columns = [S, V, A]
-        found = trace.states[:, columns]
-        sd = np.sqrt(np.diagonal(trace.covariance, axis1=1, axis2=2)[:, columns])
+        found = np.column_stack([trace.states[:, [S, V]], self._calm(trace)])
+        sd = np.sqrt(np.diagonal(trace.covariance, axis1=1, axis2=2)[:, [S, V]])
+        sd = np.column_stack([sd, np.full(len(sd), ACCELERATION_SD_MPS2)])
         start = np.zeros((1, 6))
         start[0, [0, 3]] = recording.start_position_m, self.start_sd_m
         found[trace.resting, 1:] = 0.0
@@ -171,6 +184,20 @@ class CurveMatchedOdometry:
             values[:, 1] += ahead * values[:, 2]
         states = pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
         return Estimate(states=states, mount=recording.mount)
+
+    def _calm(self, trace: Trace) -> FloatArray:
+        """Acceleration without what the body shakes, (n,): the train's own changes slowly."""
+        if self.smoothed:
+            slope = np.gradient(trace.states[:, V], 1.0 / RATE_HZ)
+            sections = signal.butter(2, CALM_HZ, fs=RATE_HZ, output="sos")
+            calm: FloatArray = signal.sosfiltfilt(sections, slope, padlen=min(len(slope) - 1, 150))
+            return calm
+        # Critically damped: the slope of the speed, followed by two equal lags.
+        keep = math.exp(-2.0 * math.pi * CALM_HZ / RATE_HZ)
+        passed: FloatArray = signal.lfilter(
+            [(1.0 - keep) ** 2], [1.0, -2.0 * keep, keep * keep], trace.acceleration
+        )
+        return passed
 
     def trace(self, recording: Recording) -> Trace:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
@@ -193,7 +220,8 @@ class CurveMatchedOdometry:
         pulse = 2.0 * math.pi * wheel.wheel_radius_m / wheel.pulses_per_revolution
         grid, table = line_table(recording.track)
         x, p = self._start(recording, pulse)
-        states, covariance, flags = np.empty((n, STATES)), np.empty((n, STATES, STATES)), np.empty((n, 2))
+        states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
+        acceleration, flags = np.empty(n), np.empty((n, 2))
         m = n if self.smoothed else 0
         kept = (
             np.empty((m, STATES)),
@@ -205,8 +233,7 @@ class CurveMatchedOdometry:
         )
         curve_matched(
             block / sheet.rate_hz,
-            np.ascontiguousarray(signals[:, :2]),
-            np.ascontiguousarray(signals[:, 2]),
+            signals,
             counts,
             self._model(recording, pulse),
             recording.gravity_mps2,
@@ -216,12 +243,13 @@ class CurveMatchedOdometry:
             p,
             states,
             covariance,
+            acceleration,
             flags,
             *kept,
         )
         if self.smoothed:
             smooth(*kept, states, covariance)
-        return Trace(ends, states, covariance, flags[:, 0] > 0.0, flags[:, 1] > 0.0)
+        return Trace(ends, states, covariance, acceleration, flags[:, 0] > 0.0, flags[:, 1] > 0.0)
 
     def wheel_scale(self, recording: Recording) -> tuple[float, float]:
         """Relative error of the nominal wheel radius found at the end of the ride, and its sd.
@@ -239,11 +267,11 @@ class CurveMatchedOdometry:
                 pulse,
                 _STILL_S,
                 self.gate,
-                self.jerk_m2ps5,
                 self.wheel_walk_m,
                 self.tread_sd,
                 self.tread_length_m,
                 sheet.accel_noise_mpsqrts**2 + self.force_m2ps3,
+                self.unsteady_s05,
                 self.push_walk_m2ps5,
                 sheet.gyro_noise_radpsqrts**2 + 1e-12,
                 # Of a Markov process that wanders by its bias instability within some 300 s.
@@ -261,17 +289,17 @@ class CurveMatchedOdometry:
         sheet = recording.imu_sheet
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        x[9] = float(recording.track.frame(np.array([x[S]])).yaw_rad[0])
+        x[YAW] = float(recording.track.frame(np.array([x[S]])).yaw_rad[0])
         sd = np.array(
             [
                 self.start_sd_m,
-                1e-3,
                 1e-3,
                 pulse / math.sqrt(12.0),
                 self.radius_sd,
                 self.tread_sd,
                 self.turn_sd_m,
                 math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2),
+                self.squat_sd,
                 self.lead_sd_m,
                 5e-3,
                 sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5,

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from simrail.columns import COLUMNS
     from simrail.errors import InputError
     from simrail.estimate import Estimate, Estimator
+    from simrail.line_odometry import with_odometry
     from simrail.measure import measure
     from simrail.profile import SpeedProfile
     from simrail.recording import Recording
@@ -82,6 +83,7 @@ _HOMES = {
     "columns": ("COLUMNS",),
     "errors": ("InputError",),
     "estimate": ("Estimate", "Estimator"),
+    "line_odometry": ("with_odometry",),
     "measure": ("measure",),
     "profile": ("SpeedProfile",),
     "recording": ("Recording",),
@@ -136,6 +138,7 @@ __all__ = [
     "score",
     "score_odometry",
     "simulate",
+    "with_odometry",
     "write_ride",
 ]
 

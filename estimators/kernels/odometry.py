@@ -11,20 +11,20 @@ import numpy as np
 from simrail.jit import FloatArray, njit
 
 STATES = 13
-S, V, A, WAY, SCALE, TREAD, TURN, PUSH, LEAD, YAW, DRIFT, SWAY, LAG = range(STATES)
+S, V, WAY, SCALE, TREAD, TURN, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG = range(STATES)
 
-UPDATES = 4
-"""Scalar updates of a step at most: wheel, accelerometer, heading, rest."""
+UPDATES = 3
+"""Scalar updates of a step at most: wheel, heading, rest."""
 
 MODEL = (
     "pulse_m",
     "still_s",
     "gate",
-    "jerk_m2ps5",
     "wheel_walk_m",
     "tread_sd",
     "tread_length_m",
     "force_m2ps3",
+    "unsteady_s05",
     "push_walk_m2ps5",
     "gyro_rad2ps",
     "drift_walk_rad2ps3",
@@ -54,30 +54,50 @@ def predict(
     p: FloatArray,
     f: FloatArray,
     work: FloatArray,
-    line: FloatArray,
-    rate_y: float,
-    rate_z: float,
+    here: FloatArray,
+    lean: FloatArray,
+    signal: FloatArray,
     dt: float,
     model: FloatArray,
-) -> None:
-    """One step of the model, in place: x, P and F. ``line`` is the design at x[S]."""
+    gravity: float,
+    steady: float,
+) -> tuple[float, float]:
+    """One step of the model, in place: x, P and F.
+
+    ``here`` is the design at x[S], ``lean`` that at x[S] - x[LEAD], ``signal`` the mean rates about Y and
+    Z and the mean force along X, ``steady`` the effort without its vibration. Returns the acceleration,
+    and the way that the wheel shows per metre.
+    """
     n = x.shape[0]
-    turn = (rate_y * np.sin(line[2]) + rate_z * np.cos(line[2])) / np.cos(line[3])
+    turn = (signal[0] * np.sin(here[2]) + signal[1] * np.cos(here[2])) / np.cos(here[3])
+    level = np.cos(lean[3])
+    share = 1.0 / (1.0 + x[SQUAT])
+    effort = (signal[2] - x[PUSH]) * share
+    acceleration = level * (effort + gravity * np.sin(lean[3]))
     half = 0.5 * dt * dt
-    way = dt * x[V] + half * x[A]
+    way = dt * x[V] + half * acceleration
     run = abs(way)
-    rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * line[1]
-    wears, sways = np.exp(-run / model[6]), np.exp(-run / model[13])
+    rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here[1]
+    wears, sways = np.exp(-run / model[5]), np.exp(-run / model[13])
     f[:, :] = 0.0
     for i in range(n):
         f[i, i] = 1.0
-    f[S, V], f[S, A], f[V, A] = dt, half, dt
-    f[WAY, V], f[WAY, A] = rolls * dt, rolls * half
-    f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * line[1]
+    by_place = level * gravity * level * lean[4]
+    for place, slope in (
+        (S, by_place),
+        (LEAD, -by_place),
+        (PUSH, -level * share),
+        (SQUAT, -level * share * effort),
+    ):
+        f[V, place] += dt * slope
+        f[S, place] += half * slope
+        f[WAY, place] += rolls * half * slope
+    f[S, V], f[WAY, V] = dt, rolls * dt
+    f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * here[1]
     f[TREAD, TREAD], f[SWAY, SWAY] = wears, sways
     f[YAW, DRIFT] = -dt
     x[S] += way
-    x[V] += dt * x[A]
+    x[V] += dt * acceleration
     x[WAY] += rolls * way
     x[TREAD] *= wears
     x[YAW] += dt * (turn - x[DRIFT])
@@ -99,22 +119,22 @@ def predict(
             p[i, j] = total
             p[j, i] = total
 
-    # White jerk moves position, speed, acceleration, and with them the way of the wheel.
-    q = model[3]
-    places = (S, V, A, WAY)
-    powers = (2, 1, 0, 2)
-    factors = (0.5, 1.0, 1.0, 0.5)
-    for i in range(4):
-        for j in range(4):
-            power = powers[i] + powers[j] + 1
-            p[places[i], places[j]] += q * factors[i] * factors[j] * dt**power / power
-    p[WAY, WAY] += model[4] * run
-    p[TREAD, TREAD] += model[5] ** 2 * (1.0 - wears * wears)
+    # What disturbs the accelerometer moves speed and position, and with them the way of the wheel.
+    q = model[6] + (model[7] * steady) ** 2
+    for i in (S, WAY):
+        for j in (S, WAY):
+            p[i, j] += q * dt**3 / 3.0
+        p[i, V] += q * dt * dt / 2.0
+        p[V, i] = p[i, V]
+    p[V, V] += q * dt
+    p[WAY, WAY] += model[3] * run
+    p[TREAD, TREAD] += model[4] ** 2 * (1.0 - wears * wears)
     p[PUSH, PUSH] += model[8] * dt
     p[YAW, YAW] += model[9] * dt + (model[11] * turn) ** 2 * dt * 10.0
     p[DRIFT, DRIFT] += model[10] * dt
     p[SWAY, SWAY] += model[12] ** 2 * (1.0 - sways * sways)
     p[LAG, LAG] += model[14] * run
+    return acceleration, rolls
 
 
 @njit
@@ -145,8 +165,7 @@ def update(
 @njit
 def curve_matched(
     dt: float,
-    rate: FloatArray,
-    force: FloatArray,
+    signals: FloatArray,
     count: FloatArray,
     model: FloatArray,
     gravity: float,
@@ -156,6 +175,7 @@ def curve_matched(
     p: FloatArray,
     states: FloatArray,
     covariance: FloatArray,
+    acceleration: FloatArray,
     flags: FloatArray,
     before: FloatArray,
     before_covariance: FloatArray,
@@ -170,10 +190,9 @@ def curve_matched(
     ----------
     dt : float
         Step, s.
-    rate : ndarray (n, 2)
-        Mean angular rates about Y and Z over the step that ends here, body axes, rad/s.
-    force : ndarray (n,)
-        Mean specific force along X over that step, m/s2.
+    signals : ndarray (n, 3)
+        Mean angular rates about Y and Z (rad/s) and mean specific force along X (m/s2) over the step that
+        ends here, body axes.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
     model : ndarray (16,)
@@ -186,31 +205,35 @@ def curve_matched(
         State and covariance at the start; replaced by the last ones.
     states, covariance : ndarray (n, 13), (n, 13, 13), output
         Filtered.
+    acceleration : ndarray (n,), output
+        Acceleration along the track over the step, unfiltered.
     flags : ndarray (n, 2), output
         1 where the wheel is not believed; 1 where the train stands.
     before, before_covariance, transition : ndarray (n, 13), (n, 13, 13), (n, 13, 13), output
         Predicted state and covariance, and F of the step, for `estimators.kernels.smoothing`;
         of no rows where no smoother follows.
-    rows, gains : ndarray (n, 4, 13), output
+    rows, gains : ndarray (n, 3, 13), output
         Row of the Jacobian and gain of each scalar update.
-    scaled : ndarray (n, 8), output
+    scaled : ndarray (n, 6), output
         Innovation over its variance of each update, then one over its variance; 0 for one not made.
     """
     n = x.shape[0]
     keep = before.shape[0] > 0
     f, work = np.zeros((n, n)), np.zeros((n, n))
-    h, gain, line = np.zeros((UPDATES, n)), np.zeros(n), np.zeros(5)
+    h, gain = np.zeros((UPDATES, n)), np.zeros(n)
+    line, lean = np.zeros(5), np.zeros(5)
     error, variance, wanted = np.zeros(UPDATES), np.zeros(UPDATES), np.zeros(UPDATES)
     pulse, still, gate = model[0], model[1], model[2]
     h[0, WAY] = 1.0
-    h[2, YAW], h[2, SWAY] = 1.0, -1.0
-    h[3, V] = 1.0
-    direction = idle = moving = agreed = wheel_speed = 0.0
+    h[1, YAW], h[1, SWAY] = 1.0, -1.0
+    h[2, V] = 1.0
+    direction = idle = moving = agreed = wheel_speed = steady = 0.0
     resting, slipping = True, False
-    for k in range(rate.shape[0]):
+    for k in range(signals.shape[0]):
         line_at(grid, table, x[S], line)
-        rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * line[1]
-        predict(x, p, f, work, line, rate[k, 0], rate[k, 1], dt, model)
+        line_at(grid, table, x[S] - x[LEAD], lean)
+        steady += dt / 0.5 * (signals[k, 2] - x[PUSH] - steady)
+        acceleration[k], rolls = predict(x, p, f, work, line, lean, signals[k], dt, model, gravity, steady)
 
         # The wheel. Its count says between which two edges it stands; an edge that has just been
         # passed says more at low speed.
@@ -223,9 +246,8 @@ def curve_matched(
             direction = 1.0 if change > 0.0 else -1.0
             idle = 0.0
             if resting:
-                # It left less than a pulse ago, with a jerk of some 0.5 m/s3 that no sensor has seen yet.
+                # It left less than a pulse ago, with a jerk of some 0.5 m/s3, held to be standing.
                 p[V, V] += (0.5 * np.cbrt(0.5 * 36.0 * pulse * pulse)) ** 2
-                p[A, A] += np.cbrt(1.5 * pulse) ** 2
                 moving = 0.0
             resting = False
         width = pulse
@@ -257,26 +279,17 @@ def curve_matched(
             before[k], before_covariance[k], transition[k] = x, p, f
 
         resting = resting or (idle > still and abs(x[V]) * idle < 2.0 * pulse)
-        wanted[1] = wanted[2] = 1.0
-        wanted[3] = 1.0 if resting else 0.0
-        variance[1], variance[2], variance[3] = model[7] / dt, model[15] ** 2, 1e-8
+        wanted[1], wanted[2] = 1.0, 1.0 if resting else 0.0
+        variance[1], variance[2] = model[15] ** 2, 1e-8
         for m in range(UPDATES):
             rows_m = h[m]
             if m == 1:
-                # The accelerometer: acceleration, gravity along the slope, an offset.
-                line_at(grid, table, x[S] - x[LEAD], line)
-                secant = 1.0 / np.cos(line[3])
-                rows_m[A], rows_m[PUSH] = secant, 1.0
-                rows_m[LEAD] = gravity * line[4] / secant
-                rows_m[S] = -rows_m[LEAD]
-                error[1] = force[k] + gravity * np.sin(line[3]) - x[A] * secant - x[PUSH]
-            elif m == 2:
                 # The heading: that of the design where the body points, and its sway about that.
                 line_at(grid, table, x[S] - direction * x[LAG], line)
                 rows_m[S], rows_m[LAG] = -line[1], direction * line[1]
-                error[2] = line[0] - x[YAW] + x[SWAY]
-            elif m == 3:
-                error[3] = -x[V]
+                error[1] = line[0] - x[YAW] + x[SWAY]
+            elif m == 2:
+                error[2] = -x[V]
             s = 0.0
             if wanted[m] > 0.0:
                 s = update(x, p, rows_m, error[m], variance[m], gain)

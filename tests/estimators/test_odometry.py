@@ -9,31 +9,38 @@ import numpy as np
 import pytest
 
 from estimators.kernels.odometry import (
+    DRIFT,
     LAG,
     LEAD,
     MODEL,
     STATES,
     SWAY,
+    TREAD,
     WAY,
     YAW,
-    A,
     S,
     V,
     curve_matched,
+    line_at,
     predict,
 )
 from estimators.kernels.smoothing import smooth
 from estimators.odometry import CurveMatchedOdometry, line_table
+from simrail.campaign import record_cell
 from simrail.columns import GYRO
 from simrail.errors import InputError
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
 from simrail.recording import Recording
 from simrail.ride import Ride, simulate
+from simrail.scenario.build import Parts
+from simrail.scenario.cells import cells
 from simrail.scenario.files import load
 from simrail.scenario.imu_file import load_grade
+from simrail.scenario.scenario import load_scenario
 from simrail.scenario.track_file import track_by_name
 from simrail.scenario.vehicle_file import VehicleFile
+from simrail.score import truth_at_imu
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.testing import check_estimator
 from simrail.track.irregularity import Irregularity
@@ -93,10 +100,11 @@ SLOW = [(20.0, 10.0, 2090.0), (20.0, 2090.0, 10.0)]
 
 
 def judge_rides(rides: list[tuple[float, float, float]], draws: int) -> None:
-    """Rms below 1 m by the filter and 0.3 m by the smoother; the 95 % interval holds 90 to 99.5 %.
+    """Rms below 1 m on every kind of ride by the filter, below 0.3 m over them by the smoother; the 95 %
+    interval holds 90 to 99 %.
 
     Errors of one ride hang together, so a coverage from a few rides is itself known to a few per cent
-    only: 12 rides of four kinds give 0.92 (filter) and 0.98 (smoother).
+    only: 32 rides of four kinds give 0.914 (filter) and 0.951 (smoother), hence 85 to 99.5 % for fewer.
     """
     for smoothed, bound in ((False, 1.0), (True, 0.3)):
         squares, inside = [], []
@@ -105,8 +113,10 @@ def judge_rides(rides: list[tuple[float, float, float]], draws: int) -> None:
             found = [errors(truth, record(truth, k), CurveMatchedOdometry(smoothed)) for k in range(draws)]
             squares.append(np.mean([np.mean(error**2) for error, _ in found]))
             inside += [np.mean(np.abs(error) < 1.96 * sd) for error, sd in found]
-            assert np.sqrt(squares[-1]) < bound, (ride, smoothed, np.sqrt(squares))
-        assert 0.9 < np.mean(inside) < 0.995 + 0.005 * (len(rides) < 4), (smoothed, inside)
+            assert np.sqrt(squares[-1]) < 1.0, (ride, smoothed, np.sqrt(squares))
+        assert np.sqrt(np.mean(squares)) < bound, (smoothed, np.sqrt(squares))
+        low, high = (0.9, 0.99) if len(rides) * draws > 15 else (0.85, 0.995)
+        assert low < np.mean(inside) < high, (smoothed, inside)
 
 
 def test_below_one_metre_and_the_smoother_below_a_third_of_one():
@@ -117,7 +127,7 @@ def test_below_one_metre_and_the_smoother_below_a_third_of_one():
 @pytest.mark.slow
 def test_below_one_metre_at_20_and_70_km_per_hour():
     """The same at both speeds."""
-    judge_rides(FAST + SLOW, 4)
+    judge_rides(FAST + SLOW, 8)
 
 
 def test_encoder_alone_is_off_by_metres():
@@ -142,7 +152,7 @@ def test_finds_wheel_and_bias():
         rolled = way * (counts[-1] - counts[0]) / (position[-1] - position[0]) - 1.0
         assert CurveMatchedOdometry().wheel_scale(recording)[0] == pytest.approx(rolled, abs=3e-3)
         assert abs(rolled) > 0.007
-        assert np.degrees(trace.states[-1, 10] - BIAS_RADPS) == pytest.approx(0.0, abs=0.002)
+        assert np.degrees(trace.states[-1, DRIFT] - BIAS_RADPS) == pytest.approx(0.0, abs=0.002)
 
 
 def test_no_curve_in_the_first_300_m_breaks_nothing():
@@ -179,6 +189,26 @@ def test_slip_is_detected_and_bridged(creepage):
     assert np.max(np.abs(error - without)) < 0.6
     blind, _ = errors(truth, slipped, replace(method, gate=1e6))
     assert np.max(np.abs(blind - without)) > 0.1 * lost
+
+
+def test_wheels_that_spin_and_slide_on_leaves():
+    """Traction through the encoder's own wheel, its axle pitched by the motor: at most 3 m off, and within
+    what the odometry claims."""
+    scenario = load_scenario("leaves", overrides=["odometry='curve_matched'", "imu.grade='lord_3dm_gx4_25'"])
+    parts, cell = Parts(scenario), next(cells(scenario))
+    truth = simulate(parts.ride(cell))
+    recording = record_cell(cell, truth, parts)
+    motion = truth_at_imu(truth, recording)
+    error = (recording.odometry["position_m"] - motion["position_m"]).to_numpy()
+    assert np.max(np.abs(error)) < 3.0
+    assert np.mean(np.abs(error) < 1.96 * recording.odometry["position_sd_m"]) > 0.9
+    slipping = CurveMatchedOdometry().trace(recording)
+    sheet = recording.encoder_sheet
+    way = recording.encoder["pulse_count"] * 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
+    run = motion["position_m"] - motion["position_m"].iloc[0]
+    wheel = np.interp(recording.imu.index, way.index, way) - run
+    assert np.max(np.abs(wheel)) > 5.0
+    assert 6.0 < 0.02 * np.sum(slipping.slipping) < 14.0
 
 
 def test_conformance():
@@ -218,7 +248,7 @@ def test_bad_options_and_missing_encoder_are_named():
 
 def model_array() -> np.ndarray:
     model = np.full(len(MODEL), 1e-6)
-    values = {"pulse_m": 1.8e-3, "tread_length_m": 40.0, "sway_length_m": 4.0, "gate": 5.0, "still_s": 0.5}
+    values = {"pulse_m": 1.8e-3, "tread_length_m": 40.0, "sway_length_m": 4.0, "gate": 7.0, "still_s": 0.5}
     for name, value in values.items():
         model[MODEL.index(name)] = value
     return model
@@ -226,13 +256,19 @@ def model_array() -> np.ndarray:
 
 def test_transition_is_the_derivative_of_the_step():
     """F against central differences of the state after a step, in a curve, at speed."""
-    x = np.array([470.0, 15.0, 0.4, 460.0, 0.01, 1e-3, -0.7, 0.02, 0.8, 0.3, 5e-4, 1e-3, 1.5])
-    line = np.array([-0.4, -0.004, 0.05, 0.01, 0.0])
+    x = np.array([470.0, 15.0, 460.0, 0.01, 1e-3, -0.7, 0.02, 0.1, 0.8, 0.3, 5e-4, 1e-3, 1.5])
+    grid = np.array([0.0, 0.25])
+    table = np.zeros((200, 4))
+    table[:, 3] = 1e-4 * np.arange(200)  # a vertical curve
+    here = np.array([-0.4, -0.004, 0.05, 0.01, 0.0])
+    signal = np.array([0.01, -0.06, 0.9])
     model = model_array()
 
     def step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        x, f = x.copy(), np.zeros((STATES, STATES))
-        predict(x, np.zeros((STATES, STATES)), f, np.zeros((STATES, STATES)), line, 0.01, -0.06, 0.02, model)
+        x, f, lean = x.copy(), np.zeros((STATES, STATES)), np.zeros(5)
+        line_at(grid, table, x[S] - x[LEAD], lean)
+        nothing = np.zeros((STATES, STATES))
+        predict(x, nothing, f, nothing.copy(), here, lean, signal, 0.02, model, 9.81, 0.9)
         return x, f
 
     _, f = step(x)
@@ -241,8 +277,8 @@ def test_transition_is_the_derivative_of_the_step():
         h[j] = 1e-4
         slope = (step(x + h)[0] - step(x - h)[0]) / 2e-4
         # How much a Markov state fades depends on the way that is run; F leaves that out.
-        exact = [i for i in range(STATES) if i not in (5, SWAY) or j == i]
-        np.testing.assert_allclose(f[exact, j], slope[exact], atol=1e-8, err_msg=str(j))
+        exact = [i for i in range(STATES) if i not in (TREAD, SWAY) or j == i]
+        np.testing.assert_allclose(f[exact, j], slope[exact], atol=2e-8, err_msg=str(j))
 
 
 def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
@@ -263,10 +299,10 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     x[YAW] = np.interp(x[S], grid[0] + np.arange(len(table)) / grid[1], table[:, 0])
     p[V, V] = 0.1
     n = STATES
-    out = [np.empty((steps, n)), np.empty((steps, n, n)), np.empty((steps, 2))]
-    kept = [np.empty((steps, *shape)) for shape in ((n,), (n, n), (n, n), (4, n), (4, n), (8,))]
+    out = [np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), np.empty((steps, 2))]
+    kept = [np.empty((steps, *shape)) for shape in ((n,), (n, n), (n, n), (3, n), (3, n), (6,))]
     curve_matched(
-        0.02, imu[:, 1:3].copy(), imu[:, 3].copy(), counts[read], method._model(recording, pulse), 9.81,
+        0.02, imu[:, 1:4].copy(), counts[read], method._model(recording, pulse), 9.81,
         grid, table, x, p, *out, *kept,
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
@@ -294,6 +330,6 @@ def test_smoother_equals_rauch_tung_striebel():
 
 def test_smoother_is_nowhere_less_sure_than_the_filter():
     filtered = run_kernel(record(truth_of(*FAST[0]), 0))
-    ahead = np.diagonal(filtered[1], axis1=1, axis2=2)[:, [S, V, A, WAY, YAW, LAG, LEAD]]
-    back = np.diagonal(filtered[6], axis1=1, axis2=2)[:, [S, V, A, WAY, YAW, LAG, LEAD]]
+    ahead = np.diagonal(filtered[1], axis1=1, axis2=2)[:, [S, V, WAY, YAW, LAG, LEAD]]
+    back = np.diagonal(filtered[6], axis1=1, axis2=2)[:, [S, V, WAY, YAW, LAG, LEAD]]
     assert np.all(back <= ahead * (1.0 + 1e-9) + 1e-15)
