@@ -47,7 +47,7 @@ class _Arrays(NamedTuple):
 
 @dataclass(frozen=True)
 class AttitudeEkf:
-    """Extended Kalman filter of paper 000, Section 5.1.
+    """Extended Kalman filter of Briales et al. 2021, Section 5.1.
 
     Attributes
     ----------

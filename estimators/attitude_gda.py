@@ -30,7 +30,7 @@ half as large again as with 0.2 deg/s, and larger on the leading than on the tra
 
 @dataclass(frozen=True)
 class AttitudeGda:
-    """Gradient descent algorithm of paper 000, Section 5.2 (EQUATIONS 2.4).
+    """Gradient descent algorithm of Briales et al. 2021, Section 5.2 (EQUATIONS 2.4).
 
     Roll and pitch start at the first accelerometer sample, yaw at the design track's.
 

@@ -63,6 +63,8 @@ ACCELERATION_SD_MPS2 = 0.03
 
 _PLACES_PER_M = 4.0
 _STILL_S = 0.5
+_STILL_SD_MPS = 1e-3
+"""Of the speed of a train that is known to stand."""
 
 
 class Trace(NamedTuple):
@@ -168,8 +170,9 @@ class CurveMatchedOdometry:
         found = np.column_stack([trace.states[:, [S, V]], self._calm(trace)])
         sd = np.sqrt(np.diagonal(trace.covariance, axis1=1, axis2=2)[:, [S, V]])
         sd = np.column_stack([sd, np.full(len(sd), ACCELERATION_SD_MPS2)])
-        start = np.zeros((1, 6))
-        start[0, [0, 3]] = recording.start_position_m, self.start_sd_m
+        # Until the filter's first step: standing at the start.
+        begun = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, _STILL_SD_MPS, ACCELERATION_SD_MPS2]
+        start = np.array([begun])
         found[trace.resting, 1:] = 0.0
         known = np.vstack([start, np.hstack([found, sd])])
         times = np.concatenate([[-np.inf], trace.time_s])
@@ -293,7 +296,7 @@ class CurveMatchedOdometry:
         sd = np.array(
             [
                 self.start_sd_m,
-                1e-3,
+                _STILL_SD_MPS,
                 pulse / math.sqrt(12.0),
                 self.radius_sd,
                 self.tread_sd,

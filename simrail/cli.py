@@ -91,7 +91,8 @@ Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Replace the sce
 def run(
     scenario: Scenario,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder of the results [results/<name>].")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder of the results; results/<name> if not given."),
     ] = None,
     seed: Seed = None,
     settings: Settings = None,
@@ -170,7 +171,8 @@ def estimate(
         str, typer.Option("--estimator", metavar="NAME", help="A registered estimator, or FILE.py:CLASS.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="A new folder [results/<ride>_<estimator>].")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Its folder; results/<ride>_<estimator> if not given."),
     ] = None,
     form: Form = "csv",
     settings: Annotated[
@@ -206,14 +208,12 @@ def list_parts() -> int:
     from simrail.catalogue import catalogue
 
     console = Console(highlight=False)
-    wide = not console.is_terminal
     for kind, entries in catalogue().items():
         console.print(f"[bold]{kind}[/bold]")
         width = max((len(name) for name in entries), default=0)
         for name, title in entries.items():
-            console.print(
-                f"  [cyan]{name:{width}}[/cyan]  {title}", overflow="ellipsis", no_wrap=True, soft_wrap=wide
-            )
+            console.print(f"  [cyan]{name:{width}}[/cyan]  ", end="")
+            console.print(title, markup=False, overflow="ignore", crop=False, no_wrap=True)
     return DONE
 
 

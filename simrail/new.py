@@ -15,9 +15,9 @@ from simrail.errors import InputError
 from simrail.scenario.files import label, shipped
 
 SHIPPED = {
-    "track": ("smooth_curve", 'track = "./{file}"'),
-    "vehicle": ("metro_irw_bogie", 'vehicle = "./{file}"'),
-    "imu": ("lord_3dm_gx4_25", 'grade = "./{file}" in an [[imu]]'),
+    "track": ("smooth_curve", 'track = "./{file}"', ""),
+    "vehicle": ("metro_irw_bogie", 'vehicle = "./{file}"', "look at it: simrail vehicle {path}\n"),
+    "imu": ("lord_3dm_gx4_25", 'grade = "./{file}" in an [[imu]]', "look at it: simrail imu {path}\n"),
 }
 KINDS = ("estimator", *SHIPPED, "scenario", "ride")
 
@@ -145,9 +145,10 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     elif kind == "scenario":
         text, next_step = _copy("scenario", "quick_kinematic", name), f"run it: simrail run {label(path)}"
     else:
-        source, use = SHIPPED[kind]
+        source, use, look = SHIPPED[kind]
         text = _copy(kind, source, name)
-        next_step = f"use it in a scenario beside it: {use.format(file=path.name)}"
+        next_step = look.format(path=label(path))
+        next_step += f"use it in a scenario beside it: {use.format(file=path.name)}"
     path.write_text(text, encoding="utf-8")
     return path, next_step
 
@@ -159,8 +160,9 @@ def _estimator(name: str, path: Path) -> tuple[str, str]:
         f'use it in a scenario beside it:\n\n    [[estimator]]\n    name = "{name}"\n'
         f'    method = "{path.name}:{class_name}"\n\n'
         f"or try it at once: simrail run quick_kinematic "
-        f"--set estimator[0].method={label(path)}:{class_name} "
-        f"--set estimator[0].name={name} --set 'estimator[0].options={{}}'"
+        # Quoted: some shells take brackets for a pattern of file names.
+        f"--set 'estimator[0].method={label(path)}:{class_name}' "
+        f"--set 'estimator[0].name={name}' --set 'estimator[0].options={{}}'"
     )
     return text, next_step
 

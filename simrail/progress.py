@@ -8,9 +8,10 @@ from typing import Self
 
 import pandas as pd
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.results import Results
@@ -121,30 +122,30 @@ def print_scores(console: Console, results: Results) -> None:
     )
 
 
-def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodStyle]) -> Table:
+def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodStyle]) -> Group:
     """Table of one case: RMS errors in degrees, the mean over its draws."""
     first = members.iloc[0]
     draws = f", mean of {len(members)} draws" if len(members) > 1 else ""
-    table = Table(
-        title=f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
+    # Title and notes stand outside of the table, which may be narrow.
+    title = Text(
+        f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
         f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}{draws}",
-        title_justify="left",
-        title_style="bold",
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+        style="bold",
     )
-    table.add_column("RMS error, deg")
-    for quantity, reference, window in COLUMNS:
-        against = "" if reference == "truth" else "\nvs design"
-        table.add_column(f"{quantity}\n{window}{against}", justify="right")
-    table.add_column("us per\nsample", justify="right")
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     good = rows[rows["status"] == OK]
     keys = ["estimator", "quantity", "reference", "window", "metric"]
     mean = good.groupby(keys, observed=True)["value"].mean()
+    # A ride without curves has no columns of them.
+    columns = [column for column in COLUMNS if any((name, *column, "rms") in mean for name in styles)]
+    table.add_column("RMS error, deg")
+    for quantity, reference, window in columns:
+        against = "" if reference == "truth" else "\nvs design"
+        table.add_column(f"{quantity}\n{window}{against}", justify="right")
+    table.add_column("us per\nsample", justify="right")
     marked = False
     for name, style in styles.items():
-        values = [mean.get((name, *column, "rms")) for column in COLUMNS]
+        values = [mean.get((name, *column, "rms")) for column in columns]
         time_us = mean.get((name, "roll", "truth", "whole", "us_per_sample"))
         numbers = ["-" if value is None else f"{value:.3f}" for value in values]
         marked = marked or bool(style.baseline)
@@ -155,6 +156,9 @@ def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodSt
             style="dim" if style.baseline else None,
         )
     notes = ["* baseline"] if marked else []
+    astray = mean.get((f"odometry:{first['odometry']}", "position", "truth", "whole", "rms"))
+    if astray is not None and first["odometry"] != "truth":
+        notes.append(f"the odometry's position error is {astray:.3g} m rms")
     in_curves = {name: mean.get((name, *COLUMNS[1], "rms")) for name in styles}
     for name, style in styles.items():
         beaten = [
@@ -166,5 +170,4 @@ def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodSt
             notes.append(
                 f"{name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
             )
-    table.caption = "; ".join(notes)
-    return table
+    return Group(title, table, Text("; ".join(notes), style="dim"))

@@ -52,6 +52,9 @@ def test_version_and_list(capsys: pytest.CaptureFixture[str]) -> None:
         assert word in text
     assert "Extended Kalman filter" in text  # a title, read without importing the class
     assert "cannot be read" not in text and "not installed" not in text
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text and "attitude of its front axle" in text  # titles are whole
+    assert call(["run", "--help"]) == DONE
+    assert "results/<name>" in " ".join(capsys.readouterr().out.split())
 
 
 def test_run_writes_everything_and_replaces_former_results(
@@ -88,6 +91,17 @@ def test_run_writes_everything_and_replaces_former_results(
     text = json.dumps(manifest)
     for path in (str(here), str(Path.home()), str(Path(simrail.__file__).parent)):
         assert path not in text or path == "/"
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_table_has_no_empty_columns_and_tells_of_the_odometry(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The ride ends before the curve begins: nothing is said of curves."""
+    assert call(["run", "quick_kinematic", *QUICK, "--set", "ride.end_m=120.0"]) == DONE
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "whole" in printed and "curve " not in printed and " - " not in printed
+    assert re.search(r"the odometry's position error is [0-9.e-]+ m rms", printed)
 
 
 @pytest.mark.usefixtures("no_drawing")
@@ -190,6 +204,7 @@ def test_templates_work_as_written(kind: str, here: Path, capsys: pytest.Capture
     said = capsys.readouterr().out
     suffix = "py" if kind == "estimator" else "toml"
     assert f"my_part.{suffix}" in said
+    assert ("look at it: simrail" in said) == (kind in ("vehicle", "imu"))
     before = (here / f"my_part.{suffix}").read_bytes()
     assert call(["new", kind, "my_part"]) == 2  # never written over
     assert (here / f"my_part.{suffix}").read_bytes() == before

@@ -35,6 +35,32 @@ def test_every_shipped_imu_is_shown(name: str, capsys: pytest.CaptureFixture[str
     assert ("synthetic" in said) == (name in ("consumer", "industrial", "tactical", "navigation"))
 
 
+def test_brackets_in_a_text_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["imu", "navigation"]) == DONE
+    assert "[earth]" in capsys.readouterr().out
+
+
+def test_an_imu_without_errors_has_no_empty_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["imu", "ideal", "--out", str(tmp_path)]) == DONE
+    assert "no error terms" in capsys.readouterr().out
+    page = (tmp_path / "ideal.html").read_text(encoding="utf-8")
+    assert "No error terms" in page
+    assert "<svg" not in page
+    assert "Allan" not in page
+
+
+def test_a_page_that_cannot_be_written_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    assert call(["imu", "ideal", "--out", str(taken)]) == BAD_INPUT
+    assert "--out: the page cannot be written" in capsys.readouterr().err
+    assert taken.read_text(encoding="utf-8") == "mine"
+
+
 def test_writes_a_page_that_stands_by_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.toml"
     mine.write_text(

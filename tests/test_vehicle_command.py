@@ -43,7 +43,7 @@ def test_prints_what_is_asked_of_a_vehicle(bogie: tuple[str, str, float]) -> Non
     assert "front.left 39.49" in text and "in all 16,100 kg" in text
     assert "critical speed: none below 400 km/h" in text
     # The body's bounce is at sqrt(4 k/m) = 1.30 Hz less what the frame gives way.
-    bounce = re.search(r"(\d\.\d+) ([\d.]+) body bounce 100 %", text)
+    bounce = re.search(r"(\d\.\d+) ([\d.]+) body bounce 100%", text)
     assert bounce and 1.15 < float(bounce[1]) < 1.30 and 5.0 < float(bounce[2]) < 25.0
     at_3_mm = re.search(r"equivalent conicity at 3 mm: (0\.\d+)", text)
     assert at_3_mm and 0.2 < float(at_3_mm[1]) < 0.3

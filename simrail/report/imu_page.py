@@ -13,6 +13,7 @@ from markupsafe import Markup
 from simrail.columns import ACCEL, GYRO, IMU
 from simrail.jit import FloatArray
 from simrail.report.imu_text import device_rows, triad_rows
+from simrail.report.page_file import write_page
 from simrail.report.style import INK, log_ticks, look, panels, to_svg
 from simrail.scenario.imu_file import ImuHead
 from simrail.sensors.allan import overlapping_allan
@@ -40,10 +41,7 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
         triads=triad_rows(grade),
         figure=Markup(allan_figure(grade, seed=seed)),
     )
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{grade.name}.html"
-    path.write_text(text, encoding="utf-8")
-    return path
+    return write_page(folder, grade.name, text)
 
 
 def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
@@ -56,11 +54,13 @@ def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
 
 
 def allan_figure(grade: ImuGrade, *, seed: int) -> str:
-    """Allan deviation of one simulated hour, each axis, beside the closed form."""
+    """Allan deviation of one simulated hour, each axis, beside the closed form; "" if it shows nothing."""
     whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * HOUR_S * grade.rate_hz, 36)))
     tau: FloatArray = whole / grade.rate_hz
     analytic = grade.allan(tau)
     frame = at_rest(grade, seconds=HOUR_S, seed=seed)
+    if not (frame[list(IMU)].to_numpy() != frame[list(IMU)].iloc[0].to_numpy()).any():
+        return ""
     units = {"gyro": FIGURES["gyro_bias_instability_degph"], "accel": FIGURES["accel_bias_instability_ug"]}
     with look():
         figure, axes = panels([2.6, 2.6])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from simrail.scenario.imu_file import ImuHead
@@ -78,8 +79,11 @@ def _words(grade: ImuGrade, key: str) -> str:
 
 def print_imu(console: Console, file: ImuHead, grade: ImuGrade) -> None:
     """Print a grade: title, source, figures, and what was assumed."""
-    console.print(f"[bold]{file.title}[/bold]  ({grade.name}{', synthetic' if file.synthetic else ''})")
-    console.print(f"source: {grade.source}", highlight=False)
+    console.print(
+        f"[bold]{escape(file.title)}[/bold]  ({grade.name}{', synthetic' if file.synthetic else ''})"
+    )
+    # Text of a person may hold brackets, e.g. [earth], which are no markup.
+    console.print(f"source: {grade.source}", highlight=False, markup=False)
     for term, words in device_rows(grade):
         console.print(f"{term}: {words}", highlight=False)
     rows = triad_rows(grade)
@@ -90,5 +94,7 @@ def print_imu(console: Console, file: ImuHead, grade: ImuGrade) -> None:
         for row in rows:
             table.add_row(*row)
         console.print(table)
+    else:
+        console.print("no error terms: it records the true motion, filtered and sampled at its rate")
     for sentence in grade.assumed:
-        console.print(f"assumed: {' '.join(sentence.split())}", highlight=False)
+        console.print(f"assumed: {' '.join(sentence.split())}", highlight=False, markup=False)

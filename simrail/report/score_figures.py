@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
-from simrail.report.style import INK, MUTED, WIDTH_IN, log_ticks, look, to_svg
+from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, log_ticks, look, to_svg
 
 _WINDOWS = (("straight", "o", "#8a8f98"), ("transition", "D", "#56B4E9"), ("curve", "s", "#D55E00"))
 _QUANTITIES = (("roll", "roll"), ("pitch", "pitch"), ("yaw_debiased", "yaw, initial offset removed"))
@@ -72,7 +72,7 @@ def curves_figure(figures: Figures, styles: Sequence[MethodStyle]) -> str:
         return ""
     with look():
         figure = Figure(figsize=(WIDTH_IN, 3.1))
-        axis = figure.add_axes((0.72 / WIDTH_IN, 0.55 / 3.1, 1.0 - 0.92 / WIDTH_IN, 2.1 / 3.1))
+        axis = figure.add_axes((LEFT_IN / WIDTH_IN, 0.55 / 3.1, 1.0 - (LEFT_IN + 0.2) / WIDTH_IN, 2.1 / 3.1))
         spread = min(0.62 / max(len(styles), 1), 0.045 * len(windows))
         for i, style in enumerate(styles):
             x, y, e = [], [], []

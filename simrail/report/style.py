@@ -26,6 +26,9 @@ from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
 WIDTH_IN = 11.25
 """Width of a figure: 1080 CSS pixels."""
 
+LEFT_IN = 0.84
+"""Margin left of the axes: tick labels such as -0.25, then two lines of label."""
+
 INK, MUTED, GRID = "#1b2430", "#667085", "#e4e7ec"
 TRUTH, DESIGN = "#c2c8d1", "#111111"
 CURVE_TINT, TRANSITION_TINT = "#eef1e6", "#f6f8f2"
@@ -67,7 +70,7 @@ def look() -> AbstractContextManager[None]:
 
 
 def panels(
-    heights_in: Sequence[float], *, left_in: float = 0.72, right_in: float = 0.2, top_in: float = 0.42
+    heights_in: Sequence[float], *, left_in: float = LEFT_IN, right_in: float = 0.2, top_in: float = 0.42
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels above each other over one x axis.
 
@@ -87,7 +90,7 @@ def panels(
         )
         axis = figure.add_axes(box, sharex=axes[0] if axes else None)
         # A fixed place, so that no label depends on the width of its tick labels.
-        axis.yaxis.set_label_coords(-0.46 / (WIDTH_IN - left_in - right_in), 0.5)
+        axis.yaxis.set_label_coords(-0.56 / (WIDTH_IN - left_in - right_in), 0.5)
         axes.append(axis)
         edge -= tall + gap
     for axis in axes[:-1]:

@@ -129,7 +129,8 @@ def odometry_table(all_cases: Sequence[Figures]) -> Table:
                 _cell(case.get(name, "position", "coverage95"), decimals=1, scale=100.0),
             ]
             label = (
-                f"{case.labels['ride']} \u00b7 {case.labels['mount']} \u00b7 {name.removeprefix('odometry:')}"
+                f"{case.labels['ride']} \u00b7 {case.labels['mount']} ({case.labels['imu']}) \u00b7 "
+                f"{name.removeprefix('odometry:')}"
             )
             key = (label, *(cell.text for cell in cells))
             if key not in seen:

@@ -122,8 +122,9 @@ def _scale_bar(axis: Axes, length_m: float) -> None:
     bar = 10.0 ** np.floor(np.log10(length_m / 4.0))
     bar *= max(k for k in (1, 2, 5) if k * bar <= length_m / 4.0)
     high = axis.get_xlim()[1]
-    base = axis.get_ylim()[0]
-    axis.plot([high - bar, high], [base, base], color=INK, lw=1.6, clip_on=False, scalex=False, scaley=False)
+    foot = axis.get_xaxis_transform()  # at the foot of the panel, also below a track without any height
+    axis.plot([high - bar, high], [0.03, 0.03], color=INK, lw=1.6, transform=foot, scalex=False, scaley=False)
+    middle = (high - bar / 2, 0.03)
     axis.annotate(
-        f"{bar:.0f} m", (high - bar / 2, base), (0, 4), textcoords="offset points", ha="center", fontsize=8
+        f"{bar:.0f} m", middle, (0, 4), xycoords=foot, textcoords="offset points", ha="center", fontsize=8
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.report.style import INK, MUTED, WIDTH_IN, look, panels, to_svg
+from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
 from simrail.report.vehicle_study import Conicity, VehicleStudy
 from simrail.report.vehicle_text import MOST_HZ
 from simrail.vehicle.contact_pair import incline
@@ -33,7 +33,7 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     touch = float(np.interp(at, wheel.lateral_m, wheel.depth_m))
     with look():
         figure = Figure(figsize=(WIDTH_IN, 4.0))
-        axis = figure.add_axes((0.72 / WIDTH_IN, 0.13, (WIDTH_IN - 0.92) / WIDTH_IN, 0.83))
+        axis = figure.add_axes((LEFT_IN / WIDTH_IN, 0.13, (WIDTH_IN - LEFT_IN - 0.2) / WIDTH_IN, 0.83))
         rail_z = -1e3 * (head.depth(e) - lift)
         wheel_z = -1e3 * (wheel.depth_m - touch)
         rail_y, wheel_y = -1e3 * (e - offset), -1e3 * wheel.lateral_m
@@ -112,9 +112,9 @@ def locus_figure(study: VehicleStudy) -> str:
     values = study.locus.eigenvalues_1ps
     with look():
         figure = Figure(figsize=(WIDTH_IN, 6.7))
-        wide = (WIDTH_IN - 0.92) / WIDTH_IN
-        plane = figure.add_axes((0.72 / WIDTH_IN, 0.41, wide, 0.56))
-        below = figure.add_axes((0.72 / WIDTH_IN, 0.08, wide, 0.22))
+        wide = (WIDTH_IN - LEFT_IN - 0.2) / WIDTH_IN
+        plane = figure.add_axes((LEFT_IN / WIDTH_IN, 0.41, wide, 0.56))
+        below = figure.add_axes((LEFT_IN / WIDTH_IN, 0.08, wide, 0.22))
         frequency = values.imag / (2.0 * np.pi)
         shown = (frequency > SLOWEST_HZ) & (frequency < _MOST_HZ) & (values.real > -40.0)
         tint = np.broadcast_to(speed[:, None], values.shape)

@@ -9,6 +9,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
+from simrail.report.page_file import write_page
 from simrail.report.vehicle_figures import conicity_figure, locus_figure, pair_figure, shift_figure
 from simrail.report.vehicle_study import Conicity, VehicleStudy
 from simrail.report.vehicle_text import amount, critical_words, listed
@@ -41,10 +42,7 @@ def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
         critical=critical_words(study.critical),
         locus=Markup(locus_figure(study)),
     )
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{model.name}.html"
-    path.write_text(text, encoding="utf-8")
-    return path
+    return write_page(folder, model.name, text)
 
 
 def _tiles(study: VehicleStudy) -> list[tuple[str, str, str]]:

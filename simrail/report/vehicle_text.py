@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from simrail.report.vehicle_study import VehicleStudy
@@ -41,8 +42,8 @@ def print_study(console: Console, study: VehicleStudy) -> None:
     """Print a study."""
     model = study.model
     mark = " [yellow](synthetic)[/yellow]" if model.synthetic else ""
-    console.print(f"[bold]{model.name}[/bold]{mark}: {model.title}", highlight=False)
-    console.print(f"[dim]{model.source}[/dim]", highlight=False)
+    console.print(f"[bold]{model.name}[/bold]{mark}: {escape(model.title)}", highlight=False)
+    console.print(f"[dim]{escape(model.source)}[/dim]", highlight=False)
 
     bodies = _table("body", "mass\nkg", "roll\nkg m2", "pitch\nkg m2", "yaw\nkg m2", "height\nm")
     for body in model.bodies:
@@ -57,7 +58,8 @@ def print_study(console: Console, study: VehicleStudy) -> None:
 
     modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held", words=2)
     for mode in listed(study.standstill):
-        modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", mode.words())
+        words = mode.words().replace(" %", "%")  # or a line may begin with the sign
+        modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", words)
     if modes.row_count:
         console.print(modes)
 

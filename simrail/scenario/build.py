@@ -212,7 +212,15 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
     with blame(scenario.file, f"{field}.method"):
         known_class = class_named(method.part.method, scenario.folder)
     with blame(scenario.file, f"{field}.options"):
-        return construct(known_class, method.part.options)
+        estimator = construct(known_class, method.part.options)
+        if getattr(estimator, "magnetometer", False) is True and scenario.spec.magnetometer is None:
+            raise InputError(
+                "the scenario has no magnetometer",
+                field="magnetometer",
+                value=True,
+                remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
+            )
+        return estimator
 
 
 def class_named(name: str, folder: Path | None) -> type[Estimator]:

@@ -206,7 +206,12 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         sign = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
         key = next(key for key in sign if key in context)
         problem, limit = "is out of range", f"{sign[key]} {context[key]}"
-        remedy = "mind the unit, which is in the name of the field"
+        counted = isinstance(context[key], int)  # a count has no unit
+        remedy = (
+            "give a number within the limit"
+            if counted
+            else "mind the unit, which is in the name of the field"
+        )
     elif kind in _TYPES:
         problem, limit = "has the wrong type", _TYPES[kind]
         remedy = (
@@ -215,6 +220,8 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
             else None
         )
         remedy = "write it in quotes" if kind == "string_type" else remedy
+        if isinstance(value, list) and kind not in ("tuple_type", "list_type"):
+            remedy = "give one value, not a list"
     elif kind == "literal_error":
         expected = str(context.get("expected", ""))
         problem, limit = "is not one of the possible values", f"one of {expected}"

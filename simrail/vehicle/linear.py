@@ -183,10 +183,14 @@ class RunningVehicle:
         inverse, before, fresh = self._inverse(state, speed_mps), np.inf, True
         fine = self._fineness
         for _ in range(60):
-            step = -inverse @ self.rates(state, speed_mps)
+            slope = self.rates(state, speed_mps)
+            step = -inverse @ slope
             largest = np.abs(step[: 6 * self.bodies]).max()
             state = state + step * min(1.0, 1e-3 / max(largest, 1e-12))
-            if largest < 1e-11 * fine or (largest < 1e-9 * fine and largest > 0.5 * before):
+            # Places that hold still are not enough: from a start nearby it is the spins that are found.
+            balanced = np.abs(slope[6 * self.bodies : 12 * self.bodies]).max() < _BALANCED_MPS2 / fine
+            still = largest < 1e-11 * fine or (largest < 1e-9 * fine and largest > 0.5 * before)
+            if still and balanced:
                 break
             if largest > 0.2 * before and not fresh:
                 inverse, fresh = self._inverse(state, speed_mps), True

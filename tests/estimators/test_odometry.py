@@ -238,6 +238,14 @@ def test_stands_still_exactly():
     assert resting[-200:].all()
 
 
+@pytest.mark.parametrize("smoothed", [False, True])
+def test_claims_something_for_every_sample(smoothed):
+    """No sd is zero, nor before the filter's first step: a NEES over the whole ride has a value."""
+    recording = record(truth_of(*FAST[0]), 0)
+    states = CurveMatchedOdometry(smoothed=smoothed).estimate(recording).states
+    assert (states[["position_sd_m", "speed_sd_mps", "acceleration_sd_mps2"]] > 0.0).all(axis=None)
+
+
 def test_bad_options_and_missing_encoder_are_named():
     with pytest.raises(InputError, match="tread_sd"):
         CurveMatchedOdometry(tread_sd=-1.0)

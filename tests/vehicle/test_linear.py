@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from simrail.errors import InputError
 from simrail.profile import SpeedProfile
+from simrail.report.vehicle_study import SLOWEST_MPS, SPEEDS
 from simrail.scenario.files import load
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.design import TrackDesign
@@ -252,6 +253,15 @@ def test_steady_running_is_steady_and_carries_the_weight(bogie):
         statics = bogie.model._statics
         object.__setattr__(lost, "_statics", np.concatenate([statics[:8], statics[-5:]]))
         running_vehicle(lost).equilibrium(20.0)
+
+
+def test_steady_running_is_found_from_a_speed_nearby():
+    """Places fit at once there, the spins of the wheels take another step."""
+    wagon = running_vehicle(load(VehicleFile, "vehicle", "two_axle_wagon").model("two_axle_wagon"))
+    at = None
+    for speed in np.linspace(SLOWEST_MPS, 400.0 / 3.6, SPEEDS):
+        at = wagon.equilibrium(speed, start=at)
+        assert np.abs(wagon.rates(at, speed)[6 * wagon.bodies : 12 * wagon.bodies]).max() < 1e-6
 
 
 def test_bogie_with_independent_wheels_does_not_hunt(bogie):
