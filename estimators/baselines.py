@@ -5,13 +5,14 @@ A method that loses to `DesignAngles` is better replaced by the track's drawing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from estimators.compensation import design_frame
-from simrail.columns import ATTITUDE
+from estimators.track_geometry import track_geometry
+from simrail.columns import ATTITUDE, RELATIVE_POSITION
 from simrail.estimate import Estimate
 from simrail.recording import Recording
 
@@ -30,3 +31,25 @@ class DesignAngles:
             states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
             mount=recording.mount,
         )
+
+
+@dataclass(frozen=True)
+class ZeroTrack:
+    """Rails that lie where the design has them: what track geometry scores against without any sensor.
+
+    Attributes
+    ----------
+    step_m : float
+        Distance of the places of its geometry.
+    """
+
+    step_m: float = 0.25
+    causal = False
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """The body follows the design track, so alignment, vertical profile and cross-level are 0."""
+        angles = DesignAngles().estimate(recording).states
+        place = dict(zip(RELATIVE_POSITION, recording.mount_position_m[1:], strict=True))
+        estimate = Estimate(states=angles.assign(**place), mount=recording.mount)
+        blind = replace(recording, rail_displacement=None, rail_sensor_sheet=None)
+        return replace(estimate, geometry=track_geometry(estimate, blind, step_m=self.step_m))

@@ -21,6 +21,7 @@ frame                  columns
 IMU signals            ``gyro_{x,y,z}_radps``, ``accel_{x,y,z}_mps2`` (at rest +g on Z)
 encoder                ``pulse_count``, and ``edge_time_s`` where the logger times edges
 magnetometer           ``magnetic_{x,y,z}_t``
+rail displacement      ``rail_{left,right}_{y,z}_m``, seen from the IMU
 gaps of the IMU        ``start_s``, ``end_s``, ``missing`` (no time index)
 odometry               ``position_m``, ``speed_mps``, ``acceleration_mps2`` and their ``..._sd_...``
 attitude               ``roll_rad``, ``pitch_rad``, ``yaw_rad`` (global), ``{angle}_sd_rad``
@@ -40,8 +41,8 @@ horizontal projection of the track. Gravity is 9.81 m/s2 on a flat Earth that do
 `measure` is told otherwise.
 
 The nouns: `TrackDesign`, `Irregularity` and `LaidTrack` (the track), `VehicleModel`, `SpeedProfile`,
-`Ride`, `Truth`, `Mount`, `ImuGrade`, `EncoderSpec`, `MagnetometerSpec`, `Recording`, `Estimate`,
-`Scenario`, `Results`.
+`Ride`, `Truth`, `Mount`, `ImuGrade`, `EncoderSpec`, `MagnetometerSpec`, `RailSensorSpec`, `Recording`,
+`Estimate`, `Scenario`, `Results`.
 A `Recording` holds what the train may know and never a true value; truth and estimate meet in `score`
 only. A person's faulty input raises `InputError`, whose text names file, field, value, limit and remedy.
 """
@@ -70,9 +71,11 @@ if TYPE_CHECKING:
     from simrail.scenario.ride_writer import write_ride
     from simrail.scenario.scenario import Scenario, load_scenario
     from simrail.score import score, score_odometry
+    from simrail.score_geometry import score_geometry
     from simrail.sensors.encoder import EncoderSpec
     from simrail.sensors.grades import ImuGrade
     from simrail.sensors.magnetometer import MagnetometerSpec
+    from simrail.sensors.rail_sensor import RailSensorSpec
     from simrail.track.design import TrackDesign
     from simrail.track.irregularity import Irregularity
     from simrail.track.laid import LaidTrack, lay
@@ -96,9 +99,11 @@ _HOMES = {
     "scenario.ride_writer": ("write_ride",),
     "scenario.scenario": ("Scenario", "load_scenario"),
     "score": ("score", "score_odometry"),
+    "score_geometry": ("score_geometry",),
     "sensors.encoder": ("EncoderSpec",),
     "sensors.grades": ("ImuGrade",),
     "sensors.magnetometer": ("MagnetometerSpec",),
+    "sensors.rail_sensor": ("RailSensorSpec",),
     "track.design": ("TrackDesign",),
     "track.irregularity": ("Irregularity",),
     "track.laid": ("LaidTrack", "lay"),
@@ -120,6 +125,7 @@ __all__ = [
     "MagnetometerSpec",
     "Mount",
     "Parts",
+    "RailSensorSpec",
     "Recording",
     "Results",
     "Ride",
@@ -136,6 +142,7 @@ __all__ = [
     "read_ride",
     "run",
     "score",
+    "score_geometry",
     "score_odometry",
     "simulate",
     "with_odometry",

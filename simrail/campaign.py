@@ -28,16 +28,19 @@ from simrail.recording import Recording
 from simrail.ride import is_cached, simulate
 from simrail.scenario.build import (
     Parts,
+    bands_of,
     earth_of,
     encoder_of,
     magnetometer_of,
     mount_of,
+    rail_sensor_of,
     temperature_of,
 )
 from simrail.scenario.cells import Cell, cells, methods
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
 from simrail.score import reference_of, score, score_odometry, truth_at_imu
+from simrail.score_geometry import score_geometry
 from simrail.score_table import concat_scores
 from simrail.truth import Mount, Truth
 from simrail.watcher import Watcher
@@ -188,6 +191,16 @@ def _run_cell(
             with ledger.timed("score"):
                 figures = score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)
                 ledger.scored(cell, name, figures)
+                if estimate.geometry is not None:
+                    figures = score_geometry(
+                        estimate,
+                        parts.rails(cell),
+                        recording,
+                        bands=bands_of(cell),
+                        twist_base_m=cell.spec.geometry.twist_base_m,
+                        **keep,
+                    )
+                    ledger.scored(cell, name, figures)
             estimates[name] = estimate
             ledger.judge_finite(cell, name, estimate)
         except Exception as error:
@@ -206,6 +219,8 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         grade=parts.grade(cell),
         encoder=encoder_of(cell),
         magnetometer=magnetometer_of(cell),
+        rail_sensor=rail_sensor_of(cell),
+        rails=None if rail_sensor_of(cell) is None else parts.rails(cell),
         odometry="truth" if cell.spec.odometry == "truth" else "encoder",
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,
@@ -237,13 +252,12 @@ def _beginning(recording: Recording, *, samples: int) -> Recording:
     encoder = recording.encoder
     if encoder is not None:
         encoder = encoder.loc[: imu.index[-1]]
-    magnetic = recording.magnetometer
-    if magnetic is not None:
-        magnetic = magnetic.iloc[:samples]
+    magnetic, seen = recording.magnetometer, recording.rail_displacement
     return replace(
         recording,
         imu=imu,
         encoder=encoder,
         odometry=recording.odometry.iloc[:samples],
-        magnetometer=magnetic,
+        magnetometer=None if magnetic is None else magnetic.iloc[:samples],
+        rail_displacement=None if seen is None else seen.iloc[:samples],
     )

@@ -40,11 +40,13 @@ ODOMETRY_SD = ("position_sd_m", "speed_sd_mps", "acceleration_sd_mps2")
 RELATIVE_POSITION = ("lateral_m", "vertical_m")
 ENCODER = ("pulse_count",)
 EDGE_TIME = "edge_time_s"
+RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
 MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
 MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
 GYRO_BIAS = ("gyro_bias_x_radps", "gyro_bias_y_radps", "gyro_bias_z_radps")
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
 IRREGULARITY = ("alignment_m", "vertical_profile_m", "cross_level_m", "gauge_m")
+IRREGULARITY_SD = ("alignment_sd_m", "vertical_profile_sd_m", "cross_level_sd_m", "gauge_sd_m")
 
 _TABLE = [
     Column("time_s", "s", "-", "time since the start of the recording; the index of every signal frame"),
@@ -68,6 +70,10 @@ _TABLE = [
     Column("pulse_count", "1", "-", "signed encoder counts since the start"),
     Column("edge_time_s", "s", "-", "time of the last edge that the encoder passed; optional"),
     Column("magnetic_{axis}_t", "T", "body", "magnetic flux density along the axis"),
+    Column("rail_left_y_m", "m", "body", "left rail seen from the IMU's place, along Y"),
+    Column("rail_left_z_m", "m", "body", "left rail seen from the IMU's place, along Z"),
+    Column("rail_right_y_m", "m", "body", "right rail seen from the IMU's place, along Y"),
+    Column("rail_right_z_m", "m", "body", "right rail seen from the IMU's place, along Z"),
     Column("gyro_bias_{axis}_radps", "rad/s", "body", "estimated gyro bias"),
     Column("innovation_{axis}_mps2", "m/s2", "body", "measured minus predicted specific force"),
     Column("nis", "1", "-", "normalised innovation squared"),
@@ -75,6 +81,10 @@ _TABLE = [
     Column("vertical_profile_m", "m", "track", "mean vertical deviation of the rails, positive up"),
     Column("cross_level_m", "m", "track", "left minus right rail height"),
     Column("gauge_m", "m", "track", "left minus right lateral deviation, positive wider"),
+    Column("alignment_sd_m", "m", "track", "standard deviation of alignment_m"),
+    Column("vertical_profile_sd_m", "m", "track", "standard deviation of vertical_profile_m"),
+    Column("cross_level_sd_m", "m", "track", "standard deviation of cross_level_m"),
+    Column("gauge_sd_m", "m", "track", "standard deviation of gauge_m"),
 ]
 
 

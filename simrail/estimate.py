@@ -36,7 +36,9 @@ class Estimate:
     covariance_of : tuple of str
         Names of the m states, in the order of `covariance`.
     geometry : pandas.DataFrame, optional
-        Rail irregularities over a uniform ``position_m``, with standard deviations.
+        Rail irregularities over a uniform ``position_m``, columns `simrail.columns.IRREGULARITY`, with
+        `IRREGULARITY_SD` where the method has them. A column that is NaN throughout is one that the method
+        cannot observe; any other is finite.
     """
 
     states: pd.DataFrame

@@ -14,14 +14,16 @@ import pandas as pd
 from simrail.columns import ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.odometry import encoder_odometry
-from simrail.recording import EncoderSheet, MagnetometerSheet, Recording
+from simrail.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
 from simrail.resample import resample
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import EarthRate, arrived, sample_imu
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
+from simrail.sensors.rail_sensor import RailSensorSpec, sample_rails
 from simrail.sheets import imu_sheet
+from simrail.track.laid import LaidTrack
 from simrail.truth import Mount, Truth
 
 
@@ -33,6 +35,8 @@ def measure(
     grade: ImuGrade,
     encoder: EncoderSpec | None = None,
     magnetometer: MagnetometerSpec | None = None,
+    rail_sensor: RailSensorSpec | None = None,
+    rails: LaidTrack | None = None,
     odometry: str = "encoder",
     seed: int,
     draw: int,
@@ -55,6 +59,10 @@ def measure(
         The wheel encoder; None for a train without one.
     magnetometer : MagnetometerSpec, optional
         A magnetometer in the housing of the IMU, sampled at the IMU's times.
+    rail_sensor : RailSensorSpec, optional
+        A sensor beside the IMU that sees both rails.
+    rails : LaidTrack, optional
+        The rails that the ride was run on (`simrail.ride.rails_of`), for that sensor.
     odometry : str
         ``"encoder"``, or ``"truth"`` for the true position, speed and acceleration of the mount.
     seed, draw : int
@@ -73,7 +81,8 @@ def measure(
     Raises
     ------
     InputError
-        If body, wheel or odometry is unknown, or a rate does not divide the truth's.
+        If body, wheel or odometry is unknown, a rate does not divide the truth's, or a rail sensor has no
+        rails to see.
     """
     motion = truth.motion(mount)
     imu, delay_s = sample_imu(
@@ -116,6 +125,11 @@ def measure(
             name=mount.name,
             track_m=(truth.track.start_m, truth.track.end_m),
         )
+    seen = None
+    if rail_sensor is not None:
+        if rails is None:
+            raise InputError("a rail sensor needs rails to see", field="rails", remedy="give rails_of(ride)")
+        seen = sample_rails(motion, imu.index, rail_sensor, rails, seed=seed, draw=draw, name=mount.name)
     if odometry == "truth":
         frame = true_odometry(motion, imu.index)
     elif odometry != "encoder":
@@ -152,6 +166,10 @@ def measure(
         gaps=gaps,
         magnetometer=magnetic,
         magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
+        rail_displacement=seen,
+        rail_sensor_sheet=None
+        if rail_sensor is None
+        else RailSensorSheet(rail_sensor.noise_m, rail_sensor.rail_base_m),
     )
 
 

@@ -127,6 +127,22 @@ class MagnetometerSheet:
 
 
 @dataclass(frozen=True)
+class RailSensorSheet:
+    """What the train knows of the sensor that sees the rails from the body.
+
+    Attributes
+    ----------
+    noise_m : float
+        Standard deviation of each of its values, outliers apart.
+    rail_base_m : float
+        Distance of the two nominal rails: what it sees of each is measured against that rail's.
+    """
+
+    noise_m: float
+    rail_base_m: float = 1.5
+
+
+@dataclass(frozen=True)
 class Recording:
     """Signals of one ride, and what the train knows.
 
@@ -167,6 +183,11 @@ class Recording:
         Indexed by the IMU's ``time_s``, columns `simrail.columns.MAGNETIC`, on the axes of the IMU.
     magnetometer_sheet : MagnetometerSheet, optional
         What is known of it.
+    rail_displacement : pandas.DataFrame, optional
+        Indexed by the IMU's ``time_s``, columns `simrail.columns.RAIL_DISPLACEMENT`: both rails seen from
+        the place of the IMU, along Y and Z of the body.
+    rail_sensor_sheet : RailSensorSheet, optional
+        What is known of the sensor that sees them.
     """
 
     name: str
@@ -185,6 +206,8 @@ class Recording:
     gaps: pd.DataFrame | None = None
     magnetometer: pd.DataFrame | None = None
     magnetometer_sheet: MagnetometerSheet | None = None
+    rail_displacement: pd.DataFrame | None = None
+    rail_sensor_sheet: RailSensorSheet | None = None
 
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""

@@ -9,7 +9,18 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from simrail.columns import ACCEL, EDGE_TIME, ENCODER, GYRO, IMU, MAGNETIC, ODOMETRY, ODOMETRY_SD, require
+from simrail.columns import (
+    ACCEL,
+    EDGE_TIME,
+    ENCODER,
+    GYRO,
+    IMU,
+    MAGNETIC,
+    ODOMETRY,
+    ODOMETRY_SD,
+    RAIL_DISPLACEMENT,
+    require,
+)
 from simrail.errors import InputError
 from simrail.recording import Recording
 from simrail.resample import check_stamps
@@ -19,6 +30,9 @@ MAX_RATE_RADPS, MAX_FORCE_MPS2 = 20.0, 500.0
 
 MAX_FIELD_T = 1e-2
 """Two hundred times the Earth's field: beyond this the unit is wrong."""
+
+MAX_RAIL_M = 10.0
+"""No rail is farther from a sensor that sees it: beyond this the unit is wrong."""
 
 
 def check_recording(recording: Recording, *, file: object = None) -> None:
@@ -37,7 +51,7 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
         At the first of: a missing column; a value that is no number; time stamps that are not
         increasing, or not uniform in the IMU; angular rates above 20 rad/s (degrees?) or specific
         forces above 500 m/s2, fields above 10 mT; an IMU rate other than its sheet's; odometry or
-        magnetometer at other times than the IMU's; an encoder or magnetometer without its sheet.
+        magnetometer at other times than the IMU's; an encoder, magnetometer or rail sensor without its sheet.
     """
     _check_signal(recording.imu, IMU, what="imu", file=file)
     _check_signal(recording.odometry, ODOMETRY + ODOMETRY_SD, what="odometry", file=file)
@@ -52,7 +66,7 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
                 remedy="give pulses per revolution and wheel radius",
             )
     _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz, file)
-    limits = [
+    limits: list[tuple[str, tuple[str, ...], float, str, str]] = [
         ("imu", GYRO, MAX_RATE_RADPS, "rad/s", "degrees"),
         ("imu", ACCEL, MAX_FORCE_MPS2, "m/s2", "mg"),
     ]
@@ -68,6 +82,17 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
             )
         limits.append(("magnetometer", MAGNETIC, MAX_FIELD_T, "T", "microtesla or gauss"))
         at_imu_times.append("magnetometer")
+    if recording.rail_displacement is not None:
+        _check_signal(recording.rail_displacement, RAIL_DISPLACEMENT, what="rail_displacement", file=file)
+        if recording.rail_sensor_sheet is None:
+            raise InputError(
+                "a rail sensor without its sheet says nothing of the rails",
+                file=file,
+                field="rail_sensor_sheet",
+                remedy="give its noise and the distance of the nominal rails",
+            )
+        limits.append(("rail_displacement", RAIL_DISPLACEMENT, MAX_RAIL_M, "m", "millimetres"))
+        at_imu_times.append("rail_displacement")
     for what, columns, limit, unit, suspect in limits:
         _check_size(getattr(recording, what), columns, (limit, unit, suspect), what=what, file=file)
     for what in at_imu_times:

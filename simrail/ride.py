@@ -20,7 +20,7 @@ from simrail import ride_cache
 from simrail.profile import SpeedProfile
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
+from simrail.track.laid import LaidTrack, lay
 from simrail.track.rail_condition import RailCondition
 from simrail.truth import Truth, abeam
 from simrail.truth_files import create_arrays, let_go, load_truth, save_truth, write_header
@@ -36,7 +36,10 @@ if TYPE_CHECKING:
 Progress = Callable[[float, float, float], None]
 """Called with (simulated seconds done, seconds in all, present speed in m/s)."""
 
-_SOURCES = ("track", "vehicle", "profile.py", "truth.py", "truth_files.py", "seeds.py", "jit.py", "ride.py")
+_SOURCES = (
+    *("track", "vehicle", "profile.py", "truth.py", "truth_files.py"),
+    *("rotation.py", "seeds.py", "jit.py", "ride.py"),
+)
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,11 @@ class Ride:
         }
 
 
+def rails_of(ride: Ride) -> LaidTrack:
+    """The rails of a ride, laid anew: the same bits every time."""
+    return lay(ride.track, ride.irregularity, seed=ride.track_seed, conditions=ride.conditions)
+
+
 def is_cached(ride: Ride) -> bool:
     """Whether `simulate` would find this ride on disk."""
     return (ride_cache.folder() / ride_cache.key_of(ride.describe()) / "truth.json").is_file()
@@ -150,13 +158,13 @@ def simulate(ride: Ride, *, progress: Progress | None = None) -> Truth:
 
 def _follow(ride: Ride) -> Truth:
     """Every body of the vehicle keeps to the irregular rails at its own place: no dynamics."""
-    channels = rail_following(lay(ride.track, ride.irregularity, seed=ride.track_seed))
+    laid = rails_of(ride)
     radius = ride.vehicle.wheels[0].radius_m
     truths = {
         body.name: kinematic_truth(
             ride.track,
             ride.profile,
-            channels=channels,
+            channels=rail_following(laid, height_m=body.position_m[2]),
             offset_m=body.position_m[0],
             height_m=body.position_m[2],
             wheel_radius_m=radius,
@@ -191,7 +199,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     model, profile = ride.vehicle, ride.profile
     duration = np.floor(profile.duration_s * ride.rate_hz) / ride.rate_hz
     rows = round(duration * ride.rate_hz) + 1
-    laid = lay(ride.track, ride.irregularity, seed=ride.track_seed, conditions=ride.conditions)
+    laid = rails_of(ride)
     setup = Setup(
         model,
         laid,

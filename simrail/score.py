@@ -23,20 +23,9 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.score_metrics import IntArray, Row, Series, figures, nis_figures
-from simrail.score_table import (
-    CURVE_PREFIX,
-    EVERY_CURVE,
-    FIGURE_COLUMNS,
-    METRICS,
-    OK,
-    WINDOWS,
-    as_score_table,
-)
-from simrail.track.design import CURVE, STRAIGHT, TRANSITION
+from simrail.score_table import OK
+from simrail.score_windows import chosen_windows, kept_metrics, table_of, windows_of
 from simrail.truth import Mount
-
-STANDSTILL_MPS = 0.01
-"""Below this true speed the vehicle counts as standing."""
 
 
 class HasMotion(Protocol):
@@ -114,7 +103,7 @@ def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Refer
     position = motion["position_m"].to_numpy()
     frame = recording.track.frame(position)
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
-    return Reference(motion, design, _windows(recording, position, motion["speed_mps"].to_numpy()))
+    return Reference(motion, design, windows_of(recording.track, position, motion["speed_mps"].to_numpy()))
 
 
 def score(
@@ -158,8 +147,8 @@ def score(
         raise InputError("the estimate speaks of another mount", value=estimate.mount, limit=recording.mount)
     if not np.array_equal(states.index.to_numpy(), recording.imu.index.to_numpy()):
         raise InputError("the estimate is not at the recording's IMU times", field="states.time_s")
-    chosen = _chosen(against.windows, windows)
-    keep = _kept(metrics)
+    chosen = chosen_windows(against.windows, windows)
+    keep = kept_metrics(metrics)
     rows: list[Row] = []
     for series in _attitude_series(states, against):
         rows += figures(series, chosen, keep)
@@ -171,7 +160,7 @@ def score(
     if us_per_sample is not None and "us_per_sample" in keep:
         n = len(states)
         rows.append((first, "full", "truth", "whole", "us_per_sample", float(us_per_sample), "us", n, OK))
-    return _table(rows)
+    return table_of(rows)
 
 
 def score_odometry(
@@ -187,11 +176,11 @@ def score_odometry(
     is the position error gained since the start over the true distance run in the whole ride.
     """
     against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
-    chosen, keep = _chosen(against.windows, windows), _kept(metrics)
+    chosen, keep = chosen_windows(against.windows, windows), kept_metrics(metrics)
     rows: list[Row] = []
     for series in _other_series(recording.odometry, against.motion):
         rows += figures(series, chosen, keep)
-    return _table(rows)
+    return table_of(rows)
 
 
 def _wrap(angle: FloatArray) -> FloatArray:
@@ -240,48 +229,3 @@ def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[Series
             run = float(np.abs(np.diff(motion[name].to_numpy())).sum())
             reason = "" if run > 1.0 else "less than 1 m run"
             yield Series("distance_relative", "truth", (error - error[0]) / max(run, 1.0), None, reason)
-
-
-def _windows(recording: Recording, position: FloatArray, speed: FloatArray) -> dict[str, IntArray]:
-    moving = np.abs(speed) >= STANDSTILL_MPS
-    kind = recording.track.kind(position)
-    masks = {
-        "whole": np.ones(len(position), dtype=bool),
-        "straight": moving & (kind == STRAIGHT),
-        "transition": moving & (kind == TRANSITION),
-        "curve": moving & (kind == CURVE),
-        "standstill": ~moving,
-        "moving": moving,
-    }
-    found = {name: np.flatnonzero(mask) for name, mask in masks.items()}
-    in_curve = found["curve"]
-    segments = np.asarray(recording.track.segment(position[in_curve]))
-    for number in np.unique(segments):
-        name = CURVE_PREFIX + recording.track.segment_name(int(number))
-        found[name] = in_curve[segments == number]
-    return found
-
-
-def _chosen(found: Mapping[str, IntArray], wanted: Collection[str] | None) -> dict[str, IntArray]:
-    if wanted is None:
-        return dict(found)
-    for name in wanted:
-        if name not in WINDOWS and not name.startswith(CURVE_PREFIX):
-            raise InputError(
-                "no such window", value=name, limit="one of " + ", ".join((*WINDOWS, EVERY_CURVE))
-            )
-    every_curve = EVERY_CURVE in wanted
-    return {n: i for n, i in found.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
-
-
-def _kept(wanted: Collection[str] | None) -> tuple[str, ...]:
-    if wanted is None:
-        return METRICS
-    for name in wanted:
-        if name not in METRICS:
-            raise InputError("no such metric", value=name, limit="one of " + ", ".join(METRICS))
-    return tuple(name for name in METRICS if name in wanted)
-
-
-def _table(rows: list[Row]) -> pd.DataFrame:
-    return as_score_table(pd.DataFrame(rows, columns=list(FIGURE_COLUMNS)))

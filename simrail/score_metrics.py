@@ -36,13 +36,14 @@ _QUANTILE_95 = float(ndtri(0.975))
 
 @dataclass(frozen=True)
 class Series:
-    """Errors of one quantity against one reference, in the unit of the score table."""
+    """Errors of one quantity, in one band, against one reference, in the unit of the score table."""
 
     quantity: str
     reference: str
     error: FloatArray
     sd: FloatArray | None
     reason: str = ""
+    band: str = "full"
 
 
 def figures(series: Series, windows: Mapping[str, IntArray], keep: Sequence[str]) -> list[Row]:
@@ -74,7 +75,7 @@ def _rows(
     return [
         (
             series.quantity,
-            "full",
+            series.band,
             series.reference,
             window,
             metric,

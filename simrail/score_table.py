@@ -12,6 +12,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
+from simrail.bands import BANDS as _STANDARD_BANDS
+from simrail.bands import TOO_COARSE, TOO_SHORT
+
 FIGURE_COLUMNS = (
     "quantity",
     "band",
@@ -70,13 +73,20 @@ QUANTITY_UNITS = {
 METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us"}
 """Metrics whose unit is not the quantity's."""
 
-BANDS = ("full", "D0", "D1", "D2", "D3")
+FULL = "full"
+"""The band of what no filter has cut."""
+BANDS = (FULL, *_STANDARD_BANDS)
 REFERENCES = ("truth", "design")
 WINDOWS = ("whole", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 OK = "ok"
 NO_SAMPLES = "no samples"
 """Status of a figure over a window that the ride does not have."""
+UNOBSERVABLE = "not observable by this method"
+"""Status of an irregularity that an estimate leaves open."""
+NO_TWIST = "base of the twist is no multiple of the step"
+LEFT_OPEN = (UNOBSERVABLE, TOO_SHORT, TOO_COARSE, NO_TWIST)
+"""Statuses of what a method or a ride cannot give, which is no failure."""
 CURVE_PREFIX = "curve:"
 """A window of one curve is ``curve:`` and the name of its segment."""
 EVERY_CURVE = CURVE_PREFIX + "*"
@@ -215,7 +225,7 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         axes = [str(name) for name in cells.columns if name not in SCORE_COLUMNS]
         frame = frame.merge(cells[["cell", *axes]], on="cell", how="left")
     # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
-    frame["failed"] = (frame["status"] != OK).astype(np.int64)
+    frame["failed"] = (~frame["status"].isin((OK, *LEFT_OPEN))).astype(np.int64)
     labels = [name for name in LABEL_COLUMNS if name not in INTEGER_COLUMNS]
     figure = [name for name in FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
     keys = [*labels, *axes, *figure]
@@ -245,7 +255,7 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
 
 def _categorical(name: str, column: pd.Series, bands: Sequence[str]) -> pd.Series:
     words = [str(word) for word in column.unique()]
-    known = (*_CLOSED.get(name, ()), *(bands if name == "band" else ()))
+    known = tuple(dict.fromkeys((*_CLOSED.get(name, ()), *(bands if name == "band" else ()))))
     extra = sorted(word for word in words if word not in known)
     is_open = name in LABEL_COLUMNS or name == "status"
     if not is_open:

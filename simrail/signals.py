@@ -9,7 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
-from simrail.columns import ACCEL, EDGE_TIME, ENCODER, GYRO, MAGNETIC, ODOMETRY, ODOMETRY_SD
+from simrail.columns import (
+    ACCEL,
+    EDGE_TIME,
+    ENCODER,
+    GYRO,
+    MAGNETIC,
+    ODOMETRY,
+    ODOMETRY_SD,
+    RAIL_DISPLACEMENT,
+)
 from simrail.sensors.datasheet import STANDARD_GRAVITY_MPS2
 
 Factor = tuple[float, float]
@@ -99,6 +108,7 @@ ENCODER_SIGNAL = Signal(
     ),
 )
 MAGNETOMETER_SIGNAL = Signal("magnetometer", (Quantity("field", MAGNETIC, FIELDS),))
+RAIL_SIGNAL = Signal("rail_displacement", tuple(_alone(column, LENGTHS) for column in RAIL_DISPLACEMENT))
 ODOMETRY_SIGNAL = Signal(
     "odometry",
     tuple(
@@ -116,6 +126,7 @@ SIGNALS: tuple[Signal, ...] = (
     IMU_SIGNAL,
     ENCODER_SIGNAL,
     MAGNETOMETER_SIGNAL,
+    RAIL_SIGNAL,
     ODOMETRY_SIGNAL,
     GAPS_SIGNAL,
 )

@@ -13,11 +13,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import is_dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from simrail.columns import COLUMNS, INNOVATION
+from simrail.columns import COLUMNS, INNOVATION, IRREGULARITY, IRREGULARITY_SD
 from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
 from simrail.rest import at_rest_initially, rest_periods
@@ -84,13 +85,14 @@ def leaves_the_recording_alone(estimator: Estimator, recording: Recording) -> No
     """No signal, no odometry, no piece of knowledge is changed."""
     own = copy.deepcopy(recording)
     estimator.estimate(own)
-    for field in ("imu", "odometry", "encoder", "magnetometer"):
+    for field in ("imu", "odometry", "encoder", "magnetometer", "rail_displacement"):
         before, after = getattr(recording, field), getattr(own, field)
         assert before is None or (before.equals(after) and list(before) == list(after)), f"changed {field}"
     for field in (
         "imu_sheet",
         "encoder_sheet",
         "magnetometer_sheet",
+        "rail_sensor_sheet",
         "track",
         "mount_position_m",
         "start_position_m",
@@ -150,8 +152,20 @@ def require_well_formed(estimate: Estimate, recording: Recording) -> None:
     if estimate.covariance is not None:
         _require_covariance(estimate, len(index))
     if estimate.geometry is not None:
-        assert estimate.geometry.index.name == "position_m", "geometry is not indexed by position_m"
-        assert np.isfinite(estimate.geometry.to_numpy(dtype=np.float64)).all(), "geometry is not finite"
+        _require_geometry(estimate.geometry)
+
+
+def _require_geometry(geometry: pd.DataFrame) -> None:
+    assert geometry.index.name == "position_m", "geometry is not indexed by position_m"
+    missing = [name for name in IRREGULARITY if name not in geometry]
+    assert not missing, f"geometry lacks {', '.join(missing)} (NaN throughout says: not observable)"
+    unknown = [str(name) for name in geometry if name not in (*IRREGULARITY, *IRREGULARITY_SD)]
+    assert not unknown, f"geometry has other columns than irregularities: {', '.join(unknown)}"
+    step = np.diff(geometry.index.to_numpy(dtype=np.float64))
+    assert len(step) == 0 or (step[0] > 0.0 and np.ptp(step) < 1e-6 * step[0]), "geometry is not uniform"
+    for name in geometry:
+        known = np.isfinite(geometry[name].to_numpy(dtype=np.float64))
+        assert known.all() or not known.any(), f"geometry is not finite in {name}, here and there"
 
 
 def _require_covariance(estimate: Estimate, n: int) -> None:
@@ -213,8 +227,14 @@ def prefix(recording: Recording, n: int) -> Recording:
         imu=recording.imu.iloc[:n].copy(),
         odometry=recording.odometry.iloc[:n].copy(),
         encoder=None if encoder is None else encoder.loc[: recording.imu.index[n - 1]].copy(),
-        magnetometer=None if recording.magnetometer is None else recording.magnetometer.iloc[:n].copy(),
+        **_beside_imu(recording, lambda frame: frame.iloc[:n].copy()),
     )
+
+
+def _beside_imu(recording: Recording, change: Callable[[pd.DataFrame], pd.DataFrame]) -> dict[str, Any]:
+    """The other signals that are sampled at the IMU's times, changed; those that there are."""
+    frames = {name: getattr(recording, name) for name in ("magnetometer", "rail_displacement")}
+    return {name: change(frame) for name, frame in frames.items() if frame is not None}
 
 
 def first_samples(estimate: Estimate, n: int) -> Estimate:
@@ -245,7 +265,7 @@ def time_reversed(recording: Recording) -> Recording:
         imu=imu,
         odometry=odometry,
         encoder=encoder,
-        magnetometer=None if recording.magnetometer is None else _turned(recording.magnetometer, negate=""),
+        **_beside_imu(recording, lambda frame: _turned(frame, negate="")),
         start_position_m=float(odometry["position_m"].iloc[0]),
     )
 
@@ -274,5 +294,5 @@ def standing(recording: Recording) -> Recording:
         imu=held(recording.imu),
         odometry=odometry,
         encoder=None if recording.encoder is None else held(recording.encoder),
-        magnetometer=None if recording.magnetometer is None else held(recording.magnetometer),
+        **_beside_imu(recording, held),
     )

@@ -29,7 +29,7 @@ from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import RailConditionPart, Scenario
-from simrail.score_table import NO_SAMPLES, OK
+from simrail.score_table import LEFT_OPEN, NO_SAMPLES, OK
 
 MOST_RIDES = 6
 """Rides that are drawn; the tables hold all."""
@@ -246,8 +246,8 @@ def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
 
 
 def _failures(scores: pd.DataFrame) -> list[tuple[str, str, str, int]]:
-    """(method, IMU, reason, figures) of what has no value; expected empty windows are left out."""
-    failed = scores[(scores["status"] != OK) & (scores["status"] != NO_SAMPLES)]
+    """(method, IMU, reason, figures) of what has no value; what cannot have one is left out."""
+    failed = scores[~scores["status"].isin((OK, NO_SAMPLES, *LEFT_OPEN))]
     if failed.empty:
         return []
     # One line per kind of fault: how many samples of a window it hit is in the table itself.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from simrail.score_table import CURVE_PREFIX, SCORE_COLUMNS, aggregate
+from simrail.score_table import CURVE_PREFIX, FULL, SCORE_COLUMNS, aggregate
 
 CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry")
 
@@ -38,18 +38,25 @@ class Figures:
     table : pandas.DataFrame
         Rows of `simrail.score_table.aggregate` of this case.
     found : dict
-        (estimator, quantity, reference, window, metric) to `Figure`.
+        (estimator, quantity, band, reference, window, metric) to `Figure`.
     """
 
     labels: dict[str, str]
     table: pd.DataFrame
-    found: dict[tuple[str, str, str, str, str], Figure]
+    found: dict[tuple[str, str, str, str, str, str], Figure]
 
     def get(
-        self, estimator: str, quantity: str, metric: str, *, window: str = "whole", reference: str = "truth"
+        self,
+        estimator: str,
+        quantity: str,
+        metric: str,
+        *,
+        band: str = FULL,
+        window: str = "whole",
+        reference: str = "truth",
     ) -> Figure:
         """One figure; NaN and no draws if there is none."""
-        return self.found.get((estimator, quantity, reference, window, metric), NOTHING)
+        return self.found.get((estimator, quantity, band, reference, window, metric), NOTHING)
 
     def estimators(self) -> list[str]:
         """Names of the methods, odometry included, in the order of the table."""
@@ -63,7 +70,7 @@ class Figures:
 
     def metric_of_any(self, estimator: str, metric: str, *, window: str = "whole") -> Figure:
         """A figure that belongs to a method as a whole (nis, us_per_sample)."""
-        for (name, _, reference, where, what), figure in self.found.items():
+        for (name, _, _, reference, where, what), figure in self.found.items():
             if (name, reference, where, what) == (estimator, "truth", window, metric):
                 return figure
         return NOTHING
@@ -94,8 +101,9 @@ def of_cell(all_cases: list[Figures], cell: dict[str, object]) -> Figures | None
 _AGGREGATES = ("sd_sensor", "sd_track", "track_draws", "draws", "failed")
 
 
-def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str], Figure]:
-    names = [rows[name].astype(str) for name in ("estimator", "quantity", "reference", "window", "metric")]
+def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str, str], Figure]:
+    keys = ("estimator", "quantity", "band", "reference", "window", "metric")
+    names = [rows[name].astype(str) for name in keys]
     # Two levels of draws: what differs between tracks and what differs between sensors add up.
     variance = rows["sd_sensor"].fillna(0.0) ** 2 + rows["sd_track"].fillna(0.0) ** 2
     sd = (variance**0.5).where(rows["draws"] > 1)

@@ -19,10 +19,11 @@ from typing import Any, TypeVar, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
+from simrail.bands import BANDS, Band
 from simrail.errors import InputError
 from simrail.estimate import Estimator, estimator_class
 from simrail.profile import SpeedProfile
-from simrail.ride import Ride
+from simrail.ride import Ride, rails_of
 from simrail.scenario.cells import Cell, Method
 from simrail.scenario.files import Part, blame, load
 from simrail.scenario.imu_file import ImuFile
@@ -34,8 +35,10 @@ from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec
+from simrail.sensors.rail_sensor import RailSensorSpec
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
+from simrail.track.laid import LaidTrack
 from simrail.track.rail_condition import FRICTION, RailCondition
 from simrail.truth import Mount
 from simrail.vehicle.model import VehicleModel
@@ -58,6 +61,7 @@ class Parts:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self._read: dict[tuple[str, str], Any] = {}
+        self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
 
     @property
@@ -122,6 +126,14 @@ class Parts:
             conditions=conditions_of(cell, self.vehicle(cell)),
         )
 
+    def rails(self, cell: Cell) -> LaidTrack:
+        """The rails of a cell's ride; the last ones are remembered, since cells come ride by ride."""
+        ride = self.ride(cell)
+        key = (cell.spec.track, repr(ride.irregularity), ride.track_seed, repr(ride.conditions))
+        if self._laid is None or self._laid[0] != key:
+            self._laid = key, rails_of(ride)
+        return self._laid[1]
+
 
 def profile_of(cell: Cell) -> SpeedProfile:
     """Speed profile of a cell's ride."""
@@ -185,6 +197,19 @@ def magnetometer_of(cell: Cell) -> MagnetometerSpec | None:
     """Magnetometer of a cell, if its scenario has one; steel stands where the seed of the track puts it."""
     part = cell.spec.magnetometer
     return None if part is None else part.spec(cell.ride_seed)
+
+
+def rail_sensor_of(cell: Cell) -> RailSensorSpec | None:
+    """Rail sensor of a cell, if its scenario has one."""
+    part = cell.spec.rail_sensor
+    return None if part is None else part.spec()
+
+
+def bands_of(cell: Cell) -> tuple[Band, ...]:
+    """Wavelength bands that the rail geometry of a cell is scored in."""
+    part = cell.spec.geometry
+    own = (Band(name, *wavelengths) for name, wavelengths in part.own_bands.items())
+    return (*(BANDS[name] for name in part.bands), *own)
 
 
 def earth_of(cell: Cell) -> EarthRate | None:

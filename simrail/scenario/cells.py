@@ -21,7 +21,7 @@ from simrail.scenario.axes import Scalar, axes_of, expand
 from simrail.scenario.scenario import EstimatorPart, ImuPart, RidePart, Scenario, ScenarioFile
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
-SENSING = ("odometry", "encoder", "magnetometer", "earth", "temperature")
+SENSING = ("odometry", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
             cell.spec.vehicle,
             cell.spec.engine,
             repr(cell.imu),
-            *map(repr, (cell.spec.encoder, cell.spec.magnetometer)),
+            *map(repr, (cell.spec.encoder, cell.spec.magnetometer, cell.spec.rail_sensor)),
         )
         if (*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)) not in judged_rides:
             judged_rides.add((*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)))

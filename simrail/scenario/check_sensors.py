@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from simrail.errors import InputError
-from simrail.scenario.build import Parts, encoder_of, magnetometer_of, profile_of
+from simrail.scenario.build import Parts, encoder_of, magnetometer_of, profile_of, rail_sensor_of
 from simrail.scenario.cells import Cell
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
 from simrail.sensors.encoder import check_encoder
 from simrail.sensors.magnetometer import check_magnetometer
+from simrail.sensors.rail_sensor import check_rail_sensor
 from simrail.track.design import TrackDesign
 from simrail.vehicle.model import VehicleModel
 
@@ -44,6 +45,10 @@ def judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
     if magnetometer is not None:
         with blame(scenario.file, "magnetometer"):
             check_magnetometer(magnetometer)
+    rail_sensor = rail_sensor_of(cell)
+    if rail_sensor is not None:
+        with blame(scenario.file, "rail_sensor"):
+            check_rail_sensor(rail_sensor)
     _judge_encoder(scenario, cell, vehicle)
 
 

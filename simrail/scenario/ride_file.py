@@ -12,7 +12,7 @@ from typing import Annotated, Self
 from pydantic import Field, field_validator, model_validator
 
 from simrail.errors import InputError
-from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet
+from simrail.recording import EncoderSheet, ImuSheet, MagnetometerSheet, RailSensorSheet
 from simrail.resample import LONGEST_GAP_S
 from simrail.scenario.files import Part
 from simrail.scenario.imu_file import ImuFile
@@ -24,6 +24,7 @@ from simrail.signals import (
     MAGNETOMETER_SIGNAL,
     ODOMETER_SIGNAL,
     ODOMETRY_SIGNAL,
+    RAIL_SIGNAL,
     Signal,
 )
 
@@ -132,6 +133,39 @@ class MagnetometerSignalPart(VectorPart):
         return MAGNETOMETER_SIGNAL
 
 
+class RailSignalPart(SignalPart):
+    """``[rail_displacement]``: both rails seen from the IMU's place, along Y and Z of the body.
+
+    At other times than the IMU's they are interpolated by straight lines.
+
+    Attributes
+    ----------
+    sheet : RailSensorSheet
+        Its noise, and the distance of the nominal rails.
+    """
+
+    sheet: RailSensorSheet
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return RAIL_SIGNAL
+
+    @field_validator("sheet")
+    @classmethod
+    def _possible(cls, value: RailSensorSheet) -> RailSensorSheet:
+        for field, most in (("noise_m", 0.1), ("rail_base_m", 2.0)):
+            if not 0.0 < getattr(value, field) <= most:
+                raise InputError(
+                    "is out of range",
+                    field=field,
+                    value=getattr(value, field),
+                    limit=f"> 0, <= {most:g} m",
+                    remedy="give it in metres",
+                )
+        return value
+
+
 class OdometerPart(SignalPart):
     """``[odometer]``: the distance or the speed that the train's own odometer gives, instead of pulses.
 
@@ -216,7 +250,7 @@ class RideFile(Part):
         Local gravity.
     longest_gap_s : float
         Longest gap in a signal that is bridged by a straight line.
-    imu, encoder, magnetometer, odometer, odometry, gaps
+    imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
         Its signals. Without an odometry it is made from encoder or odometer.
     """
 
@@ -228,6 +262,7 @@ class RideFile(Part):
     imu: ImuSignalPart
     encoder: EncoderSignalPart | None = None
     magnetometer: MagnetometerSignalPart | None = None
+    rail_displacement: RailSignalPart | None = None
     odometer: OdometerPart | None = None
     odometry: OdometrySignalPart | None = None
     gaps: GapsPart | None = None

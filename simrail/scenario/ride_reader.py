@@ -81,6 +81,10 @@ def read_ride(path: Path) -> Recording:
         magnetometer = _at(
             reader.frame(spec.magnetometer, "magnetometer"), times, spec.longest_gap_s, "magnetometer", file
         )
+    seen = None
+    if spec.rail_displacement is not None:
+        seen = reader.frame(spec.rail_displacement, "rail_displacement")
+        seen = _at(seen, times, spec.longest_gap_s, "rail_displacement", file)
     if spec.odometry is not None:
         odometry = _at(reader.frame(spec.odometry, "odometry"), times, WAY_GAP_S, "odometry", file)
         source = spec.odometry.source
@@ -116,6 +120,8 @@ def read_ride(path: Path) -> Recording:
         gaps=gaps,
         magnetometer=magnetometer,
         magnetometer_sheet=None if spec.magnetometer is None else spec.magnetometer.sheet,
+        rail_displacement=seen,
+        rail_sensor_sheet=None if spec.rail_displacement is None else spec.rail_displacement.sheet,
     )
     check_recording(recording, file=file)
     check_plausible(recording, file=file)

@@ -85,6 +85,8 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         tables["encoder"] |= {"sheet": asdict(recording.encoder_sheet)}
     if recording.magnetometer_sheet is not None:
         tables["magnetometer"] |= {"sheet": asdict(recording.magnetometer_sheet)}
+    if recording.rail_sensor_sheet is not None:
+        tables["rail_displacement"] |= {"sheet": asdict(recording.rail_sensor_sheet)}
     head = {
         "name": recording.name,
         "track": f"./{TRACK_FILE}",

@@ -20,7 +20,7 @@ from simrail.line_odometry import OdometryName
 from simrail.scenario.axes import Axis, Listed
 from simrail.scenario.files import Part, find, judge, label, parse_toml, read_text
 from simrail.scenario.overrides import override
-from simrail.scenario.sensor_parts import EncoderPart, MagnetometerPart
+from simrail.scenario.sensor_parts import EncoderPart, MagnetometerPart, RailSensorPart
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
 """A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
@@ -168,6 +168,27 @@ class ScorePart(Part):
     metrics: tuple[str, ...] | None = None
 
 
+class GeometryPart(Part):
+    """``[geometry]``: in which wavelength bands, and over which base of twist, rail geometry is scored.
+
+    ``bands`` are those of `simrail.bands` by name; ``own_bands`` are others, name = [shortest, longest], m.
+    """
+
+    bands: tuple[Literal["D0", "D1", "D2", "D3"], ...] = ("D0", "D1", "D2", "D3")
+    own_bands: dict[Name, tuple[Positive, Positive]] = Field(default_factory=dict)
+    twist_base_m: Annotated[float, Field(gt=0.0, le=50.0)] = 3.0
+
+    @field_validator("own_bands")
+    @classmethod
+    def _bands(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        for name, (shortest, longest) in value.items():
+            if name in ("full", "D0", "D1", "D2", "D3"):
+                raise ValueError(f"{name} is a name that is taken; give the band another one")
+            if shortest >= longest:
+                raise ValueError(f"{name} is not (shortest, longest): {[shortest, longest]}")
+        return value
+
+
 class ScenarioFile(Part):
     """The content of a scenario file."""
 
@@ -187,10 +208,12 @@ class ScenarioFile(Part):
     imu: Annotated[list[ImuPart], Field(min_length=1)]
     encoder: EncoderPart | None = None
     magnetometer: MagnetometerPart | None = None
+    rail_sensor: RailSensorPart | None = None
     earth: EarthPart | None = None
     temperature: TemperaturePart | None = None
     estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
     score: ScorePart = ScorePart()
+    geometry: GeometryPart = GeometryPart()
 
     @field_validator("step_s")
     @classmethod

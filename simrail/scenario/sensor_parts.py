@@ -1,4 +1,4 @@
-"""What a person writes of the sensors beside the IMU: ``[encoder]`` and ``[magnetometer]``.
+"""What a person writes of the sensors beside the IMU: ``[encoder]``, ``[magnetometer]``, ``[rail_sensor]``.
 
 Each part makes the specification of its sensor (`spec`); units of the text end here. Whether a sensor fits
 vehicle and ride is judged by `simrail.scenario.check_sensors`.
@@ -16,6 +16,7 @@ from simrail.scenario.files import Part
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.magnetic_surroundings import Steel, Traction
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
+from simrail.sensors.rail_sensor import RailSensorSpec
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -161,4 +162,26 @@ class MagnetometerPart(Part):
                 share=traction.share,
             ),
             steel=None if steel is None else Steel(track_seed=track_seed, **steel.model_dump()),
+        )
+
+
+class RailSensorPart(Part):
+    """``[rail_sensor]``: a sensor beside each IMU that sees both rails from its body.
+
+    ``rail_base_mm`` is the distance of the nominal rails that cross-level is a height over: 1500 mm at full
+    size.
+    """
+
+    noise_mm: Listed[Annotated[float, Field(ge=0.0, lt=100.0)]] = 0.1
+    outlier_fraction: Listed[Annotated[float, Field(ge=0.0, le=0.2)]] = 0.01
+    outlier_mm: Listed[Annotated[float, Field(ge=0.0, lt=1000.0)]] = 5.0
+    rail_base_mm: Listed[Annotated[float, Field(ge=50.0, le=2000.0)]] = 1500.0
+
+    def spec(self) -> RailSensorSpec:
+        """The sensor, with no axis left."""
+        return RailSensorSpec(
+            noise_m=self.noise_mm / 1e3,
+            outlier_fraction=self.outlier_fraction,
+            outlier_m=self.outlier_mm / 1e3,
+            rail_base_m=self.rail_base_mm / 1e3,
         )

@@ -14,11 +14,11 @@ import pandas as pd
 from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.resample import check_stamps
+from simrail.rotation import rotation_matrix
 from simrail.scenario.data_file import column_names, line_of, read_columns
 from simrail.scenario.files import label
 from simrail.scenario.signal_part import DATE_TIMES, SignalPart, VectorPart
 from simrail.signals import TIMES, Quantity
-from simrail.truth import rotation_matrix
 
 
 class SignalReader:

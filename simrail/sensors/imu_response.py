@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from simrail.jit import FloatArray, njit
+from simrail.rotation import rotation_matrix
 from simrail.sensors.grades import REFERENCE_TEMPERATURE_C, ImuGrade, Triad
 from simrail.sensors.imu_noise import Streams
-from simrail.truth import rotation_matrix
 
 _CUBIC = 1.5 * math.sqrt(3.0)
 """u - u^3 has its maximum 2 / (3 sqrt 3) at u = 1 / sqrt 3."""

@@ -20,6 +20,7 @@ import pandas as pd
 from simrail.columns import ATTITUDE, MAGNETIC, RELATIVE_ATTITUDE, RELATIVE_POSITION
 from simrail.errors import InputError
 from simrail.jit import FloatArray
+from simrail.rotation import rotation_matrix
 from simrail.seeds import stream
 from simrail.sensors.magnetic_surroundings import (
     Steel,
@@ -29,7 +30,6 @@ from simrail.sensors.magnetic_surroundings import (
     steel_field,
     traction_field,
 )
-from simrail.truth import rotation_matrix
 
 Vector = tuple[float, float, float]
 

@@ -20,8 +20,8 @@ import numpy as np
 
 from simrail.jit import FloatArray
 from simrail.profile import SpeedProfile
+from simrail.rotation import euler_angles, rotation_matrix
 from simrail.track.laid import LaidTrack
-from simrail.truth import euler_angles, rotation_matrix
 from simrail.vehicle.contact_tables import rest_drops_m
 from simrail.vehicle.force_data import ForceData, pack
 from simrail.vehicle.model import VehicleModel

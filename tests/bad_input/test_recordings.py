@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD
+from simrail.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD, RAIL_DISPLACEMENT
 from simrail.errors import InputError
-from simrail.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording import EncoderSheet, ImuSheet, RailSensorSheet, Recording
 from simrail.recording_check import check_recording
 from simrail.track.design import Straight, TrackDesign
 
@@ -34,6 +34,12 @@ def sound() -> Recording:
         odometry=odometry,
         odometry_source="encoder",
     )
+
+
+def rails_of(recording: Recording) -> pd.DataFrame:
+    """What a rail sensor sees at rest, half a metre above the rails."""
+    seen = pd.DataFrame(0.75, index=recording.imu.index, columns=list(RAIL_DISPLACEMENT))
+    return seen.assign(rail_right_y_m=-0.75, rail_left_z_m=-0.5, rail_right_z_m=-0.5)
 
 
 def with_index(frame: pd.DataFrame, change: Callable[[np.ndarray], None]) -> pd.DataFrame:
@@ -82,6 +88,18 @@ FAULTS: dict[str, tuple[Callable[[Recording], Recording], list[str]]] = {
     "gap": (
         lambda r: replace(r, imu=with_index(r.imu, gap)),
         ["imu.time_s", "not uniform", "sample 600", "5.004 s", "0.004 s"],
+    ),
+    "rail_sensor_without_sheet": (
+        lambda r: replace(r, rail_displacement=rails_of(r)),
+        ["rail_sensor_sheet", "without its sheet", "nominal rails"],
+    ),
+    "rails_in_millimetres": (
+        lambda r: replace(r, rail_displacement=1e3 * rails_of(r), rail_sensor_sheet=RailSensorSheet(1e-4)),
+        ["rail_displacement.rail_left_y_m", "750", "10 m", "millimetres"],
+    ),
+    "rails_at_other_times": (
+        lambda r: replace(r, rail_displacement=rails_of(r).iloc[1:], rail_sensor_sheet=RailSensorSheet(1e-4)),
+        ["rail_displacement", "times"],
     ),
     "wrong_rate": (
         lambda r: replace(r, imu=with_index(r.imu, wrong_rate)),

@@ -251,6 +251,36 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "[magnetometer]\ninclination = 55.0\n\n[encoder]",
         ["magnetometer.inclination", "unknown key", "inclination_deg?"],
     ),
+    "a rail sensor in metres": (
+        "[encoder]",
+        "[rail_sensor]\nrail_base_mm = 1.5\n\n[encoder]",
+        ["rail_sensor.rail_base_mm", "1.5", ">= 50"],
+    ),
+    "a rail sensor with more outliers than values": (
+        "[encoder]",
+        "[rail_sensor]\noutlier_fraction = 1.0\n\n[encoder]",
+        ["rail_sensor.outlier_fraction", "1.0", "<= 0.2"],
+    ),
+    "a band that is none": (
+        "[encoder]",
+        '[geometry]\nbands = ["D4"]\n\n[encoder]',
+        ["geometry.bands", "'D4'", "'D3'"],
+    ),
+    "an own band with the name of another": (
+        "[encoder]",
+        "[geometry.own_bands]\nD1 = [3.0, 30.0]\n\n[encoder]",
+        ["geometry.own_bands", "D1", "taken"],
+    ),
+    "a band from long to short": (
+        "[encoder]",
+        "[geometry.own_bands]\npaper = [7.0, 0.3]\n\n[encoder]",
+        ["geometry.own_bands", "paper", "[7.0, 0.3]"],
+    ),
+    "a twist over nothing": (
+        "[encoder]",
+        "[geometry]\ntwist_base_m = 0.0\n\n[encoder]",
+        ["geometry.twist_base_m", "0.0", "> 0"],
+    ),
     "two rides of one name": (
         "[[imu]]",
         '[[ride]]\nname = "out"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 50.0\n\n[[imu]]',

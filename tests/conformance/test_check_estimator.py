@@ -14,7 +14,7 @@ from estimators.ahrs import Vqf
 from estimators.attitude_ekf import AttitudeEkf
 from estimators.attitude_gda import AttitudeGda
 from estimators.baselines import DesignAngles
-from simrail.columns import ATTITUDE
+from simrail.columns import ATTITUDE, IRREGULARITY
 from simrail.estimate import Estimate, Estimator
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
@@ -22,7 +22,7 @@ from simrail.recording import Recording
 from simrail.scenario.imu_file import load_grade
 from simrail.scenario.track_file import track_by_name
 from simrail.sensors.encoder import EncoderSpec
-from simrail.testing import check_estimator
+from simrail.testing import check_estimator, require_well_formed
 from simrail.truth import Mount
 from simrail.vehicle.kinematic_engine import harmonic, kinematic_truth
 
@@ -226,6 +226,35 @@ class IndefiniteCovariance(Sound):
         covariance = np.tile(np.eye(3), (len(recording.imu), 1, 1))
         covariance[:, 0, 1] = covariance[:, 1, 0] = 2.0
         return replace(super().estimate(recording), covariance=covariance, covariance_of=ATTITUDE)
+
+
+@dataclass(frozen=True)
+class Rails(Sound):
+    """Says something of the rails as well; gauge is left open."""
+
+    fault: str = ""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        places = pd.Index(0.25 * np.arange(40.0, 60.0), name="position_m")
+        geometry = pd.DataFrame(0.0, index=places, columns=list(IRREGULARITY)).assign(gauge_m=np.nan)
+        if self.fault == "hole":
+            geometry.iloc[3, 0] = np.nan
+        elif self.fault == "column":
+            geometry = geometry.rename(columns={"gauge_m": "gauge_mm"})
+        elif self.fault == "step":
+            geometry = geometry.drop(index=12.0)
+        return replace(super().estimate(recording), geometry=geometry)
+
+
+def test_geometry_may_leave_a_quantity_open_but_not_in_places() -> None:
+    check_estimator(Rails(), ride())
+    for fault, words in (
+        ("hole", "not finite in alignment_m, here and there"),
+        ("column", "geometry lacks gauge_m"),
+        ("step", "geometry is not uniform"),
+    ):
+        with pytest.raises(AssertionError, match=words):
+            require_well_formed(Rails(fault).estimate(ride()), ride())
 
 
 class UnsaidCausal(Sound):

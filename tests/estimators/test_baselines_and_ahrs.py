@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from estimators.ahrs import Vqf
-from estimators.baselines import DesignAngles
+from estimators.baselines import DesignAngles, ZeroTrack
 from estimators.quaternions import from_euler, level, to_euler
 from simrail.columns import ATTITUDE
-from simrail.testing import standing
+from simrail.testing import check_estimator, standing
 
 
 def test_design_angles_are_the_tracks(bend: Callable, exactly: Callable) -> None:
@@ -29,6 +30,18 @@ def test_design_angles_use_no_imu(bend: Callable, exactly: Callable) -> None:
     before = DesignAngles().estimate(recording).states
     recording.imu.iloc[:, :] = 0.0
     np.testing.assert_array_equal(DesignAngles().estimate(recording).states, before)
+
+
+def test_zero_track_says_that_the_rails_lie_as_designed(bend: Callable, exactly: Callable) -> None:
+    recording = exactly(bend())
+    estimate = ZeroTrack(step_m=0.5).estimate(recording)
+    geometry = estimate.geometry
+    assert geometry is not None and len(geometry) == 1161 and geometry.index[0] == 10.0
+    assert np.abs(geometry.iloc[:, :3]).max(axis=None) < 1e-12
+    assert geometry["gauge_m"].isna().all()
+    assert (estimate.states["lateral_m"] == 0.2).all() and (estimate.states["vertical_m"] == 0.6).all()
+    short = exactly(bend(), step=40)
+    check_estimator(ZeroTrack(), replace(short, imu_sheet=replace(short.imu_sheet, rate_hz=25.0)))
 
 
 def test_quaternions_agree_with_scipy() -> None:

@@ -9,13 +9,13 @@ import pytest
 
 import scenarios
 from simrail.profile import SpeedProfile
+from simrail.rotation import rotation_matrix
 from simrail.scenario.files import load
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.track.rail_condition import RailCondition
-from simrail.truth import rotation_matrix
 from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.creep_laws import CreepLaw
 from simrail.vehicle.engine import Setup

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from simrail.profile import SpeedProfile
+from simrail.rotation import rotation_matrix
 from simrail.scenario.files import judge, load, shipped
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
@@ -14,7 +15,6 @@ from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.truth import rotation_matrix
 from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.engine import Setup
 from simrail.vehicle.model import LinearContact

@@ -24,8 +24,11 @@ from simrail.scenario.signal_part import SignalPart, VectorPart
 from simrail.scenario.track_file import TrackFile, track_by_name, track_text
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.magnetometer import MagnetometerSpec
+from simrail.sensors.rail_sensor import RailSensorSpec
 from simrail.signals import SIGNALS
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
+from simrail.track.irregularity import Irregularity
+from simrail.track.laid import lay
 from simrail.truth import Mount
 from simrail.vehicle.kinematic_engine import kinematic_truth
 
@@ -53,13 +56,15 @@ def recording() -> Recording:
         grade=load_grade("lord_3dm_gx4_25"),
         encoder=EncoderSpec("wheel", radius_error_sd=1e-3, edge_times=True),
         magnetometer=MagnetometerSpec(),
+        rail_sensor=RailSensorSpec(),
+        rails=lay(track, Irregularity("erri_b176_low", fade_m=20.0), seed=1),
         seed=1,
         draw=0,
     )
 
 
 def assert_same(a: Recording, b: Recording) -> None:
-    for part in ("imu", "odometry", "encoder", "magnetometer", "gaps"):
+    for part in ("imu", "odometry", "encoder", "magnetometer", "rail_displacement", "gaps"):
         left, right = getattr(a, part), getattr(b, part)
         if left is None:
             assert right is None
@@ -70,8 +75,12 @@ def assert_same(a: Recording, b: Recording) -> None:
             assert right.index.name == (None if part == "gaps" else "time_s")
             assert left.dtypes.equals(right.dtypes)
     blank = pd.DataFrame()
-    assert replace(a, imu=blank, odometry=blank, encoder=None, magnetometer=None, gaps=None).__repr__() == (
-        replace(b, imu=blank, odometry=blank, encoder=None, magnetometer=None, gaps=None).__repr__()
+    assert replace(
+        a, imu=blank, odometry=blank, encoder=None, magnetometer=None, rail_displacement=None, gaps=None
+    ).__repr__() == (
+        replace(
+            b, imu=blank, odometry=blank, encoder=None, magnetometer=None, rail_displacement=None, gaps=None
+        ).__repr__()
     )
 
 
@@ -83,6 +92,7 @@ def test_round_trip_is_exact(recording, tmp_path, format):
         f"imu.{format}",
         f"magnetometer.{format}",
         f"odometry.{format}",
+        f"rail_displacement.{format}",
         "ride.toml",
         "track.toml",
     ]
@@ -157,6 +167,7 @@ def test_every_shipped_track_can_be_written(name):
 def test_round_trip_without_an_encoder(recording, tmp_path):
     blind = replace(recording, encoder=None, encoder_sheet=None, odometry_source="truth")
     blind = replace(blind, magnetometer=None, magnetometer_sheet=None)
+    blind = replace(blind, rail_displacement=None, rail_sensor_sheet=None)
     write_ride(blind, tmp_path / "deep" / "ride")
     assert_same(blind, read_ride(tmp_path / "deep" / "ride"))
 

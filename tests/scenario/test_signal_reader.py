@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simrail.errors import InputError
+from simrail.rotation import rotation_matrix
 from simrail.scenario.files import judge, parse_toml
 from simrail.scenario.ride_file import ImuSignalPart
 from simrail.scenario.signal_reader import SignalReader
 from simrail.signals import FORCES, RATES
-from simrail.truth import rotation_matrix
 
 AXES = [
     tuple(sign + letter for sign, letter in zip(signs, letters, strict=True))

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from simrail.profile import SpeedProfile
+from simrail.rotation import rotation_matrix
 from simrail.scenario.files import load
 from simrail.scenario.track_file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
-from simrail.truth import Mount, rotation_matrix
+from simrail.truth import Mount
 from simrail.vehicle.kinematic_engine import harmonic, kinematic_truth, rail_following
 
 MOUNT = Mount("imu", "body", (0.3, -0.2, 0.6))

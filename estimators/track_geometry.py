@@ -1,0 +1,250 @@
+"""What the rails look like, from the trajectory of a body: the four irregularities over the track.
+
+With a sensor that sees the rails from the body, each rail is where the body is plus what the sensor sees: the
+measuring system of Gonzalez-Carbajal et al. 2023 (paper 001), whose camera is numbers here. Without one the
+body itself is the probe: its points that nominally stand on the rails are taken for the rails. For an IMU on
+a wheelset the contact keeps that true but for the wheelset's own play between the rails; for one on a bogie
+or a body the motion of the suspensions stays in as well. Gauge is then not observable.
+
+It has no filter of its own: the trajectory is smoothed before, and wavelength bands are cut out after
+(`simrail.bands`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import ndimage, signal
+from scipy.interpolate import CubicSpline
+
+from simrail.columns import ATTITUDE, IRREGULARITY, IRREGULARITY_SD, RELATIVE_POSITION, require
+from simrail.errors import InputError
+from simrail.estimate import Estimate
+from simrail.jit import FloatArray
+from simrail.recording import Recording
+from simrail.rotation import rotation_matrix
+from simrail.track.elements import RAIL_BASE_M
+
+GAUGE = IRREGULARITY.index("gauge_m")
+FINE = 8
+"""Cells per step in which samples are averaged before the step's own low-pass."""
+
+_REACH = 10
+"""Steps that the low-pass sees on either side."""
+
+_LOW_PASS = signal.firwin(2 * _REACH * FINE + 1, 1.0 / FINE, window=("kaiser", 5.0))
+"""Passes waves longer than 2.5 steps to 0.2 % and stops those shorter than 1.7 to 1 %."""
+
+OUTLIER_SDS = 5.0
+"""Standard deviations of the noise from the running median beyond which a view of the rails is not used."""
+
+
+def track_geometry(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    step_m: float = 0.25,
+    rail_base_m: float | None = None,
+) -> pd.DataFrame:
+    """Irregularities of the rails from a trajectory.
+
+    With A the rotation from body to track frame, y and z the IMU's place in that frame, u_l and u_r the rails
+    seen from the IMU in body axes, and b half the distance of the nominal rails:
+
+        r_l = (0, y, z) + A u_l,     d_l = r_l - (0, b, 0)        (r_r and d_r alike, with -b)
+        alignment        = (d_l,y + d_r,y)/2        cross-level = d_l,z - d_r,z
+        vertical profile = (d_l,z + d_r,z)/2        gauge       = d_l,y - d_r,y
+
+    Without a rail sensor u_l = (0, b - m_y, -m_z), the nominal place of the rail seen from the mount m.
+    For small angles alignment is then y + m_z roll and cross-level 2 b roll (less the mount's own y).
+
+    Parameters
+    ----------
+    estimate : Estimate
+        Its states hold the attitude, ``lateral_m`` and ``vertical_m`` of the IMU; ``position_m`` counts
+        before the odometry's where it is there. Standard deviations (``roll_sd_rad``, ``lateral_sd_m``,
+        ``vertical_sd_m``), or the covariance of these three states, are carried through to first order;
+        without them there are none in the answer.
+    recording : Recording
+        Its odometry, design track, mount, and rail sensor if there is one.
+    step_m : float
+        Distance of the places, whole multiples of it. Samples of the same eighth of a step are averaged,
+        whenever they were taken: in a stop, running backwards, or passing again. Then a low-pass without
+        shift takes off what the step cannot carry.
+    rail_base_m : float, optional
+        Distance 2 b of the nominal rails; that of the rail sensor, or 1.5 m.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Indexed by ``position_m`` (uniform), columns `IRREGULARITY`, and `IRREGULARITY_SD` where known.
+        ``gauge_m`` is NaN throughout without a rail sensor: it is not observable. No rows if the train moved
+        by less than a step. Standard deviations speak of the trajectory and the sensor only, not of what a
+        wheelset does between the rails, nor of an error of the position along the track.
+
+    Raises
+    ------
+    InputError
+        If the states lack a column or a number, or step or base are not positive.
+    """
+    states = estimate.states
+    require(states, (*ATTITUDE, *RELATIVE_POSITION), what="states")
+    sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
+    known_base = RAIL_BASE_M if sheet is None else sheet.rail_base_m
+    base = known_base if rail_base_m is None else rail_base_m
+    for name, value in (("step_m", step_m), ("rail_base_m", base)):
+        if not 0.0 < value < np.inf:
+            raise InputError("is out of range", field=name, value=value, limit="> 0 m")
+    known = states if "position_m" in states.columns else recording.odometry
+    if len(known) != len(states):
+        raise InputError("states are not at the recording's times", field="states", value=len(states))
+    track = recording.track
+    place = np.clip(known["position_m"].to_numpy(dtype=np.float64), track.start_m, track.end_m)
+    values = states[[*ATTITUDE, *RELATIVE_POSITION]].to_numpy(dtype=np.float64)
+    if not (np.isfinite(place).all() and np.isfinite(values).all()):
+        raise InputError("holds a value that is not finite", field="states")
+    frame = track.frame(place)
+    design = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
+    turn = np.swapaxes(design, 1, 2) @ rotation_matrix(values[:, :3])
+    seen = _seen(recording, base)
+    arms = np.einsum("nij,nrj->nri", turn, seen)  # from the IMU to left and right rail, track axes
+    rails = arms[:, :, 1:] + values[:, None, 3:] - np.array([[0.5 * base, 0.0], [-0.5 * base, 0.0]])
+    use, noise_sd = np.ones(len(place), dtype=bool), 0.0
+    if sheet is not None:
+        use, noise_sd = trusted(seen[:, :, 1:].reshape(-1, 4), sheet.noise_m), sheet.noise_m
+    covariance = _covariance(estimate)
+    variance = None if covariance is None else _variance(arms, covariance)[use]
+    found = over_space(place[use], irregularities(rails)[use], step_m=step_m, variance=variance)
+    columns = dict(zip(IRREGULARITY, found.values.T, strict=True))
+    if found.variance is not None:
+        # Of mean and difference of two rails with equal, independent noise.
+        white = found.noise_gain[:, None] * noise_sd**2 * np.array([0.5, 0.5, 2.0, 2.0])
+        sds = np.sqrt(found.variance + white)
+        columns |= dict(zip(IRREGULARITY_SD, sds.T, strict=True))
+    if sheet is None:
+        for name in [column for column in columns if column.startswith("gauge")]:
+            columns[name] = np.full(len(found.position_m), np.nan)
+    return pd.DataFrame(columns, index=pd.Index(found.position_m, name="position_m"))
+
+
+def irregularities(rails: FloatArray) -> FloatArray:
+    """The four of `simrail.columns.IRREGULARITY` (n, 4) from deviations (n, left and right, y and z)."""
+    left, right = rails[:, 0], rails[:, 1]
+    mean, apart = 0.5 * (left + right), left - right
+    return np.column_stack([mean[:, 0], mean[:, 1], apart[:, 1], apart[:, 0]])
+
+
+def _seen(recording: Recording, base_m: float) -> FloatArray:
+    """Rails seen from the IMU, body axes (n, left and right, 3)."""
+    frame = recording.rail_displacement
+    seen = np.zeros((len(recording.imu), 2, 3))
+    if frame is not None:
+        seen[:, :, 1:] = frame.to_numpy(dtype=np.float64).reshape(-1, 2, 2)
+        return seen
+    _, across, height = recording.mount_position_m
+    seen[:, 0, 1], seen[:, 1, 1] = 0.5 * base_m - across, -0.5 * base_m - across
+    seen[:, :, 2] = -height
+    return seen
+
+
+def trusted(seen: FloatArray, noise_m: float) -> np.ndarray:
+    """Which samples (n,) of the views (n, m) are no outliers.
+
+    A sample is dropped if one of its values is more than `OUTLIER_SDS` standard deviations from the median
+    of the five around it: those of the sheet, or, where the rails themselves move more, of that
+    difference (1.4826 times its median).
+    """
+    away = np.abs(seen - ndimage.median_filter(seen, size=(5, 1), mode="nearest"))
+    limit = OUTLIER_SDS * np.maximum(noise_m, 1.4826 * np.median(away, axis=0))
+    return np.asarray((away <= limit).all(axis=1))
+
+
+def _covariance(estimate: Estimate) -> FloatArray | None:
+    """Covariance (n, 3, 3) of roll, lateral and vertical position, where it is known."""
+    names = ("roll_rad", *RELATIVE_POSITION)
+    if estimate.covariance is not None and set(names) <= set(estimate.covariance_of):
+        at = [estimate.covariance_of.index(name) for name in names]
+        return estimate.covariance[:, at][:, :, at]
+    sds = ("roll_sd_rad", "lateral_sd_m", "vertical_sd_m")
+    if not set(sds) <= set(estimate.states.columns):
+        return None
+    squares = np.square(estimate.states[list(sds)].to_numpy(dtype=np.float64))
+    return squares[:, :, None] * np.eye(3)
+
+
+def _variance(arms: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Variance (n, 4) of the irregularities: a turn by d about X moves a rail by d (-arm_z, arm_y)."""
+    n = len(arms)
+    moved = irregularities(np.stack([-arms[:, :, 2], arms[:, :, 1]], axis=-1))
+    slope = np.zeros((n, 4, 3))
+    slope[:, :, 0], slope[:, 0, 1], slope[:, 1, 2] = moved, 1.0, 1.0
+    return np.einsum("nij,njk,nik->ni", slope, covariance, slope)
+
+
+class OverSpace(NamedTuple):
+    """Samples brought from time to uniform places.
+
+    Attributes
+    ----------
+    position_m : ndarray (g,)
+        Whole multiples of the step.
+    values : ndarray (g, m)
+    variance : ndarray (g, m), optional
+        That of the samples there: errors of a trajectory hardly change over a step, no mean lessens them.
+    noise_gain : ndarray (g,)
+        Variance that is left of white noise of variance 1 in the samples; too small over the last few
+        steps at each end, unless the train stood there.
+    """
+
+    position_m: FloatArray
+    values: FloatArray
+    variance: FloatArray | None
+    noise_gain: FloatArray
+
+
+def over_space(
+    place: FloatArray, values: FloatArray, *, step_m: float, variance: FloatArray | None = None
+) -> OverSpace:
+    """Bring samples (n, m) taken at places (n,), in any order, to uniform places.
+
+    They are averaged in cells of an eighth of the step, a cubic spline joins the means at the mean places,
+    and a symmetric low-pass thins the spline out to the step. Over the ten steps at each end it sees the line
+    turned about its end point.
+    """
+    first, last = (np.ceil(place.min() / step_m - 1e-9), np.floor(place.max() / step_m + 1e-9))
+    if last - first < 1:
+        nothing = np.empty((0, values.shape[1]))
+        return OverSpace(np.empty(0), nothing, None if variance is None else nothing, np.empty(0))
+    cell_m = step_m / FINE
+    kinds = np.unique(np.floor(place / cell_m).astype(np.int64), return_inverse=True)[1]
+    at = np.bincount(kinds, place) / np.bincount(kinds)
+    # Two means may be close where the train stood on the border of two cells: make one of both.
+    close = np.diff(at, prepend=-np.inf) < 0.25 * cell_m
+    kinds = (np.arange(len(at)) - np.cumsum(close))[kinds]
+    count = np.bincount(kinds)
+
+    def mean(columns: FloatArray) -> FloatArray:
+        return np.stack([np.bincount(kinds, column) / count for column in columns.T], axis=-1)
+
+    at = mean(place[:, None])[:, 0]
+    position = np.arange(first, last + 1) * step_m
+    fine = first * step_m + cell_m * np.arange((len(position) - 1) * FINE + 1)
+    line = CubicSpline(at, mean(values))(np.clip(fine, at[0], at[-1]))
+    line = _thinned(line, _LOW_PASS, odd=True)
+    density = count * cell_m / np.gradient(at)  # samples per cell; below one where the train is fast
+    spread = np.interp(fine, at, 1.0 / density)[:, None]
+    gain = _thinned(spread, _LOW_PASS**2, odd=False)[:, 0]
+    if variance is not None:
+        means = mean(variance)
+        variance = np.stack([np.interp(position, at, column) for column in means.T], axis=-1)
+    return OverSpace(position, line, variance, np.minimum(gain, 1.0))
+
+
+def _thinned(line: FloatArray, taps: FloatArray, *, odd: bool) -> FloatArray:
+    """Low-pass a line (n, m) and keep every `FINE`-th sample; beyond its ends it is turned or mirrored."""
+    beyond = ((_REACH * FINE, _REACH * FINE), (0, 0))
+    longer = np.pad(line, beyond, mode="reflect", reflect_type="odd" if odd else "even")
+    passed: FloatArray = signal.upfirdn(taps, longer, up=1, down=FINE, axis=0)
+    return passed[2 * _REACH : 2 * _REACH + (len(line) - 1) // FINE + 1]

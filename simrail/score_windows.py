@@ -1,0 +1,73 @@
+"""Windows of a ride and the choice among windows and metrics, for every score alike."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from simrail.errors import InputError
+from simrail.jit import FloatArray
+from simrail.score_metrics import IntArray, Row
+from simrail.score_table import (
+    CURVE_PREFIX,
+    EVERY_CURVE,
+    FIGURE_COLUMNS,
+    METRICS,
+    WINDOWS,
+    as_score_table,
+)
+from simrail.track.design import CURVE, STRAIGHT, TRANSITION, TrackDesign
+
+STANDSTILL_MPS = 0.01
+"""Below this true speed the vehicle counts as standing."""
+
+
+def windows_of(track: TrackDesign, position: FloatArray, speed: FloatArray) -> dict[str, IntArray]:
+    """Sample numbers of every window, from places (n,) on the track and speeds (n,)."""
+    moving = np.abs(speed) >= STANDSTILL_MPS
+    kind = track.kind(position)
+    masks = {
+        "whole": np.ones(len(position), dtype=bool),
+        "straight": moving & (kind == STRAIGHT),
+        "transition": moving & (kind == TRANSITION),
+        "curve": moving & (kind == CURVE),
+        "standstill": ~moving,
+        "moving": moving,
+    }
+    found = {name: np.flatnonzero(mask) for name, mask in masks.items()}
+    in_curve = found["curve"]
+    segments = np.asarray(track.segment(position[in_curve]))
+    for number in np.unique(segments):
+        name = CURVE_PREFIX + track.segment_name(int(number))
+        found[name] = in_curve[segments == number]
+    return found
+
+
+def chosen_windows(found: Mapping[str, IntArray], wanted: Collection[str] | None) -> dict[str, IntArray]:
+    """Those of the windows found that are wanted; all if nothing is said."""
+    if wanted is None:
+        return dict(found)
+    for name in wanted:
+        if name not in WINDOWS and not name.startswith(CURVE_PREFIX):
+            raise InputError(
+                "no such window", value=name, limit="one of " + ", ".join((*WINDOWS, EVERY_CURVE))
+            )
+    every_curve = EVERY_CURVE in wanted
+    return {n: i for n, i in found.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
+
+
+def kept_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
+    """The metrics that are wanted; all if nothing is said."""
+    if wanted is None:
+        return METRICS
+    for name in wanted:
+        if name not in METRICS:
+            raise InputError("no such metric", value=name, limit="one of " + ", ".join(METRICS))
+    return tuple(name for name in METRICS if name in wanted)
+
+
+def table_of(rows: list[Row], *, bands: Sequence[str] = ()) -> pd.DataFrame:
+    """Rows as a score table."""
+    return as_score_table(pd.DataFrame(rows, columns=list(FIGURE_COLUMNS)), bands=bands)

@@ -1,0 +1,158 @@
+"""A sensor that sees both rails from the body: numbers in the place of cameras or lasers, no images.
+
+It gives where each rail passes through the plane across the body at the IMU, seen from the IMU along the Y
+and Z of the body, with white noise and now and then an outlier. The defaults are the order of what cameras
+such as those of paper 001 (Gonzalez-Carbajal et al. 2023) deliver; the size of the outliers is synthetic. Its
+axes are those of the body without error, and it samples with the IMU.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from simrail.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
+from simrail.errors import InputError
+from simrail.jit import FloatArray
+from simrail.rotation import rotation_matrix
+from simrail.seeds import stream
+from simrail.track.elements import RAIL_BASE_M
+from simrail.track.laid import LaidTrack
+
+
+@dataclass(frozen=True)
+class RailSensorSpec:
+    """A sensor of the rails.
+
+    Attributes
+    ----------
+    noise_m : float
+        Standard deviation of each value.
+    outlier_fraction : float
+        Share of the values that are outliers.
+    outlier_m : float
+        Standard deviation of what an outlier adds; synthetic.
+    rail_base_m : float
+        Distance of the two nominal rails, +-rail_base_m/2 beside the track's centre.
+    """
+
+    noise_m: float = 0.1e-3
+    outlier_fraction: float = 0.01
+    outlier_m: float = 5e-3
+    rail_base_m: float = RAIL_BASE_M
+
+
+def sample_rails(
+    motion: pd.DataFrame,
+    times: pd.Index,
+    spec: RailSensorSpec,
+    rails: LaidTrack,
+    *,
+    seed: int,
+    draw: int,
+    name: str,
+) -> pd.DataFrame:
+    """What the sensor gives over a ride.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        True motion of the IMU's mount, columns `simrail.columns.MOTION`, indexed by ``time_s`` (uniform).
+    times : pandas.Index
+        Times of the samples, s.
+    spec : RailSensorSpec
+        The sensor.
+    rails : LaidTrack
+        The rails that the ride was run on.
+    seed, draw : int
+        Seed of the scenario and number of the sensor draw.
+    name : str
+        Name of the IMU: with seed and draw it names the random streams, one for each term.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Indexed by `times`, columns `simrail.columns.RAIL_DISPLACEMENT`, m.
+
+    Raises
+    ------
+    InputError
+        If a value of the specification is impossible.
+    """
+    check_rail_sensor(spec)
+    wanted = times.to_numpy(dtype=np.float64)
+    known = motion.index.to_numpy(dtype=np.float64)
+
+    def at_times(*columns: str) -> FloatArray:
+        return np.column_stack([np.interp(wanted, known, motion[column].to_numpy()) for column in columns])
+
+    position, angles = at_times(*POSITION), at_times(*ATTITUDE)
+    guess = at_times("position_m")[:, 0]
+    left, right = rails_seen(position, angles, guess, rails, base_m=spec.rail_base_m)
+    values = np.column_stack([left, right])
+
+    def term(stem: str) -> np.random.Generator:
+        return stream(seed, "sensor", draw, "rail_sensor", name, stem)
+
+    values += term("white").standard_normal(values.shape) * spec.noise_m
+    struck = term("outlier_place").random(values.shape) < spec.outlier_fraction
+    values += struck * term("outlier_size").standard_normal(values.shape) * spec.outlier_m
+    return pd.DataFrame(values, index=pd.Index(wanted, name="time_s"), columns=list(RAIL_DISPLACEMENT))
+
+
+def rails_seen(
+    position: FloatArray, angles: FloatArray, guess: FloatArray, rails: LaidTrack, *, base_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Where the left and the right rail (n, 2 each: y, z) pass through the plane X = 0 of a body.
+
+    Parameters
+    ----------
+    position, angles : ndarray (n, 3)
+        Global position of the body's point and its roll, pitch and yaw.
+    guess : ndarray (n,)
+        Places s to begin from, within some metres.
+    rails : LaidTrack
+        The rails: each stands at (0, +-base_m/2, 0) plus its deviation in the track frame.
+    base_m : float
+        Distance of the nominal rails.
+    """
+    body = rotation_matrix(angles)
+    found = []
+    for side, first in ((0.5, 0), (-0.5, 2)):
+        s, seen = guess, np.empty((len(guess), 3))
+        for _ in range(4):
+            s = np.clip(s, rails.design.start_m, rails.design.end_m)
+            frame = rails.design.frame(s)
+            track = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
+            place = np.zeros((len(s), 3))
+            place[:, 1:] = rails.rails(s)[:, first : first + 2]
+            place[:, 1] += side * base_m
+            head = frame.position + np.einsum("nij,nj->ni", track, place)
+            seen = np.einsum("nji,nj->ni", body, head - position)
+            # A metre of s carries the rail about a metre along the body: the rest is for the next turn.
+            s = s - seen[:, 0]
+            if np.abs(seen[:, 0]).max() < 1e-6:
+                break
+        found.append(seen[:, 1:])
+    return found[0], found[1]
+
+
+def check_rail_sensor(spec: RailSensorSpec) -> None:
+    """Refuse a sensor that cannot be.
+
+    Raises
+    ------
+    InputError
+        Naming the field.
+    """
+
+    def require(good: bool, field: str, limit: str) -> None:
+        if not good:
+            raise InputError("is impossible", field=field, value=getattr(spec, field), limit=limit)
+
+    require(0.0 <= spec.noise_m < 0.1, "noise_m", "0 to 0.1 m")
+    require(0.0 <= spec.outlier_fraction <= 0.2, "outlier_fraction", "0 to 0.2: beyond it no median helps")
+    require(0.0 <= spec.outlier_m < 1.0, "outlier_m", "0 to 1 m")
+    require(0.05 <= spec.rail_base_m <= 2.0, "rail_base_m", "0.05 to 2 m")
