@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import imufusion
 import numpy as np
 import pandas as pd
 from vqf import VQF
@@ -21,7 +22,7 @@ from simrail.recording import Recording
 class Vqf:
     """VQF (Laidig and Seel 2023) through the `vqf` package, with its own default parameters.
 
-    It stands in for the commercial AHRS that paper 000 compares with. Its estimate of the gyro bias
+    It stands in for the commercial AHRS that Briales et al. 2021 compare with. Its estimate of the gyro bias
     at rest takes long, slow, steady curves for standstill, which spoils yaw at 20 km/h.
 
     Attributes
@@ -77,6 +78,56 @@ class Vqf:
             angles = to_euler(vqf.updateBatch(gyro, force)["quat6D"], start_yaw_rad=0.0)
             # Its heading starts anywhere: turned so that the first sample is the design track's.
             angles[:, 2] += start_yaw - angles[0, 2]
+        return Estimate(
+            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
+            mount=recording.mount,
+        )
+
+
+@dataclass(frozen=True)
+class Imufusion:
+    """The revised Madgwick filter through the `imufusion` package, its rejection of acceleration off.
+
+    A complementary filter with a fixed gain, which the package raises during its first three seconds. The
+    package counts in single precision. Its default convention (north, west, up) is ours with yaw from X.
+
+    Attributes
+    ----------
+    gain : float
+        Speed of the correction towards the accelerometer's vertical: the package's own default.
+    compensated : bool
+        Take the design track's acceleration off the accelerometer first; see `Vqf`.
+    rest_bias : bool
+        Subtract the gyro's mean over the rests so far, as every method does.
+    """
+
+    gain: float = 0.5
+    compensated: bool = False
+    rest_bias: bool = True
+
+    causal = True
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.gain < np.inf:
+            raise InputError("must be a finite number", field="gain", value=self.gain, limit=">= 0")
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate roll, pitch and yaw; yaw starts at the design track's."""
+        gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
+        rates_degps = np.rad2deg(gyro - rest_bias(recording, enabled=self.rest_bias).bias)
+        force_g = gravity_force(recording, compensated=self.compensated) / recording.gravity_mps2
+        ahrs = imufusion.Ahrs()
+        settings = imufusion.AhrsSettings()
+        settings.gain = self.gain
+        ahrs.set_settings(settings)
+        ahrs.set_sample_period(1.0 / recording.imu_sheet.rate_hz)
+        update, quaternion = ahrs.update_no_magnetometer, ahrs.get_quaternion
+        found = np.empty((len(force_g), 4))
+        for k in range(len(force_g)):
+            update(rates_degps[k], force_g[k])
+            found[k] = quaternion()
+        angles = to_euler(found, start_yaw_rad=0.0)
+        angles[:, 2] += float(design_frame(recording, count=1).yaw_rad[0]) - angles[0, 2]
         return Estimate(
             states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
             mount=recording.mount,

@@ -10,6 +10,8 @@ what is neglected is the body's own relative motion.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from simrail.columns import ACCEL
@@ -40,13 +42,33 @@ def design_frame(recording: Recording, *, count: int | None = None) -> TrackFram
     return recording.track.frame(np.clip(position, recording.track.start_m, recording.track.end_m))
 
 
-def track_acceleration(
+class TrackMotion(NamedTuple):
+    """How the track frame moves along with the train, and what that does to what is carried in it; n samples.
+
+    Attributes
+    ----------
+    origin : ndarray (n, 3)
+        Acceleration of the frame's origin, m/s2, components in the track frame.
+    of_y, of_z : ndarray (n, 3)
+        What is added per m of y and of z in the frame, 1/s2.
+    rate : ndarray (n, 3)
+        Angular rate of the frame, rad/s, its own components.
+    """
+
+    origin: FloatArray
+    of_y: FloatArray
+    of_z: FloatArray
+    rate: FloatArray
+
+
+def track_motion(
     recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
-) -> FloatArray:
-    """Acceleration of the IMU's nominal place in the moving track frame (EQUATIONS 1.1 and 2.1).
+) -> TrackMotion:
+    """Motion of the track frame abeam of the IMU (EQUATIONS 1.1 and 2.1).
 
     With k the Darboux curvatures of the track frame per metre of horizontal arc length, k' their
-    derivative, V = ds/dt and A = dV/dt (both signed), and r = (0, r_y, r_z) the IMU's place:
+    derivative, V = ds/dt and A = dV/dt (both signed), a place r = (0, y, z) that is fixed in the frame has
+    the acceleration c = origin + y of_y + z of_z:
 
         w = V k,   alpha = A k + V^2 k'
         c = (A/cos th + V^2 tan th th'/cos th, V^2 k3/cos th, -V^2 k2/cos th)
@@ -57,23 +79,17 @@ def track_acceleration(
     Parameters
     ----------
     recording : Recording
-        Its odometry frame, design track and mount are used; its signals are not.
+        Its odometry frame and design track are used; its signals are not.
     frame : TrackFrame, optional
         `design_frame(recording)`, if it is at hand.
     printed : bool
         Use paper 000, Eqs. 3-6 as they are printed, to show what it costs: k = (roll', pitch', yaw')
         without the coupling of cant and slope, k' = (0, 0, yaw''), no 1/cos th.
-
-    Returns
-    -------
-    ndarray (n, 3)
-        c, m/s2, components in the track frame.
     """
     frame = design_frame(recording) if frame is None else frame
     speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
     speed_rate = recording.odometry["acceleration_mps2"].to_numpy(dtype=np.float64)
     square = speed * speed
-    _, r_y, r_z = recording.mount_position_m
     if printed:
         t, v, h = frame.rates.T
         t1, v1, h1 = 0.0 * t, 0.0 * t, frame.second[:, 2]
@@ -89,10 +105,27 @@ def track_acceleration(
         speed_rate * v + square * v1,
         speed_rate * h + square * h1,
     )
-    c_x = origin[0] + r_y * (square * t * v - a_h) + r_z * (square * t * h + a_v)
-    c_y = origin[1] - r_y * square * (t * t + h * h) + r_z * (square * v * h - a_t)
-    c_z = origin[2] + r_y * (square * v * h + a_t) - r_z * square * (t * t + v * v)
-    return np.column_stack([c_x, c_y, c_z])
+    return TrackMotion(
+        origin=np.column_stack(origin),
+        of_y=np.column_stack([square * t * v - a_h, -square * (t * t + h * h), square * v * h + a_t]),
+        of_z=np.column_stack([square * t * h + a_v, square * v * h - a_t, -square * (t * t + v * v)]),
+        rate=np.column_stack([t, v, h]) * speed[:, None],
+    )
+
+
+def track_acceleration(
+    recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
+) -> FloatArray:
+    """Acceleration of the IMU's nominal place in the moving track frame; see `track_motion`.
+
+    Returns
+    -------
+    ndarray (n, 3)
+        c, m/s2, components in the track frame.
+    """
+    motion = track_motion(recording, frame, printed=printed)
+    _, r_y, r_z = recording.mount_position_m
+    return motion.origin + r_y * motion.of_y + r_z * motion.of_z
 
 
 def gravity_force(

@@ -27,7 +27,8 @@ odometry               ``position_m``, ``speed_mps``, ``acceleration_mps2`` and 
 attitude               ``roll_rad``, ``pitch_rad``, ``yaw_rad`` (global), ``{angle}_sd_rad``
 relative attitude      ``relative_{angle}_rad`` (in the design track frame)
 motion of a mount      position, velocity, attitude, IMU, odometry, ``lateral_m``, ``vertical_m``
-innovations            ``innovation_{x,y,z}_mps2``, ``nis``
+place in the track     ``lateral_m``, ``vertical_m`` and their ``..._sd_m``
+innovations            ``innovation_{x,y,z}_mps2``, ``innovation_{x,y,z}_radps``, ``nis``
 rail irregularity      ``alignment_m``, ``vertical_profile_m``, ``cross_level_m``, ``gauge_m``,
                        indexed by ``position_m``
 scores                 `simrail.score_table.SCORE_COLUMNS`: one row per quantity, band, reference,

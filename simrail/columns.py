@@ -38,6 +38,7 @@ VELOCITY = ("velocity_x_mps", "velocity_y_mps", "velocity_z_mps")
 ODOMETRY = ("position_m", "speed_mps", "acceleration_mps2")
 ODOMETRY_SD = ("position_sd_m", "speed_sd_mps", "acceleration_sd_mps2")
 RELATIVE_POSITION = ("lateral_m", "vertical_m")
+RELATIVE_POSITION_SD = ("lateral_sd_m", "vertical_sd_m")
 ENCODER = ("pulse_count",)
 EDGE_TIME = "edge_time_s"
 RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
@@ -45,6 +46,7 @@ MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
 MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
 GYRO_BIAS = ("gyro_bias_x_radps", "gyro_bias_y_radps", "gyro_bias_z_radps")
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
+RATE_INNOVATION = ("innovation_x_radps", "innovation_y_radps", "innovation_z_radps")
 IRREGULARITY = ("alignment_m", "vertical_profile_m", "cross_level_m", "gauge_m")
 IRREGULARITY_SD = ("alignment_sd_m", "vertical_profile_sd_m", "cross_level_sd_m", "gauge_sd_m")
 
@@ -67,6 +69,8 @@ _TABLE = [
     Column("acceleration_sd_mps2", "m/s2", "track", "standard deviation of acceleration_mps2"),
     Column("lateral_m", "m", "track", "lateral position r_y of the mount, positive left"),
     Column("vertical_m", "m", "track", "vertical position r_z of the mount above the design rail plane"),
+    Column("lateral_sd_m", "m", "track", "standard deviation of lateral_m"),
+    Column("vertical_sd_m", "m", "track", "standard deviation of vertical_m"),
     Column("pulse_count", "1", "-", "signed encoder counts since the start"),
     Column("edge_time_s", "s", "-", "time of the last edge that the encoder passed; optional"),
     Column("magnetic_{axis}_t", "T", "body", "magnetic flux density along the axis"),
@@ -76,7 +80,8 @@ _TABLE = [
     Column("rail_right_z_m", "m", "body", "right rail seen from the IMU's place, along Z"),
     Column("gyro_bias_{axis}_radps", "rad/s", "body", "estimated gyro bias"),
     Column("innovation_{axis}_mps2", "m/s2", "body", "measured minus predicted specific force"),
-    Column("nis", "1", "-", "normalised innovation squared"),
+    Column("innovation_{axis}_radps", "rad/s", "body", "measured minus predicted angular rate"),
+    Column("nis", "1", "-", "normalised innovation squared of all innovations of the sample together"),
     Column("alignment_m", "m", "track", "mean lateral deviation of the rails, positive left"),
     Column("vertical_profile_m", "m", "track", "mean vertical deviation of the rails, positive up"),
     Column("cross_level_m", "m", "track", "left minus right rail height"),

@@ -30,7 +30,8 @@ class Estimate:
     mount : str
         Name of the IMU that the states speak of.
     innovations : pandas.DataFrame, optional
-        Indexed by ``time_s``; columns ``simrail.columns.INNOVATION``.
+        Indexed by ``time_s``; columns ``simrail.columns.INNOVATION``, and ``RATE_INNOVATION`` where the
+        method predicts the gyro as well.
     covariance : ndarray (n, m, m), optional
         Covariance of the states named in `covariance_of`.
     covariance_of : tuple of str

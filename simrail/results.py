@@ -27,7 +27,18 @@ from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.score_table import aggregate
 from simrail.watcher import Watcher
 
-PACKAGES = ("simrail", "exudyn", "numpy", "scipy", "pandas", "numba", "pyarrow", "filterpy", "vqf")
+PACKAGES = (
+    "simrail",
+    "exudyn",
+    "numpy",
+    "scipy",
+    "pandas",
+    "numba",
+    "pyarrow",
+    "filterpy",
+    "vqf",
+    "imufusion",
+)
 MANIFEST = "manifest.json"
 
 

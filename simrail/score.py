@@ -103,7 +103,9 @@ def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Refer
     position = motion["position_m"].to_numpy()
     frame = recording.track.frame(position)
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
-    return Reference(motion, design, windows_of(recording.track, position, motion["speed_mps"].to_numpy()))
+    time = recording.imu.index.to_numpy(dtype=np.float64)
+    found = windows_of(recording.track, position, motion["speed_mps"].to_numpy(), time_s=time)
+    return Reference(motion, design, found)
 
 
 def score(

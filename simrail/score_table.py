@@ -77,7 +77,7 @@ FULL = "full"
 """The band of what no filter has cut."""
 BANDS = (FULL, *_STANDARD_BANDS)
 REFERENCES = ("truth", "design")
-WINDOWS = ("whole", "straight", "transition", "curve", "standstill", "moving")
+WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 OK = "ok"
 NO_SAMPLES = "no samples"

@@ -24,8 +24,17 @@ STANDSTILL_MPS = 0.01
 """Below this true speed the vehicle counts as standing."""
 
 
-def windows_of(track: TrackDesign, position: FloatArray, speed: FloatArray) -> dict[str, IntArray]:
-    """Sample numbers of every window, from places (n,) on the track and speeds (n,)."""
+CROP_S = 2.0
+"""What the window ``cropped`` leaves out at either end, as Briales et al. 2021 (section 7.1) do."""
+
+
+def windows_of(
+    track: TrackDesign, position: FloatArray, speed: FloatArray, *, time_s: FloatArray | None = None
+) -> dict[str, IntArray]:
+    """Sample numbers of every window, from places (n,) on the track, speeds (n,) and times (n,).
+
+    Without times there is no window ``cropped``.
+    """
     moving = np.abs(speed) >= STANDSTILL_MPS
     kind = track.kind(position)
     masks = {
@@ -36,6 +45,8 @@ def windows_of(track: TrackDesign, position: FloatArray, speed: FloatArray) -> d
         "standstill": ~moving,
         "moving": moving,
     }
+    if time_s is not None:
+        masks["cropped"] = (time_s >= time_s[0] + CROP_S) & (time_s <= time_s[-1] - CROP_S)
     found = {name: np.flatnonzero(mask) for name, mask in masks.items()}
     in_curve = found["curve"]
     segments = np.asarray(track.segment(position[in_curve]))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.columns import COLUMNS, INNOVATION, IRREGULARITY, IRREGULARITY_SD
+from simrail.columns import COLUMNS, INNOVATION, IRREGULARITY, IRREGULARITY_SD, RATE_INNOVATION
 from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
 from simrail.rest import at_rest_initially, rest_periods
@@ -148,7 +148,8 @@ def require_well_formed(estimate: Estimate, recording: Recording) -> None:
     sds = [name for name in estimate.states if "_sd_" in str(name)]
     assert (estimate.states[sds].to_numpy() >= 0.0).all(), "a standard deviation is negative"
     if estimate.innovations is not None:
-        assert set(estimate.innovations) <= set(INNOVATION), "innovations has other columns than INNOVATION"
+        known = {*INNOVATION, *RATE_INNOVATION}
+        assert set(estimate.innovations) <= known, "innovations has other columns than INNOVATION"
     if estimate.covariance is not None:
         _require_covariance(estimate, len(index))
     if estimate.geometry is not None:

@@ -192,10 +192,12 @@ def test_debiased_yaw_has_its_initial_offset_removed_and_keeps_its_drift() -> No
 def test_windows_follow_the_track_and_the_true_speed() -> None:
     motion = ride()
     n = len(motion)
+    time = motion.index.to_numpy()
     position = motion["position_m"].to_numpy()
     moving = motion["speed_mps"].to_numpy() > 0.0
     masks = {
         "whole": np.ones(n, bool),
+        "cropped": (time >= time[0] + 2.0) & (time <= time[-1] - 2.0),
         "standstill": ~moving,
         "moving": moving,
         "straight": moving & ((position < 100.0) | (position >= 400.0)),

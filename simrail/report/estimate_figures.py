@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from simrail.columns import ATTITUDE, ATTITUDE_SD, INNOVATION
+from simrail.columns import ATTITUDE, ATTITUDE_SD, COLUMNS, INNOVATION, RATE_INNOVATION
 from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
@@ -70,18 +70,19 @@ def innovation_figure(recording: Recording, estimate: Estimate) -> str:
         # Innovations may come at fewer times than the samples: an update that was left out has none.
         x = np.interp(estimate.innovations.index.to_numpy(), times, _axis(recording))
         bins = Bins(x, bins=500)
-        names = [name for name in INNOVATION if name in estimate.innovations]
+        names = [name for name in (*RATE_INNOVATION, *INNOVATION) if name in estimate.innovations]
         figure, axes = panels([1.0] * len(names), top_in=0.15)
         for axis, name in zip(axes, names, strict=True):
             values = np.nan_to_num(estimate.innovations[name].to_numpy(dtype=np.float64))
             found = bins.envelope(values)
             axis.fill_between(found.x, found.low, found.high, color="#009E73", alpha=0.28, lw=0)
             axis.plot(found.x, found.mean, color="#009E73", lw=1.1)
-            word = "NIS" if name == "nis" else f"innov. {name.split('_')[1].upper()}\nm/s\u00b2"
+            unit = COLUMNS[name].unit.replace("s2", "s\u00b2")
+            word = "NIS" if name == "nis" else f"innov. {name.split('_')[1].upper()}\n{unit}"
             axis.set_ylabel(word, fontsize=8.2)
             pad_limits(axis, np.percentile(found.low, 1.0), np.percentile(found.high, 99.0))
         _finish(axes, recording, x)
-        return to_svg(figure, description="Innovations: measured minus predicted specific force")
+        return to_svg(figure, description="Innovations: measured minus predicted signals")
 
 
 def _axis(recording: Recording) -> FloatArray:

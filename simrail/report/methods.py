@@ -21,7 +21,16 @@ _COLOURS = {
 }
 _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
-_ACRONYMS = {"ekf": "EKF", "gda": "GDA", "vqf": "VQF", "ahrs": "AHRS", "kf": "KF", "imu": "IMU"}
+_SPELLED = {
+    "sabatini": "Sabatini",
+    "yuan": "Yuan",
+    "ekf": "EKF",
+    "gda": "GDA",
+    "vqf": "VQF",
+    "ahrs": "AHRS",
+    "kf": "KF",
+    "imu": "IMU",
+}
 
 
 @dataclass(frozen=True)
@@ -57,7 +66,7 @@ class MethodStyle:
 def readable(name: str) -> str:
     """Name of a method in words: ``"ekf_compensated"`` becomes ``"EKF compensated"``."""
     head, bracket, tail = name.partition("[")
-    words = " ".join(_ACRONYMS.get(word, word) for word in head.split("_"))
+    words = " ".join(_SPELLED.get(word, word) for word in head.split("_"))
     return words + bracket + tail
 
 

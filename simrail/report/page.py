@@ -20,6 +20,7 @@ from simrail.example import CellResult
 from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.findings import Finding, findings
 from simrail.report.methods import MethodStyle, method_styles
+from simrail.report.paper_000.section import paper_view
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.provenance import facts, parts
 from simrail.report.ride_figures import direction_of, imu_figure, odometry_figure, speed_figure
@@ -96,6 +97,9 @@ def write_report(
     """
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
+    paper = None
+    if scenario.spec.paper == "briales_2021":
+        paper = paper_view(all_cases, methods(scenario), styles, examples)
     rides = [
         _ride(example, all_cases, styles, scenario.spec.rail_condition) for example in examples[:MOST_RIDES]
     ]
@@ -112,6 +116,7 @@ def write_report(
         facts=facts(manifest),
         parts=parts(scenario, cells, examples),
         styles=styles,
+        paper=paper,
         tracks=_tracks(examples),
         rides=rides,
         rides_left_out=max(len(examples) - MOST_RIDES, 0),

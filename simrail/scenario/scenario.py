@@ -190,9 +190,13 @@ class GeometryPart(Part):
 
 
 class ScenarioFile(Part):
-    """The content of a scenario file."""
+    """The content of a scenario file.
+
+    ``paper`` names the publication whose tables and figures the report sets beside the scenario's own.
+    """
 
     title: str
+    paper: Literal["briales_2021"] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)]
     track: Listed[str]
     vehicle: Listed[str]

@@ -330,7 +330,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "a window that is none": (
         "[encoder]",
         '[score]\nwindows = ["curves"]\n\n[encoder]',
-        ["score.windows[0]", "'curves'", "whole, straight"],
+        ["score.windows[0]", "'curves'", "whole, cropped"],
     ),
     "a metric that is none": (
         "[encoder]",

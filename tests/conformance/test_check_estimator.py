@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimators.ahrs import Vqf
+from estimators.ahrs import Imufusion, Vqf
 from estimators.attitude_ekf import AttitudeEkf
 from estimators.attitude_gda import AttitudeGda
 from estimators.baselines import DesignAngles
+from estimators.trajectory_smoother import TrajectorySmoother
 from simrail.columns import ATTITUDE, IRREGULARITY
 from simrail.estimate import Estimate, Estimator
 from simrail.measure import measure
@@ -52,12 +53,22 @@ OURS = [
     AttitudeEkf(compensated=False),
     AttitudeEkf(tuning="paper_final"),
     AttitudeEkf(tuning="paper_initial", process_noise="per_step", rest_bias=False),
+    AttitudeEkf(tuning="paper_final", process_noise="per_step", rest_bias=False),
     AttitudeEkf(printed=True),
+    AttitudeEkf(compensated=False, doubt=100.0),
     AttitudeGda(),
+    AttitudeGda(tuning="paper", rest_bias=False),
+    AttitudeGda(printed=True),
     AttitudeGda(compensated=False, tuning="paper"),
     DesignAngles(),
     Vqf(),
     Vqf(compensated=True),
+    Imufusion(),
+    Imufusion(compensated=True, rest_bias=False),
+    TrajectorySmoother(),
+    TrajectorySmoother(with_covariance=False),
+    TrajectorySmoother(smoothed=False),
+    TrajectorySmoother(smoothed=False, printed=True, rest_bias=False),
 ]
 
 
@@ -66,9 +77,30 @@ def test_ours_pass(estimator: Estimator) -> None:
     check_estimator(estimator, ride())
 
 
-@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda(), Vqf()], ids=["ekf", "gda", "vqf"])
+BACKWARDS = {
+    "ekf": AttitudeEkf(),
+    "gda": AttitudeGda(),
+    "vqf": Vqf(),
+    "imufusion": Imufusion(),
+    "trajectory": TrajectorySmoother(),
+    "trajectory_filter": TrajectorySmoother(smoothed=False),
+}
+
+
+@pytest.mark.parametrize("estimator", BACKWARDS.values(), ids=list(BACKWARDS))
 def test_ours_pass_backwards_and_with_a_perfect_imu(estimator: Estimator) -> None:
     check_estimator(estimator, ride(-1, "ideal"))
+
+
+def test_a_smoother_that_says_it_is_causal_is_caught() -> None:
+    """The trajectory smoother does look ahead."""
+
+    @dataclass(frozen=True)
+    class Liar(TrajectorySmoother):
+        causal = True
+
+    with pytest.raises(AssertionError, match="sees_no_future"):
+        check_estimator(Liar(), ride())
 
 
 def test_ours_pass_without_an_encoder() -> None:

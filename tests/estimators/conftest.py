@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from scipy.interpolate import PPoly
 
+from estimators.odometry import CurveMatchedOdometry
 from simrail.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
@@ -175,6 +176,68 @@ def record_bogie(speed_kmh: float, direction: int, draw: int) -> Recording:
         seed=1,
         draw=draw,
     )
+
+
+METRO_AT = {"axle": AXLE_AT, "frame": Mount("frame", "frame", (0.0, 0.0, 0.6))}
+
+
+@lru_cache
+def metro_truth(speed_kmh: float, direction: int) -> Truth:
+    """The bogie's ride by the compiled engine."""
+    start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
+    return simulate(
+        Ride(
+            name="trajectory",
+            track=track_by_name("condequinto_olivar"),
+            irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 40.0),
+            track_seed=1,
+            vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
+            profile=SpeedProfile(start, end, speed_kmh / 3.6),
+            engine="compiled",
+        )
+    )
+
+
+@lru_cache(maxsize=4)
+def record_metro(speed_kmh: float, direction: int, mount: str, draw: int) -> Recording:
+    """That ride as recorded, with curve-matched odometry."""
+    recording = measure(
+        metro_truth(speed_kmh, direction),
+        name=f"metro {mount} {speed_kmh:g} km/h {direction:+d}",
+        mount=METRO_AT[mount],
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("front.left", radius_error_sd=0.001),
+        seed=1,
+        draw=draw,
+    )
+    odometry = CurveMatchedOdometry(smoothed=True).estimate(recording).states
+    return recording.with_odometry(odometry, "curve_matched")
+
+
+@pytest.fixture
+def metro_recording() -> Callable[..., Recording]:
+    return record_metro
+
+
+@pytest.fixture
+def metro_motion() -> Callable[..., pd.DataFrame]:
+    """True motion of a mount on that ride."""
+
+    def motion(speed_kmh: float, direction: int, mount: str) -> pd.DataFrame:
+        return metro_truth(speed_kmh, direction).motion(METRO_AT[mount])
+
+    return motion
+
+
+@pytest.fixture
+def line_exactly() -> Callable[..., tuple[Recording, pd.DataFrame]]:
+    """The kinematic ride over the line without any sensor, and its true motion."""
+
+    def record(speed_kmh: float, direction: int) -> tuple[Recording, pd.DataFrame]:
+        recording = record_exactly(line_truth(speed_kmh, direction))
+        return recording, line_motion(speed_kmh, direction).loc[recording.imu.index]
+
+    return record
 
 
 @pytest.fixture

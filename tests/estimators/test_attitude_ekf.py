@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimators.attitude_ekf import AttitudeEkf
-from simrail.columns import ATTITUDE, ATTITUDE_SD
+from simrail.columns import ACCEL, ATTITUDE, ATTITUDE_SD
 from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.recording import Recording
@@ -127,6 +127,17 @@ def test_given_noise_replaces_the_tunings(noisy: Recording) -> None:
     np.testing.assert_allclose(paper.states, other.states, rtol=1e-12)  # 1e-3 / Ts
 
 
+def test_a_force_that_is_not_gravitys_size_is_doubted(noisy: Recording) -> None:
+    force = noisy.imu[list(ACCEL)].to_numpy()
+    excess = np.linalg.norm(force, axis=1) - noisy.gravity_mps2
+    plain = AttitudeEkf(compensated=False)._arrays(noisy)[0].noise
+    doubted = AttitudeEkf(compensated=False, doubt=50.0)._arrays(noisy)[0].noise
+    np.testing.assert_allclose(
+        doubted - plain, np.tile(50.0 * excess[:, None] ** 2, 3), rtol=1e-9, atol=1e-12
+    )
+    assert np.ptp(excess) > 0.1
+
+
 @pytest.mark.parametrize(
     ("options", "named"),
     [
@@ -137,6 +148,7 @@ def test_given_noise_replaces_the_tunings(noisy: Recording) -> None:
         ({"start_sd_rad": -1.0}, "start_sd_rad"),
         ({"gyro_intensity_rad2ps": float("nan")}, "gyro_intensity_rad2ps"),
         ({"vibration": float("inf")}, "vibration"),
+        ({"doubt": -1.0}, "doubt"),
     ],
 )
 def test_bad_options_are_refused_by_name(options: dict, named: str) -> None:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimators.ahrs import Vqf
+from estimators.ahrs import Imufusion, Vqf
 from estimators.baselines import DesignAngles, ZeroTrack
 from estimators.quaternions import from_euler, level, to_euler
 from simrail.columns import ATTITUDE
+from simrail.errors import InputError
 from simrail.testing import check_estimator, standing
 
 
@@ -89,3 +90,23 @@ def test_vqf_starts_at_the_designs_yaw(bend: Callable, exactly: Callable) -> Non
     recording.imu.iloc[:, 3:] = np.array([2.0, -3.0, 9.0])
     frame = recording.track.frame(recording.odometry["position_m"].iloc[:1])
     assert Vqf().estimate(recording).states["yaw_rad"].iloc[0] == frame.yaw_rad[0]
+
+
+def test_imufusion_finds_attitude_and_heading_in_our_convention(
+    bend: Callable, exactly: Callable, true_angles: Callable
+) -> None:
+    truth = bend()
+    recording = exactly(truth)
+    true = true_angles(truth, recording)
+    error = Imufusion(compensated=True).estimate(recording).states[list(ATTITUDE)].to_numpy() - true
+    # Exact signals: what is left is single precision, and first-order integration.
+    assert np.degrees(np.abs(error)).max() < 0.2
+    assert np.degrees(np.ptp(true[:, 2])) > 20.0
+    plain = Imufusion().estimate(recording).states["roll_rad"].to_numpy() - true[:, 0]
+    assert np.degrees(np.abs(plain)).max() > 1.0
+
+
+def test_imufusion_refuses_a_gain_that_is_none() -> None:
+    for gain in (-0.1, np.nan, np.inf):
+        with pytest.raises(InputError, match="gain"):
+            Imufusion(gain=gain)

@@ -1,0 +1,201 @@
+"""Compiled backward pass of the trajectory smoother: modified Bryson-Frazier, without any inverse.
+
+It uses what `estimators.kernels.trajectory.trajectory_filter` left behind and replaces it, in place: a ride
+of an hour then needs no second copy of its covariances. It equals the Rauch-Tung-Striebel smoother because
+the transition is linear.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimators.kernels.trajectory import WIDTH, mirror
+from estimators.kernels.trajectory_equations import (
+    PITCH,
+    PITCH_RATE,
+    ROLL,
+    ROLL_RATE,
+    ROWS,
+    STATES,
+    YAW,
+    YAW_RATE,
+    Y,
+    Z,
+    measured,
+    misprint,
+)
+from simrail.jit import FloatArray, njit, njit_borrowed
+
+
+@njit_borrowed
+def jacobian_rows(x: FloatArray, j: FloatArray, rows: FloatArray) -> None:
+    """Whole rows (8, 16) from `measured`'s part; what is always zero or one must stand there already."""
+    rows[0, PITCH], rows[0, YAW_RATE] = -x[YAW_RATE], -x[PITCH]
+    rows[1, ROLL], rows[1, YAW_RATE] = x[YAW_RATE], x[ROLL]
+    rows[2, ROLL], rows[2, PITCH_RATE] = -x[PITCH_RATE], -x[ROLL]
+    rows[3, PITCH], rows[3, YAW] = j[0, 0], j[0, 1]
+    rows[4, ROLL], rows[4, YAW] = j[1, 0], j[1, 1]
+    rows[5, ROLL], rows[5, PITCH] = j[2, 0], j[2, 1]
+    for r in range(3):
+        for i in range(6):
+            rows[3 + r, Y + i] = j[r, 2 + i]
+
+
+@njit_borrowed
+def transpose_predict(lam: FloatArray, dt: float) -> None:
+    """lam <- F' lam in place."""
+    half = 0.5 * dt * dt
+    for a in range(0, 6, 2):
+        lam[a + 1] += dt * lam[a]
+    for a in range(6, 12, 3):
+        lam[a + 2] += dt * lam[a + 1] + half * lam[a]
+        lam[a + 1] += dt * lam[a]
+
+
+@njit_borrowed
+def information_predict(info: FloatArray, dt: float) -> None:
+    """Lam <- F' Lam F in place."""
+    half = 0.5 * dt * dt
+    width = info.shape[1]
+    for a in range(0, 6, 2):
+        for i in range(width):
+            info[a + 1, i] += dt * info[a, i]
+    for a in range(6, 12, 3):
+        for i in range(width):
+            info[a + 2, i] += dt * info[a + 1, i] + half * info[a, i]
+        for i in range(width):
+            info[a + 1, i] += dt * info[a, i]
+    for i in range(12):
+        info[i, 1] += dt * info[i, 0]
+        info[i, 3] += dt * info[i, 2]
+        info[i, 5] += dt * info[i, 4]
+        info[i, 8] += dt * info[i, 7] + half * info[i, 6]
+        info[i, 7] += dt * info[i, 6]
+        info[i, 11] += dt * info[i, 10] + half * info[i, 9]
+        info[i, 10] += dt * info[i, 9]
+    mirror(info)
+
+
+@njit_borrowed
+def give_back(info: FloatArray, h: FloatArray, gain: FloatArray, inverse: float, v: FloatArray) -> None:
+    """Lam <- (I - h K') Lam (I - K h') + h h'/s in place, as Lam - h w' - w h'."""
+    width = info.shape[1]
+    for i in range(width):
+        v[i] = 0.0
+    for c in range(12):
+        k = gain[c]
+        for i in range(width):
+            v[i] += k * info[c, i]
+    square = inverse
+    for c in range(12):
+        square += gain[c] * v[c]
+    for i in range(width):
+        v[i] -= 0.5 * square * h[i]
+    for r in range(12):
+        a, b = h[r], v[r]
+        for i in range(width):
+            info[r, i] -= a * v[i] + b * h[i]
+
+
+@njit_borrowed
+def shrink(
+    info: FloatArray, p: FloatArray, work: FloatArray, v: FloatArray, packed: FloatArray, k: int
+) -> None:
+    """Row k of ``packed`` becomes P - P Lam P."""
+    width = p.shape[1]
+    for r in range(12):
+        for i in range(width):
+            work[r, i] = 0.0
+        for c in range(12):
+            a = info[r, c]
+            for i in range(width):
+                work[r, i] += a * p[c, i]
+    at = 0
+    for r in range(12):
+        for i in range(width):
+            v[i] = 0.0
+        for c in range(12):
+            a = p[r, c]
+            for i in range(width):
+                v[i] += a * work[c, i]
+        for c in range(r, 12):
+            packed[k, at] -= v[c]
+            at += 1
+
+
+@njit_borrowed
+def unpack(packed: FloatArray, k: int, p: FloatArray) -> None:
+    """Row k of ``packed`` (n, 78) as a full matrix."""
+    at = 0
+    for i in range(12):
+        for c in range(i, 12):
+            p[i, c] = packed[k, at]
+            p[c, i] = packed[k, at]
+            at += 1
+
+
+@njit
+def trajectory_back(
+    track: FloatArray,
+    slips: FloatArray,
+    step_s: float,
+    gravity: float,
+    gains: FloatArray,
+    scaled: FloatArray,
+    states: FloatArray,
+    covariance: FloatArray,
+    with_covariance: bool,
+) -> None:
+    """Turn predicted states and covariances into smoothed ones.
+
+    Backwards through the updates of each sample, m = 8..1, and then through F:
+
+        lam <- lam - J_m' (K_m' lam + e_m/s_m),   Lam <- (I - J_m' K_m') Lam (I - K_m J_m) + J_m' J_m/s_m
+        x = x^- - P^- lam,                        P = P^- - P^- Lam P^-
+        lam <- F' lam,                            Lam <- F' Lam F
+
+    Parameters
+    ----------
+    track, slips, step_s, gravity
+        As the filter had them: the Jacobian is made again, which is cheaper than to fetch it.
+    gains, scaled : ndarray (n, 8, 12), (n, 8, 2)
+        From the filter.
+    states, covariance : ndarray (n, 12), (n, 78), in and out
+        The filter's ``before`` and ``before_covariance``; replaced by the smoothed ones.
+    with_covariance : bool
+        False leaves ``covariance`` as it is, the predicted one.
+    """
+    lam, v, out = np.zeros(STATES), np.zeros(WIDTH), np.zeros(STATES)
+    g, j, rows = np.zeros(6), np.zeros((3, 8)), np.zeros((ROWS, WIDTH))
+    info, p, work = np.zeros((STATES, WIDTH)), np.zeros((STATES, WIDTH)), np.zeros((STATES, WIDTH))
+    rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = rows[6, Y] = rows[7, Z] = 1.0
+    for k in range(states.shape[0] - 1, -1, -1):
+        x = states[k]
+        measured(x, track, k, gravity, g, j)
+        if slips.shape[0] > 0:
+            misprint(x, track, slips, k, j)
+        jacobian_rows(x, j, rows)
+        for m in range(ROWS - 1, -1, -1):
+            dot = scaled[k, m, 0]
+            for i in range(STATES):
+                dot += gains[k, m, i] * lam[i]
+            for i in range(STATES):
+                lam[i] -= rows[m, i] * dot
+            if with_covariance:
+                give_back(info, rows[m], gains[k, m], scaled[k, m, 1], v)
+        out[:] = 0.0
+        at = 0
+        for i in range(STATES):
+            out[i] += covariance[k, at] * lam[i]
+            at += 1
+            for c in range(i + 1, STATES):
+                out[i] += covariance[k, at] * lam[c]
+                out[c] += covariance[k, at] * lam[i]
+                at += 1
+        if with_covariance:
+            unpack(covariance, k, p)
+            shrink(info, p, work, v, covariance, k)
+            information_predict(info, step_s)
+        for i in range(STATES):
+            states[k, i] -= out[i]
+        transpose_predict(lam, step_s)

@@ -1,0 +1,268 @@
+"""Model of the trajectory smoother: what its kernels take of a recording, and the same filter by filterpy.
+
+Gonzalez-Carbajal et al. 2023 (paper 001), sections 2 and 3 and appendix 1, with the errata of EQUATIONS 1.3.
+The state is
+
+    x = [roll, roll', pitch, pitch', yaw, yaw', y, y', y'', z, z', z'']
+
+with the angles of the body in the global frame, its place (0, y, z) in the design track frame, ' for d/dt.
+
+Not here: the loops (`estimators.kernels.trajectory`), the noise (`estimators.trajectory_noise`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter, rts_smoother
+from scipy.linalg import block_diag
+
+from estimators.compensation import design_frame, track_motion
+from estimators.kernels.trajectory import PACKED
+from estimators.kernels.trajectory_equations import STATES
+from estimators.rest_bias import rest_bias
+from estimators.trajectory_noise import Hyperparameters
+from simrail.columns import ACCEL, GYRO
+from simrail.jit import FloatArray
+from simrail.recording import Recording
+from simrail.track.frame import TrackFrame
+
+
+class Model(NamedTuple):
+    """What the filter takes, in its order; shapes as in `estimators.kernels.trajectory.trajectory_filter`."""
+
+    signals: FloatArray
+    track: FloatArray
+    slips: FloatArray
+    process: FloatArray
+    noise: FloatArray
+    virtual: FloatArray
+    start: FloatArray
+    start_variance: FloatArray
+    step_s: float
+    gravity: float
+
+
+class Found(NamedTuple):
+    """What a backend finds; n samples.
+
+    Attributes
+    ----------
+    states : ndarray (n, 12)
+        Smoothed or filtered.
+    covariance : ndarray (n, 78) or (0, 78)
+        Upper triangles of their covariances, row by row; of no rows if not wanted.
+    innovations : ndarray (n, 7)
+        Measured minus predicted rates and forces, and their normalised innovation squared.
+    log_likelihood : float
+        Of all measurements, the virtual ones among them.
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    innovations: FloatArray
+    log_likelihood: float
+
+
+def transition(step_s: float) -> FloatArray:
+    """F (12, 12): angles turn with constant rates, places move with constant acceleration."""
+    pair = np.array([[1.0, step_s], [0.0, 1.0]])
+    triple = np.array([[1.0, step_s, 0.5 * step_s**2], [0.0, 1.0, step_s], [0.0, 0.0, 1.0]])
+    return np.asarray(block_diag(pair, pair, pair, triple, triple))
+
+
+def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray]:
+    """Blocks of Q: white angular acceleration, and white jerk, over one step."""
+    dt = step_s
+    pair = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    triple = np.array(
+        [
+            [dt**5 / 20, dt**4 / 8, dt**3 / 6],
+            [dt**4 / 8, dt**3 / 3, dt**2 / 2],
+            [dt**3 / 6, dt**2 / 2, dt],
+        ]
+    )
+    values = parameters.vector()
+    return [q * pair for q in values[:3]] + [q * triple for q in values[3:5]]
+
+
+def model_of(
+    recording: Recording,
+    parameters: Hyperparameters,
+    *,
+    use_rest_bias: bool = True,
+    second_order: bool = True,
+    printed: bool = False,
+    start_sd: FloatArray,
+) -> Model:
+    """Gather what the filter takes.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    parameters : Hyperparameters
+        Noise.
+    use_rest_bias, second_order, printed : bool
+        See `estimators.trajectory_smoother.TrajectorySmoother`.
+    start_sd : ndarray (12,)
+        Standard deviations about the start that is assumed: the design's angles and rates, centred.
+    """
+    sheet = recording.imu_sheet
+    frame = design_frame(recording)
+    signals = recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64, copy=True)
+    signals[:, :3] -= rest_bias(recording, enabled=use_rest_bias).bias
+    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
+    if second_order and not printed:
+        signals -= beyond_first_order(frame, speed, recording.gravity_mps2)
+    _, lateral, height = recording.mount_position_m
+    start = np.zeros(STATES)
+    start[[0, 2, 4]] = frame.roll_rad[0], frame.pitch_rad[0], frame.yaw_rad[0]
+    start[[1, 3, 5]] = speed[0] * frame.rates[0]
+    start[[6, 9]] = lateral, height
+    return Model(
+        signals=np.ascontiguousarray(signals),
+        track=track_terms(recording, frame, printed=printed),
+        slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
+        process=np.concatenate(
+            [q[np.triu_indices(len(q))] for q in process_noise(parameters, 1.0 / sheet.rate_hz)]
+        ),
+        noise=parameters.vector()[5:],
+        virtual=np.array([lateral, height]),
+        start=start,
+        start_variance=start_sd**2,
+        step_s=1.0 / sheet.rate_hz,
+        gravity=recording.gravity_mps2,
+    )
+
+
+def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
+    """`estimators.kernels.trajectory_equations.TERMS` at every sample, (n, 15).
+
+    Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
+    (paper 001, appendix 1, g4C, g5C, g6C).
+    """
+    motion = track_motion(recording, frame, printed=printed)
+    of_z = motion.of_z.copy()
+    if printed:
+        of_z[:, 2] = motion.of_y[:, 1]
+    angles = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
+    return np.ascontiguousarray(
+        np.column_stack([*angles, motion.origin, motion.of_y, of_z, 2.0 * motion.rate])
+    )
+
+
+def beyond_first_order(frame: TrackFrame, speed: FloatArray, gravity: float) -> FloatArray:
+    """What the equations leave out, of first order in cant and slope as they are, at the design's own angles.
+
+    C' g e_z and the body's rate of a body that keeps to the design, less their first order: 0.05 m/s2 along
+    Z with 0.1 rad of cant, which the filter would take for a body that rises for the length of the curve.
+
+    Returns
+    -------
+    ndarray (n, 6)
+        rad/s and m/s2.
+    """
+    roll, pitch = frame.roll_rad, frame.pitch_rad
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    roll_rate, pitch_rate, yaw_rate = (speed[:, None] * frame.rates).T
+    rates = speed[:, None] * frame.k
+    first = [
+        roll_rate - pitch * yaw_rate,
+        pitch_rate + roll * yaw_rate,
+        yaw_rate - roll * pitch_rate,
+    ]
+    forces = gravity * np.column_stack([pitch - sp, sr * cp - roll, cr * cp - 1.0])
+    return np.hstack([rates - np.column_stack(first), forces])
+
+
+def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
+    """See `estimators.kernels.trajectory_equations.misprint`."""
+    _, v, h = frame.rates.T
+    return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
+
+
+def _cross(a: FloatArray) -> FloatArray:
+    """Matrix (3, 3) with [a]x b = a x b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def measured(
+    x: FloatArray, track: FloatArray, gravity: float, slips: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """All eight measurements of a state and their Jacobian (8, 12) by vectors; ``track`` is one row of terms.
+
+    With rho the angles of the body in the track frame and r = (0, y, z) its place there,
+
+        a = origin + M r + 2 w x r' + r'',   force = (I - [rho]x) a + g (-pitch, roll, 1)
+    """
+    angles, rates, r = x[[0, 2, 4]], x[[1, 3, 5]], np.array([[0.0] * 3, x[6:9], x[9:12]])
+    rho, origin, twice = angles - track[:3], track[3:6], _cross(track[12:15])
+    m = np.column_stack([np.zeros(3), track[6:9], track[9:12]])
+    turn = np.eye(3) - _cross(rho)
+    a = origin + m @ r[:, 0] + twice @ r[:, 1] + r[:, 2]
+    gravity_of_angles = gravity * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    roll, pitch, _ = angles
+    rate_map = np.array([[1.0, 0.0, -pitch], [0.0, 1.0, roll], [0.0, -roll, 1.0]])
+    value = np.concatenate(
+        [
+            rate_map @ rates,
+            turn @ a + gravity_of_angles @ angles + np.array([0.0, 0.0, gravity]),
+            [x[6], x[9]],
+        ]
+    )
+    j = np.zeros((8, 12))
+    j[:3, [1, 3, 5]] = rate_map
+    j[:3, [0, 2]] = np.array([[0.0, -rates[2]], [rates[2], 0.0], [-rates[1], 0.0]])
+    j[3:6, [0, 2, 4]] = _cross(a) + gravity_of_angles
+    j[3:6, [6, 9]] = (turn @ m)[:, 1:]
+    j[3:6, [7, 10]] = (turn @ twice)[:, 1:]
+    j[3:6, [8, 11]] = turn[:, 1:]
+    j[6, 6] = j[7, 9] = 1.0
+    if slips is not None:
+        j[3, 2] += slips[0]
+        j[4, 9] += slips[1] + rho[0] * slips[2]
+        j[5, 0] += 2.0 * x[8]
+    return value, j
+
+
+def filterpy_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> Found:
+    """The same estimate by filterpy: block update in Joseph's form, and the Rauch-Tung-Striebel smoother."""
+    n = len(model.signals)
+    f = transition(model.step_s)
+    upper = np.triu_indices(STATES)
+    ekf = ExtendedKalmanFilter(dim_x=STATES, dim_z=8)
+    ekf.x, ekf.P, ekf.F = model.start.copy(), np.diag(model.start_variance), f
+    ekf.Q, ekf.R = _dense_process(model.process), np.diag(model.noise)
+    states, covariances = np.empty((n, STATES)), np.empty((n, STATES, STATES))
+    innovations, likelihood = np.empty((n, 7)), 0.0
+    for k in range(n):
+        if k > 0:
+            ekf.predict()
+        slips = model.slips[k] if len(model.slips) else None
+        value, j = measured(ekf.x, model.track[k], model.gravity, slips)
+        z = np.concatenate([model.signals[k], model.virtual])
+        ekf.update(z, lambda x, j=j: j, lambda x, value=value: value)
+        states[k], covariances[k] = ekf.x, ekf.P
+        e, s = ekf.y, ekf.S
+        innovations[k, :6], innovations[k, 6] = e[:6], e[:6] @ np.linalg.solve(s[:6, :6], e[:6])
+        spread = np.linalg.slogdet(s)[1] + len(e) * math.log(2.0 * math.pi)
+        likelihood -= 0.5 * (e @ np.linalg.solve(s, e) + spread)
+    if smoothed:
+        states, covariances, _, _ = rts_smoother(states, covariances, [f] * n, [ekf.Q] * n)
+    packed = covariances[:, *upper] if with_covariance else np.empty((0, PACKED))
+    return Found(states, packed, innovations, float(likelihood))
+
+
+def _dense_process(process: FloatArray) -> FloatArray:
+    """Q (12, 12) of the upper triangles of its blocks."""
+    blocks, at = [], 0
+    for size in (2, 2, 2, 3, 3):
+        block = np.zeros((size, size))
+        count = size * (size + 1) // 2
+        block[np.triu_indices(size)] = process[at : at + count]
+        blocks.append(block + np.triu(block, 1).T)
+        at += count
+    return np.asarray(block_diag(*blocks))

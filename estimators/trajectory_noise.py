@@ -1,0 +1,117 @@
+"""Noise that the trajectory smoother assumes: the 13 hyper-parameters of paper 001, and their file.
+
+Gonzalez-Carbajal et al. 2023, Eq. 16. The paper searches them by maximum likelihood or against a known output
+(section 4); the result of a search is a small TOML file:
+
+    [hyperparameters]
+    roll_rad2ps3 = 1e-2
+    ...
+
+with all 13 names. Not here: the search.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from simrail.errors import InputError
+from simrail.jit import FloatArray
+
+
+@dataclass(frozen=True)
+class Hyperparameters:
+    """Intensities of the process noise and variances of the measurements (paper 001, Eq. 16, in its order).
+
+    Attributes
+    ----------
+    roll_rad2ps3, pitch_rad2ps3, yaw_rad2ps3 : float
+        Intensity (two-sided spectral density) of the angular accelerations.
+    lateral_m2ps5, vertical_m2ps5 : float
+        Intensity of the jerk of y and z.
+    gyro_x_rad2ps2, gyro_y_rad2ps2, gyro_z_rad2ps2 : float
+        Variance of a sample of each gyro.
+    accel_x_m2ps4, accel_y_m2ps4, accel_z_m2ps4 : float
+        Variance of a sample of each accelerometer.
+    lateral_position_m2, vertical_position_m2 : float
+        Variance of the virtual measurements of y and z. They are no measurements, and the likelihood does not
+        identify them: they are design constants. Against an accelerometer of variance u_accel they take over
+        for motion slower than (u_accel/u_position)^(1/4) rad/s: by default 0.96 rad/s, wavelengths above
+        128 m at 70 km/h and above 37 m at 20 km/h.
+
+    The defaults were set by hand, between what the likelihood and what the true trajectory prefer on rides of
+    the light-metro bogie's axle and frame at 20 and 70 km/h over rails of ERRI B176 low, as the 3DM-GX4-25
+    records them. X of the accelerometer is believed least, since odometry does not see how the bogie shakes
+    along the track.
+    """
+
+    roll_rad2ps3: float = 0.01
+    pitch_rad2ps3: float = 0.01
+    yaw_rad2ps3: float = 0.01
+    lateral_m2ps5: float = 10.0
+    vertical_m2ps5: float = 10.0
+    gyro_x_rad2ps2: float = 3e-6
+    gyro_y_rad2ps2: float = 3e-6
+    gyro_z_rad2ps2: float = 3e-6
+    accel_x_m2ps4: float = 0.025
+    accel_y_m2ps4: float = 2.5e-3
+    accel_z_m2ps4: float = 2.5e-3
+    lateral_position_m2: float = 3e-3
+    vertical_position_m2: float = 3e-3
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+                raise InputError("is no positive number", field=field.name, value=value, limit="> 0")
+
+    def vector(self) -> FloatArray:
+        """The 13 values in the paper's order."""
+        return np.array(astuple(self), dtype=np.float64)
+
+    @classmethod
+    def from_vector(cls, values: FloatArray) -> Hyperparameters:
+        """Make them from the 13 values in the paper's order."""
+        return cls(*(float(value) for value in values))
+
+
+def read_hyperparameters(path: str | Path) -> Hyperparameters:
+    """Read a file of hyper-parameters.
+
+    Raises
+    ------
+    InputError
+        Naming the file, and the field that is missing, unknown or not positive.
+    """
+    file, table, remedy = Path(path), "hyperparameters", "write the file anew from its tuning"
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {error.strerror}", file=file, remedy="mend the path; it is seen from here"
+        ) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"is no TOML: {error}", file=file, remedy=remedy) from error
+    values = data.get(table)
+    if not isinstance(values, dict):
+        raise InputError("the table is missing", file=file, field=table, value=sorted(data), remedy=remedy)
+    known = [field.name for field in fields(Hyperparameters)]
+    for name in [*values, *known]:
+        if name not in known or name not in values:
+            raise InputError(
+                "is missing" if name in known else "is no hyper-parameter",
+                file=file,
+                field=f"{table}.{name}",
+                limit="the names " + ", ".join(known),
+                remedy=remedy,
+            )
+    try:
+        return Hyperparameters(**values)
+    except InputError as error:
+        raise InputError(
+            error.problem, file=file, field=f"{table}.{error.field}", value=error.value, limit=error.limit
+        ) from error

@@ -1,0 +1,193 @@
+"""Trajectory and attitude of a body on the track by a smoother over twelve states.
+
+Gonzalez-Carbajal et al. 2023 (paper 001): gyro, accelerometer, odometry and the design track give the angles
+of the body and its place (y, z) in the track frame; virtual measurements that say "where it belongs, more or
+less" keep the place from drifting. Forwards it is an extended Kalman filter, backwards a fixed-interval
+smoother, and the first alone is to be had as a causal filter. It works at standstill and backwards, since
+speed enters the measurements only, with its sign.
+
+The model has no sensor bias: what an offset of the accelerometer does to roll and pitch, and one of the gyro
+to yaw, is not in the standard deviations. Place is another matter: the virtual measurements hold it.
+
+The model stands in `estimators.trajectory_model`, the noise in `estimators.trajectory_noise`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from estimators.kernels.trajectory import PACKED, trajectory_filter
+from estimators.kernels.trajectory_back import trajectory_back
+from estimators.kernels.trajectory_equations import ROWS, STATES
+from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
+from estimators.trajectory_noise import Hyperparameters, read_hyperparameters
+from simrail.columns import (
+    ATTITUDE,
+    ATTITUDE_SD,
+    INNOVATION,
+    RATE_INNOVATION,
+    RELATIVE_POSITION,
+    RELATIVE_POSITION_SD,
+)
+from simrail.errors import InputError
+from simrail.estimate import Estimate
+from simrail.jit import FloatArray
+from simrail.recording import Recording
+
+OUTPUT = (0, 2, 4, 6, 9)
+"""States of the estimate among the twelve: roll, pitch, yaw, y, z."""
+
+START_RATE_SD = 0.02
+"""rad/s: the train starts from rest, or as steadily as the track turns."""
+
+START_PLACE_SD = (0.01, 0.02, 0.2)
+"""m, m/s, m/s2: place in the track frame and its derivatives."""
+
+
+@dataclass(frozen=True)
+class TrajectorySmoother:
+    """Extended Kalman smoother of paper 001, section 3 and appendix 1.
+
+    Attributes
+    ----------
+    smoothed : bool
+        False stops after the filter, which is causal.
+    hyperparameters : Hyperparameters
+        Noise.
+    tuning : str
+        File of hyper-parameters to use instead (`estimators.trajectory_noise`); empty for none.
+    rest_bias : bool
+        Subtract the gyro's mean over the rests so far.
+    second_order : bool
+        Take what the paper's equations, of first order in cant and slope, leave out off the signals, for a
+        body that keeps to the design (`estimators.trajectory_model.beyond_first_order`). False for the
+        paper's.
+    printed : bool
+        The equations as paper 001 prints them (EQUATIONS 1.3), to show what it costs.
+    backend : str
+        ``"compiled"``, or ``"filterpy"``: slow, readable, the reference.
+    with_covariance : bool
+        False leaves out covariances and standard deviations, which take more than half of the time.
+    start_sd_rad, start_yaw_sd_rad : float
+        Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
+    """
+
+    smoothed: bool = True
+    hyperparameters: Hyperparameters = field(default_factory=Hyperparameters)
+    tuning: str = ""
+    rest_bias: bool = True
+    second_order: bool = True
+    printed: bool = False
+    backend: str = "compiled"
+    with_covariance: bool = True
+    start_sd_rad: float = math.radians(1.0)
+    start_yaw_sd_rad: float = math.radians(0.3)
+
+    def __post_init__(self) -> None:
+        if self.backend not in BACKENDS:
+            raise InputError(
+                "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
+            )
+        if not isinstance(self.hyperparameters, Hyperparameters):
+            raise InputError(
+                "are no Hyperparameters",
+                field="hyperparameters",
+                value=self.hyperparameters,
+                remedy="in a scenario, name a file of them in the option tuning",
+            )
+        for name in ("start_sd_rad", "start_yaw_sd_rad"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
+        if self.tuning:
+            if self.hyperparameters != Hyperparameters():
+                raise InputError("a file and values cannot both be given", field="tuning", value=self.tuning)
+            read_hyperparameters(self.tuning)
+
+    @property
+    def causal(self) -> bool:
+        """The filter is causal, the smoother is not."""
+        return not self.smoothed
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate attitude and place in the track frame at every IMU sample."""
+        found = self.trace(recording)
+        index = recording.imu.index
+        names = [*ATTITUDE, *RELATIVE_POSITION]
+        columns = [found.states[:, list(OUTPUT)]]
+        covariance = None
+        if self.with_covariance:
+            covariance = block(found.covariance, OUTPUT)
+            columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
+            names += [*ATTITUDE_SD, *RELATIVE_POSITION_SD]
+        return Estimate(
+            states=pd.DataFrame(np.hstack(columns), index=index, columns=names),
+            mount=recording.mount,
+            innovations=pd.DataFrame(found.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
+            covariance=covariance,
+            covariance_of=(*ATTITUDE, *RELATIVE_POSITION) if self.with_covariance else (),
+        )
+
+    def trace(self, recording: Recording) -> Found:
+        """All twelve states with their covariances, the innovations, and the log-likelihood."""
+        return BACKENDS[self.backend](
+            self.model(recording), smoothed=self.smoothed, with_covariance=self.with_covariance
+        )
+
+    def log_likelihood(self, recording: Recording) -> float:
+        """Log-likelihood of the recording by prediction-error decomposition."""
+        return log_likelihood(self.model(recording))
+
+    def model(self, recording: Recording) -> Model:
+        """What the backends take of a recording."""
+        rates, place = [START_RATE_SD] * 3, START_PLACE_SD
+        angles = [self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad]
+        pairs = [sd for pair in zip(angles, rates, strict=True) for sd in pair]
+        return model_of(
+            recording,
+            read_hyperparameters(self.tuning) if self.tuning else self.hyperparameters,
+            use_rest_bias=self.rest_bias,
+            second_order=self.second_order,
+            printed=self.printed,
+            start_sd=np.array([*pairs, *place, *place]),
+        )
+
+
+def block(packed: FloatArray, states: tuple[int, ...]) -> FloatArray:
+    """Covariance of some of the states, (n, m, m), from upper triangles (n, 78)."""
+    at = np.zeros((STATES, STATES), dtype=np.intp)
+    upper = np.triu_indices(STATES)
+    at[upper] = np.arange(PACKED)
+    at = np.maximum(at, at.T)
+    return np.ascontiguousarray(packed[:, at[np.ix_(states, states)]])
+
+
+def log_likelihood(model: Model) -> float:
+    """Log-likelihood alone: nothing is kept."""
+    none = np.empty((0, STATES)), np.empty((0, PACKED))
+    updates = np.empty((0, ROWS, STATES)), np.empty((0, ROWS, 2))
+    return trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)))
+
+
+def compiled_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> Found:
+    """Filter and smoother by the kernels."""
+    n = len(model.signals)
+    none = np.empty((0, STATES)), np.empty((0, PACKED))
+    kept = np.empty((n, STATES)), np.empty((n, PACKED))
+    m = n if smoothed else 0
+    updates = np.empty((m, ROWS, STATES)), np.empty((m, ROWS, 2))
+    innovations = np.empty((n, 7))
+    before, after = (kept, none) if smoothed else (none, kept)
+    likelihood = trajectory_filter(*model, *before, *updates, *after, innovations)
+    if smoothed:
+        trajectory_back(
+            model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance
+        )
+    return Found(kept[0], kept[1] if with_covariance else none[1], innovations, likelihood)
+
+
+BACKENDS = {"compiled": compiled_backend, "filterpy": filterpy_backend}
+"""Who can run it, by name."""
