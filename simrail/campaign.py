@@ -5,26 +5,23 @@ each cell draws its sensors, every estimator runs on the recording, and each est
 fails becomes a row with its reason and the others go on. Seeds belong to names, so the scores of a
 cell do not depend on which cells ran before it.
 
-Nothing is written here: see `simrail.results`.
+What is gathered on the way is in `simrail.ledger`. Nothing is written here: see `simrail.results`.
 """
 
 from __future__ import annotations
 
 import time
-import traceback
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from itertools import groupby
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
 from simrail.example import CellResult
 from simrail.interrupts import Check, interruptible
+from simrail.ledger import Failure, Ledger, cell_record
 from simrail.line_odometry import with_odometry
 from simrail.measure import measure
 from simrail.recording import Recording
@@ -39,45 +36,14 @@ from simrail.scenario.build import (
     rail_sensor_of,
     temperature_of,
 )
-from simrail.scenario.cells import Cell, Method, cells, methods
+from simrail.scenario.cells import Cell, cells, methods
 from simrail.scenario.check import Plan, judge_scenario
-from simrail.scenario.scenario import RidePart, Scenario
+from simrail.scenario.scenario import Scenario
 from simrail.score import reference_of, score, score_odometry, truth_at_imu
 from simrail.score_geometry import score_geometry
-from simrail.score_table import concat_scores, failed_figures, labelled
+from simrail.score_table import concat_scores
 from simrail.truth import Mount, Truth
-
-MOST_EXAMPLES = 6
-"""Recordings that are kept for the report's figures, one per ride."""
-
-
-class Watcher:
-    """Is told how a campaign goes; this one keeps silent. Subclass it to show progress."""
-
-    def ride_begins(self, number: int, count: int, name: str) -> None:
-        """Ride `number` (from 1) of `count` is simulated, or found in the cache, from now on."""
-
-    def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
-        """The ride has been simulated so far."""
-
-    def ride_ends(self) -> None:
-        """The ride is there; its cells are measured and estimated from now on."""
-
-    def estimate_made(self, number: int, count: int, name: str) -> None:
-        """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
-
-    def recording_written(self, number: int, count: int, name: str) -> None:
-        """Recording `number` (from 1) of `count` has been written, by an export."""
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A cell, or one estimator on it, that failed: the reason for the table, the traceback for its author."""
-
-    cell: int
-    estimator: str
-    reason: str
-    trace: str
+from simrail.watcher import Watcher
 
 
 @dataclass(frozen=True)
@@ -125,56 +91,6 @@ class _RememberedTruth(Truth):
         return self.remembered[place]
 
 
-@dataclass
-class _Ledger:
-    """What the loop gathers."""
-
-    scenario: Scenario
-    estimators: Mapping[str, tuple[Method, Estimator]]
-    tables: list[pd.DataFrame] = field(default_factory=list)
-    failures: list[Failure] = field(default_factory=list)
-    examples: list[CellResult] = field(default_factory=list)
-    rides: list[dict[str, Any]] = field(default_factory=list)
-    wall_s: dict[str, float] = field(
-        default_factory=lambda: {"simulate": 0.0, "measure": 0.0, "estimate": 0.0, "score": 0.0}
-    )
-    warm: set[str] = field(default_factory=set)
-    shown: set[int] = field(default_factory=set)
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        """Add the wall time of a block to a stage."""
-        begun = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.wall_s[stage] += time.perf_counter() - begun
-
-    def failed(self, cell: Cell, estimator: str, error: Exception) -> None:
-        """Note a failure as a row with its reason."""
-        reason = _reason(error)
-        trace = "".join(traceback.format_exception(error))
-        self.failures.append(Failure(cell.number, estimator, reason, trace))
-        self.tables.append(labelled(failed_figures(reason), self.labels(cell, estimator)))
-
-    def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
-        """Labels of a row of the score table."""
-        known = self.estimators.get(estimator)
-        return {
-            "cell": cell.number,
-            "scenario": self.scenario.name,
-            "ride": cell.ride.name,
-            "vehicle": cell.spec.vehicle,
-            "mount": cell.imu.name,
-            "imu": cell.imu.grade,
-            "odometry": cell.spec.odometry,
-            "tuning": known[0].tuning if known else "default",
-            "track_draw": cell.track_draw,
-            "sensor_draw": cell.sensor_draw,
-            "estimator": estimator,
-        }
-
-
 def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> CampaignResult:
     """Run every cell of a scenario.
 
@@ -196,12 +112,12 @@ def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> Campa
     parts = Parts(scenario)
     plan = judge_scenario(scenario, parts)
     chosen = {method.name: (method, plan.estimators[method.name]) for method in methods(scenario)}
-    ledger = _Ledger(scenario, chosen)
+    ledger = Ledger(scenario, chosen)
     records = []
     with interruptible() as check:
         for ride_number, group in groupby(cells(scenario), key=lambda cell: cell.ride_number):
             ride_cells = list(group)
-            records += [_cell_record(cell) for cell in ride_cells]
+            records += [cell_record(cell) for cell in ride_cells]
             watcher.ride_begins(ride_number + 1, plan.rides, ride_cells[0].ride.name)
             _run_ride(ride_cells, parts, ledger, watcher, check, plan.cells)
     return CampaignResult(
@@ -216,7 +132,7 @@ def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> Campa
 
 
 def _run_ride(
-    ride_cells: list[Cell], parts: Parts, ledger: _Ledger, watcher: Watcher, check: Check, cell_count: int
+    ride_cells: list[Cell], parts: Parts, ledger: Ledger, watcher: Watcher, check: Check, cell_count: int
 ) -> None:
     """Simulate one ride and run its cells."""
     first = ride_cells[0]
@@ -247,7 +163,7 @@ def _run_cell(
     cell: Cell,
     truth: Truth,
     parts: Parts,
-    ledger: _Ledger,
+    ledger: Ledger,
     watcher: Watcher,
     check: Check,
     cell_count: int,
@@ -261,9 +177,7 @@ def _run_cell(
             motion = truth_at_imu(truth, recording)
             reference = reference_of(motion, recording)
             figures = score_odometry(recording, reference, **keep)
-            ledger.tables.append(
-                labelled(figures, ledger.labels(cell, f"odometry:{recording.odometry_source}"))
-            )
+            ledger.scored(cell, f"odometry:{recording.odometry_source}", figures)
     except Exception as error:
         check()
         for name in ledger.estimators:
@@ -276,7 +190,7 @@ def _run_cell(
             estimate, us_per_sample = _timed_estimate(estimator, recording, name, ledger)
             with ledger.timed("score"):
                 figures = score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)
-                ledger.tables.append(labelled(figures, ledger.labels(cell, name)))
+                ledger.scored(cell, name, figures)
                 if estimate.geometry is not None:
                     figures = score_geometry(
                         estimate,
@@ -286,19 +200,14 @@ def _run_cell(
                         twist_base_m=cell.spec.geometry.twist_base_m,
                         **keep,
                     )
-                    ledger.tables.append(labelled(figures, ledger.labels(cell, name)))
+                    ledger.scored(cell, name, figures)
             estimates[name] = estimate
-            _note_not_finite(cell, name, estimate, ledger)
+            ledger.judge_finite(cell, name, estimate)
         except Exception as error:
             check()
             ledger.failed(cell, name, error)
         watcher.estimate_made(cell.number * len(ledger.estimators) + i + 1, count, name)
-    first_of_ride = cell.track_draw == 0 and cell.ride_number not in ledger.shown
-    if first_of_ride and len(ledger.examples) < MOST_EXAMPLES:
-        ledger.shown.add(cell.ride_number)
-        described = {**ledger.labels(cell, ""), **_cell_record(cell)}
-        del described["estimator"], described["tuning"]
-        ledger.examples.append(CellResult(described, recording, motion, estimates))
+    ledger.show(cell, recording, motion, estimates)
 
 
 def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
@@ -321,16 +230,8 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
     return with_odometry(recording, cell.spec.odometry)
 
 
-def _note_not_finite(cell: Cell, name: str, estimate: Estimate, ledger: _Ledger) -> None:
-    """An estimate that is not finite has rows that say so; it is a failure of its cell as well."""
-    bad = int((~np.isfinite(estimate.states.to_numpy(dtype=np.float64))).any(axis=1).sum())
-    if bad:
-        reason = f"estimate not finite in {bad} of {len(estimate.states)} samples"
-        ledger.failures.append(Failure(cell.number, name, reason, reason + "\n"))
-
-
 def _timed_estimate(
-    estimator: Estimator, recording: Recording, name: str, ledger: _Ledger
+    estimator: Estimator, recording: Recording, name: str, ledger: Ledger
 ) -> tuple[Estimate, float]:
     """Estimate, and the microseconds per sample that it took."""
     if name not in ledger.warm:
@@ -360,37 +261,3 @@ def _beginning(recording: Recording, *, samples: int) -> Recording:
         magnetometer=None if magnetic is None else magnetic.iloc[:samples],
         rail_displacement=None if seen is None else seen.iloc[:samples],
     )
-
-
-def _cell_record(cell: Cell) -> dict[str, object]:
-    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
-    record: dict[str, object] = {
-        "cell": cell.number,
-        "case": cell.case,
-        "ride": cell.ride.name,
-        "vehicle": cell.spec.vehicle,
-        "mount": cell.imu.name,
-        "imu": cell.imu.grade,
-        "odometry": cell.spec.odometry,
-        "track_draw": cell.track_draw,
-        "sensor_draw": cell.sensor_draw,
-        "track": cell.spec.track,
-        "engine": cell.spec.engine,
-        "speed_kmh": cell.ride.speed_kmh or 0.0,
-        "direction": _direction(cell.ride),
-    }
-    return record | {name: value for name, value in cell.settings.items() if name not in record}
-
-
-def _direction(ride: RidePart) -> str:
-    """Whether a ride runs towards larger s, smaller s, or not at all."""
-    if ride.end_m is None:
-        return "standing"
-    return "forward" if ride.end_m > ride.start_m else "backward"
-
-
-def _reason(error: Exception) -> str:
-    """One line that says why."""
-    text = " ".join(str(error).split())
-    named = text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
-    return named[:300]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.campaign import Watcher, record_cell
+from simrail.campaign import record_cell
 from simrail.drafts import draft_of
 from simrail.errors import InputError
 from simrail.interrupts import interruptible
@@ -23,6 +23,7 @@ from simrail.scenario.check import judge_scenario
 from simrail.scenario.ride_writer import Format, refuse_existing, write_frame, write_parts
 from simrail.scenario.scenario import Scenario
 from simrail.score import truth_at_imu
+from simrail.watcher import Watcher
 
 INDEX_FILE = "recordings.csv"
 TRUTH_STEM = "truth_not_part_of_the_recording"

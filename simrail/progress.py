@@ -13,11 +13,11 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.table import Table
 from rich.text import Text
 
-from simrail.campaign import Watcher
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.results import Results
 from simrail.scenario.cells import methods
 from simrail.score_table import OK
+from simrail.watcher import Watcher
 
 COLUMNS = (
     ("roll", "truth", "whole"),

@@ -25,7 +25,7 @@ from simrail.track.rail_condition import RailCondition
 from simrail.truth import Truth, abeam
 from simrail.truth_files import create_arrays, let_go, load_truth, save_truth, write_header
 from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import Segment
+from simrail.vehicle.engine import Segment, Setup
 from simrail.vehicle.kinematic_engine import kinematic_truth, rail_following
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.profile_files import profiles_digest
@@ -200,15 +200,16 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     duration = np.floor(profile.duration_s * ride.rate_hz) / ride.rate_hz
     rows = round(duration * ride.rate_hz) + 1
     laid = rails_of(ride)
-    engine = _engine_of(ride.engine)(
+    setup = Setup(
         model,
         laid,
-        profile=profile,
+        profile,
         step_s=ride.step_s,
         rate_hz=ride.rate_hz,
         gravity_mps2=ride.gravity_mps2,
         drive=ride.drive,
     )
+    engine = _engine_of(ride.engine)(setup)
     bodies, wheels = len(model.bodies), len(model.wheels)
     arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4)
     at = arrays["reference_position_m"]

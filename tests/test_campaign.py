@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,22 +10,16 @@ import pandas as pd
 import pytest
 
 from simrail import campaign
-from simrail.campaign import CampaignResult, Watcher, run_campaign
+from simrail.campaign import CampaignResult, run_campaign
 from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.score_table import OK, SCORE_COLUMNS
+from simrail.watcher import Watcher
 
 SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
 
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Rides of these tests go into a cache of their own."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def short(*settings: str) -> Scenario:

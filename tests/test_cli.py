@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -26,19 +25,7 @@ GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 QUICK = ["--set", "ride.end_m=200.0", "--set", "ride.rest_s=1.0", "--set", "imu.grade='lord_3dm_gx4_25'"]
 FILES = {"manifest.json", "scores.parquet", "scores.csv", "cells.parquet", "report.html"}
 
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
-        yield
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture

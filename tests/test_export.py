@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,19 +30,7 @@ from simrail.score import score
 QUICK = ["ride.end_m=150.0", "ride.rest_s=1.0", "ride.speed_kmh=30.0"]
 SETTINGS = [word for setting in QUICK for word in ("--set", setting)]
 
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
-        yield
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def names_in(folder: Path) -> set[str]:

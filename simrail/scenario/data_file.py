@@ -2,7 +2,7 @@
 
 Reads the columns that are asked for by name, as float64 exactly as printed, and refuses what is not there
 or no number, with the line of the file. What the columns mean is said by the ride file
-(`simrail.scenario.ride_file`).
+(`simrail.scenario.signal_part`).
 """
 
 from __future__ import annotations

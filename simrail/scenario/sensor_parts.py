@@ -1,7 +1,7 @@
 """What a person writes of the sensors beside the IMU: ``[encoder]``, ``[magnetometer]``, ``[rail_sensor]``.
 
 Each part makes the specification of its sensor (`spec`); units of the text end here. Whether a sensor fits
-vehicle and ride is judged by `simrail.scenario.check`.
+vehicle and ride is judged by `simrail.scenario.check_sensors`.
 """
 
 from __future__ import annotations

@@ -8,24 +8,21 @@ is the test of the other. It needs no Exudyn.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from simrail.jit import FloatArray
-from simrail.profile import SpeedProfile
-from simrail.track.laid import LaidTrack
 from simrail.vehicle.engine import (
     Segment,
+    Setup,
     refuse_derailed,
     start_memo,
     start_poses,
     stretches,
     wheel_loads_n,
 )
-from simrail.vehicle.force_data import pack, states_of
-from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.force_data import states_of
 from simrail.vehicle.stepper import BODY, march
 
 
@@ -34,40 +31,14 @@ class CompiledEngine:
 
     Parameters
     ----------
-    model : VehicleModel
-        The vehicle.
-    track : LaidTrack
-        The track.
-    profile : SpeedProfile
-        How it is driven.
-    step_s : float
-        Step of the integrator.
-    rate_hz : float
-        Output rate; its period must be a multiple of the step.
-    gravity_mps2 : float
-        Gravity.
-    settle_s : float
-        Time at rest before the ride, in which the springs come to rest; not part of the output.
-    drive : {"guide", "wheels"}
-        Whether the guide pulls the vehicle along or its wheels drive and brake it.
+    setup : Setup
+        What runs, where and how.
     """
 
-    def __init__(
-        self,
-        model: VehicleModel,
-        track: LaidTrack,
-        *,
-        profile: SpeedProfile,
-        step_s: float = 0.5e-3,
-        rate_hz: float = 1000.0,
-        gravity_mps2: float = 9.81,
-        settle_s: float = 4.0,
-        drive: Literal["guide", "wheels"] = "guide",
-    ) -> None:
-        self.model = model
-        self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
-        self.data = pack(model, track, profile, gravity_mps2=gravity_mps2, drive=drive)
-        self.memo = start_memo(model, profile)
+    def __init__(self, setup: Setup) -> None:
+        self.setup, model = setup, setup.model
+        self.data = setup.pack()
+        self.memo = start_memo(setup)
         self._inertia = np.array([[body.mass_kg, *body.inertia_kgm2] for body in model.bodies])
         self._spin_inertia = self.data.spins[:, 0].copy()
         self._turned = BODY * len(model.bodies)
@@ -77,7 +48,7 @@ class CompiledEngine:
         self._scratch = (
             np.zeros((3, len(self.state))), np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(34)
         )  # fmt: skip
-        poses = start_poses(model, track, profile, gravity_mps2=gravity_mps2)
+        poses = start_poses(setup)
         for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
             body[:3] = position
             body[3:7] = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
@@ -93,12 +64,10 @@ class CompiledEngine:
             If a wheel leaves the rail beyond its flange tip.
         """
         for time_s, rows, slopes in stretches(
+            self.setup,
             self._solve,
             lambda steps: self._bodies(steps)[:, :, 7:],
             duration_s=duration_s,
-            settle_s=self.settle_s,
-            step_s=self.step_s,
-            rate_hz=self.rate_hz,
             segment_s=segment_s,
         ):
             bodies = self._bodies(rows)
@@ -125,7 +94,7 @@ class CompiledEngine:
 
     def _march(self, first: int, rows: FloatArray) -> int:
         return march(
-            first, self.step_s, self.state, rows, self._inertia, self._spin_inertia, self.memo,
+            first, self.setup.step_s, self.state, rows, self._inertia, self._spin_inertia, self.memo,
             *self._scratch, tuple(self.data),
         )  # fmt: skip
 
@@ -134,8 +103,8 @@ class CompiledEngine:
         rows = np.empty((last - first + 1, len(self.state)))
         rows[0] = self.state
         made = self._march(first, rows[1:])
-        refuse_derailed(self.memo, self.model)
+        refuse_derailed(self.memo, self.setup.model)
         if made < last - first or not np.isfinite(self.state).all():
-            begin, end = first * self.step_s, last * self.step_s
+            begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")
         return rows

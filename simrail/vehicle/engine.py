@@ -1,4 +1,4 @@
-"""What every engine of motion shares: where it starts, which rows it puts out, how a ride ends early.
+"""What every engine of motion shares: what it is given, where it starts, which rows it puts out, how it ends.
 
 An engine integrates the equations of motion step by step. What it says of the ride, and when, is decided
 here, once: output rows, accelerations from the velocities, wheel loads, derailment. Not here: the
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from simrail.profile import SpeedProfile
 from simrail.rotation import euler_angles, rotation_matrix
 from simrail.track.laid import LaidTrack
 from simrail.vehicle.contact_tables import rest_drops_m
+from simrail.vehicle.force_data import ForceData, pack
 from simrail.vehicle.model import VehicleModel
 
 _DIFFERENCE = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
@@ -33,6 +35,44 @@ _MEMO_HEAD, _MEMO_AXLE = 2, 5
 
 class DerailedError(RuntimeError):
     """A wheel climbed beyond its flange tip: the ride ends there."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an engine is given: one vehicle on one laid track, and how it is to run there.
+
+    Attributes
+    ----------
+    model : VehicleModel
+        The vehicle.
+    track : LaidTrack
+        The track.
+    profile : SpeedProfile
+        How it is driven.
+    step_s : float
+        Step of the integrator.
+    rate_hz : float
+        Output rate; its period must be a multiple of the step.
+    gravity_mps2 : float
+        Gravity.
+    settle_s : float
+        Time at rest before the ride, in which the springs come to rest; not part of the output.
+    drive : {"guide", "wheels"}
+        Whether the guide pulls the vehicle along or its wheels drive and brake it.
+    """
+
+    model: VehicleModel
+    track: LaidTrack
+    profile: SpeedProfile
+    step_s: float = 0.5e-3
+    rate_hz: float = 1000.0
+    gravity_mps2: float = 9.81
+    settle_s: float = 4.0
+    drive: Literal["guide", "wheels"] = "guide"
+
+    def pack(self) -> ForceData:
+        """The arrays that the force kernel takes; see `simrail.vehicle.force_data.pack`."""
+        return pack(self.model, self.track, self.profile, gravity_mps2=self.gravity_mps2, drive=self.drive)
 
 
 @dataclass(frozen=True)
@@ -79,18 +119,17 @@ class Segment:
         )
 
 
-def start_poses(
-    model: VehicleModel, track: LaidTrack, profile: SpeedProfile, *, gravity_mps2: float
-) -> Iterator[tuple[FloatArray, FloatArray]]:
+def start_poses(setup: Setup) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Position (3,) and rotation (3, 3) of each body at rest at the profile's start, on the rails there.
 
     A body stands as an axle would at its place: over the middle of the rails, and leaning with them.
     Dropped onto irregular rails instead, wheels would bounce for seconds.
     """
-    drops = rest_drops_m(model, gravity_mps2=gravity_mps2)
+    model, track = setup.model, setup.track
+    drops = rest_drops_m(model, gravity_mps2=setup.gravity_mps2)
     half = model.wheel_rail.tape_circle_half_m
     for body, drop in zip(model.bodies, drops, strict=True):
-        s = np.array([profile.start_m + body.position_m[0]])
+        s = np.array([setup.profile.start_m + body.position_m[0]])
         frame = track.design.frame(s)
         y_left, z_left, y_right, z_right = track.rails(s)[0]
         lean = frame.roll_rad + (z_left - z_right) / (2.0 * half)
@@ -103,13 +142,12 @@ def start_poses(
         yield frame.position[0] + middle + rotation @ offset, rotation
 
 
-def start_memo(model: VehicleModel, profile: SpeedProfile) -> FloatArray:
+def start_memo(setup: Setup) -> FloatArray:
     """Memory of the force kernel at the start: every axle looks for its place on the track from here."""
+    model, start_m = setup.model, setup.profile.start_m
     memo = np.zeros(_MEMO_HEAD + _MEMO_AXLE * len(model.axle_names))
-    memo[1] = profile.start_m + model.body(model.guide.body).position_m[0]
-    memo[_MEMO_HEAD::_MEMO_AXLE] = [
-        profile.start_m + model.body(name).position_m[0] for name in model.axle_names
-    ]
+    memo[1] = start_m + model.body(model.guide.body).position_m[0]
+    memo[_MEMO_HEAD::_MEMO_AXLE] = [start_m + model.body(name).position_m[0] for name in model.axle_names]
     return memo
 
 
@@ -129,19 +167,19 @@ def refuse_derailed(memo: FloatArray, model: VehicleModel) -> None:
 
 
 def stretches(
+    setup: Setup,
     solve: Callable[[int, int], FloatArray],
     rates_of: Callable[[FloatArray], FloatArray],
     *,
     duration_s: float,
-    settle_s: float,
-    step_s: float,
-    rate_hz: float,
     segment_s: float,
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
     """Solve stretch by stretch, and take the output rows out of the steps.
 
     Parameters
     ----------
+    setup : Setup
+        What the engine was given.
     solve : callable
         Given the first and the last step, integrates from the present state, and returns what the
         engine stores at every step, both ends included: (steps + 1, ...). Step 0 is the start of the ride.
@@ -149,10 +187,6 @@ def stretches(
         Takes velocities and angular rates (m, b, 6) out of m stored steps.
     duration_s : float
         Length of the ride.
-    settle_s : float
-        Time at rest before it.
-    step_s, rate_hz : float
-        Step of the integrator and output rate.
     segment_s : float
         Length of a stretch.
 
@@ -164,12 +198,13 @@ def stretches(
     slopes : ndarray (n, b, 6)
         Derivatives of the rates.
     """
-    every = round(1.0 / (rate_hz * step_s))
+    step_s = setup.step_s
+    every = round(1.0 / (setup.rate_hz * step_s))
     total = round(duration_s / step_s)
     per_segment = max(every, round(segment_s / step_s) // every * every)
     # Steps at hand, from `first` on; differences reach 3 steps, so rows lag behind the solution, and a few
     # steps are solved beyond the end.
-    steps = solve(-max(round(settle_s / step_s), 2 * _REACH), 0)[-1 - 2 * _REACH :]
+    steps = solve(-max(round(setup.settle_s / step_s), 2 * _REACH), 0)[-1 - 2 * _REACH :]
     first = 1 - len(steps)
     done = 0
     while done <= total:

@@ -1,9 +1,9 @@
 """The reference engine: rigid bodies in Exudyn, all forces from the one compiled kernel.
 
 The bodies are ordinary Exudyn rigid bodies; wheel spins and creep states are the coordinates of one
-generic node with a diagonal mass; one object without mass on all nodes calls `simrail.vehicle.forces`.
-There are no joints and no constraints, so the explicit RK44 integrates it from standstill to
-standstill. This is the only file that imports exudyn.
+generic node with a diagonal mass; one object without mass on all nodes calls the force kernel
+(`simrail.vehicle.exudyn_forces`). There are no joints and no constraints, so the explicit RK44 integrates
+it from standstill to standstill. This is the only file that imports exudyn.
 
 The springs can be Exudyn's own instead (``suspension="native"``): one `RigidBodySpringDamper` per spring,
 taken out of the kernel. That is a test of the kernel's definition of a spring against independent code,
@@ -38,131 +38,20 @@ from exudyn.itemInterface import (
 )
 from scipy.spatial.transform import Rotation
 
-from simrail.jit import FloatArray, njit
-from simrail.profile import SpeedProfile
-from simrail.track.laid import LaidTrack
+from simrail.jit import FloatArray
 from simrail.vehicle.engine import (
     Segment,
+    Setup,
     refuse_derailed,
     start_memo,
     start_poses,
     stretches,
     wheel_loads_n,
 )
-from simrail.vehicle.force_data import pack, spread, states_of
-from simrail.vehicle.forces import forces
-from simrail.vehicle.model import VehicleModel
-
-HALF_TURN = np.array([1.0, -1.0, -1.0])
-"""Diagonal of the half turn about X between the axes of a body and those of its node."""
-
+from simrail.vehicle.exudyn_forces import HALF_TURN, generalized_forces_of, spread
+from simrail.vehicle.force_data import states_of
 
 _NOTHING = [0.0]
-
-
-@njit
-def generalized_forces(
-    t: float,
-    state: FloatArray,
-    bodies: FloatArray,
-    springs: FloatArray,
-    series: FloatArray,
-    turns: FloatArray,
-    stops: FloatArray,
-    laws: FloatArray,
-    wheels: FloatArray,
-    spins: FloatArray,
-    axles: FloatArray,
-    guide: FloatArray,
-    switches: FloatArray,
-    drive: FloatArray,
-    grid: FloatArray,
-    table: FloatArray,
-    coef: FloatArray,
-    const: FloatArray,
-    pose: FloatArray,
-    wrench: FloatArray,
-    memo: FloatArray,
-    work: FloatArray,
-) -> None:
-    """Forces in Exudyn's coordinates.
-
-    ``state`` (3 n,) holds coordinates, rates and, as the output, generalised forces, each n = 6 b + p +
-    the number of first-order states long. Rates and moments of a node are in its own axes: the body's,
-    half a turn about X.
-    """
-    nb = bodies.shape[0]
-    n = state.shape[0] // 3
-    q, v, out = state[:n], state[n : 2 * n], state[2 * n :]
-    for b in range(nb):
-        p, j = pose[b], 6 * b
-        for k in range(3):
-            p[k], p[3 + k] = q[j + k], v[j + k]
-        # Rodrigues: cos I + sin/angle [r]x + (1 - cos)/angle^2 r r^T, then the half turn.
-        rx, ry, rz = q[j + 3], q[j + 4], q[j + 5]
-        square = rx * rx + ry * ry + rz * rz
-        angle = np.sqrt(square)
-        c = np.cos(angle)
-        s = np.sin(angle) / angle
-        d = (1.0 - c) / square
-        p[6], p[7], p[8] = c + d * rx * rx, s * rz - d * rx * ry, -s * ry - d * rx * rz
-        p[9], p[10], p[11] = s * rz + d * rx * ry, -c - d * ry * ry, s * rx - d * ry * rz
-        p[12], p[13], p[14] = d * rx * rz - s * ry, -s * rx - d * ry * rz, -c - d * rz * rz
-        wx, wy, wz = v[j + 3], -v[j + 4], -v[j + 5]
-        for k in range(3):
-            p[15 + k] = p[6 + 3 * k] * wx + p[7 + 3 * k] * wy + p[8 + 3 * k] * wz
-    first = 6 * nb
-    creep = first + spins.shape[0]
-    forces(
-        t, pose, v[first:creep], v[creep:], bodies, springs, series, turns, stops, laws, wheels, spins, axles,
-        guide, switches, drive, grid, table, coef, const, wrench, out[first:creep], out[creep:], memo, work,
-    )  # fmt: skip
-    for b in range(nb):
-        w, p, j = wrench[b], pose[b], 6 * b
-        out[j], out[j + 1], out[j + 2] = w[0], w[1], w[2]
-        out[j + 3] = p[6] * w[3] + p[9] * w[4] + p[12] * w[5]
-        out[j + 4] = -(p[7] * w[3] + p[10] * w[4] + p[13] * w[5])
-        out[j + 5] = -(p[8] * w[3] + p[11] * w[4] + p[14] * w[5])
-
-
-@njit
-def part_of(arena: FloatArray, i: int) -> FloatArray:
-    """The i-th part of an arena (see `simrail.vehicle.force_data.spread`), flat."""
-    at = int(arena[6 * i])
-    n = 1
-    for k in range(1, 6):
-        n *= int(arena[6 * i + k])
-    return arena[at : at + n]
-
-
-@njit
-def generalized_forces_of(t: float, arena: FloatArray) -> None:
-    """`generalized_forces` of an arena that holds its arguments after t, in their order."""
-    coef = part_of(arena, 15)
-    generalized_forces(
-        t,
-        part_of(arena, 0),
-        part_of(arena, 1).reshape(-1, 1),
-        part_of(arena, 2).reshape(int(arena[13]), 17),
-        part_of(arena, 3).reshape(int(arena[19]), 11),
-        part_of(arena, 4).reshape(int(arena[25]), 8),
-        part_of(arena, 5).reshape(int(arena[31]), 12),
-        part_of(arena, 6).reshape(int(arena[37]), 5),
-        part_of(arena, 7).reshape(-1, 6),
-        part_of(arena, 8).reshape(-1, 6),
-        part_of(arena, 9).reshape(-1, 2),
-        part_of(arena, 10),
-        part_of(arena, 11),
-        part_of(arena, 12).reshape(-1, 5),
-        part_of(arena, 13),
-        part_of(arena, 14).reshape(-1, 12, 4),
-        coef.reshape(int(arena[91]), 2, int(arena[93]), int(arena[94]), 4),
-        part_of(arena, 16).reshape(int(arena[97]), -1),
-        part_of(arena, 17).reshape(-1, 18),
-        part_of(arena, 18).reshape(-1, 6),
-        part_of(arena, 19),
-        part_of(arena, 20),
-    )
 
 
 class ExudynEngine:
@@ -170,43 +59,15 @@ class ExudynEngine:
 
     Parameters
     ----------
-    model : VehicleModel
-        The vehicle.
-    track : LaidTrack
-        The track.
-    profile : SpeedProfile
-        How it is driven.
-    step_s : float
-        Step of the integrator.
-    rate_hz : float
-        Output rate; its period must be a multiple of the step.
-    gravity_mps2 : float
-        Gravity.
-    settle_s : float
-        Time at rest before the ride, in which the springs come to rest; not part of the output.
+    setup : Setup
+        What runs, where and how.
     suspension : {"hook", "native"}
         Who computes the springs: the kernel, or Exudyn's own items (see the module).
-    drive : {"guide", "wheels"}
-        Whether the guide pulls the vehicle along or its wheels drive and brake it.
     """
 
-    def __init__(
-        self,
-        model: VehicleModel,
-        track: LaidTrack,
-        *,
-        profile: SpeedProfile,
-        step_s: float = 0.5e-3,
-        rate_hz: float = 1000.0,
-        gravity_mps2: float = 9.81,
-        settle_s: float = 4.0,
-        suspension: Literal["hook", "native"] = "hook",
-        drive: Literal["guide", "wheels"] = "guide",
-    ) -> None:
-        self.model, self.track, self.profile = model, track, profile
-        self.step_s, self.rate_hz, self.settle_s = step_s, rate_hz, settle_s
-        self.gravity_mps2 = gravity_mps2
-        data = pack(model, track, profile, gravity_mps2=gravity_mps2, drive=drive)
+    def __init__(self, setup: Setup, *, suspension: Literal["hook", "native"] = "hook") -> None:
+        self.setup, model = setup, setup.model
+        data = setup.pack()
         self._native = data.springs[:0]
         if suspension == "native":
             self._native, data = data.springs, data._replace(springs=data.springs[:0])
@@ -228,14 +89,12 @@ class ExudynEngine:
         DerailedError
             If a wheel leaves the rail beyond its flange tip.
         """
-        bodies, spins = len(self.model.bodies), len(self._spins)
+        bodies, spins = len(self.setup.model.bodies), len(self._spins)
         for time_s, rows, slopes in stretches(
+            self.setup,
             self._solve,
             lambda steps: steps[:, 1, : 6 * bodies].reshape(-1, bodies, 6),
             duration_s=duration_s,
-            settle_s=self.settle_s,
-            step_s=self.step_s,
-            rate_hz=self.rate_hz,
             segment_s=segment_s,
         ):
             places = rows[:, 0, : 6 * bodies].reshape(-1, bodies, 6)
@@ -258,13 +117,13 @@ class ExudynEngine:
         return wheel_loads_n(self.memo)
 
     def _build(self) -> None:
-        model = self.model
+        model = self.setup.model
         exu.config.printToConsole = False  # its hints (lists allocated by callbacks) are no news here
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._nodes = []
         objects = []
-        poses = start_poses(model, self.track, self.profile, gravity_mps2=self.gravity_mps2)
+        poses = start_poses(self.setup)
         for body, (position, rotation) in zip(model.bodies, poses, strict=True):
             turn = Rotation.from_matrix(rotation * HALF_TURN).as_rotvec()
             node = self.mbs.AddNode(
@@ -279,7 +138,7 @@ class ExudynEngine:
             )
             self._nodes.append(node)
         self._add_springs(objects)
-        self.memo[:] = start_memo(model, self.profile)
+        self.memo[:] = start_memo(self.setup)
         aux = len(self._spins) + self._states
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
@@ -307,7 +166,7 @@ class ExudynEngine:
         self._settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
         self._settings.solution.file.write = False
         # At every step: half a step, lest rounding lets one slip.
-        self._settings.solution.sensors.writePeriod = self.step_s / 2.0
+        self._settings.solution.sensors.writePeriod = self.setup.step_s / 2.0
 
     def _add_springs(self, objects: list[Any]) -> None:
         """Exudyn's own springs in place of the kernel's: rows as in `ForceData.springs`.
@@ -345,7 +204,7 @@ class ExudynEngine:
         view = memoryview(self._state.data).cast("B")
         put = struct.Struct(f"{2 * n}d").pack_into
         get = self._state[2 * n :].tolist
-        arena, settle = self._arena, self.settle_s
+        arena, settle = self._arena, self.setup.settle_s
 
         def user_function(mbs: Any, t: float, item: int, q: list[float], v: list[float]) -> list[float]:
             put(view, 0, *q, *v)
@@ -357,10 +216,10 @@ class ExudynEngine:
 
     def _sensor(self) -> Any:
         """Copies coordinates and rates into the rows of the present solution, step by step."""
-        system = self.mbs.systemData
+        system, step = self.mbs.systemData, self.setup.step_s
 
         def user_function(mbs: Any, t: float, numbers: Any, factors: Any, configuration: Any) -> list[float]:
-            row = self._rows[round((t - self._rows_start_s) / self.step_s)]
+            row = self._rows[round((t - self._rows_start_s) / step)]
             row[0] = system.GetODE2Coordinates()
             row[1] = system.GetODE2Coordinates_t()
             return _NOTHING
@@ -371,16 +230,16 @@ class ExudynEngine:
         """Integrate from the present state; coordinates and rates (steps + 1, 2, n) at every step."""
         integration = self._settings.timeIntegration
         # Exudyn knows no negative times: its clock starts with the settling.
-        integration.startTime = first * self.step_s + self.settle_s
-        integration.endTime = last * self.step_s + self.settle_s
+        integration.startTime = first * self.setup.step_s + self.setup.settle_s
+        integration.endTime = last * self.setup.step_s + self.setup.settle_s
         integration.numberOfSteps = last - first
         self._rows = np.full((last - first + 1, 2, self.size), np.nan)
         self._rows_start_s = integration.startTime
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
         )
-        refuse_derailed(self.memo, self.model)
+        refuse_derailed(self.memo, self.setup.model)
         if not solved or np.isnan(self._rows).any():
-            begin, end = first * self.step_s, last * self.step_s
+            begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")
         return self._rows

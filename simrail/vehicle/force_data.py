@@ -6,7 +6,6 @@ when a global changes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -249,28 +248,3 @@ def _switches(model: VehicleModel) -> FloatArray:
             0.5 * linear.gravitational_yaw_stiffness_nmprad,
         )
     return switches
-
-
-def spread(parts: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-    """Lay arrays into one, with a header that says where each begins and what shape it has.
-
-    A compiled function takes some 0.15 us per array that it is handed; at 8,000 calls a simulated second
-    one array instead of sixteen is worth it. `simrail.vehicle.exudyn_engine` takes them out again.
-
-    Returns
-    -------
-    arena : ndarray (m,)
-        Header of six numbers per part (offset, then the shape padded with ones to five), then the parts.
-    views : list of ndarray
-        The parts, as views into the arena.
-    """
-    head = 6 * len(parts)
-    arena = np.zeros(head + sum(part.size for part in parts))
-    views = []
-    at = head
-    for i, part in enumerate(parts):
-        arena[6 * i : 6 * i + 6] = at, *part.shape, *(1,) * (5 - part.ndim)
-        views.append(arena[at : at + part.size].reshape(part.shape))
-        views[-1][...] = part
-        at += part.size
-    return arena, views

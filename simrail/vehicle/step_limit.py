@@ -6,7 +6,7 @@ oscillation of circular frequency w up to ``w h = 2.83``; long before that its f
 ``(w h)^4 / 120``. A step beyond the limit need not blow up, since contacts part and creep saturates: it
 chatters, which looks like a ride.
 
-Not here: judging a scenario by it (`simrail.scenario.check`).
+Not here: judging a scenario by it (`simrail.scenario.check_ride`).
 """
 
 from __future__ import annotations

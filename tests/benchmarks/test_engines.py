@@ -17,6 +17,7 @@ from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.engine import Setup
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 ENGINES = {"compiled": CompiledEngine, "exudyn": ExudynEngine}
@@ -43,7 +44,7 @@ def test_engine(benchmark, engine, vehicle):
     profile = SpeedProfile(330.0, 600.0, 40.0 / 3.6, rest_s=1.0, final_rest_s=2.0, acceleration_mps2=1.0)
 
     def setup():
-        return (ENGINES[engine](model, laid, profile=profile, settle_s=0.5),), {}
+        return (ENGINES[engine](Setup(model, laid, profile, settle_s=0.5)),), {}
 
     def drive(engine):
         return sum(len(segment.time_s) for segment in engine.run(DURATION_S))

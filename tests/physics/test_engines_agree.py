@@ -18,6 +18,7 @@ from simrail.track.laid import lay
 from simrail.track.rail_condition import RailCondition
 from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.creep_laws import CreepLaw
+from simrail.vehicle.engine import Setup
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
@@ -43,7 +44,7 @@ def run(
     if law is not None:
         model = replace(model, wheel_rail=replace(model.wheel_rail, creep=CreepLaw(law)))
     laid = lay(load(TrackFile, "track", track).design(track), rough, seed=1, conditions=conditions)
-    solver = engine(model, laid, profile=profile, settle_s=1.0, step_s=step_s, drive=drive)
+    solver = engine(Setup(model, laid, profile, settle_s=1.0, step_s=step_s, drive=drive))
     segments = list(solver.run(duration_s, segment_s=3.0))
     joined = {name: np.concatenate([getattr(part, name) for part in segments]) for name in FIELDS}
     return SimpleNamespace(**joined, loads_n=solver.wheel_loads_n(), model=model, laid=laid)

@@ -15,7 +15,7 @@ from simrail.sensors.imu import sample_imu
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.truth import Mount
-from simrail.vehicle.engine import DerailedError
+from simrail.vehicle.engine import DerailedError, Setup
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
@@ -97,7 +97,7 @@ def test_static_wheel_loads_carry_the_weight():
     """To 0.1 % after settling, and each wheel its share."""
     model = vehicle()
     laid = lay(track("level_straight"), SMOOTH, seed=0)
-    engine = ExudynEngine(model, laid, profile=SpeedProfile(100.0, 101.0, 1.0))
+    engine = ExudynEngine(Setup(model, laid, SpeedProfile(100.0, 101.0, 1.0)))
     for _ in engine.run(0.1):
         pass
     weight = sum(body.mass_kg for body in model.bodies) * 9.81

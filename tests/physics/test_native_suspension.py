@@ -11,6 +11,7 @@ from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
+from simrail.vehicle.engine import Setup
 from simrail.vehicle.exudyn_engine import ExudynEngine
 
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
@@ -28,7 +29,7 @@ def vehicle(name):
 
 def motion(model, laid, suspension):
     """Accelerations (n, b, 3) across 3 s into the irregular curve, and angular ones."""
-    engine = ExudynEngine(model, laid, profile=PROFILE, settle_s=1.0, suspension=suspension)
+    engine = ExudynEngine(Setup(model, laid, PROFILE, settle_s=1.0), suspension=suspension)
     parts = list(engine.run(3.0))
     return tuple(
         np.concatenate([getattr(p, name) for p in parts]) for name in ("acceleration", "angular_acceleration")

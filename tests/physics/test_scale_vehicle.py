@@ -12,7 +12,7 @@ from simrail.scenario.vehicle_file import VehicleFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import DerailedError
+from simrail.vehicle.engine import DerailedError, Setup
 from simrail.vehicle.linear import running_vehicle
 from simrail.vehicle.stability import standstill_modes
 from simrail.vehicle.step_limit import contact_resonance
@@ -32,7 +32,7 @@ def laid():
 
 
 def felt(model, laid, step_s, duration_s=4.0):
-    engine = CompiledEngine(model, laid, profile=PROFILE, settle_s=2.0, step_s=step_s)
+    engine = CompiledEngine(Setup(model, laid, PROFILE, settle_s=2.0, step_s=step_s))
     return np.concatenate([part.acceleration for part in engine.run(duration_s)])
 
 

@@ -16,6 +16,7 @@ from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.engine import Setup
 from simrail.vehicle.model import LinearContact
 from simrail.vehicle.step_limit import contact_resonance
 
@@ -47,7 +48,7 @@ def straight():
 def run(model, track, profile, *, duration_s=None, irregularity=SMOOTH, settle_s=2.0, step_s=0.5e-3):
     """Engine after the ride, and position (n, b, 3), states (n, k), times (n,) of it."""
     engine = CompiledEngine(
-        model, lay(track, irregularity, seed=1), profile=profile, settle_s=settle_s, step_s=step_s
+        Setup(model, lay(track, irregularity, seed=1), profile, settle_s=settle_s, step_s=step_s)
     )
     parts = list(engine.run(profile.duration_s if duration_s is None else duration_s))
     position, states, time_s = (
@@ -84,7 +85,7 @@ def test_rides_an_irregular_curve_for_5_s(name):
     radius, cant = (3000.0, 10.0) if name == "suspended_wheelset" else (300.0, 60.0)
     profile = SpeedProfile(60.0, 160.0, 12.0, rest_s=0.2, acceleration_mps2=4.0, jerk_mps3=8.0)
     engine = CompiledEngine(
-        vehicle(name), lay(curve(radius, cant), ROUGH, seed=1), profile=profile, settle_s=1.0
+        Setup(vehicle(name), lay(curve(radius, cant), ROUGH, seed=1), profile, settle_s=1.0)
     )
     felt = np.concatenate([part.acceleration for part in engine.run(5.0)])
     assert len(felt) == 5001
@@ -255,12 +256,12 @@ def test_train_runs_from_rest_through_the_sharp_curve():
     """It stands still on level track, and takes the 250 m curve of the line at 40 km/h on all its wheels."""
     model = vehicle("metro_irw_train")
     still = CompiledEngine(
-        model, lay(straight(), SMOOTH, seed=1), profile=SpeedProfile(100.0, 110.0, 1.0, rest_s=5.0)
+        Setup(model, lay(straight(), SMOOTH, seed=1), SpeedProfile(100.0, 110.0, 1.0, rest_s=5.0))
     )
     assert np.abs(np.concatenate([part.acceleration for part in still.run(1.0)])).max() < 1e-6
     line = load(TrackFile, "track", "condequinto_olivar").design("condequinto_olivar")
     profile = SpeedProfile(345.0, 640.0, 40.0 / 3.6, rest_s=0.5, acceleration_mps2=1.0, jerk_mps3=1.0)
-    engine = CompiledEngine(model, lay(line, ROUGH, seed=1), profile=profile, settle_s=2.0)
+    engine = CompiledEngine(Setup(model, lay(line, ROUGH, seed=1), profile, settle_s=2.0))
     felt, loads = [], []
     for part in engine.run(22.0, segment_s=0.5):
         felt.append(part.acceleration)

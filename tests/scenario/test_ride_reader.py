@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from estimators.attitude_ekf import AttitudeEkf
 from estimators.attitude_gda import AttitudeGda
@@ -18,13 +15,9 @@ from simrail.errors import InputError
 from simrail.odometry import speed_odometry
 from simrail.profile import SpeedProfile
 from simrail.recording import Recording
-from simrail.rotation import rotation_matrix
-from simrail.scenario.files import judge, parse_toml
-from simrail.scenario.ride_file import ImuSignalPart
-from simrail.scenario.ride_reader import _Reader, read_ride
+from simrail.scenario.ride_reader import read_ride
 from simrail.scenario.track_file import track_by_name
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
-from simrail.signals import FORCES, LENGTHS, RATES, SPEEDS, TIMES
 from simrail.truth import Mount, Truth
 from simrail.vehicle.kinematic_engine import kinematic_truth
 
@@ -214,70 +207,6 @@ def test_a_file_without_time_stamps(motion, truth, tmp_path):
         read_ride(write_head(tmp_path, start))
 
 
-AXES = [
-    tuple(sign + letter for sign, letter in zip(signs, letters, strict=True))
-    for letters in permutations("xyz")
-    for signs in product(("", "-"), repeat=3)
-]
-
-
-def is_rotation(axes: tuple[str, ...]) -> bool:
-    matrix = np.zeros((3, 3))
-    for row, axis in enumerate(axes):
-        matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
-    return bool(np.linalg.det(matrix) > 0.0)
-
-
-@pytest.mark.parametrize("axes", AXES, ids="".join)
-def test_the_24_rotations_are_taken_and_the_24_mirrors_refused(axes):
-    text = f'file = "a.csv"\nbody = "b"\nposition_m = [0, 0, 0]\ngrade = "x"\naxes = {list(axes)}'
-    data = parse_toml(text, file="t")
-    if is_rotation(axes):
-        assert judge(ImuSignalPart, data, file="t").axes == axes
-    else:
-        with pytest.raises(InputError, match="left-handed"):
-            judge(ImuSignalPart, data, file="t")
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    axes=st.sampled_from([axes for axes in AXES if is_rotation(axes)]),
-    gyro_unit=st.sampled_from([sign + unit for unit in RATES for sign in ("", "-")]),
-    accel_unit=st.sampled_from([sign + unit for unit in FORCES for sign in ("", "-")]),
-    angles=st.tuples(*[st.floats(-60.0, 60.0)] * 3) | st.just((0.0, 0.0, 0.0)),
-    seed=st.integers(0, 99),
-)
-def test_units_and_axes_are_undone(tmp_path_factory, axes, gyro_unit, accel_unit, angles, seed):
-    """What a device of any unit and mounting says of a motion is read back as that motion."""
-    folder = tmp_path_factory.mktemp("map")
-    body = np.random.default_rng(seed).standard_normal((20, 6))
-    tilt = rotation_matrix(np.radians([angles]))[0]
-    columns = {"time_s": np.arange(20) / 10.0}
-    for part, unit, units, names in (
-        (body[:, :3], gyro_unit, RATES, ("p", "q", "r")),
-        (body[:, 3:], accel_unit, FORCES, ("u", "v", "w")),
-    ):
-        multiply, divide = units[unit.removeprefix("-")]
-        printed = as_device(part @ tilt, axes) / (multiply / divide)
-        columns |= dict(zip(names, (-printed if unit[0] == "-" else printed).T, strict=True))
-    pd.DataFrame(columns).to_csv(folder / "a.csv", index=False)
-    roll, pitch, yaw = angles
-    text = f"""file = "a.csv"
-body = "b"
-position_m = [0, 0, 0]
-grade = "x"
-axes = {list(axes)}
-roll_deg = {roll!r}
-pitch_deg = {pitch!r}
-yaw_deg = {yaw!r}
-columns = {{ gyro = ["p", "q", "r"], accel = ["u", "v", "w"] }}
-units = {{ gyro = "{gyro_unit}", accel = "{accel_unit}" }}
-"""
-    part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
-    found = _Reader(folder, "t").frame(part, "imu").to_numpy()
-    np.testing.assert_allclose(found, body, rtol=0.0, atol=1e-14 if any(angles) else 2e-15)
-
-
 def test_speed_of_an_odometer(truth, motion, tmp_path):
     """Speed in whole tenths of a km/h, ten times a second: the way within its own standard deviation."""
     start = float(motion["position_m"].iloc[0])
@@ -331,23 +260,3 @@ def test_speed_filter_is_causal_and_signed():
     np.testing.assert_array_equal(back["position_m"], -whole["position_m"])
     # s = t^2/2 while the speed rises evenly, known to a small lag.
     assert whole["position_m"].iloc[-1] - 5.0 == pytest.approx(32.0 + 8.0 * 7.99, abs=0.3)
-
-
-def test_units_are_those_of_the_tables_of_units():
-    """Against literal figures: standard gravity by definition, 180 deg per pi, 3600 s per hour."""
-    known = {
-        "g": 9.80665,
-        "mg": 9.80665e-3,
-        "deg/s": 0.017453292519943295,
-        "deg/h": 4.84813681109536e-06,
-        "km/h": 0.2777777777777778,
-        "km": 1000.0,
-        "mm": 1e-3,
-        "ms": 1e-3,
-        "us": 1e-6,
-        "ns": 1e-9,
-    }
-    listed = {**RATES, **FORCES, **SPEEDS, **LENGTHS, **TIMES}
-    for unit, (multiply, divide) in listed.items():
-        assert multiply / divide == pytest.approx(known.get(unit, 1.0), rel=1e-15), unit
-    assert set(known) | {"s", "m", "m/s", "m/s2", "rad/s"} == set(listed)

@@ -17,9 +17,10 @@ from simrail.recording import Recording
 from simrail.recording_check import check_recording
 from simrail.scenario.files import judge, parse_toml, shipped
 from simrail.scenario.imu_file import load_grade
-from simrail.scenario.ride_file import RideFile, SignalPart, VectorPart
+from simrail.scenario.ride_file import RideFile
 from simrail.scenario.ride_reader import read_ride
 from simrail.scenario.ride_writer import write_ride
+from simrail.scenario.signal_part import SignalPart, VectorPart
 from simrail.scenario.track_file import TrackFile, track_by_name, track_text
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.magnetometer import MagnetometerSpec

@@ -21,9 +21,7 @@ from simrail.sensors.allan import (
     FLICKER_FLOOR,
     GAUSS_MARKOV_PEAK_AT,
     bias_sd,
-    flicker_stages,
     gauss_markov_allan,
-    overlapping_allan,
 )
 from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import sample_imu
@@ -273,17 +271,6 @@ def test_flicker_floor_is_flat_at_every_rate(rate, kind):
     check_flicker(grade, grade, kind)
 
 
-@pytest.mark.parametrize("span", ((0.1, 1.0), (1.0, 1000.0), (1.0, 36_000.0), (100.0, 200.0)))
-def test_flicker_stages_are_flat_over_their_range_by_the_closed_form(span):
-    correlation, sd = flicker_stages(2.0, span)
-    tau = np.geomspace(*span, 200)
-    variance = sum(
-        gauss_markov_allan(tau, sd=s, correlation_s=t) ** 2 for t, s in zip(correlation, sd, strict=True)
-    )
-    assert np.abs(np.sqrt(variance) / (2.0 * FLICKER_FLOOR) - 1.0).max() < 0.02
-    assert np.max(correlation[1:] / correlation[:-1]) <= 8.0 * (1.0 + 1e-9)
-
-
 @pytest.mark.parametrize("factor", (2.0, 0.5))
 def test_another_range_of_the_floor_is_caught(factor):
     low, high = FLICKERING.flicker_range_s
@@ -333,14 +320,6 @@ def test_increments_leave_the_quantisation_of_angles():
     np.testing.assert_allclose(found, grade.allan(taus)["gyro"], rtol=0.03)
     by_hand = np.hypot(np.sqrt(3.0) * (0.2 / 100.0 / np.sqrt(12.0)) / taus, 0.01 / np.sqrt(taus))
     np.testing.assert_allclose(grade.allan(taus)["gyro"], by_hand, rtol=1e-12)
-
-
-def test_own_overlapping_allan_deviation_is_that_of_allantools():
-    series = np.cumsum(np.random.default_rng(1).standard_normal(5000)) + 3.0
-    taus = [0.01, 0.07, 1.0, 12.0]
-    np.testing.assert_allclose(
-        overlapping_allan(series, 100.0, np.array(taus)), allan(series, 100.0, taus), rtol=1e-9
-    )
 
 
 @pytest.mark.parametrize("term", ("turn_on_bias", "resolution", "range"))

@@ -13,7 +13,6 @@ import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.special import fresnel
 
 from simrail.errors import InputError
 from simrail.track.design import (
@@ -227,94 +226,6 @@ def test_curvatures_against_the_symbolic_derivation() -> None:
     assert np.abs(frame.dk).max(axis=0).min() > 1e-5
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "length"),
-    [(None, 300.0, 40.0), (250.0, -150.0, 60.0), (-400.0, None, 80.0), (25.0, -12.0, 90.0)],
-)
-def test_clothoid_against_fresnel_integrals(before: float | None, after: float | None, length: float) -> None:
-    ends = [Straight(20.0) if radius is None else Curve(20.0, radius) for radius in (before, after)]
-    design = TrackDesign("clothoid", 0.0, (ends[0], Transition(length), ends[1]))
-    k0, k1 = (0.0 if radius is None else 1.0 / radius for radius in (before, after))
-    rate = (k1 - k0) / length
-    u = np.linspace(0.0, length, 201)
-    # Completing the square: angle = base + rate (u + shift)^2 / 2.
-    scale, shift = np.sqrt(np.pi / abs(rate)), k0 / rate
-    entry = design.frame(20.0)
-    base = entry.yaw_rad - 0.5 * rate * shift**2
-    sine, cosine = fresnel((u + shift) / scale)
-    sine0, cosine0 = fresnel(shift / scale)
-    spiral = scale * ((cosine - cosine0) + 1j * np.sign(rate) * (sine - sine0)) * np.exp(1j * base)
-    position = design.frame(20.0 + u).position - entry.position
-    assert np.abs(position[:, 0] + 1j * position[:, 1] - spiral).max() < 1e-12
-
-
-def test_arc_lies_on_its_circle() -> None:
-    design = TrackDesign("circle", 5.0, (Curve(1000.0, 100.0, 0.1),))
-    position = design.frame(np.linspace(5.0, 1005.0, 99)).position
-    # A left curve that starts towards +x turns about (0, +R).
-    assert np.abs(np.hypot(position[:, 0], position[:, 1] - 100.0) - 100.0).max() < 1e-12
-    assert design.frame(1005.0).yaw_rad == pytest.approx(10.0, abs=1e-14)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("ramp", ["smooth", "linear"])
-def test_cant_ramp(ramp: str, side: float) -> None:
-    design = TrackDesign(
-        "ramp", 0.0, (Straight(30.0), Transition(50.0), Curve(30.0, side * 300.0, 0.12)), cant_ramp=ramp
-    )
-    u = np.linspace(0.0, 1.0, 41)
-    frame = design.frame(30.0 + 50.0 * u)
-    share = u if ramp == "linear" else 10 * u**3 - 15 * u**4 + 6 * u**5
-    # The outer rail of a left curve is the right one: left side down, roll negative.
-    assert np.abs(1.5 * np.sin(frame.roll_rad) + side * 0.12 * share).max() < 1e-15
-    assert design.frame(100.0).roll_rad == pytest.approx(-side * np.arcsin(0.08), abs=1e-16)
-    eps = 1e-7
-    twist = design.frame(np.array([30.0 + eps, 80.0 - eps])).rates[:, 0]
-    bend = design.frame(np.array([30.0 + eps, 80.0 - eps])).second[:, 0]
-    if ramp == "smooth":
-        assert np.abs(twist).max() < 1e-12
-        assert np.abs(bend).max() < 1e-9
-    else:
-        assert twist[0] == pytest.approx(-side * 0.12 / 50.0 / 1.5, rel=1e-9)
-
-
-@pytest.mark.parametrize("ramp", [0.0, 5.0, 20.0])
-@pytest.mark.parametrize("change", [0.045, -0.045, 0.001])
-def test_vertical_curve_keeps_the_change_of_slope_exact(ramp: float, change: float) -> None:
-    radius, middle = 1500.0, 200.0
-    design = TrackDesign(
-        "crest",
-        0.0,
-        (Straight(400.0),),
-        gradients=(Gradient(0.0, -0.01), Gradient(middle, change - 0.01)),
-        vertical_radius_m=radius,
-        vertical_ramp_m=ramp,
-    )
-    slope = -np.tan(design.frame(np.array([0.0, 100.0, 300.0, 400.0])).pitch_rad)
-    assert np.abs(slope - [-0.01, -0.01, change - 0.01, change - 0.01]).max() < 1e-16
-    # The gradients meet at the middle, as the two tangents of a parabola do.
-    z = design.frame(np.array([0.0, 400.0])).position[:, 2]
-    assert z[1] - z[0] == pytest.approx(-0.01 * middle + (change - 0.01) * (400.0 - middle), abs=1e-13)
-    length = max(radius * abs(change), ramp)
-    centre = design.frame(middle)
-    bend = -centre.rates[1] / np.cos(centre.pitch_rad) ** 2
-    assert bend == pytest.approx(change / length, rel=1e-12)
-    outside = middle + np.array([-1.0, 1.0]) * (0.5 * (length + ramp) + 1e-6)
-    assert np.array_equal(design.frame(outside).rates[:, 1], [0.0, 0.0])
-    s = np.linspace(middle - 60.0, middle + 60.0, 120001)
-    steps = np.abs(np.diff(design.frame(s).rates[:, 1])).max()
-    # A bare parabola steps by 1/radius; a ramp rises by no more than 15/8 of its mean slope.
-    assert steps == pytest.approx(1.0 / radius, rel=1e-3) if not ramp else steps < 2e-3 / ramp / radius
-
-
-def test_parabola_stands_where_it_should() -> None:
-    design = TrackDesign(
-        "parabola", 0.0, (Straight(300.0),), gradients=(Gradient(100.0, 0.03),), vertical_ramp_m=0.0
-    )
-    s = np.array([50.0, 70.0, 100.0, 130.0, 200.0])  # level until 100 - 30, radius 2000 m, 60 m long
-    assert design.frame(s).position[:, 2] == pytest.approx([0.0, 0.0, 30.0**2 / 4000, 0.9, 3.0], abs=1e-14)
-
-
 @pytest.mark.parametrize("place", [-30.001, 370.5, np.nan, np.inf])
 def test_off_the_track_is_an_error_that_names_place_and_limits(place: float) -> None:
     for method in (LEFT_AND_RIGHT.frame, LEFT_AND_RIGHT.kind, LEFT_AND_RIGHT.curvature):
@@ -369,27 +280,6 @@ def test_start_position_and_yaw_move_the_whole_line() -> None:
 
 def test_a_design_is_not_worked_on_before_it_is_used() -> None:
     assert TrackDesign("nonsense", 0.0, (Transition(-1.0),)).name == "nonsense"
-
-
-@pytest.mark.parametrize(
-    ("elements", "field"),
-    [
-        ((), "segment"),
-        ((Straight(0.0),), "segment[0].length_m"),
-        ((Straight(float("nan")),), "segment[0].length_m"),
-        ((Straight(10.0), Transition(10.0)), "segment[1]"),
-        ((Transition(10.0), Straight(10.0)), "segment[0]"),
-        ((Straight(10.0), Transition(10.0), Transition(10.0), Straight(10.0)), "segment[1]"),
-        ((Straight(10.0), Curve(10.0, 300.0)), "segment[1]"),
-        ((Curve(10.0, 300.0, 0.02), Curve(10.0, 300.0, 0.03)), "segment[1]"),
-        ((Curve(10.0, 0.0),), "segment[0].radius_m"),
-        ((Curve(10.0, 300.0, 80.0),), "segment[0].cant_m"),
-    ],
-)
-def test_elements_that_cannot_be_joined(elements: tuple[Element, ...], field: str) -> None:
-    with pytest.raises(InputError) as caught:
-        TrackDesign("bad", 0.0, elements).check()
-    assert caught.value.field == field
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,18 @@
 """What several tests of the contact measure against."""
 
+from functools import cache
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from simrail.vehicle.contact import build_contact, wheel_force
 from simrail.vehicle.hertz import kalker_coefficients
+from simrail.vehicle.profiles import rail_60e1, s1002
+from simrail.vehicle.wheelset import contact_state
+
+ARGUMENTS = ("side", "y", "z", "phi", "psi", "y_rail", "z_rail", "V", "v_x", "y_dot", "z_dot", "phi_dot")
+ARGUMENTS += ("psi_dot", "W", "kappa_h", "dy_rail", "dz_rail")
 
 
 def fastsim(xi_x, xi_y, spin, *, a, b, normal, friction, modulus, strips=50):
@@ -46,3 +55,66 @@ def fastsim(xi_x, xi_y, spin, *, a, b, normal, friction, modulus, strips=50):
 def dense_fastsim():
     """`fastsim` as a function of creepages, contact and number of strips."""
     return fastsim
+
+
+@cache
+def table(load=53e3, **options):
+    return build_contact(s1002(), rail_60e1(), static_load_n=load, **options)
+
+
+def call(contact, zeta=None, **state):
+    """Flag, forces and creep rates at a state; what is not given is 0 (side: left)."""
+    values = dict.fromkeys(ARGUMENTS, 0.0) | {"side": 1.0} | state
+    zeta = np.zeros(4) if zeta is None else np.array(zeta, dtype=float)
+    rate, out = np.full(4, np.nan), np.full(8, np.nan)
+    friction = values.pop("friction", contact.const[5])
+    arguments = (*(float(values[a]) for a in ARGUMENTS), float(friction))
+    flag = wheel_force(contact.coef, contact.const, *arguments, zeta, rate, out)
+    return flag, out, rate
+
+
+def settle(contact, **state):
+    """Creep states of steady rolling, by marching their own equation."""
+    zeta = np.zeros(4)
+    for _ in range(4000):
+        _, out, rate = call(contact, zeta, **state)
+        zeta = zeta + 3e-4 * rate
+    assert np.abs(rate).max() < 1e-9
+    return zeta, out
+
+
+def random_states(n, seed=7):
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        side = rng.choice([-1.0, 1.0])
+        y, phi = rng.uniform(-6.5e-3, 6.5e-3), rng.uniform(-3e-3, 3e-3)
+        state = {"side": side, "y": y, "phi": phi, "psi": rng.uniform(-8e-3, 8e-3)}
+        state |= {"y_rail": rng.uniform(-1e-3, 1e-3), "z_rail": rng.uniform(-1e-3, 1e-3)}
+        V = rng.uniform(-30.0, 30.0)
+        state |= {"V": V, "v_x": V * rng.uniform(0.999, 1.001), "W": V / 0.46 * rng.uniform(0.99, 1.01)}
+        for name in ("y_dot", "z_dot"):
+            state[name] = rng.normal(0.0, 0.02)
+        for name in ("phi_dot", "psi_dot"):
+            state[name] = rng.normal(0.0, 0.02)
+        state |= {"kappa_h": rng.uniform(-5e-3, 5e-3)}
+        state |= {"dy_rail": rng.normal(0.0, 1e-3), "dz_rail": rng.normal(0.0, 1e-3)}
+        state["z"] = height_for(table(), state, rng.uniform(10e-6, 150e-6))
+        yield state, rng.normal(0.0, 2e-3, 4)
+
+
+def height_for(contact, state, penetration):
+    """Height of the axle at which the deeper patch has this penetration."""
+    at = {k: state.get(k, 0.0) for k in ("y", "phi", "psi", "y_rail", "z_rail")}
+    found = contact_state(
+        contact, state.get("side", 1.0), y_m=at["y"], z_m=0.0, roll_rad=at["phi"], yaw_rad=at["psi"],
+        y_rail_m=at["y_rail"], z_rail_m=at["z_rail"],
+    )  # fmt: skip
+    return max(p["penetration_m"] for p in found.values()) - penetration
+
+
+@pytest.fixture(scope="session")
+def kernel():
+    """The contact kernel at one state at a time: `table`, `call`, `settle`, `random_states`, `height_for`."""
+    return SimpleNamespace(
+        table=table, call=call, settle=settle, random_states=random_states, height_for=height_for
+    )

@@ -19,7 +19,7 @@ from simrail.track.design import Straight, TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
 from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import DerailedError
+from simrail.vehicle.engine import DerailedError, Setup
 from simrail.vehicle.stepper import BODY
 
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
@@ -37,7 +37,7 @@ def curve(irregularity, seed=1):
 
 
 def ride(laid, profile, duration_s, *, segment_s=5.0, **options):
-    engine = CompiledEngine(bogie(), laid, profile=profile, **{"settle_s": 1.0, **options})
+    engine = CompiledEngine(Setup(bogie(), laid, profile, **{"settle_s": 1.0, **options}))
     segments = list(engine.run(duration_s, segment_s=segment_s))
     joined = {name: np.concatenate([getattr(part, name) for part in segments]) for name in FIELDS}
     return SimpleNamespace(**joined)
@@ -181,7 +181,7 @@ def test_coasting_gains_no_energy():
     model = bogie()
     design = TrackDesign("level", 0.0, (Straight(2000.0),))
     engine = CompiledEngine(
-        model, lay(design, SMOOTH, seed=0), profile=SpeedProfile(20.0, 1900.0, 20.0, **BRISK)
+        Setup(model, lay(design, SMOOTH, seed=0), SpeedProfile(20.0, 1900.0, 20.0, **BRISK))
     )
 
     def energy():
@@ -214,7 +214,7 @@ def test_derailment_is_said_at_once():
     """One clear error, and no steps after it."""
     profile = SpeedProfile(20.0, 560.0, 75.0, rest_s=0.5, acceleration_mps2=30.0, jerk_mps3=200.0)
     laid = curve(SMOOTH)
-    engine = CompiledEngine(bogie(), laid, profile=profile)
+    engine = CompiledEngine(Setup(bogie(), laid, profile))
     with pytest.raises(DerailedError, match=r"axle front left the rail at s = [\d.]+ m") as said:
         for _ in engine.run(8.0, segment_s=60.0):
             pass
@@ -225,7 +225,7 @@ def test_derailment_is_said_at_once():
 def test_static_wheel_loads():
     """To 0.1 % after settling."""
     model = bogie()
-    engine = CompiledEngine(model, curve(SMOOTH), profile=SpeedProfile(20.0, 30.0, 5.0))
+    engine = CompiledEngine(Setup(model, curve(SMOOTH), SpeedProfile(20.0, 30.0, 5.0)))
     for _ in engine.run(0.1):
         pass
     np.testing.assert_allclose(engine.wheel_loads_n(), model.wheel_load_n(9.81), rtol=1e-3)

@@ -14,6 +14,7 @@ from simrail.track.laid import lay
 from simrail.vehicle.compiled_engine import CompiledEngine
 from simrail.vehicle.contact import build_contact, static_height
 from simrail.vehicle.contact_tables import contacts_of, rest_drops_m
+from simrail.vehicle.engine import Setup
 from simrail.vehicle.profiles import rail_60e1, s1002
 
 LEVEL = TrackDesign("level", 0.0, (Straight(60.0),))
@@ -35,7 +36,7 @@ def bogie(body_at_m=0.0):
 def at_rest(model):
     """Heights of the axles less their nominal ones, and wheel loads, after 8 s at rest."""
     laid = lay(LEVEL, Irregularity("none", fade_m=0.0), seed=0)
-    engine = CompiledEngine(model, laid, profile=SpeedProfile(20.0, 40.0, 5.0, rest_s=5.0), settle_s=8.0)
+    engine = CompiledEngine(Setup(model, laid, SpeedProfile(20.0, 40.0, 5.0, rest_s=5.0), settle_s=8.0))
     segment = next(iter(engine.run(0.5)))
     nominal = [model.body(name).position_m[2] for name in model.axle_names]
     return segment.position[-1, : len(nominal), 2] - nominal, engine.wheel_loads_n()

@@ -297,12 +297,13 @@ def test_exudyns_own_linearised_system_has_the_same_eigenvalues(bogie):
     Exudyn differentiates its own equations (one-sided, along its Lie-group increments, hence the rate
     of a displacement is the velocity), so this checks coordinates, inertia and differences at once.
     """
+    from simrail.vehicle.engine import Setup
     from simrail.vehicle.exudyn_engine import ExudynEngine, exu
 
     speed = 10.0
     laid = lay(TrackDesign("level", 0.0, (Straight(400.0),)), Irregularity("none", fade_m=1.0), seed=0)
     profile = SpeedProfile(20.0, 390.0, speed, acceleration_mps2=3.0, jerk_mps3=6.0, rest_s=0.1)
-    engine = ExudynEngine(bogie.model, laid, profile=profile, settle_s=2.0)
+    engine = ExudynEngine(Setup(bogie.model, laid, profile, settle_s=2.0))
     for _ in engine.run(14.0):
         pass
     mass, stiffness, damping = exu.solver.ComputeLinearizedSystem(engine.mbs, engine._settings)

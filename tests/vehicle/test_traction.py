@@ -21,6 +21,7 @@ from simrail.track.laid import lay
 from simrail.track.rail_condition import RailCondition
 from simrail.truth import abeam
 from simrail.vehicle.compiled_engine import CompiledEngine
+from simrail.vehicle.engine import Setup
 from simrail.vehicle.hertz import hertz_ellipse, kalker_coefficients
 from simrail.vehicle.traction import Traction
 from simrail.vehicle.traction_forces import driver
@@ -55,7 +56,7 @@ def mass_kg(model, *, rolling):
 def run(model, profile, *, conditions=(), gradient=0.0, duration_s=None, engine=CompiledEngine, **options):
     design = TrackDesign("line", 0.0, (Straight(500.0),), gradients=(Gradient(0.0, gradient),))
     laid = lay(design, SMOOTH, seed=0, conditions=conditions)
-    solver = engine(model, laid, profile=profile, drive="wheels", **{"settle_s": 3.0, **options})
+    solver = engine(Setup(model, laid, profile, drive="wheels", **{"settle_s": 3.0, **options}))
     segments = list(solver.run(duration_s or np.floor(profile.duration_s * 1000.0) / 1000.0))
     fields = ("time_s", "position", "velocity", "acceleration", "rate", "spin_rad", "states")
     ride = SimpleNamespace(**{f: np.concatenate([getattr(s, f) for s in segments]) for f in fields})

@@ -1,0 +1,22 @@
+"""Who is told how a campaign or an export goes. What it then shows is its own: see `simrail.progress`."""
+
+from __future__ import annotations
+
+
+class Watcher:
+    """Is told how a campaign goes; this one keeps silent. Subclass it to show progress."""
+
+    def ride_begins(self, number: int, count: int, name: str) -> None:
+        """Ride `number` (from 1) of `count` is simulated, or found in the cache, from now on."""
+
+    def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
+        """The ride has been simulated so far."""
+
+    def ride_ends(self) -> None:
+        """The ride is there; its cells are measured and estimated from now on."""
+
+    def estimate_made(self, number: int, count: int, name: str) -> None:
+        """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
+
+    def recording_written(self, number: int, count: int, name: str) -> None:
+        """Recording `number` (from 1) of `count` has been written, by an export."""

@@ -1,0 +1,22 @@
+"""Folders of their own for tests that run scenarios."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Rides of a module's tests go into a cache of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("cache")
+        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
+        yield
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder of a test, empty."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -1,0 +1,136 @@
+"""The report's sentences are looked up in the scores, also when they do not flatter."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.columns import ATTITUDE
+from simrail.estimate import Estimate
+from simrail.example import CellResult
+from simrail.report.findings import findings, significant
+from simrail.report.methods import method_styles
+from simrail.report.pivot import cases
+from simrail.scenario.cells import methods
+from simrail.scenario.scenario import Scenario
+
+
+def said(scenario: Scenario, scores: pd.DataFrame, cells: pd.DataFrame) -> str:
+    styles = list(method_styles(methods(scenario)).values())
+    return "\n".join(finding.text for finding in findings(cases(scores, cells)[0], styles))
+
+
+def test_sentences_are_looked_up_in_the_scores(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    text = said(scenario, *tables(example()))
+    sizes = "from 0.500\u00b0 rms without to 0.100\u00b0 with it: 5.0 times less"
+    assert f"In curves, compensation takes the roll error of EKF {sizes}" in text
+    # Design: roll off by the square wave of 0.25 deg, pitch exact.
+    assert (
+        "'Design angles only', which uses no IMU, beats EKF compensated in pitch (0\u00b0 against 0.200\u00b0"
+        in text
+    )
+    assert "beats EKF compensated in roll" not in text
+    assert re.search(r"Of the baselines.*plain filter in roll \(0.250\u00b0 against 0.500\u00b0 rms\)", text)
+    assert "VQF is worse than EKF compensated in roll: 0.400\u00b0 against 0.100\u00b0 rms" in text
+    assert "No ideal IMU was run" in text
+    assert "odometry 'encoder'; its position error is 0.500 m rms" in text
+
+
+def test_sentences_turn_with_the_scores(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    """Exchange the method with its uncompensated twin: the page must say that compensation hurts."""
+    one = example()
+    swapped = dict(one.estimates)
+    swapped["ekf_compensated"], swapped["plain_filter"] = swapped["plain_filter"], swapped["ekf_compensated"]
+    text = said(scenario, *tables(CellResult(one.cell, one.recording, one.motion, swapped)))
+    assert "compensation does not reduce the roll error of EKF" in text and "times less" not in text
+    assert "beats EKF compensated in roll (0.250\u00b0 against 0.500\u00b0 rms)" in text
+    assert "VQF is better than EKF compensated" in text
+
+
+def test_a_filter_that_is_never_beaten_is_said_to_be_so(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    one = example()
+    states = one.motion[list(ATTITUDE)]
+    perfect = dict(one.estimates, ekf_compensated=Estimate(states=states, mount="axle"))
+    text = said(scenario, *tables(CellResult(one.cell, one.recording, one.motion, perfect)))
+    assert "EKF compensated: nowhere beaten by 'design angles only'" in text
+
+
+def test_coverage_decides_what_is_said_of_the_standard_deviations(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    one = example()
+    for sd_deg, verdict in ((0.1, "larger than its errors"), (0.04, "are too small")):
+        states = one.estimates["ekf_compensated"].states.assign(roll_sd_rad=np.deg2rad(sd_deg))
+        estimates = dict(one.estimates, ekf_compensated=Estimate(states=states, mount="axle"))
+        text = said(scenario, *tables(CellResult(one.cell, one.recording, one.motion, estimates)))
+        assert verdict in text
+
+
+def test_true_odometry_is_called_an_ablation(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    one = example()
+    scores, cells = tables(one)
+    scores["estimator"] = scores["estimator"].cat.rename_categories({"odometry:encoder": "odometry:truth"})
+    assert "ablation" in said(scenario, scores, cells)
+
+
+def test_the_ideal_imu_tells_the_floor(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    one = example()
+    ideal = CellResult(one.cell | {"imu": "ideal"}, one.recording, one.motion, one.estimates)
+    all_cases = cases(*tables(one, ideal))
+    styles = list(method_styles(methods(scenario)).values())
+    text = "\n".join(finding.text for finding in findings(all_cases[0], styles, others=all_cases))
+    assert "With an ideal IMU" in text and "EKF compensated 0.100\u00b0 instead of 0.100\u00b0" in text
+
+
+def test_roles_follow_from_the_scenario_not_from_names(scenario: Scenario) -> None:
+    styles = method_styles(methods(scenario))
+    assert {name: style.baseline for name, style in styles.items()} == {
+        "ekf_compensated": "",
+        "plain_filter": "uncompensated",
+        "vqf": "general purpose",
+        "design_angles": "no IMU",
+    }
+    assert styles["ekf_compensated"].twin == "plain_filter"
+    assert len({(style.colour, style.stroke) for style in styles.values()}) == len(styles)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (0.21349, "0.213"),
+        (2.1349, "2.13"),
+        (123.4, "123"),
+        (0.00012, "0.0001"),
+        (0.0999999, "0.100"),
+        (1e-9, "<0.0001"),
+    ],
+)
+def test_numbers_have_three_significant_digits(value: float, text: str) -> None:
+    assert significant(value) == text

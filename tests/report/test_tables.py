@@ -1,0 +1,61 @@
+"""The report's tables, and the cases that they are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.example import CellResult
+from simrail.report.methods import method_styles
+from simrail.report.pivot import Figures, cases, of_cell
+from simrail.report.tables import error_table
+from simrail.scenario.cells import methods
+from simrail.scenario.scenario import Scenario
+
+
+def case_of(scores: pd.DataFrame, cells: pd.DataFrame) -> Figures:
+    return cases(scores, cells)[0]
+
+
+def test_table_marks_the_best_method_and_every_loss(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    styles = list(method_styles(methods(scenario)).values())
+    table = error_table(case_of(*tables(example())), styles, reference="truth")
+    column = table.columns.index("curve")
+    marks = {row.label: row.cells[column] for row in table.rows}
+    assert marks["EKF compensated"].mark == "best" and marks["EKF compensated"].text == "0.100"
+    assert marks["plain filter"].mark == "worse" and marks["VQF"].mark == "worse"
+    assert marks["design angles"].mark == "" and marks["design angles"].text == "0.250"
+    design = error_table(case_of(*tables(example())), styles, reference="design")
+    assert design.rows[3].cells[column].text == "0.000"
+    assert sum(span for _, span in table.groups) == len(table.columns) == len(table.rows[0].cells)
+
+
+def test_spread_over_draws_is_shown(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    case = case_of(*tables(example(), spread=0.1))
+    found = case.get("ekf_compensated", "roll", "rms")
+    assert found.draws == 2
+    assert found.value == pytest.approx(0.1)
+    assert found.sd == pytest.approx(0.1 * np.sqrt(2) * 0.1)
+
+
+def test_cases_are_found_by_their_labels(
+    example: Callable[..., CellResult], tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
+) -> None:
+    one, two = example(), example(backward=True, name="back")
+    all_cases = cases(*tables(one, two))
+    assert len(all_cases) == 2
+    found = of_cell(all_cases, two.cell)
+    assert found is not None and found.labels["ride"] == "back"
+    assert of_cell(all_cases, {"ride": "elsewhere"}) is None
+    assert all_cases[0].curves() == ["curve:curve 3 R300"]
