@@ -49,6 +49,7 @@ from simrail.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.jit import FloatArray
+from simrail.odometry import encoder_odometry
 from simrail.recording import Recording
 from simrail.track.design import TrackDesign
 
@@ -57,6 +58,9 @@ RATE_HZ = 50.0
 
 CALM_HZ = 1.0
 """Up to here an acceleration is the train's."""
+
+HOLD_S = 2.0
+"""After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
 
 ACCELERATION_SD_MPS2 = 0.03
 """Of that acceleration: what the body's pitching leaves in it."""
@@ -182,11 +186,30 @@ class CurveMatchedOdometry:
         else:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = known[last]
+            self._roll(values, recording, _held(trace.slipping, HOLD_S)[np.maximum(last - 1, 0)])
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
         states = pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
         return Estimate(states=states, mount=recording.mount)
+
+    def _roll(self, values: FloatArray, recording: Recording, slipping: np.ndarray) -> None:
+        """Put the wheel's own acceleration into values (n, 6), where the wheel rolls.
+
+        An attitude filter takes the acceleration off the accelerometer. Made from that same accelerometer
+        it would take the body's own pitch away as well.
+        """
+        assert recording.encoder is not None and recording.encoder_sheet is not None
+        wheel = encoder_odometry(
+            recording.encoder,
+            recording.encoder_sheet,
+            recording.imu.index.to_numpy(dtype=np.float64),
+            start_position_m=recording.start_position_m,
+            radius_relative_sd=self.radius_sd,
+        )
+        rolls = ~slipping
+        values[rolls, 2] = wheel["acceleration_mps2"].to_numpy()[rolls]
+        values[rolls, 5] = wheel["acceleration_sd_mps2"].to_numpy()[rolls]
 
     def _calm(self, trace: Trace) -> FloatArray:
         """Acceleration without what the body shakes, (n,): the train's own changes slowly."""
@@ -311,6 +334,14 @@ class CurveMatchedOdometry:
             ]
         )
         return x, np.diag(sd**2)
+
+
+def _held(flags: np.ndarray, hold_s: float) -> np.ndarray:
+    """Flags (n,) at the filter's steps, each held on for a time."""
+    steps = np.arange(len(flags))
+    latest = np.maximum.accumulate(np.where(flags, steps, -len(flags) - 10**6))
+    held: np.ndarray = steps - latest <= hold_s * RATE_HZ
+    return held
 
 
 def line_table(track: TrackDesign) -> tuple[FloatArray, FloatArray]:
