@@ -186,7 +186,8 @@ class CurveMatchedOdometry:
         else:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = known[last]
-            self._roll(values, recording, _held(trace.slipping, HOLD_S)[np.maximum(last - 1, 0)])
+            slipping = np.concatenate([[False], _held(trace.slipping, HOLD_S)])
+            self._roll(values, recording, slipping[last])
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
