@@ -4,7 +4,8 @@ Gonzalez-Carbajal et al. 2023 (paper 001): gyro, accelerometer, odometry and the
 of the body and its place (y, z) in the track frame; virtual measurements that say "where it belongs, more or
 less" keep the place from drifting. Forwards it is an extended Kalman filter, backwards a fixed-interval
 smoother, and the first alone is to be had as a causal filter. It works at standstill and backwards, since
-speed enters the measurements only, with its sign.
+speed enters the measurements only, with its sign. What the rails look like then follows from the trajectory
+(`estimators.track_geometry`).
 
 The model has no sensor bias: what an offset of the accelerometer does to roll and pitch, and one of the gyro
 to yaw, is not in the standard deviations. Place is another matter: the virtual measurements hold it.
@@ -15,7 +16,7 @@ The model stands in `estimators.trajectory_model`, the noise in `estimators.traj
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ import pandas as pd
 from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_back import trajectory_back
 from estimators.kernels.trajectory_equations import ROWS, STATES
+from estimators.track_geometry import track_geometry
 from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
 from estimators.trajectory_noise import Hyperparameters, read_hyperparameters
 from simrail.columns import (
@@ -72,6 +74,9 @@ class TrajectorySmoother:
         ``"compiled"``, or ``"filterpy"``: slow, readable, the reference.
     with_covariance : bool
         False leaves out covariances and standard deviations, which take more than half of the time.
+    geometry_step_m : float
+        Distance of the places of the rail geometry; 0 leaves the geometry out. The filter's states are causal,
+        its geometry lies over the track and is made after the ride, as the smoother's is.
     start_sd_rad, start_yaw_sd_rad : float
         Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
     """
@@ -84,6 +89,7 @@ class TrajectorySmoother:
     printed: bool = False
     backend: str = "compiled"
     with_covariance: bool = True
+    geometry_step_m: float = 0.25
     start_sd_rad: float = math.radians(1.0)
     start_yaw_sd_rad: float = math.radians(0.3)
 
@@ -102,6 +108,13 @@ class TrajectorySmoother:
         for name in ("start_sd_rad", "start_yaw_sd_rad"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
+        if not 0.0 <= self.geometry_step_m < math.inf:
+            raise InputError(
+                "is out of range",
+                field="geometry_step_m",
+                value=self.geometry_step_m,
+                limit="0 (none) or more, m",
+            )
         if self.tuning:
             if self.hyperparameters != Hyperparameters():
                 raise InputError("a file and values cannot both be given", field="tuning", value=self.tuning)
@@ -113,7 +126,14 @@ class TrajectorySmoother:
         return not self.smoothed
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate attitude and place in the track frame at every IMU sample."""
+        """Estimate attitude and place in the track frame at every IMU sample, and the rails along the ride."""
+        estimate = self._trajectory(recording)
+        if not self.geometry_step_m:
+            return estimate
+        return replace(estimate, geometry=track_geometry(estimate, recording, step_m=self.geometry_step_m))
+
+    def _trajectory(self, recording: Recording) -> Estimate:
+        """Without the geometry; the trace is let go before that is made, since it is large."""
         found = self.trace(recording)
         index = recording.imu.index
         names = [*ATTITUDE, *RELATIVE_POSITION]

@@ -13,15 +13,19 @@ import pandas as pd
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from estimators.baselines import ZeroTrack
 from estimators.kernels.trajectory_equations import TERMS
+from estimators.track_geometry import track_geometry
 from estimators.trajectory_model import Found, Model, process_noise
 from estimators.trajectory_noise import Hyperparameters, read_hyperparameters
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend, log_likelihood
-from simrail.columns import ATTITUDE, ATTITUDE_SD, RELATIVE_POSITION, RELATIVE_POSITION_SD
+from simrail.bands import BANDS, band_pass
+from simrail.columns import ATTITUDE, ATTITUDE_SD, IRREGULARITY, RELATIVE_POSITION, RELATIVE_POSITION_SD
 from simrail.errors import InputError
 from simrail.recording import Recording
 from simrail.report.estimate_figures import innovation_figure
 from simrail.scenario.build import construct
+from simrail.score_geometry import score_geometry
 from simrail.seeds import stream
 from simrail.testing import standing, time_reversed
 from simrail.truth import Mount
@@ -195,6 +199,43 @@ def test_states_and_covariance_are_those_of_the_trace(line_recording: Callable) 
         assert smoother.causal is not smoother.smoothed
 
 
+def test_the_rails_follow_from_the_trajectory(line_recording: Callable) -> None:
+    """Its geometry is that of its own states, at the step asked for; with sds, gauge left open; or none."""
+    recording = WHERE["curve"](line_recording)
+    for smoother in (TrajectorySmoother(), TrajectorySmoother(smoothed=False, geometry_step_m=0.5)):
+        estimate = smoother.estimate(recording)
+        by_hand = track_geometry(estimate, recording, step_m=smoother.geometry_step_m)
+        assert estimate.geometry is not None
+        pd.testing.assert_frame_equal(estimate.geometry, by_hand, check_exact=True)
+        assert np.diff(by_hand.index).mean() == pytest.approx(smoother.geometry_step_m)
+        assert by_hand["gauge_m"].isna().all()
+        assert (by_hand[["alignment_sd_m", "vertical_profile_sd_m", "cross_level_sd_m"]] > 0.0).all(axis=None)
+    means = TrajectorySmoother(with_covariance=False).estimate(recording).geometry
+    assert means is not None and list(means) == list(IRREGULARITY)
+    assert TrajectorySmoother(geometry_step_m=0.0).estimate(recording).geometry is None
+
+
+def test_its_geometry_beats_that_of_no_sensor(metro_recording: Callable, metro_rails: Callable) -> None:
+    """Between 3 and 25 m, at 70 km/h from the axle. That of no sensor errs by the true rails, to the digit."""
+    recording, rails = metro_recording(70.0, 1, "axle", 0), metro_rails(70.0, 1)
+    zero = ZeroTrack().estimate(recording)
+    assert zero.geometry is not None
+    place = zero.geometry.index.to_numpy()
+    ours, none = (
+        score_geometry(estimate, rails, recording, windows=["whole"], metrics=["sd"]).set_index(
+            ["quantity", "band"]
+        )["value"]
+        for estimate in (TrajectorySmoother().estimate(recording), zero)
+    )
+    for name in IRREGULARITY[:3]:
+        quantity = name.removesuffix("_m")
+        true = 1e3 * rails.irregularities(place)[name].to_numpy()
+        passed = band_pass(true, BANDS["D1"].edges_m(quantity), step_m=0.25)
+        assert none[quantity, "full"] == pytest.approx(true.std(), rel=1e-9)
+        assert none[quantity, "D1"] == pytest.approx(np.nanstd(passed), rel=1e-9)
+        assert ours[quantity, "D1"] < none[quantity, "D1"]
+
+
 def test_hyperparameters_are_read_from_a_file(tmp_path: Path, line_recording: Callable) -> None:
     parameters = Hyperparameters(lateral_m2ps5=3.0, accel_x_m2ps4=0.5)
     path = tmp_path / "tuned.toml"
@@ -242,6 +283,7 @@ def test_a_bad_file_is_named(tmp_path: Path, text: str, words: list[str]) -> Non
         ({"backend": "matlab"}, "backend"),
         ({"start_sd_rad": 0.0}, "start_sd_rad"),
         ({"start_yaw_sd_rad": float("nan")}, "start_yaw_sd_rad"),
+        ({"geometry_step_m": -0.25}, "geometry_step_m"),
         ({"tuning": "nowhere.toml"}, "nowhere.toml"),
         ({"tuning": "a.toml", "hyperparameters": Hyperparameters(lateral_m2ps5=2.0)}, "tuning"),
     ],
