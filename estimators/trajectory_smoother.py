@@ -75,8 +75,8 @@ class TrajectorySmoother:
     with_covariance : bool
         False leaves out covariances and standard deviations, which take more than half of the time.
     geometry_step_m : float
-        Distance of the places of the rail geometry; 0 leaves the geometry out. The filter's states are causal,
-        its geometry lies over the track and is made after the ride, as the smoother's is.
+        Distance of the places of the rail geometry; 0 leaves the geometry out. It lies over the track and is
+        made after the ride, also of the filter's states, which are causal.
     start_sd_rad, start_yaw_sd_rad : float
         Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
     """
@@ -126,7 +126,7 @@ class TrajectorySmoother:
         return not self.smoothed
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate attitude and place in the track frame at every IMU sample, and the rails along the ride."""
+        """Estimate attitude and place in the track frame at every IMU sample, and the rails below."""
         estimate = self._trajectory(recording)
         if not self.geometry_step_m:
             return estimate

@@ -216,7 +216,7 @@ def test_the_rails_follow_from_the_trajectory(line_recording: Callable) -> None:
 
 
 def test_its_geometry_beats_that_of_no_sensor(metro_recording: Callable, metro_rails: Callable) -> None:
-    """Between 3 and 25 m, at 70 km/h from the axle. That of no sensor errs by the true rails, to the digit."""
+    """In D1, at 70 km/h from the axle. That of no sensor errs by the true rails, to the digit."""
     recording, rails = metro_recording(70.0, 1, "axle", 0), metro_rails(70.0, 1)
     zero = ZeroTrack().estimate(recording)
     assert zero.geometry is not None
