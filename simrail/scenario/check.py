@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from simrail.errors import InputError
 from simrail.estimate import Estimator
-from simrail.scenario.build import Parts, estimator_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells, count, methods
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
@@ -74,7 +74,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
             remedy="shorten a list or take fewer draws",
         )
     _judge_score(scenario)
-    estimators = _judge_estimators(scenario)
+    estimators = _judge_estimators(scenario, parts)
     warnings: dict[str, None] = {}
     simulated = 0.0
     judged_rides: set[tuple[str, ...]] = set()
@@ -124,7 +124,7 @@ def _judge_score(scenario: Scenario) -> None:
                 )
 
 
-def _judge_estimators(scenario: Scenario) -> dict[str, Estimator]:
+def _judge_estimators(scenario: Scenario, parts: Parts) -> dict[str, Estimator]:
     made: dict[str, Estimator] = {}
     for method in methods(scenario):
         if method.name in made:
@@ -135,5 +135,5 @@ def _judge_estimators(scenario: Scenario) -> dict[str, Estimator]:
                 value=method.name,
                 remedy="give each a name of its own",
             )
-        made[method.name] = estimator_of(scenario, method)
+        made[method.name] = parts.estimator(method)
     return made

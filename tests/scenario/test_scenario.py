@@ -11,9 +11,10 @@ from pydantic import Field
 
 from simrail.errors import InputError
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
-from simrail.scenario.build import Parts, encoder_of, estimator_of, magnetometer_of, mount_of, profile_of
+from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of, profile_of
 from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
+from simrail.scenario.estimators import estimator_of
 from simrail.scenario.files import Part, judge, shipped
 from simrail.scenario.overrides import override
 from simrail.scenario.scenario import load_scenario, read_scenario
