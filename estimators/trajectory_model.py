@@ -208,7 +208,7 @@ def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) ->
         rad/s and m/s2.
     """
     roll, pitch, _ = angles.T
-    roll_rate, pitch_rate, yaw_rate = rates.T
+    _, pitch_rate, yaw_rate = rates.T
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
     beyond = [
         (pitch - sp) * yaw_rate,

@@ -1,4 +1,4 @@
-"""Passes of the smoother: what first order in roll costs a body that rolls much, and what a second pass mends."""
+"""Passes of the smoother: what first order in roll costs a body that rolls, and what a second one mends."""
 
 from __future__ import annotations
 
