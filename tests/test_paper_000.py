@@ -38,7 +38,7 @@ MEAN_KMH = {"go20A": 21.0, "go20B": 18.0, "back20A": -21.0, "back20B": -21.0, "g
 
 def test_mean_speeds_are_those_of_table_2() -> None:
     found = {}
-    for cell in cells(load_scenario("metro_table3", overrides=["sensor_draws=1"])):
+    for cell in cells(load_scenario("metro_table3", overrides=["monte_carlo.sensor_draws=1"])):
         profile = profile_of(cell)
         t = np.linspace(0.0, profile.duration_s, 200_001)
         position, speed, _ = profile.motion(t)
@@ -196,7 +196,9 @@ def some_rides(names: tuple[str, ...], draws: int) -> Scenario:
     text = load_scenario("metro_table3").text.replace(', "ideal"]', "]")
     head, *parts = re.split(r"(?m)^(?=\[\[ride\]\]|\[\[imu\]\])", text)
     kept = [part for part in parts if "[[ride]]" not in part or any(f'"{n}"' in part for n in names)]
-    return read_scenario(head + "".join(kept), name="metro_table3", overrides=[f"sensor_draws={draws}"])
+    return read_scenario(
+        head + "".join(kept), name="metro_table3", overrides=[f"monte_carlo.sensor_draws={draws}"]
+    )
 
 
 @lru_cache
