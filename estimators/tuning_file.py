@@ -160,15 +160,13 @@ def _judge_names(
                 f"no such {what}" if name not in known else f"the {what} is missing",
                 file=file.name,
                 field=prefix + name,
-                value=None if name not in data else data[name],
+                value=data.get(name),
                 limit=f"the {what}s " + ", ".join(known),
                 remedy=REMEDY if name in known else "remove it",
             )
 
 
-def _hyperparameters(
-    table: dict[str, Any], name: str, search: Search | None, file: Path
-) -> Hyperparameters:
+def _hyperparameters(table: dict[str, Any], name: str, search: Search | None, file: Path) -> Hyperparameters:
     known = tuple(entry.name for entry in fields(Hyperparameters))
     _judge_names(table, known, needed=known, file=file, what="hyper-parameter", prefix=f"{name}.")
     try:

@@ -84,9 +84,8 @@ class SearchSpace:
             low, high = self._logs(i, logs)
             logs[i] = low + at[i] * (high - low)
         found = np.clip(10.0**logs, *self.box)
-        for accel, position in PAIRS.values():
-            if self.position_m2 is not None:
-                found[position] = self.position_m2
+        if self.position_m2 is not None:
+            found[[position for _, position in PAIRS.values()]] = self.position_m2
         for axis in self.constrained:
             accel, position = PAIRS[axis]
             found[accel] = min(found[accel], found[position] / RATIO)  # rounding of the logarithms

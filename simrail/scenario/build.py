@@ -13,9 +13,7 @@ from math import radians
 from pathlib import Path
 from typing import Any, TypeVar
 
-
 from simrail.bands import BANDS, Band
-from simrail.errors import InputError
 from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, rails_of

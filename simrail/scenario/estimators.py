@@ -1,7 +1,7 @@
 """From a method's words to an estimator: its class by name, and its options, each judged.
 
-An option may be a file: where the class declares a type that has `from_file(path)`, the scenario gives a path,
-seen from its own folder first. Nothing is estimated here.
+An option may be a file: where the class declares a type that has `from_file(path)`, the scenario gives a
+path, seen from its own folder first. Nothing is estimated here.
 """
 
 from __future__ import annotations
@@ -85,7 +85,9 @@ def _existing(name: str, folder: Path | None) -> Path:
     for candidate in (*([folder / name] if folder else []), Path(name)):
         if candidate.is_file():
             return candidate
-    raise InputError("no such file", value=name, remedy="mend the path; it is seen from the scenario's folder")
+    raise InputError(
+        "no such file", value=name, remedy="mend the path; it is seen from the scenario's folder"
+    )
 
 
 def option_files(estimator: Estimator) -> dict[str, str]:
