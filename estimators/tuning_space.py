@@ -99,7 +99,7 @@ class SearchSpace:
         found = []
         for i in self.searched:
             low, high = self._logs(i, logs)
-            found.append((logs[i] - low) / (high - low))
+            found.append((logs[i] - low) / (high - low) if high > low else 0.0)
         return np.clip(np.array(found), 0.0, 1.0)
 
     def limits(self, values: FloatArray) -> FloatArray:
