@@ -10,8 +10,6 @@ import dataclasses
 import difflib
 import hashlib
 import json
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from math import radians
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -22,6 +20,7 @@ from pydantic.errors import PydanticUserError
 from simrail.bands import BANDS, Band
 from simrail.errors import InputError
 from simrail.estimate import Estimator, estimator_class
+from simrail.own_files import load_own
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, rails_of
 from simrail.scenario.cells import Cell, Method
@@ -63,6 +62,10 @@ class Parts:
         self._read: dict[tuple[str, str], Any] = {}
         self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the rails, for another process: they are laid faster than sent."""
+        return {**self.__dict__, "_laid": None}
 
     @property
     def hash(self) -> str:
@@ -259,21 +262,7 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
         raise InputError(
             "no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder"
         )
-    # A name of its own per content: two files, or two versions of one, never share a module.
-    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
-    if module_name not in sys.modules:
-        spec = spec_from_file_location(module_name, path)
-        assert spec is not None and spec.loader is not None
-        module = module_from_spec(spec)
-        sys.modules[module_name] = module  # dataclasses look their module up there
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[module_name]
-            raise InputError(
-                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
-            ) from error
-    found = getattr(sys.modules[module_name], class_name, None)
+    found = getattr(load_own(path, shown=path_name), class_name, None)
     if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
         raise InputError(
             "the file has no such estimator class",
