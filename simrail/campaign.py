@@ -94,7 +94,7 @@ def run_campaign(
     """
     job = scenario if isinstance(scenario, Job) else prepare(scenario)
     with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
-        kept = kept or Unfinished(Path(spare))
+        kept = Unfinished(Path(spare)) if kept is None else kept
         loop = _Loop(job, kept, watcher or Watcher(), only)
         with interruptible():
             try:

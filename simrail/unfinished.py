@@ -97,9 +97,10 @@ class Unfinished:
         with (self.folder / LOG).open("a", encoding="utf-8") as stream:
             stream.write(f"{now} {line}\n")
 
-    def __bool__(self) -> bool:
-        """Whether there is a finished batch."""
-        return bool(self._files())
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no finished batch."""
+        return not self._files()
 
     def clear(self) -> None:
         """Drop every batch, and the log."""
@@ -139,7 +140,7 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
     kept = Unfinished(folder)
     try:
         with _locked(folder):
-            if start == "resume" and not kept:
+            if start == "resume" and kept.is_empty:
                 raise InputError(
                     "there is no unfinished run of this plan",
                     field="--resume",
@@ -151,7 +152,7 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
                 kept.clear()
             yield kept
     finally:
-        if not kept:
+        if kept.is_empty:
             kept.remove()
 
 
