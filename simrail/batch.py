@@ -15,7 +15,7 @@ import socket
 import threading
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -25,14 +25,13 @@ from threadpoolctl import threadpool_limits
 
 from simrail.cell import look_at, run_cells
 from simrail.errors import InputError
-from simrail.estimate import Estimator
 from simrail.example import CellResult
 from simrail.interrupts import Check, interruptible
 from simrail.ledger import Failure, Ledger, cell_record, reason_of
 from simrail.own_files import install, sources_of
 from simrail.ride import Progress, is_cached, simulate
 from simrail.scenario.build import Parts
-from simrail.scenario.cells import Cell, Method
+from simrail.scenario.cells import Cell, methods
 from simrail.score_table import concat_scores
 from simrail.sources import score_code_hash
 from simrail.truth import Mount, Truth
@@ -45,7 +44,7 @@ class Order:
     Attributes
     ----------
     data : bytes
-        Parts and estimators, pickled.
+        Parts, estimators among them, pickled.
     key : str
         SHA-256 of the data.
     code : str
@@ -136,13 +135,16 @@ class _Desk:
 
     key: str
     parts: Parts
-    estimators: Mapping[str, tuple[Method, Estimator]]
+    tunings: dict[int, dict[str, str]] = field(default_factory=dict)
     warm: set[str] = field(default_factory=set)
     ride: tuple[int, Truth, dict[str, Any]] | None = None
 
-    def ledger(self) -> Ledger:
-        """A ledger for one batch."""
-        return Ledger(self.parts.scenario.name, self.estimators, self.warm)
+    def ledger(self, sample: int) -> Ledger:
+        """A ledger for one batch, whose cells are of one sample, as they share a ride."""
+        scenario = self.parts.scenario
+        if sample not in self.tunings:
+            self.tunings[sample] = {each.name: each.tuning for each in methods(scenario, sample=sample)}
+        return Ledger(scenario.name, self.parts.estimators(sample), self.tunings[sample], self.warm)
 
 
 _desk: _Desk | None = None
@@ -150,15 +152,15 @@ _at_work = threading.RLock()
 """One batch at a time in a process, whatever threads it has: timings and memory are those of one batch."""
 
 
-def order_of(parts: Parts, estimators: Mapping[str, tuple[Method, Estimator]]) -> Order:
-    """Pack what every batch needs.
+def order_of(parts: Parts) -> Order:
+    """Pack what every batch needs: the parts of a scenario that has been judged, its estimators among them.
 
     Raises
     ------
     InputError
         If an estimator cannot be sent to another process.
     """
-    for name, (_, estimator) in estimators.items():
+    for name, estimator in parts.estimators(0).items():
         try:
             pickle.dumps(estimator)
         except Exception as error:
@@ -168,8 +170,8 @@ def order_of(parts: Parts, estimators: Mapping[str, tuple[Method, Estimator]]) -
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
             ) from error
-    sources = sources_of([estimator for _, estimator in estimators.values()])
-    data = pickle.dumps((sources, pickle.dumps((parts, dict(estimators)))))
+    sources = sources_of(list(parts.estimators(0).values()))
+    data = pickle.dumps((sources, pickle.dumps(parts)))
     return Order(data, hashlib.sha256(data).hexdigest(), score_code_hash())
 
 
@@ -201,7 +203,7 @@ def run_batch(order: Order, cells: tuple[Cell, ...]) -> BatchResult:
     """Run cells that share a ride; for errors see `run_ride`."""
     notes: list[str] = []
     with _at_desk(order) as (desk, check):
-        ledger = desk.ledger()
+        ledger = desk.ledger(cells[0].sample)
         facts: dict[str, Any] = {}
         try:
             with ledger.timed("simulate"):
@@ -220,7 +222,7 @@ def run_batch(order: Order, cells: tuple[Cell, ...]) -> BatchResult:
 def lost_batch(order: Order, cells: tuple[Cell, ...], reason: str, trace: str) -> BatchResult:
     """Failed rows for cells that cannot be run, and why."""
     with _at_desk(order) as (desk, _):
-        ledger = desk.ledger()
+        ledger = desk.ledger(cells[0].sample)
         for cell in cells:
             for name in ledger.estimators:
                 ledger.lost(cell, name, reason, trace)
@@ -231,7 +233,7 @@ def example_of(order: Order, cell: Cell) -> CellResult:
     """Run a cell again to look at it closely."""
     with _at_desk(order) as (desk, _):
         truth, _ = _ride(desk, cell, [])
-        ledger = desk.ledger()
+        ledger = desk.ledger(cell.sample)
         described = {**ledger.labels(cell, ""), **cell_record(cell)}
         del described["estimator"], described["tuning"]
         return look_at(cell, truth, desk.parts, ledger, described)
@@ -260,7 +262,7 @@ def _at_desk(order: Order) -> Iterator[tuple[_Desk, Check]]:
         if _desk is None or _desk.key != order.key:
             sources, data = pickle.loads(order.data)
             install(sources)
-            _desk = _Desk(order.key, *pickle.loads(data))
+            _desk = _Desk(order.key, pickle.loads(data))
         yield _desk, check
 
 

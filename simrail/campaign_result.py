@@ -96,7 +96,7 @@ def _examples(job: Job, listed: list[Cell], failures: list[Failure]) -> list[Cel
         if len(found) == MOST_EXAMPLES:
             break
         lost = failed.get(cell.number, 0) >= len(job.plan.estimators)
-        if cell.track_draw == 0 and cell.ride_number not in shown and not lost:
+        if cell.track_draw == cell.sample == 0 and cell.ride_number not in shown and not lost:
             shown.add(cell.ride_number)
             with suppress(Exception):
                 found.append(example_of(job.order, cell))

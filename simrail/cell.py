@@ -73,7 +73,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, ledger: Ledger,
                 ledger.failed(cell, name, error)
     if not recorded:
         return
-    for name, (_, estimator) in ledger.estimators.items():
+    for name, estimator in ledger.estimators.items():
         found = _estimates(name, estimator, [one.recording for one in recorded], ledger, check)
         for one, outcome in zip(recorded, found, strict=True):
             try:
@@ -113,7 +113,7 @@ def look_at(
     """Run a cell again for the figures of a report: its recording and estimates, without scores."""
     recording = record_cell(cell, truth, parts)
     estimates = {}
-    for name, (_, estimator) in ledger.estimators.items():
+    for name, estimator in ledger.estimators.items():
         with suppress(Exception):
             (estimates[name],) = estimate_many(estimator, [recording])
     return CellResult(described, recording, truth_at_imu(truth, recording), estimates)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from simrail.batch import Order, order_of
 from simrail.scenario.build import Parts
-from simrail.scenario.cells import methods
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
 from simrail.sources import score_code_hash
@@ -51,7 +50,6 @@ def prepare(scenario: Scenario) -> Job:
     """
     parts = Parts(scenario)
     plan = judge_scenario(scenario, parts)
-    chosen = {method.name: (method, plan.estimators[method.name]) for method in methods(scenario)}
     files = {inspect.getsourcefile(type(estimator)) for estimator in plan.estimators.values()}
     decides = {
         "name": scenario.name,
@@ -61,4 +59,4 @@ def prepare(scenario: Scenario) -> Job:
         "versions": {package: version(package) for package in _PACKAGES},
     }
     key = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-    return Job(scenario, plan, parts, order_of(parts, chosen), key)
+    return Job(scenario, plan, parts, order_of(parts), key)

@@ -16,8 +16,8 @@ import pandas as pd
 
 from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
-from simrail.scenario.cells import Cell, Method
-from simrail.scenario.scenario import RidePart
+from simrail.scenario.cells import Cell
+from simrail.scenario.parts import RidePart
 from simrail.score_table import failed_figures, labelled
 
 
@@ -42,8 +42,10 @@ class Ledger:
     ----------
     scenario : str
         Name of what is run.
-    estimators : mapping of str to (Method, Estimator)
+    estimators : mapping of str to Estimator
         By their names in the tables.
+    tunings : mapping of str to str
+        How each is tuned, by the same names.
     warm : set of str
         Estimators whose kernels have been compiled in this process.
     tables : list of pandas.DataFrame
@@ -55,7 +57,8 @@ class Ledger:
     """
 
     scenario: str
-    estimators: Mapping[str, tuple[Method, Estimator]]
+    estimators: Mapping[str, Estimator]
+    tunings: Mapping[str, str]
     warm: set[str] = field(default_factory=set)
     tables: list[pd.DataFrame] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
@@ -83,7 +86,6 @@ class Ledger:
 
     def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
         """Labels of a row of the score table."""
-        known = self.estimators.get(estimator)
         return {
             "cell": cell.number,
             "scenario": self.scenario,
@@ -92,7 +94,7 @@ class Ledger:
             "mount": cell.imu.name,
             "imu": cell.imu.grade,
             "odometry": cell.spec.odometry,
-            "tuning": known[0].tuning if known else "default",
+            "tuning": self.tunings.get(estimator, "default"),
             "track_draw": cell.track_draw,
             "sensor_draw": cell.sensor_draw,
             "estimator": estimator,
@@ -120,6 +122,7 @@ def cell_record(cell: Cell) -> dict[str, object]:
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
+        "sample": cell.sample,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
         "track": cell.spec.track,

@@ -21,7 +21,7 @@ from simrail.columns import ATTITUDE, ATTITUDE_SD, RELATIVE_POSITION, RELATIVE_P
 from simrail.errors import InputError
 from simrail.recording import Recording
 from simrail.report.estimate_figures import innovation_figure
-from simrail.scenario.build import construct
+from simrail.scenario.build_estimator import construct
 from simrail.seeds import stream
 from simrail.testing import standing, time_reversed
 from simrail.truth import Mount
