@@ -35,7 +35,7 @@ _MOST_CELLS, _MOST_SECONDS = 20, 600.0
 """Largest batch: cells, and seconds of recordings together, which are held in memory at once."""
 
 _MOST_TRIES = 3
-"""How often a batch is run whose worker dies; then its cells have failed."""
+"""How often a cell is run whose worker dies each time; then it has failed."""
 
 
 class _Task(NamedTuple):
@@ -201,13 +201,14 @@ class _Loop:
     def _lost(self, task: _Task, *, given_up: bool) -> None:
         """A worker died over a task: run it again, alone; in the end, its cells have failed."""
         self.tries[task.name] += 1
-        if self.tries[task.name] < _MOST_TRIES and not given_up:
+        single = task.is_ride or len(task.cells) == 1
+        if not given_up and self.tries[task.name] < (_MOST_TRIES if single else _MOST_TRIES - 1):
             self._tell(f"a worker died: {task.words} run again")
             self.suspects.append(task)
-        elif len(task.cells) > 1 and not task.is_ride:
+        elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it.
             singles = [_Task(False, (cell,)) for cell in task.cells]
-            self.tries.update({single.name: _MOST_TRIES - 1 for single in singles})
+            self.tries.update({one.name: _MOST_TRIES - 1 for one in singles})
             self.suspects.extend(singles)
         else:
             reason = "the worker died, killed or out of memory, each time this was run"

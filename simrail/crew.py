@@ -144,7 +144,11 @@ class _Processes:
         return self._workers
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        future: Future[Any] = self._pool.submit(function, *arguments)
+        try:
+            future: Future[Any] = self._pool.submit(function, *arguments)
+        except BrokenExecutor as error:  # a worker died since the last one was handed in
+            future = Future()
+            future.set_exception(error)
         return future
 
     def renew(self) -> None:
