@@ -168,6 +168,25 @@ def concat_scores(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+def in_order(scores: pd.DataFrame) -> pd.DataFrame:
+    """Rows in the order of the cells, words in that of the vocabulary and then of the rows.
+
+    What is returned depends on the rows of each cell alone, not on the order in which cells were stacked.
+    """
+    cell = scores["cell"].to_numpy()
+    if (np.diff(cell) < 0).any():
+        scores = scores.iloc[np.argsort(cell, kind="stable")].reset_index(drop=True)
+    columns: dict[str, object] = {}
+    for name in scores.columns:
+        column = scores[name]
+        if isinstance(column.dtype, pd.CategoricalDtype):
+            used = [column.cat.categories[code] for code in pd.unique(column.cat.codes)]
+            words = list(dict.fromkeys((*_CLOSED.get(name, ()), *used)))
+            column = column.cat.set_categories(words)
+        columns[name] = column
+    return pd.DataFrame(columns)
+
+
 def labelled(figures: pd.DataFrame, labels: dict[str, object]) -> pd.DataFrame:
     """Put the campaign's labels before the figures of one estimate.
 

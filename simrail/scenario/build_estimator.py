@@ -11,9 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import hashlib
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -22,6 +19,7 @@ from pydantic.errors import PydanticUserError
 
 from simrail.errors import InputError
 from simrail.estimate import Estimator, estimator_class
+from simrail.own_files import load_own
 from simrail.scenario.cells import Method
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
@@ -56,22 +54,7 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
     path_name, colon, class_name = name.rpartition(":")
     if not colon or not path_name.endswith(".py"):
         return estimator_class(name)
-    path = _existing(path_name, folder)
-    # A name of its own per content: two files, or two versions of one, never share a module.
-    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
-    if module_name not in sys.modules:
-        spec = spec_from_file_location(module_name, path)
-        assert spec is not None and spec.loader is not None
-        module = module_from_spec(spec)
-        sys.modules[module_name] = module  # dataclasses look their module up there
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[module_name]
-            raise InputError(
-                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
-            ) from error
-    found = getattr(sys.modules[module_name], class_name, None)
+    found = getattr(load_own(_existing(path_name, folder), shown=path_name), class_name, None)
     if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
         raise InputError(
             "the file has no such estimator class",
