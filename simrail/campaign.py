@@ -24,7 +24,7 @@ from simrail.interrupts import Check, interruptible
 from simrail.ledger import Failure, Ledger, cell_record
 from simrail.line_odometry import with_odometry
 from simrail.measure import measure
-from simrail.recording import Recording
+from simrail.recording import Recording, beginning
 from simrail.ride import is_cached, simulate
 from simrail.scenario.build import (
     Parts,
@@ -91,7 +91,7 @@ class _RememberedTruth(Truth):
         return self.remembered[place]
 
 
-def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> CampaignResult:
+def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None, many: bool = False) -> CampaignResult:
     """Run every cell of a scenario.
 
     Parameters
@@ -100,6 +100,8 @@ def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> Campa
         As read by `simrail.load_scenario`.
     watcher : Watcher, optional
         Is told of the progress.
+    many : bool
+        Accept more cells than `simrail.scenario.check.MOST_CELLS`.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None) -> Campa
     """
     watcher = watcher or Watcher()
     parts = Parts(scenario)
-    plan = judge_scenario(scenario, parts)
+    plan = judge_scenario(scenario, parts, many=many)
     chosen = {method.name: (method, plan.estimators[method.name]) for method in methods(scenario)}
     ledger = Ledger(scenario, chosen)
     records = []
@@ -237,27 +239,10 @@ def _timed_estimate(
     if name not in ledger.warm:
         # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
         with ledger.timed("estimate"), suppress(Exception):
-            estimator.estimate(_beginning(recording, samples=64))
+            estimator.estimate(beginning(recording, samples=64))
         ledger.warm.add(name)
     with ledger.timed("estimate"):
         begun = time.perf_counter()
         estimate = estimator.estimate(recording)
         seconds = time.perf_counter() - begun
     return estimate, 1e6 * seconds / len(recording.imu)
-
-
-def _beginning(recording: Recording, *, samples: int) -> Recording:
-    """The first samples of a recording."""
-    imu = recording.imu.iloc[:samples]
-    encoder = recording.encoder
-    if encoder is not None:
-        encoder = encoder.loc[: imu.index[-1]]
-    magnetic, seen = recording.magnetometer, recording.rail_displacement
-    return replace(
-        recording,
-        imu=imu,
-        encoder=encoder,
-        odometry=recording.odometry.iloc[:samples],
-        magnetometer=None if magnetic is None else magnetic.iloc[:samples],
-        rail_displacement=None if seen is None else seen.iloc[:samples],
-    )

@@ -59,6 +59,7 @@ def run(
     seed: int | None = None,
     overrides: Sequence[str] = (),
     watcher: Watcher | None = None,
+    many: bool = False,
 ) -> Results:
     """Run a scenario: simulate, record, estimate, score, and write the results.
 
@@ -74,6 +75,8 @@ def run(
         Settings ``key=value`` that replace what the file says.
     watcher : Watcher, optional
         Is told of the progress.
+    many : bool
+        Accept more cells than `simrail.scenario.check.MOST_CELLS`.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
-    campaign = run_campaign(scenario, watcher=watcher)
+    campaign = run_campaign(scenario, watcher=watcher, many=many)
     manifest = describe(scenario, campaign)
     manifest["started_utc"] = started.isoformat(timespec="seconds")
     with draft_of(folder) as draft:
