@@ -146,8 +146,8 @@ def interval(
         return Interval(np.nan, np.nan, np.nan)
     k = int(labels.max()) + 1
     if statistic == "mean":
-        sums, counts = np.bincount(labels, kept, k), np.bincount(labels, minlength=k)
-        value, low, high = mean_interval(sums, counts.astype(np.float64), confidence=confidence)
+        sums, counts = np.bincount(labels, kept, k), np.bincount(labels, minlength=k).astype(np.float64)
+        value, low, high = mean_interval(sums, counts, confidence=confidence)
         return Interval(float(value[0]), float(low[0]), float(high[0]))
     of = _weighted(statistic, kept)
     whole = float(of(np.ones((1, len(kept))))[0])

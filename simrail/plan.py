@@ -24,8 +24,8 @@ from simrail.scenario.scenario import Scenario
 from simrail.score_windows import chosen_windows, windows_of
 from simrail.truth import Truth
 
-SCORE_ROW_BYTES = 10.0
-"""Of ``scores.parquet``; recorded on tables of 10,000 to 1,000,000 rows, which take 8 to 11."""
+SCORE_ROW_BYTES = 8.0
+"""Of ``scores.parquet``; recorded on tables of 60,000 to 800,000 rows, which take 5 to 8."""
 
 MOST_ENGINES = 8
 """Engines, vehicles and steps that are rehearsed; more of them cost what the mean of these costs."""

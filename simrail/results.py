@@ -19,12 +19,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from simrail.aggregate import aggregate
 from simrail.campaign import CampaignResult, run_campaign
 from simrail.drafts import draft_of
 from simrail.errors import InputError
 from simrail.report.page import write_report
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.score_table import aggregate
 from simrail.watcher import Watcher
 
 PACKAGES = (
