@@ -146,7 +146,8 @@ def interval(
         return Interval(np.nan, np.nan, np.nan)
     k = int(labels.max()) + 1
     if statistic == "mean":
-        sums, counts = np.bincount(labels, kept, k), np.bincount(labels, minlength=k).astype(np.float64)
+        sums = np.asarray(np.bincount(labels, kept, k), dtype=np.float64)
+        counts = np.asarray(np.bincount(labels, minlength=k), dtype=np.float64)
         value, low, high = mean_interval(sums, counts, confidence=confidence)
         return Interval(float(value[0]), float(low[0]), float(high[0]))
     of = _weighted(statistic, kept)
