@@ -18,7 +18,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
 from simrail.errors import InputError
-from simrail.estimate import Estimator, estimator_class
+from simrail.estimate import SENSORS, Estimator, estimator_class
 from simrail.own_files import load_own
 from simrail.scenario.cells import Method
 from simrail.scenario.files import blame
@@ -32,21 +32,43 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
     ------
     InputError
         If no such estimator is registered, it has no such option (the message lists those that it
-        has), or an option has a value that it cannot have.
+        has), an option has a value that it cannot have, or it needs a sensor that the scenario lacks.
     """
     field = f"estimator[{method.index}]"
     with blame(scenario.file, f"{field}.method"):
         known_class = class_named(method.part.method, scenario.folder)
     with blame(scenario.file, f"{field}.options"):
         estimator = construct(known_class, method.part.options, folder=scenario.folder)
-        if getattr(estimator, "magnetometer", False) is True and scenario.spec.magnetometer is None:
+    _judge_needs(scenario, method, estimator)
+    return estimator
+
+
+def _judge_needs(scenario: Scenario, method: Method, estimator: Estimator) -> None:
+    """Refuse an estimator that needs a sensor which the scenario lacks."""
+    for need in getattr(estimator, "needs", ()):
+        field = f"estimator[{method.index}]"
+        if need not in SENSORS:
             raise InputError(
-                "the scenario has no magnetometer",
-                field="magnetometer",
-                value=True,
-                remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
+                "needs what no scenario has",
+                file=scenario.file,
+                field=f"{field}.method",
+                value=need,
+                limit="one of " + ", ".join(SENSORS),
+                remedy="mend 'needs' of the estimator",
             )
-        return estimator
+        if getattr(scenario.spec, need) is not None:
+            continue
+        # Where an option of that name asks for the sensor, the option may as well be given up.
+        asked = method.part.options.get(need)
+        raise InputError(
+            f"the scenario has no {need.replace('_', ' ')}",
+            file=scenario.file,
+            field=f"{field}.options.{need}" if asked else f"{field}.method",
+            value=asked or method.part.method,
+            limit=f"a scenario with a table [{need}]",
+            remedy=f"add a [{need}] to the scenario, or "
+            + (f"set {need} = false" if asked is True else "remove this estimator"),
+        )
 
 
 def class_named(name: str, folder: Path | None) -> type[Estimator]:
