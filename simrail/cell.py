@@ -13,6 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+import pandas as pd
+
 from simrail.estimate import Estimate, Estimator, estimate_many
 from simrail.example import CellResult
 from simrail.interrupts import Check
