@@ -160,7 +160,7 @@ def _judge_names(
                 f"no such {what}" if name not in known else f"the {what} is missing",
                 file=file.name,
                 field=prefix + name,
-                value=None if name not in data else data[name],
+                value=data.get(name),
                 limit=f"the {what}s " + ", ".join(known),
                 remedy=REMEDY if name in known else "remove it",
             )

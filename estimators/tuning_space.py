@@ -84,9 +84,8 @@ class SearchSpace:
             low, high = self._logs(i, logs)
             logs[i] = low + at[i] * (high - low)
         found = np.clip(10.0**logs, *self.box)
-        for accel, position in PAIRS.values():
-            if self.position_m2 is not None:
-                found[position] = self.position_m2
+        if self.position_m2 is not None:
+            found[[position for _, position in PAIRS.values()]] = self.position_m2
         for axis in self.constrained:
             accel, position = PAIRS[axis]
             found[accel] = min(found[accel], found[position] / RATIO)  # rounding of the logarithms
@@ -100,7 +99,7 @@ class SearchSpace:
         found = []
         for i in self.searched:
             low, high = self._logs(i, logs)
-            found.append((logs[i] - low) / (high - low))
+            found.append((logs[i] - low) / (high - low) if high > low else 0.0)
         return np.clip(np.array(found), 0.0, 1.0)
 
     def limits(self, values: FloatArray) -> FloatArray:

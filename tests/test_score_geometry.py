@@ -8,6 +8,7 @@ import pytest
 
 from estimators.track_geometry import track_geometry
 from simrail import bands as band_module
+from simrail.aggregate import aggregate
 from simrail.bands import BANDS, TOO_SHORT, Band
 from simrail.campaign import run_campaign
 from simrail.columns import ATTITUDE, IRREGULARITY, ODOMETRY, ODOMETRY_SD, RELATIVE_POSITION
@@ -20,7 +21,7 @@ from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.score_geometry import score_geometry
-from simrail.score_table import FIGURE_COLUMNS, NO_TWIST, OK, UNOBSERVABLE, aggregate
+from simrail.score_table import FIGURE_COLUMNS, NO_TWIST, OK, UNOBSERVABLE
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay
@@ -197,7 +198,7 @@ def scenario(tmp_path_factory):
     own.write_text(KNOWING, encoding="utf-8")
     text = (
         f"estimator=[{{name='zero',method='{own}:ZeroTrack'}},{{name='known',method='{own}:Known'}}]",
-        "sensor_draws=1",
+        "monte_carlo.sensor_draws=1",
         "ride.rest_s=2.0",
         "ride.speed_kmh=70.0",
         "odometry='truth'",

@@ -1,8 +1,8 @@
 """From a scenario's words to the nouns of the testbed: track, vehicle, ride, mount, grade.
 
-Each noun is made for one cell, and every fault is an `InputError` that names the field of
-the scenario, or the file of the part and its field. Nothing is simulated here; estimators are made in
-`simrail.scenario.estimators`.
+Each noun is made for one cell, and every fault is an `InputError` that names the field of the scenario,
+or the file of the part and its field. Nothing is simulated here. Estimators are made in
+`simrail.scenario.build_estimator`.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from math import radians
 from pathlib import Path
 from typing import Any, TypeVar
 
-
 from simrail.bands import BANDS, Band
 from simrail.errors import InputError
 from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, rails_of
-from simrail.scenario.cells import Cell, Method
-from simrail.scenario.estimators import estimator_of, option_files
+from simrail.scenario.build_estimator import estimator_of, option_files
+from simrail.scenario.cells import Cell, methods
+from simrail.scenario.distributions import Distribution
 from simrail.scenario.files import Part, blame, load
 from simrail.scenario.imu_file import ImuFile
 from simrail.scenario.scenario import Scenario
@@ -57,8 +57,13 @@ class Parts:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self._read: dict[tuple[str, str], Any] = {}
+        self._estimators: dict[int, dict[str, Estimator]] = {}
         self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the rails, for another process: they are laid faster than sent."""
+        return {**self.__dict__, "_laid": None}
 
     @property
     def hash(self) -> str:
@@ -101,12 +106,31 @@ class Parts:
         grade: ImuGrade = self._read["imu", name]
         return grade
 
-    def estimator(self, method: Method) -> Estimator:
-        """Estimator of a method; what is in the files that its options name counts as the scenario's."""
-        made = estimator_of(self.scenario, method)
-        for option, content in option_files(made).items():
-            self._content[f"estimator {method.name} {option}"] = content
-        return made
+    def estimators(self, sample: int) -> dict[str, Estimator]:
+        """Estimators of a sample by their names in the tables; those that no sample changes are shared."""
+        if sample not in self._estimators:
+            made: dict[str, Estimator] = {}
+            first = self._estimators.get(0, {})
+            for method in methods(self.scenario, sample=sample):
+                is_drawn = any(
+                    isinstance(option, Distribution)
+                    for option in self.scenario.spec.estimator[method.index].options.values()
+                )
+                if method.name in made:
+                    raise InputError(
+                        "two estimators have this name",
+                        file=self.scenario.file,
+                        field=f"estimator[{method.index}].name",
+                        value=method.name,
+                        remedy="give each a name of its own",
+                    )
+                known = None if is_drawn else first.get(method.name)
+                made[method.name] = known or estimator_of(self.scenario, method)
+                for option, content in option_files(made[method.name]).items():
+                    # What is in the files that its options name counts as the scenario's.
+                    self._content[f"estimator {method.name} {option} {sample}"] = content
+            self._estimators[sample] = made
+        return self._estimators[sample]
 
     def _load(self, model: type[_Part], kind: str, name: str) -> _Part:
         part = load(model, kind, name, folder=self.scenario.folder)
