@@ -255,9 +255,8 @@ def _at_desk(order: Order) -> Iterator[tuple[_Desk, Check]]:
         if order.code != score_code_hash():
             raise InputError(
                 "the worker runs other code than the campaign, and would give other bits",
-                field="--cluster",
                 value=_worker(),
-                remedy="install the same simrail on every machine",
+                remedy="change no source while a campaign runs, and install the same on every machine",
             )
         if _desk is None or _desk.key != order.key:
             sources, data = pickle.loads(order.data)

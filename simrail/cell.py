@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -21,7 +21,7 @@ from simrail.interrupts import Check
 from simrail.ledger import Ledger
 from simrail.line_odometry import with_odometry
 from simrail.measure import measure
-from simrail.recording import Recording
+from simrail.recording import Recording, beginning
 from simrail.scenario.build import (
     Parts,
     bands_of,
@@ -125,7 +125,7 @@ def _record(cell: Cell, truth: Truth, parts: Parts, ledger: Ledger) -> _Recorded
         recording = record_cell(cell, truth, parts)
     with ledger.timed("score"):
         reference = reference_of(truth_at_imu(truth, recording), recording)
-        figures = score_odometry(recording, reference, **_kept(cell))
+        figures = score_odometry(recording, reference, **kept_of(cell))
         ledger.scored(cell, f"odometry:{recording.odometry_source}", figures)
     return _Recorded(cell, recording, reference)
 
@@ -141,7 +141,7 @@ def _estimates(
     if name not in ledger.warm:
         # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
         with ledger.timed("estimate"), suppress(Exception):
-            estimate_many(estimator, [_beginning(recordings[0], samples=64)])
+            estimate_many(estimator, [beginning(recordings[0], samples=64)])
         ledger.warm.add(name)
     together = [recordings] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
     while together:
@@ -168,42 +168,35 @@ def _score(
     one: _Recorded, name: str, estimate: Estimate, us_per_sample: float, parts: Parts, ledger: Ledger
 ) -> None:
     """Score one estimate."""
-    cell, keep = one.cell, _kept(one.cell)
-    figures = score(estimate, one.reference, one.recording, us_per_sample=us_per_sample, **keep)
-    ledger.scored(cell, name, figures)
+    for figures in figures_of(one.cell, estimate, one.reference, one.recording, us_per_sample, parts):
+        ledger.scored(one.cell, name, figures)
+
+
+def figures_of(
+    cell: Cell,
+    estimate: Estimate,
+    reference: Reference,
+    recording: Recording,
+    us_per_sample: float,
+    parts: Parts,
+) -> list[pd.DataFrame]:
+    """Scores of one estimate as a cell wants them: of its states, and of its geometry if it has one."""
+    keep = kept_of(cell)
+    tables = [score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)]
     if estimate.geometry is not None:
-        figures = score_geometry(
-            estimate,
-            parts.rails(cell),
-            one.recording,
-            bands=bands_of(cell),
-            twist_base_m=cell.spec.geometry.twist_base_m,
-            **keep,
+        tables.append(
+            score_geometry(
+                estimate,
+                parts.rails(cell),
+                recording,
+                bands=bands_of(cell),
+                twist_base_m=cell.spec.geometry.twist_base_m,
+                **keep,
+            )
         )
-        ledger.scored(cell, name, figures)
+    return tables
 
 
-def _kept(cell: Cell) -> dict[str, Any]:
+def kept_of(cell: Cell) -> dict[str, Any]:
     """What of the score table the scenario keeps."""
     return {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
-
-
-def _beginning(recording: Recording, *, samples: int) -> Recording:
-    """The first samples of a recording."""
-    imu = recording.imu.iloc[:samples]
-    encoder = recording.encoder
-    if encoder is not None:
-        encoder = encoder.loc[: imu.index[-1]]
-    magnetic, seen = recording.magnetometer, recording.rail_displacement
-
-    def cut(frame: pd.DataFrame | None) -> pd.DataFrame | None:
-        return None if frame is None else frame.iloc[:samples]
-
-    return replace(
-        recording,
-        imu=imu,
-        encoder=encoder,
-        odometry=recording.odometry.iloc[:samples],
-        magnetometer=cut(magnetic),
-        rail_displacement=cut(seen),
-    )

@@ -120,9 +120,16 @@ def run(
     ] = False,
     seed: Seed = None,
     settings: Settings = None,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Only say what would be run, and about what it takes.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Run more than a million cells.")] = False,
 ) -> int:
     """Simulate, record, estimate and score a scenario; write its results."""
     from rich.console import Console
+
+    if plan:
+        return _plan(scenario, seed, settings or [], many=yes)
 
     from simrail.progress import ProgressWatcher, print_cell, print_scores
     from simrail.results import run as run_scenario
@@ -150,12 +157,29 @@ def run(
                 cluster=cluster,
                 start=cast("Any", wanted[0] if wanted else "auto"),
                 watcher=watcher,
+                many=yes,
             )
     if cell is not None:
         print_cell(console, alone)
         return CELL_FAILED if alone.failures else DONE
     print_scores(console, results)
     return CELL_FAILED if results.campaign.failures else DONE
+
+
+def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> int:
+    """Show what a scenario would run."""
+    import os
+
+    from rich.console import Console
+
+    from simrail.plan import forecast, print_forecast
+    from simrail.scenario.scenario import load_scenario
+
+    read = load_scenario(name, overrides=settings, seed=seed)
+    with Console(stderr=True).status("rehearsing"):
+        told = forecast(read, many=many)
+    print_forecast(Console(), read, told, cores=os.cpu_count() or 1)
+    return DONE
 
 
 @app.command()

@@ -40,8 +40,15 @@ class Job:
     key: str
 
 
-def prepare(scenario: Scenario) -> Job:
+def prepare(scenario: Scenario, *, many: bool = False) -> Job:
     """Judge a scenario and pack it for the workers.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As read.
+    many : bool
+        Accept more cells than `simrail.scenario.check.MOST_CELLS`.
 
     Raises
     ------
@@ -49,7 +56,7 @@ def prepare(scenario: Scenario) -> Job:
         If the scenario cannot be run.
     """
     parts = Parts(scenario)
-    plan = judge_scenario(scenario, parts)
+    plan = judge_scenario(scenario, parts, many=many)
     files = {inspect.getsourcefile(type(estimator)) for estimator in plan.estimators.values()}
     decides = {
         "name": scenario.name,

@@ -21,6 +21,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from simrail.aggregate import aggregate
 from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult
 from simrail.drafts import draft_of
@@ -29,7 +30,6 @@ from simrail.job import prepare
 from simrail.report.page import write_report
 from simrail.retry import keep_good
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.score_table import aggregate
 from simrail.unfinished import LOG, Start, unfinished_of
 from simrail.watcher import Watcher
 
@@ -68,6 +68,7 @@ def run(
     cluster: str | None = None,
     start: Start = "auto",
     watcher: Watcher | None = None,
+    many: bool = False,
 ) -> Results:
     """Run a scenario: simulate, record, estimate, score, and write the results.
 
@@ -88,6 +89,8 @@ def run(
         to run the failed cells of finished results again.
     watcher : Watcher, optional
         Is told of the progress.
+    many : bool
+        Accept more cells than `simrail.scenario.check.MOST_CELLS`.
 
     Returns
     -------
@@ -109,7 +112,7 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
-    job = prepare(scenario)
+    job = prepare(scenario, many=many)
     with unfinished_of(folder, job.key, start=start) as kept:
         if start == "retry-failed":
             keep_good(folder, job, kept)

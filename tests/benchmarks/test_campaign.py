@@ -16,10 +16,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from simrail.aggregate import aggregate
 from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult
 from simrail.scenario.scenario import load_scenario
-from simrail.score_table import aggregate, concat_scores
+from simrail.score_table import concat_scores
 from simrail.watcher import Watcher
 
 SMALL = [
@@ -53,9 +54,7 @@ def campaign(cells: int, workers: int) -> tuple[CampaignResult, float, float]:
 def test_most_of_the_processor_time_is_spent_in_the_cells() -> None:
     found, wall, cpu = campaign(int(os.environ.get("SIMRAIL_BENCH_CELLS", "2000")), 2)
     share = sum(found.cpu_s.values()) / cpu
-    print(
-        f"\n{len(found.cells)} cells, {wall:.0f} s, {cpu:.0f} s of processor time, {100 * share:.1f} % in cells"
-    )
+    print(f"\n{len(found.cells)} cells, {wall:.0f} s, {cpu:.0f} s of processor, {100 * share:.1f} % in cells")
     print({stage: f"{100 * seconds / cpu:.1f} %" for stage, seconds in found.cpu_s.items()})
     assert share >= 0.85
 

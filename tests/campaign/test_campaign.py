@@ -10,12 +10,13 @@ import pandas as pd
 import pytest
 
 from simrail import batch
+from simrail.aggregate import aggregate
 from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult
 from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
-from simrail.score_table import OK, SCORE_COLUMNS, aggregate
+from simrail.score_table import OK, SCORE_COLUMNS
 from simrail.watcher import Watcher
 
 SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
