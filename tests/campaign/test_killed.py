@@ -57,7 +57,8 @@ def run_with_kills(
 ) -> tuple[int, int]:
     """Run until it ends by itself, killing the main process or a worker so many times at random moments.
 
-    Returns how many were killed, and how many cells the last session found done. Asserts after each session that no more than one batch of each worker was lost per kill.
+    Returns how many were killed, and how many cells the last session found done.
+    Asserts after each session that no more than one batch of each worker was lost per kill.
     """
     chance = random.Random(seed)
     done = before = 0
