@@ -118,8 +118,8 @@ def test_over_twenty_draws_it_errs_less_than_the_paper() -> None:
     for imu in ("lord_3dm_gx4_25", "adis16505_1"):
         for quantity, most in PAPER_MM.items():
             chosen = rows[(rows["imu"] == imu) & (rows["quantity"] == quantity)]
-            ours = chosen[chosen["estimator"] == "trajectory_smoother"]["value"]
-            blind = chosen[chosen["estimator"] == "trajectory_smoother_camera_free"]["value"]
+            ours = chosen[chosen["estimator"] == "smoother"]["value"]
+            blind = chosen[chosen["estimator"] == "smoother_camera_free"]["value"]
             assert len(ours) == len(blind) == 20
             assert np.sqrt(np.mean(ours**2)) <= most
             assert np.sqrt(np.mean(blind**2)) > np.sqrt(np.mean(ours**2))
