@@ -81,8 +81,9 @@ def track_geometry(
     pandas.DataFrame
         Indexed by ``position_m`` (uniform), columns `IRREGULARITY`, and `IRREGULARITY_SD` where known.
         ``gauge_m`` is NaN throughout without a rail sensor: it is not observable. No rows if the train moved
-        by less than a step. Standard deviations speak of the trajectory and the sensor only, not of what a
-        wheelset does between the rails, nor of an error of the position along the track.
+        by less than a step. Standard deviations speak of the trajectory, the sensor, and the position along
+        the track as far as its own sd is known (``position_sd_m``), but not of what a wheelset does between
+        the rails, nor of the design cant that a wrong position takes off a transition.
 
     Raises
     ------
@@ -115,13 +116,19 @@ def track_geometry(
     if sheet is not None:
         use, noise_sd = trusted(seen[:, :, 1:].reshape(-1, 4), sheet.noise_m), sheet.noise_m
     covariance = _covariance(estimate)
-    variance = None if covariance is None else _variance(arms, covariance)[use]
+    variance = None
+    if covariance is not None:
+        place_sd = (
+            known["position_sd_m"].to_numpy(dtype=np.float64) if "position_sd_m" in known else 0.0 * place
+        )
+        variance = np.column_stack([_variance(arms, covariance), place_sd**2])[use]
     found = over_space(place[use], irregularities(rails)[use], step_m=step_m, variance=variance)
     columns = dict(zip(IRREGULARITY, found.values.T, strict=True))
     if found.variance is not None:
         # Of mean and difference of two rails with equal, independent noise.
         white = found.noise_gain[:, None] * noise_sd**2 * np.array([0.5, 0.5, 2.0, 2.0])
-        sds = np.sqrt(found.variance + white)
+        moved = displaced(found.position_m, found.values, np.sqrt(found.variance[:, 4]))
+        sds = np.sqrt(found.variance[:, :4] + white + moved)
         columns |= dict(zip(IRREGULARITY_SD, sds.T, strict=True))
     if sheet is None:
         for name in [column for column in columns if column.startswith("gauge")]:
@@ -181,6 +188,20 @@ def _variance(arms: FloatArray, covariance: FloatArray) -> FloatArray:
     slope = np.zeros((n, 4, 3))
     slope[:, :, 0], slope[:, 0, 1], slope[:, 1, 2] = moved, 1.0, 1.0
     return np.einsum("nij,njk,nik->ni", slope, covariance, slope)
+
+
+def displaced(position: FloatArray, lines: FloatArray, sd: FloatArray) -> FloatArray:
+    """Mean square (n, m) by which lines over places change if they are moved along, by normal displacements.
+
+    By Gauss and Hermite's quadrature of five points, so that it holds for displacements that are not small
+    against the waves of the lines as well. Beyond their ends the lines stay as they are there.
+    """
+    if len(position) == 0 or not sd.any():
+        return np.zeros_like(lines)
+    roots, weights = np.polynomial.hermite_e.hermegauss(5)
+    between = CubicSpline(position, lines)
+    moved = [between(np.clip(position + root * sd, position[0], position[-1])) for root in roots]
+    return np.einsum("k,knm->nm", weights / weights.sum(), np.square(np.array(moved) - lines))
 
 
 class OverSpace(NamedTuple):

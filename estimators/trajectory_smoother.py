@@ -7,8 +7,9 @@ smoother, and the first alone is to be had as a causal filter. It works at stand
 speed enters the measurements only, with its sign. What the rails look like then follows from the trajectory
 (`estimators.track_geometry`).
 
-The model has no sensor bias: what an offset of the accelerometer does to roll and pitch, and one of the gyro
-to yaw, is not in the standard deviations. Place is another matter: the virtual measurements hold it.
+The model has no sensor bias. An offset of the accelerometer is wholly taken for roll and pitch, so its sd
+by the data sheet is added to theirs afterwards (`sensor_bias`). What one of the gyro does to yaw is not in
+the standard deviations. Place is another matter: the virtual measurements hold it.
 
 The model stands in `estimators.trajectory_model`, the noise in `estimators.trajectory_noise`.
 """
@@ -74,6 +75,9 @@ class TrajectorySmoother:
         ``"compiled"``, or ``"filterpy"``: slow, readable, the reference.
     with_covariance : bool
         False leaves out covariances and standard deviations, which take more than half of the time.
+    sensor_bias : bool
+        Add what the turn-on bias of the data sheet does to roll and pitch to their variances. False leaves
+        the paper's, of a model in which sensors have none.
     geometry_step_m : float
         Distance of the places of the rail geometry; 0 leaves the geometry out. It lies over the track and is
         made after the ride, also of the filter's states, which are causal.
@@ -89,6 +93,7 @@ class TrajectorySmoother:
     printed: bool = False
     backend: str = "compiled"
     with_covariance: bool = True
+    sensor_bias: bool = True
     geometry_step_m: float = 0.25
     start_sd_rad: float = math.radians(1.0)
     start_yaw_sd_rad: float = math.radians(0.3)
@@ -141,6 +146,9 @@ class TrajectorySmoother:
         covariance = None
         if self.with_covariance:
             covariance = block(found.covariance, OUTPUT)
+            if self.sensor_bias:
+                tilt = recording.imu_sheet.accel_turn_on_bias_mps2 / recording.gravity_mps2
+                covariance[:, [0, 1], [0, 1]] += tilt**2 / 3.0  # uniform within that bound
             columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
             names += [*ATTITUDE_SD, *RELATIVE_POSITION_SD]
         return Estimate(

@@ -216,6 +216,30 @@ def test_errors_of_the_states_are_as_large_as_the_standard_deviations_say():
     np.testing.assert_allclose(np.std(errors, axis=0), expected, rtol=4.0 / np.sqrt(600.0))
 
 
+@pytest.mark.parametrize("sd_m", [0.1, 1.0])
+def test_an_error_of_the_position_is_as_large_as_the_standard_deviations_say(sd_m):
+    """Also where it is no longer small against the waves: over 1 m those of 3 m turn by half."""
+    recording, estimate = ride("forward")
+    still = dict.fromkeys(("roll_sd_rad", "lateral_sd_m", "vertical_sd_m"), 0.0)
+    estimate = replace(estimate, states=estimate.states.assign(**still))
+    known = recording.odometry.assign(position_sd_m=sd_m)
+    told = track_geometry(estimate, replace(recording, odometry=known))
+    assert (track_geometry(estimate, recording)[list(IRREGULARITY_SD[:3])] == 0.0).all(axis=None)
+    # Inside of the straight at the end, where the design does not change with the position.
+    places = np.arange(240.0, 320.25, 0.25)
+    rails = LAID.irregularities(places)
+    rng = np.random.default_rng(8)
+    squares = 0.0
+    for off in rng.standard_normal(200) * sd_m:
+        squares = squares + np.square(LAID.irregularities(places + off).to_numpy() - rails.to_numpy())
+    found = np.sqrt(squares[:, :3] / 200)
+    said = told.loc[places, list(IRREGULARITY_SD[:3])].to_numpy()
+    # Over all places: four standard errors of the sd of 200, and what five points make of a large sd.
+    ratio = np.sqrt(np.mean(said**2, axis=0) / np.mean(found**2, axis=0))
+    np.testing.assert_allclose(ratio, 1.0, rtol=4.0 / np.sqrt(400.0))
+    assert np.corrcoef(said[:, 2], found[:, 2])[0, 1] > 0.9
+
+
 def test_samples_of_one_place_are_averaged_whenever_they_came():
     rng = np.random.default_rng(1)
     there = np.linspace(0.0, 30.0, 6000)

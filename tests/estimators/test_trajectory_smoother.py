@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -188,7 +189,10 @@ def test_time_and_memory_grow_with_the_ride(line_recording: Callable) -> None:
 
 def test_states_and_covariance_are_those_of_the_trace(line_recording: Callable) -> None:
     recording = WHERE["curve"](line_recording)
-    for smoother in (TrajectorySmoother(), TrajectorySmoother(smoothed=False)):
+    for smoother in (
+        TrajectorySmoother(sensor_bias=False),
+        TrajectorySmoother(sensor_bias=False, smoothed=False),
+    ):
         estimate, found = smoother.estimate(recording), smoother.trace(recording)
         assert estimate.covariance is not None
         assert estimate.covariance_of == tuple(NAMES)
@@ -197,6 +201,29 @@ def test_states_and_covariance_are_those_of_the_trace(line_recording: Callable) 
         diagonal = found.covariance[:, DIAGONAL][:, [0, 2, 4, 6, 9]]
         np.testing.assert_array_equal(sds, np.sqrt(diagonal))
         assert smoother.causal is not smoother.smoothed
+
+
+def test_an_offset_of_the_accelerometer_is_taken_for_tilt_and_told(line_recording: Callable) -> None:
+    """Offsets uniform within the bound of the data sheet go to roll and pitch as a whole, not to y and z."""
+    recording = part(line_recording(70.0, 1, 0), 6000, 6000)
+    bound = recording.imu_sheet.accel_turn_on_bias_mps2
+    smoother = TrajectorySmoother(sensor_bias=False, geometry_step_m=0.0)
+    before = smoother.estimate(recording).states
+    told = replace(smoother, sensor_bias=True).estimate(recording).states
+    added = np.square(told[["roll_sd_rad", "pitch_sd_rad"]]) - np.square(
+        before[["roll_sd_rad", "pitch_sd_rad"]]
+    )
+    np.testing.assert_allclose(added, (bound / 9.81) ** 2 / 3.0, rtol=1e-9)
+    same = ["yaw_sd_rad", *RELATIVE_POSITION_SD]
+    assert np.array_equal(told[same], before[same])
+    # The smoother is linear enough: one offset on each axis says what all of them do.
+    imu = recording.imu.copy()
+    imu[["accel_x_mps2", "accel_y_mps2"]] += bound / math.sqrt(3.0)
+    moved = smoother.estimate(replace(recording, imu=imu)).states - before
+    middle = moved.iloc[2500:-2500]
+    tilt = bound / math.sqrt(3.0) / 9.81
+    np.testing.assert_allclose(np.abs(middle[["roll_rad", "pitch_rad"]]), tilt, rtol=0.1)
+    assert np.abs(middle[list(RELATIVE_POSITION)]).mean().max() < 1e-3
 
 
 def test_the_rails_follow_from_the_trajectory(line_recording: Callable) -> None:
