@@ -29,69 +29,29 @@ metre or two behind. They are found along the way because the train knows where 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
 wheel's way starts anew when both agree on the speed again.
 
-Not here: the loops (`estimators.kernels.odometry`, `estimators.kernels.smoothing`), and odometry from the
-encoder alone (`simrail.odometry`).
+Not here: the loops (`estimators.kernels.odometry`, `estimators.kernels.smoothing`), what is made of their
+steps (`estimators.odometry_trace`), and odometry from the encoder alone (`simrail.odometry`).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
-from scipy import signal
 
-from estimators.kernels.odometry import SCALE, STATES, UPDATES, YAW, S, V, curve_matched
+from estimators.kernels.odometry import SCALE, STATES, UPDATES, YAW, S, curve_matched
 from estimators.kernels.smoothing import smooth
-from simrail.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
+from estimators.odometry_trace import RATE_HZ, STILL_SD_MPS, Trace, at_imu_times
+from simrail.columns import ACCEL, GYRO
 from simrail.errors import InputError
 from simrail.estimate import Estimate
 from simrail.jit import FloatArray
-from simrail.odometry import encoder_odometry
 from simrail.recording import Recording
 from simrail.track.design import TrackDesign
 
-RATE_HZ = 50.0
-"""Rate of the filter. A train's jerk is limited: between two steps nothing happens along the track."""
-
-CALM_HZ = 1.0
-"""Up to here an acceleration is the train's."""
-
-HOLD_S = 2.0
-"""After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
-
-ACCELERATION_SD_MPS2 = 0.03
-"""Of that acceleration: what the body's pitching leaves in it."""
-
 _PLACES_PER_M = 4.0
 _STILL_S = 0.5
-_STILL_SD_MPS = 1e-3
-"""Of the speed of a train that is known to stand."""
-
-
-class Trace(NamedTuple):
-    """What the filter found at its own steps, n of them.
-
-    Attributes
-    ----------
-    time_s : ndarray (n,)
-        Ends of the steps.
-    states, covariance : ndarray (n, 13), (n, 13, 13)
-        See the module.
-    acceleration : ndarray (n,)
-        Along the track, over the step; it shakes with the body.
-    slipping, resting : ndarray (n,) of bool
-        Where the wheel was not believed, and where the train stood.
-    """
-
-    time_s: FloatArray
-    states: FloatArray
-    covariance: FloatArray
-    acceleration: FloatArray
-    slipping: np.ndarray
-    resting: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -170,61 +130,14 @@ class CurveMatchedOdometry:
             If the recording has no encoder.
         """
         trace = self.trace(recording)
-        wanted = recording.imu.index.to_numpy(dtype=np.float64)
-        found = np.column_stack([trace.states[:, [S, V]], self._calm(trace)])
-        sd = np.sqrt(np.diagonal(trace.covariance, axis1=1, axis2=2)[:, [S, V]])
-        sd = np.column_stack([sd, np.full(len(sd), ACCELERATION_SD_MPS2)])
-        # Until the filter's first step: standing at the start.
-        begun = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, _STILL_SD_MPS, ACCELERATION_SD_MPS2]
-        start = np.array([begun])
-        found[trace.resting, 1:] = 0.0
-        known = np.vstack([start, np.hstack([found, sd])])
-        times = np.concatenate([[-np.inf], trace.time_s])
-        if self.smoothed:
-            times[0] = min(wanted[0], trace.time_s[0]) - 1.0 / RATE_HZ
-            values = np.column_stack([np.interp(wanted, times, column) for column in known.T])
-        else:
-            last = np.searchsorted(times, wanted, side="right") - 1
-            values = known[last]
-            slipping = np.concatenate([[False], _held(trace.slipping, HOLD_S)])
-            self._roll(values, recording, slipping[last])
-            ahead = np.where(last > 0, wanted - times[last], 0.0)
-            values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
-            values[:, 1] += ahead * values[:, 2]
-        states = pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
+        states = at_imu_times(
+            trace,
+            recording,
+            smoothed=self.smoothed,
+            start_sd_m=self.start_sd_m,
+            radius_sd=self.radius_sd,
+        )
         return Estimate(states=states, mount=recording.mount)
-
-    def _roll(self, values: FloatArray, recording: Recording, slipping: np.ndarray) -> None:
-        """Put the wheel's own acceleration into values (n, 6), where the wheel rolls.
-
-        An attitude filter takes the acceleration off the accelerometer. Made from that same accelerometer
-        it would take the body's own pitch away as well.
-        """
-        assert recording.encoder is not None and recording.encoder_sheet is not None
-        wheel = encoder_odometry(
-            recording.encoder,
-            recording.encoder_sheet,
-            recording.imu.index.to_numpy(dtype=np.float64),
-            start_position_m=recording.start_position_m,
-            radius_relative_sd=self.radius_sd,
-        )
-        rolls = ~slipping
-        values[rolls, 2] = wheel["acceleration_mps2"].to_numpy()[rolls]
-        values[rolls, 5] = wheel["acceleration_sd_mps2"].to_numpy()[rolls]
-
-    def _calm(self, trace: Trace) -> FloatArray:
-        """Acceleration without what the body shakes, (n,): the train's own changes slowly."""
-        if self.smoothed:
-            slope = np.gradient(trace.states[:, V], 1.0 / RATE_HZ)
-            sections = signal.butter(2, CALM_HZ, fs=RATE_HZ, output="sos")
-            calm: FloatArray = signal.sosfiltfilt(sections, slope, padlen=min(len(slope) - 1, 150))
-            return calm
-        # Critically damped: the slope of the speed, followed by two equal lags.
-        keep = math.exp(-2.0 * math.pi * CALM_HZ / RATE_HZ)
-        passed: FloatArray = signal.lfilter(
-            [(1.0 - keep) ** 2], [1.0, -2.0 * keep, keep * keep], trace.acceleration
-        )
-        return passed
 
     def trace(self, recording: Recording) -> Trace:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
@@ -320,7 +233,7 @@ class CurveMatchedOdometry:
         sd = np.array(
             [
                 self.start_sd_m,
-                _STILL_SD_MPS,
+                STILL_SD_MPS,
                 pulse / math.sqrt(12.0),
                 self.radius_sd,
                 self.tread_sd,
@@ -335,14 +248,6 @@ class CurveMatchedOdometry:
             ]
         )
         return x, np.diag(sd**2)
-
-
-def _held(flags: np.ndarray, hold_s: float) -> np.ndarray:
-    """Flags (n,) at the filter's steps, each held on for a time."""
-    steps = np.arange(len(flags))
-    latest = np.maximum.accumulate(np.where(flags, steps, -len(flags) - 10**6))
-    held: np.ndarray = steps - latest <= hold_s * RATE_HZ
-    return held
 
 
 def line_table(track: TrackDesign) -> tuple[FloatArray, FloatArray]:

@@ -185,7 +185,7 @@ def _run_cell(
         return
     estimates: dict[str, Estimate] = {}
     count = cell_count * len(ledger.estimators)
-    for i, (name, (_, estimator)) in enumerate(ledger.estimators.items()):
+    for i, (name, estimator) in enumerate(parts.estimators(cell.sample).items()):
         try:
             estimate, us_per_sample = _timed_estimate(estimator, recording, name, ledger)
             with ledger.timed("score"):

@@ -18,7 +18,7 @@ from simrail.errors import InputError
 from simrail.interrupts import interruptible
 from simrail.ride import simulate
 from simrail.scenario.build import Parts
-from simrail.scenario.cells import Cell, cells
+from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.ride_writer import Format, refuse_existing, write_frame, write_parts
 from simrail.scenario.scenario import Scenario
@@ -77,18 +77,15 @@ def export(
     watcher = watcher or Watcher()
     refuse_existing(folder)
     parts = Parts(scenario)
-    plan = judge_scenario(scenario, parts)
-    chosen = [
-        replace(cell, sensor_draw=draw)
-        for cell in cells(scenario)
-        if cell.track_draw == 0 and cell.sensor_draw == 0
-    ]
+    judge_scenario(scenario, parts)
+    chosen = [replace(cell, sensor_draw=draw) for cell in first_cells(scenario)]
+    rides = len({cell.ride_number for cell in chosen})
     names = _names(chosen)
     records = []
     with interruptible() as check, draft_of(folder) as draft:
         for number, (_, group) in enumerate(groupby(chosen, key=lambda cell: cell.ride_number), start=1):
             ride_cells = list(group)
-            watcher.ride_begins(number, plan.rides // scenario.spec.track_draws, ride_cells[0].ride.name)
+            watcher.ride_begins(number, rides, ride_cells[0].ride.name)
             try:
                 motion = simulate(parts.ride(ride_cells[0]), progress=watcher.ride_goes)
             except Exception:

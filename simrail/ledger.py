@@ -20,7 +20,8 @@ from simrail.estimate import Estimate, Estimator
 from simrail.example import CellResult
 from simrail.recording import Recording
 from simrail.scenario.cells import Cell, Method
-from simrail.scenario.scenario import RidePart, Scenario
+from simrail.scenario.parts import RidePart
+from simrail.scenario.scenario import Scenario
 from simrail.score_table import failed_figures, labelled
 
 MOST_EXAMPLES = 6
@@ -123,7 +124,7 @@ class Ledger:
         self, cell: Cell, recording: Recording, motion: pd.DataFrame, estimates: dict[str, Estimate]
     ) -> None:
         """Keep a cell for the figures if it is the first of its ride, up to `MOST_EXAMPLES`."""
-        first_of_ride = cell.track_draw == 0 and cell.ride_number not in self.shown
+        first_of_ride = cell.track_draw == cell.sample == 0 and cell.ride_number not in self.shown
         if first_of_ride and len(self.examples) < MOST_EXAMPLES:
             self.shown.add(cell.ride_number)
             described = {**self.labels(cell, ""), **cell_record(cell)}
@@ -141,6 +142,7 @@ def cell_record(cell: Cell) -> dict[str, object]:
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
+        "sample": cell.sample,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
         "track": cell.spec.track,

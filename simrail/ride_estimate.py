@@ -13,7 +13,7 @@ from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
 from simrail.report.estimate_page import write_estimate_page
 from simrail.report.methods import readable
-from simrail.scenario.build import class_named, construct
+from simrail.scenario.build_estimator import class_named, construct
 from simrail.scenario.files import blame
 from simrail.scenario.overrides import override
 from simrail.scenario.ride_reader import read_ride

@@ -209,28 +209,32 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         A score table with labels.
     cells : pandas.DataFrame, optional
         One row per cell (column ``cell``) with the values of the scenario's axes, in columns that
-        the score table does not have: figures of unlike axes are never averaged.
+        the score table does not have: figures of unlike axes are never averaged. Columns that differ
+        between the cells of one ``case`` are draws of a distribution, no axes, and are left out.
 
     Returns
     -------
     pandas.DataFrame
         The text columns and axes, then ``value`` (mean over all draws that are ok), ``sd_sensor``
         (pooled standard deviation between sensor draws of one track), ``sd_track`` (standard
-        deviation between the means of the tracks), ``track_draws``, ``draws`` (ok), ``failed``.
+        deviation between the means of the tracks, of all samples), ``track_draws``, ``draws`` (ok),
+        ``failed``.
         A standard deviation that the number of draws does not allow is empty.
     """
     axes: list[str] = []
+    track = ["track_draw"]
     frame = scores.drop(columns=["n_samples"])
     if cells is not None:
-        axes = [str(name) for name in cells.columns if name not in SCORE_COLUMNS]
-        frame = frame.merge(cells[["cell", *axes]], on="cell", how="left")
+        axes = axis_columns(cells)
+        track = [*(["sample"] if "sample" in cells else []), *track]
+        frame = frame.merge(cells[["cell", *axes, *track[:-1]]], on="cell", how="left")
     # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
     frame["failed"] = (~frame["status"].isin((OK, *LEFT_OPEN))).astype(np.int64)
     labels = [name for name in LABEL_COLUMNS if name not in INTEGER_COLUMNS]
     figure = [name for name in FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
     keys = [*labels, *axes, *figure]
     per_track = (
-        frame.groupby([*keys, "track_draw"], observed=True, dropna=False, sort=False)
+        frame.groupby([*keys, *track], observed=True, dropna=False, sort=False)
         .agg(mean=("value", "mean"), var=("value", "var"), draws=("value", "count"), failed=("failed", "sum"))
         .reset_index()
     )
@@ -251,6 +255,15 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         }
     )
     return result.reset_index()
+
+
+def axis_columns(cells: pd.DataFrame) -> list[str]:
+    """Columns of the table of cells that tell its cases apart: neither labels nor draws."""
+    names = [str(name) for name in cells.columns if name not in (*SCORE_COLUMNS, "sample")]
+    if "case" not in names:
+        return names
+    most = cells.groupby("case")[names].nunique(dropna=False).max()
+    return [name for name in names if most[name] <= 1]
 
 
 def _categorical(name: str, column: pd.Series, bands: Sequence[str]) -> pd.Series:

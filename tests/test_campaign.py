@@ -14,7 +14,7 @@ from simrail.campaign import CampaignResult, run_campaign
 from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
-from simrail.score_table import OK, SCORE_COLUMNS
+from simrail.score_table import OK, SCORE_COLUMNS, aggregate
 from simrail.watcher import Watcher
 
 SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
@@ -68,7 +68,7 @@ def test_another_seed_gives_other_scores(two_draws: CampaignResult) -> None:
 def test_a_cell_does_not_depend_on_its_neighbours(two_draws: CampaignResult) -> None:
     # The same ride among others, in another place of the order, with more draws and another estimator.
     more = short(
-        "sensor_draws=3",
+        "monte_carlo.sensor_draws=3",
         "ride.speed_kmh=[30.0, 50.0]",
         "odometry=['truth', 'curve_matched']",
         "estimator[0].options.rest_bias=[false, true]",
@@ -106,7 +106,7 @@ def test_draws_differ_and_rides_over_one_draw_are_paired(two_draws: CampaignResu
             "[[imu]]", '[[ride]]\nname = "back"\nstart_m = 590.0\nend_m = 10.0\nspeed_kmh = 50.0\n\n[[imu]]'
         ),
         name="both",
-        overrides=["track_draws=3"],
+        overrides=["monte_carlo.track_draws=3"],
     )
     listed = list(cells(back))
     seeds = {(cell.ride.name, cell.track_draw): (cell.ride_seed, cell.sensor_seed) for cell in listed}
@@ -158,7 +158,9 @@ def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
     text += '\n[[estimator]]\nname = "failing"\nmethod = "failing.py:Failing"\n'
     text += '\n[[estimator]]\nname = "nan"\nmethod = "failing.py:Failing"\noptions = { nan = true }\n'
     text += '\n[[estimator]]\nname = "after"\nmethod = "DesignAngles"\n'
-    scenario = read_scenario(text, name="failing", folder=tmp_path, overrides=[*SHORT, "sensor_draws=6"])
+    scenario = read_scenario(
+        text, name="failing", folder=tmp_path, overrides=[*SHORT, "monte_carlo.sensor_draws=6"]
+    )
     counter = Counter()
     found = run_campaign(scenario, watcher=counter)
     raised = [failure for failure in found.failures if failure.estimator == "failing"]
@@ -189,7 +191,7 @@ def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch)
         return real(ride, progress=progress)
 
     monkeypatch.setattr(campaign, "simulate", derail)
-    found = run_campaign(short("ride.speed_kmh=[50.0, 30.0]", "sensor_draws=1"))
+    found = run_campaign(short("ride.speed_kmh=[50.0, 30.0]", "monte_carlo.sensor_draws=1"))
     assert len(found.cells) == 2 and len(found.rides) == 1
     statuses = found.scores.groupby("cell")["status"].agg(lambda column: sorted(set(column.astype(str))))
     assert statuses[0] == ["RuntimeError: derailed: axle front left the rail at s = 100.0 m"]
@@ -214,7 +216,7 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
     monkeypatch.setattr(campaign, "simulate", swallow)
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(short("sensor_draws=1", "ride.speed_kmh=[30.0, 50.0]"))
+        run_campaign(short("monte_carlo.sensor_draws=1", "ride.speed_kmh=[30.0, 50.0]"))
     assert calls == ["out"]
     assert signal.getsignal(signal.SIGINT) is before
 
@@ -222,7 +224,9 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
 def test_examples_and_kept_windows() -> None:
     found = run_campaign(
         short(
-            "sensor_draws=2", "score.windows=['curve', 'curve:*']", "score.metrics=['rms', 'us_per_sample']"
+            "monte_carlo.sensor_draws=2",
+            "score.windows=['curve', 'curve:*']",
+            "score.metrics=['rms', 'us_per_sample']",
         )
     )
     assert len(found.examples) == 1
@@ -232,3 +236,23 @@ def test_examples_and_kept_windows() -> None:
     rms = found.scores[found.scores["metric"] == "rms"]
     assert {str(window) for window in rms["window"]} == {"curve", "curve:curve 3 R300"}
     assert set(found.scores["metric"].astype(str)) == {"rms", "us_per_sample"}
+
+
+def test_figures_are_averaged_over_samples_and_their_values_are_kept() -> None:
+    settings = ["monte_carlo.samples=3", "monte_carlo.sensor_draws=2", "score.windows=['whole']"]
+    found = run_campaign(short("ride.speed_kmh={ uniform = [30.0, 50.0] }", *settings))
+    assert not found.failures
+    assert found.cells["ride.speed_kmh"].nunique() == 3 and set(found.cells["sample"]) == {0, 1, 2}
+    table = aggregate(found.scores, found.cells)
+    assert "ride.speed_kmh" not in table and "sample" not in table  # chance is no axis
+    rows = found.scores.merge(found.cells[["cell", "sample"]], on="cell")
+    which = {"estimator": "design_angles", "quantity": "roll", "metric": "rms"}
+    for name, word in (which | {"reference": "truth"}).items():
+        rows, table = rows[rows[name] == word], table[table[name] == word]
+    assert len(rows) == 6 and len(table) == 1
+    row = table.iloc[0]
+    assert row["value"] == pytest.approx(rows["value"].mean())
+    assert (
+        row["sd_track"] == pytest.approx(rows.groupby("sample")["value"].mean().std()) and row["sd_track"] > 0
+    )
+    assert (row["track_draws"], row["draws"]) == (3, 6)

@@ -220,7 +220,7 @@ def test_templates_work_as_written(kind: str, here: Path, capsys: pytest.Capture
     options = [word for setting in settings for word in ("--set", setting)]
     assert call(["check", scenario, *options]) == DONE
     if kind == "estimator":
-        assert call(["run", scenario, *QUICK, *options, "--set", "sensor_draws=1"]) == DONE
+        assert call(["run", scenario, *QUICK, *options, "--set", "monte_carlo.sensor_draws=1"]) == DONE
         scores = pd.read_parquet(here / "results" / "mine" / "scores.parquet")
         rms = scores.query("estimator == 'design_angles' and metric == 'rms' and window == 'whole'")
         roll = rms.query("quantity == 'roll' and reference == 'truth'")["value"].item()

@@ -38,7 +38,7 @@ MEAN_KMH = {"go20A": 21.0, "go20B": 18.0, "back20A": -21.0, "back20B": -21.0, "g
 
 def test_mean_speeds_are_those_of_table_2() -> None:
     found = {}
-    for cell in cells(load_scenario("metro_table3", overrides=["sensor_draws=1"])):
+    for cell in cells(load_scenario("metro_table3", overrides=["monte_carlo.sensor_draws=1"])):
         profile = profile_of(cell)
         t = np.linspace(0.0, profile.duration_s, 200_001)
         position, speed, _ = profile.motion(t)
@@ -193,10 +193,15 @@ def test_the_figures_of_a_sentence_are_looked_up() -> None:
 
 def some_rides(names: tuple[str, ...], draws: int) -> Scenario:
     """The scenario with some of its rides, fewer draws, and without the ideal IMU."""
-    text = load_scenario("metro_table3").text.replace(', "ideal"]', "]")
-    head, *parts = re.split(r"(?m)^(?=\[\[ride\]\]|\[\[imu\]\])", text)
-    kept = [part for part in parts if "[[ride]]" not in part or any(f'"{n}"' in part for n in names)]
-    return read_scenario(head + "".join(kept), name="metro_table3", overrides=[f"sensor_draws={draws}"])
+    text = load_scenario("metro_table3").text
+    head, *parts = re.split(r"(?m)^(?=\[\[ride\]\]|\[\[imu\]\]|\[magnetometer)", text)
+    others = ("[[imu]]", "[magnetometer")
+    wanted = [f'name = "{name}"' for name in names]
+    kept = [part for part in parts if part.startswith(others) or any(name in part for name in wanted)]
+    kept = [part for part in kept if '"ideal"' not in part]
+    return read_scenario(
+        head + "".join(kept), name="metro_table3", overrides=[f"monte_carlo.sensor_draws={draws}"]
+    )
 
 
 @lru_cache
@@ -282,6 +287,21 @@ def test_spread_of_planted_errors() -> None:
     assert spread_of(shifted, "planted") == pytest.approx(np.std([0.3, -0.1], ddof=1), rel=1e-9)
 
 
+def ratio_of(scores: pd.DataFrame, ride: str, method: str, ours: str) -> tuple[float, float]:
+    """Roll error in curves of one method over another's: the ratio of the means, and its standard error."""
+    chosen = scores[
+        (scores["quantity"] == "roll")
+        & (scores["window"] == "curve")
+        & (scores["metric"] == "rms")
+        & (scores["reference"] == "truth")
+        & (scores["ride"] == ride)
+    ]
+    a, b = (chosen.loc[chosen["estimator"] == name, "value"].to_numpy() for name in (method, ours))
+    ratio = a.mean() / b.mean()
+    # By the delta method, the two paired by their draws.
+    return float(ratio), float((a - ratio * b).std(ddof=1) / np.sqrt(len(a)) / b.mean())
+
+
 @pytest.mark.slow
 def test_claims_on_all_rides() -> None:
     # Ten draws: the accelerometer's bias, which differs between draws, is the floor of every roll error.
@@ -297,10 +317,13 @@ def test_claims_on_all_rides() -> None:
     scenario, result = campaign(names, 10)
     rides = rides_of(cases(result.scores, result.cells), methods(scenario))
     for case in rides.cases:
-        worse = max(rides.one(case, part, "roll", window="curve") for part in ("ekf", "gda"))
+        limit = 4.0 if "70" in case.labels["ride"] else 3.0
         for part in GENERAL_PURPOSE:
-            times = rides.one(case, part, "roll", window="curve") / worse
-            assert times > (4.0 if "70" in case.labels["ride"] else 3.0), (case.labels["ride"], part)
+            for ours in ("ekf", "gda"):
+                ride, names = case.labels["ride"], rides.names
+                times, error = ratio_of(result.scores, ride, names[part], names[ours])
+                # Ten draws of a bias do not settle a factor of 4.2: only what chance does not explain counts.
+                assert times + 2.0 * error > limit, (ride, part, ours)
     for part in ("ekf", "gda"):
         for go, back in (("go20A", "back20A"), ("go70", "back70")):
             errors = [rides.one(c, part, "roll") for c in rides.cases if c.labels["ride"] in (go, back)]

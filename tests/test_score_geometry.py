@@ -197,7 +197,7 @@ def scenario(tmp_path_factory):
     own.write_text(KNOWING, encoding="utf-8")
     text = (
         f"estimator=[{{name='zero',method='{own}:ZeroTrack'}},{{name='known',method='{own}:Known'}}]",
-        "sensor_draws=1",
+        "monte_carlo.sensor_draws=1",
         "ride.rest_s=2.0",
         "ride.speed_kmh=70.0",
         "odometry='truth'",

@@ -29,7 +29,8 @@ from simrail.report.tables import Table, consistency_table, error_table, odometr
 from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
 from simrail.scenario.cells import methods
-from simrail.scenario.scenario import RailConditionPart, Scenario
+from simrail.scenario.parts import RailConditionPart
+from simrail.scenario.scenario import Scenario
 from simrail.score_table import LEFT_OPEN, NO_SAMPLES, OK
 
 MOST_RIDES = 6

@@ -11,7 +11,7 @@ from simrail.columns import ACCEL, GYRO
 from simrail.example import CellResult
 from simrail.report.decimate import Bins
 from simrail.report.style import INK, distance_axis, legend_above, look, panels, shade_track, to_svg
-from simrail.scenario.scenario import RailConditionPart
+from simrail.scenario.parts import RailConditionPart
 
 _TINTS = ("#0072B2", "#009E73", "#D55E00")
 

@@ -1,7 +1,8 @@
 """Lists as axes: a scalar of a scenario may be a list, and then the scenario is a campaign.
 
-A field annotated ``Listed[float]`` takes one number or a list of them. A list becomes an `Axis`;
-`expand` turns a model that holds axes into one model per combination, none of which holds an axis.
+A field annotated ``Listed[float]`` takes one number, a list of them or a distribution. A list becomes
+an `Axis`; `expand` turns a model that holds axes into one model per combination, none of which holds
+an axis. A distribution becomes a `Distribution`; `drawn` puts the values of a sample in its place.
 Fields that are lists by nature (positions, stops) are not annotated so and stay what they are.
 
 This module neither reads files nor knows what the fields mean.
@@ -9,15 +10,16 @@ This module neither reads files nor knows what the fields mean.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import product
 from typing import Annotated, Any, TypeVar
 
 from pydantic import WrapValidator
 
+from simrail.scenario.distributions import Distribution, Value, read_distribution
 from simrail.scenario.files import Part
 
-Scalar = str | int | float | bool
+Scalar = Value
 _T = TypeVar("_T")
 _Part = TypeVar("_Part", bound=Part)
 
@@ -29,6 +31,8 @@ class Axis(tuple[Scalar, ...]):
 
 
 def _one_or_list(value: Any, handler: Callable[[Any], Any]) -> Any:
+    if isinstance(value, dict):
+        return read_distribution(value, handler)
     if not isinstance(value, (list, tuple)):
         return handler(value)
     if not value:
@@ -40,7 +44,14 @@ def _one_or_list(value: Any, handler: Callable[[Any], Any]) -> Any:
 
 
 Listed = Annotated[_T, WrapValidator(_one_or_list)]
-"""One value, or a list of values that makes an axis."""
+"""One value, a list of values that makes an axis, or a distribution that values are drawn from."""
+
+
+def each(value: Any) -> tuple[Any, ...]:
+    """What a field may turn out to be: its value, the values of its list, or the extremes of its draws."""
+    if isinstance(value, Axis):
+        return value
+    return value.extremes if isinstance(value, Distribution) else (value,)
 
 
 def axes_of(model: Part, *, prefix: str = "", fields: Iterable[str] | None = None) -> dict[str, Axis]:
@@ -61,17 +72,25 @@ def axes_of(model: Part, *, prefix: str = "", fields: Iterable[str] | None = Non
         Dotted field name -> its values, in the order of the fields. Arrays of tables (rides, IMUs,
         estimators) are not looked into: each of their tables has axes of its own.
     """
-    found: dict[str, Axis] = {}
+    return {name: value for name, value in _leaves(model, prefix, fields) if isinstance(value, Axis)}
+
+
+def distributions_of(
+    model: Part, *, prefix: str = "", fields: Iterable[str] | None = None
+) -> dict[str, Distribution]:
+    """Find the distributions of a model and of the tables within it, as `axes_of` finds its axes."""
+    return {name: value for name, value in _leaves(model, prefix, fields) if isinstance(value, Distribution)}
+
+
+def _leaves(model: Part, prefix: str, fields: Iterable[str] | None) -> Iterator[tuple[str, object]]:
     for name in type(model).model_fields if fields is None else fields:
         value = getattr(model, name)
-        if isinstance(value, Axis):
-            found[prefix + name] = value
-        elif isinstance(value, Part):
-            found.update(axes_of(value, prefix=f"{prefix}{name}."))
+        if isinstance(value, Part):
+            yield from _leaves(value, f"{prefix}{name}.", None)
         elif isinstance(value, dict):
-            inner = {f"{prefix}{name}.{key}": item for key, item in value.items() if isinstance(item, Axis)}
-            found.update(inner)
-    return found
+            yield from ((f"{prefix}{name}.{key}", item) for key, item in value.items())
+        else:
+            yield prefix + name, value
 
 
 def expand(
@@ -102,6 +121,35 @@ def expand(
             concrete = _with(concrete, name.split("."), value)
         combinations.append(({prefix + name: value for name, value in settings.items()}, concrete))
     return combinations
+
+
+def drawn(
+    model: _Part, values: Mapping[str, Scalar], *, prefix: str = "", fields: Iterable[str] | None = None
+) -> tuple[dict[str, Scalar], _Part]:
+    """Put the values of one sample in the place of a model's distributions.
+
+    Parameters
+    ----------
+    model : Part
+        Model without axes.
+    values : mapping of str to value
+        Of the sample, by the names that the distributions have with the prefix.
+    prefix : str, optional
+        Stands before the model's names in ``values``, e.g. ``"ride.out."``.
+    fields : iterable of str, optional
+        These fields only.
+
+    Returns
+    -------
+    settings : dict
+        Name (without the prefix) -> value.
+    concrete : Part
+        The model that has them.
+    """
+    settings = {name: values[prefix + name] for name in distributions_of(model, fields=fields)}
+    for name, value in settings.items():
+        model = _with(model, name.split("."), value)
+    return settings, model
 
 
 def _with(model: Any, path: list[str], value: Scalar) -> Any:

@@ -1,30 +1,26 @@
-"""From a scenario's words to the nouns of the testbed: track, vehicle, ride, mount, grade, estimator.
+"""From a scenario's words to the nouns of the testbed: track, vehicle, ride, mount, grade.
 
-Each noun is made for one cell, and every fault is an `InputError` that names the field of
-the scenario, or the file of the part and its field. Nothing is simulated here.
+Each noun is made for one cell, and every fault is an `InputError` that names the field of the scenario,
+or the file of the part and its field. Nothing is simulated here. Estimators are made in
+`simrail.scenario.build_estimator`.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import difflib
 import hashlib
 import json
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from math import radians
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
-
-from pydantic import ConfigDict, TypeAdapter, ValidationError
-from pydantic.errors import PydanticUserError
+from typing import Any, TypeVar
 
 from simrail.bands import BANDS, Band
 from simrail.errors import InputError
-from simrail.estimate import Estimator, estimator_class
+from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, rails_of
-from simrail.scenario.cells import Cell, Method
+from simrail.scenario.build_estimator import estimator_of
+from simrail.scenario.cells import Cell, methods
+from simrail.scenario.distributions import Distribution
 from simrail.scenario.files import Part, blame, load
 from simrail.scenario.imu_file import ImuFile
 from simrail.scenario.scenario import Scenario
@@ -61,6 +57,7 @@ class Parts:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self._read: dict[tuple[str, str], Any] = {}
+        self._estimators: dict[int, dict[str, Estimator]] = {}
         self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
 
@@ -104,6 +101,29 @@ class Parts:
                 self._read["imu", name] = part.grade(Path(name).stem)
         grade: ImuGrade = self._read["imu", name]
         return grade
+
+    def estimators(self, sample: int) -> dict[str, Estimator]:
+        """Estimators of a sample by their names in the tables; those that no sample changes are shared."""
+        if sample not in self._estimators:
+            made: dict[str, Estimator] = {}
+            first = self._estimators.get(0, {})
+            for method in methods(self.scenario, sample=sample):
+                is_drawn = any(
+                    isinstance(option, Distribution)
+                    for option in self.scenario.spec.estimator[method.index].options.values()
+                )
+                if method.name in made:
+                    raise InputError(
+                        "two estimators have this name",
+                        file=self.scenario.file,
+                        field=f"estimator[{method.index}].name",
+                        value=method.name,
+                        remedy="give each a name of its own",
+                    )
+                known = None if is_drawn else first.get(method.name)
+                made[method.name] = known or estimator_of(self.scenario, method)
+            self._estimators[sample] = made
+        return self._estimators[sample]
 
     def _load(self, model: type[_Part], kind: str, name: str) -> _Part:
         part = load(model, kind, name, folder=self.scenario.folder)
@@ -222,115 +242,3 @@ def temperature_of(cell: Cell) -> Temperature | None:
     """Temperature of the IMU of a cell; None for that of its calibration."""
     part = cell.spec.temperature
     return None if part is None else Temperature(part.start_c, part.ambient_c, part.time_constant_s)
-
-
-def estimator_of(scenario: Scenario, method: Method) -> Estimator:
-    """Make an estimator from its class and the options of the scenario.
-
-    Raises
-    ------
-    InputError
-        If no such estimator is registered, it has no such option (the message lists those that it
-        has), or an option has a value that it cannot have.
-    """
-    field = f"estimator[{method.index}]"
-    with blame(scenario.file, f"{field}.method"):
-        known_class = class_named(method.part.method, scenario.folder)
-    with blame(scenario.file, f"{field}.options"):
-        estimator = construct(known_class, method.part.options)
-        if getattr(estimator, "magnetometer", False) is True and scenario.spec.magnetometer is None:
-            raise InputError(
-                "the scenario has no magnetometer",
-                field="magnetometer",
-                value=True,
-                remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
-            )
-        return estimator
-
-
-def class_named(name: str, folder: Path | None) -> type[Estimator]:
-    """Class of a method: a registered name, or ``"file.py:Class"`` for one's own file."""
-    path_name, colon, class_name = name.rpartition(":")
-    if not colon or not path_name.endswith(".py"):
-        return estimator_class(name)
-    candidates = [*([folder / path_name] if folder else []), Path(path_name)]
-    path = next((candidate for candidate in candidates if candidate.is_file()), None)
-    if path is None:
-        raise InputError(
-            "no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder"
-        )
-    # A name of its own per content: two files, or two versions of one, never share a module.
-    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
-    if module_name not in sys.modules:
-        spec = spec_from_file_location(module_name, path)
-        assert spec is not None and spec.loader is not None
-        module = module_from_spec(spec)
-        sys.modules[module_name] = module  # dataclasses look their module up there
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[module_name]
-            raise InputError(
-                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
-            ) from error
-    found = getattr(sys.modules[module_name], class_name, None)
-    if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
-        raise InputError(
-            "the file has no such estimator class",
-            value=class_name,
-            limit="a class with a method estimate(recording)",
-            remedy="see 'simrail new estimator NAME'",
-        )
-    own: type[Estimator] = found
-    return own
-
-
-def construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:
-    """Make an estimator from its options, each judged against the type that its class declares."""
-    if not dataclasses.is_dataclass(known_class):
-        raise InputError(
-            "is no dataclass, so its options cannot be judged",
-            value=known_class.__qualname__,
-            remedy="make the estimator a frozen dataclass, as in 'simrail new estimator'",
-        )
-    known = {entry.name for entry in dataclasses.fields(known_class) if entry.init and entry.name != "causal"}
-    types = get_type_hints(known_class)
-    values: dict[str, Any] = {}
-    for name, value in options.items():
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            raise InputError(
-                f"{known_class.__name__} has no such option",
-                field=name,
-                value=value,
-                limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
-                remedy=f"did you mean {near[0]}?" if near else "remove it",
-            )
-        values[name] = _option(types.get(name, Any), name, value)
-    try:
-        made: Estimator = known_class(**values)
-    except InputError:
-        raise
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{known_class.__name__} refuses them: {error}", value=options) from error
-    return made
-
-
-def _option(kind: Any, name: str, value: Any) -> Any:
-    """Judge one option against the type that the class declares for it; tuples may be given as arrays."""
-    if isinstance(value, list):
-        value = tuple(tuple(item) if isinstance(item, list) else item for item in value)
-    try:
-        adapter = TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False))
-    except PydanticUserError:
-        return value
-    try:
-        return adapter.validate_python(value)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError(
-            "has the wrong type or value",
-            field=name,
-            value=value,
-            limit=first["msg"].removeprefix("Input should be "),
-        ) from None

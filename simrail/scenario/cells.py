@@ -2,8 +2,12 @@
 
 A *world* is what decides the motion: track, vehicle, engine, step, irregularity and a ride. A world
 and a track draw make one simulated ride; a ride, a sensor setting, an IMU and a sensor draw make one
-*cell*: one recording, on which every estimator runs. Cells that differ in their draws only share a
-*case*: scores are aggregated over the cells of a case.
+*cell*: one recording, on which every estimator runs. Cells that differ by chance only (in their
+sample of the scenario's distributions, and in their draws) share a *case*: scores are aggregated over
+the cells of a case.
+
+A list compares: its values meet the same draws. A distribution is chance: each of its samples has
+draws of its own.
 
 Nothing depends on the order: seeds are found by name (`ride_seed`, `sensor_seed`), so a cell gives
 the same scores alone, among others, or in another order.
@@ -13,12 +17,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
-from simrail.scenario.axes import Scalar, axes_of, expand
-from simrail.scenario.scenario import EstimatorPart, ImuPart, RidePart, Scenario, ScenarioFile
+from simrail.scenario.axes import Scalar, axes_of, drawn, expand
+from simrail.scenario.parts import EstimatorPart, ImuPart, RidePart
+from simrail.scenario.samples import sample_count, samples_of
+from simrail.scenario.scenario import Scenario, ScenarioFile
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
 SENSING = ("odometry", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
@@ -33,19 +39,21 @@ class Cell:
     number : int
         Its place in the order of the scenario, from 0.
     case : int
-        Number that it shares with the cells that differ in draws only.
+        Number that it shares with the cells that differ in sample and draws only.
     ride_number : int
         Number that it shares with the cells that use the same simulated ride.
     spec : ScenarioFile
-        The scenario with this cell's values; nothing in it that the cell uses is an axis.
+        The scenario with this cell's values; nothing in it that the cell uses is a list or a
+        distribution.
     ride, imu : RidePart, ImuPart
         Its ride and its IMU.
     ride_index, imu_index : int
         Where they stand in the scenario, for messages.
-    track_draw, sensor_draw : int
-        Draws, from 0.
+    sample, track_draw, sensor_draw : int
+        Sample of the distributions, and draws within it, from 0.
     settings : dict
-        Values of the scenario's axes by dotted name, e.g. ``{"ride.speed_kmh": 70.0}``.
+        Values of the scenario's lists and distributions by dotted name, e.g.
+        ``{"ride.speed_kmh": 70.0}``.
     """
 
     number: int
@@ -56,6 +64,7 @@ class Cell:
     imu: ImuPart
     ride_index: int
     imu_index: int
+    sample: int
     track_draw: int
     sensor_draw: int
     settings: dict[str, Scalar]
@@ -63,12 +72,17 @@ class Cell:
     @property
     def ride_seed(self) -> int:
         """Root seed of the track that is laid: the same for all rides over a track draw."""
-        return derived_seed(self.spec.seed, "track_draw", self.track_draw)
+        return derived_seed(self.spec.seed, *self._sample_name, "track_draw", self.track_draw)
 
     @property
     def sensor_seed(self) -> int:
         """Root seed of the sensors: rides over the same draws are paired, draws share nothing."""
-        return derived_seed(self.spec.seed, "sensors_of_track_draw", self.track_draw)
+        return derived_seed(self.spec.seed, *self._sample_name, "sensors_of_track_draw", self.track_draw)
+
+    @property
+    def _sample_name(self) -> tuple[str | int, ...]:
+        # The first sample keeps the seeds that the cell has without any distribution.
+        return ("sample", self.sample) if self.sample else ()
 
 
 @dataclass(frozen=True)
@@ -107,55 +121,133 @@ def cells(scenario: Scenario) -> Iterator[Cell]:
     scenario : Scenario
         As read by `simrail.scenario.scenario.load_scenario`.
     """
-    spec = scenario.spec
     number = ride_number = 0
-    worlds = [
-        (world_settings | ride_settings, world, i, ride)
-        for world_settings, world in expand(spec, fields=WORLD)
-        for i, part in enumerate(spec.ride)
-        for ride_settings, ride in expand(part, prefix="ride.")
-    ]
-    sensings = [
-        (sensing_settings | imu_settings, sensing, i, imu)
-        for sensing_settings, sensing in expand(spec, fields=SENSING)
-        for i, part in enumerate(spec.imu)
-        for imu_settings, imu in expand(part, prefix="imu.")
-    ]
-    for w, (world_settings, world, ride_index, ride) in enumerate(worlds):
-        for track_draw in range(spec.track_draws):
-            for k, (sensing_settings, sensing, imu_index, imu) in enumerate(sensings):
-                together = world.model_copy(update={name: getattr(sensing, name) for name in SENSING})
-                for sensor_draw in range(spec.sensor_draws):
-                    yield Cell(
+    for world in _worlds(scenario.spec):
+        for track_draw in range(scenario.spec.monte_carlo.track_draws):
+            for sensing in _sensings(scenario.spec, world):
+                for sensor_draw in range(_draws(scenario.spec, sensing.imu)):
+                    yield replace(
+                        sensing,
                         number=number,
-                        case=w * len(sensings) + k,
                         ride_number=ride_number,
-                        spec=together,
-                        ride=ride,
-                        imu=imu,
-                        ride_index=ride_index,
-                        imu_index=imu_index,
                         track_draw=track_draw,
                         sensor_draw=sensor_draw,
-                        settings=world_settings | sensing_settings,
                     )
                     number += 1
             ride_number += 1
 
 
+def first_cells(scenario: Scenario) -> Iterator[Cell]:
+    """Yield one cell of each case and sample, its first draws, numbered as in `cells`."""
+    spec = scenario.spec
+    draws = spec.monte_carlo.track_draws
+    number = 0
+    for w, world in enumerate(_worlds(spec)):
+        before = 0
+        for sensing in _sensings(spec, world):
+            yield replace(sensing, number=number + before, ride_number=w * draws)
+            before += _draws(spec, sensing.imu)
+        number += before * draws
+
+
+@dataclass(frozen=True)
+class _World:
+    """What decides the motion, of one case and sample."""
+
+    case: int
+    settings: dict[str, Scalar]
+    spec: ScenarioFile
+    ride: RidePart
+    ride_index: int
+    sample: int
+    values: dict[str, Scalar]
+
+
+def _worlds(spec: ScenarioFile) -> Iterator[_World]:
+    samples, sensings = samples_of(spec), _sensing_count(spec)
+    listed = (
+        (world_settings, world, i, ride_settings, ride)
+        for world_settings, world in expand(spec, fields=WORLD)
+        for i, part in enumerate(spec.ride)
+        for ride_settings, ride in expand(part, prefix="ride.")
+    )
+    for w, (world_settings, world, i, ride_settings, ride) in enumerate(listed):
+        for k, values in enumerate(samples):
+            world_drawn, concrete = drawn(world, values, fields=WORLD)
+            ride_drawn, ridden = drawn(ride, values, prefix=f"ride.{ride.name}.")
+            settings = world_settings | world_drawn | ride_settings | _prefixed("ride.", ride_drawn)
+            yield _World(w * sensings, settings, concrete, ridden.as_ridden, i, k, values)
+
+
+def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
+    """First cells of a world, one for each setting of the sensors; not numbered."""
+    listed = (
+        (sensing_settings, sensing, i, imu_settings, imu)
+        for sensing_settings, sensing in expand(spec, fields=SENSING)
+        for i, part in enumerate(spec.imu)
+        for imu_settings, imu in expand(part, prefix="imu.")
+    )
+    of_estimators = {name: value for name, value in world.values.items() if name.startswith("estimator.")}
+    for k, (sensing_settings, sensing, i, imu_settings, imu) in enumerate(listed):
+        sensing_drawn, concrete = drawn(sensing, world.values, fields=SENSING)
+        imu_drawn, mounted = drawn(imu, world.values, prefix=f"imu.{imu.name}.")
+        yield Cell(
+            number=0,
+            case=world.case + k,
+            ride_number=0,
+            spec=world.spec.model_copy(update={name: getattr(concrete, name) for name in SENSING}),
+            ride=world.ride,
+            imu=mounted,
+            ride_index=world.ride_index,
+            imu_index=i,
+            sample=world.sample,
+            track_draw=0,
+            sensor_draw=0,
+            settings=world.settings
+            | sensing_settings
+            | sensing_drawn
+            | imu_settings
+            | _prefixed("imu.", imu_drawn)
+            | of_estimators,
+        )
+
+
+def _prefixed(prefix: str, settings: dict[str, Scalar]) -> dict[str, Scalar]:
+    return {prefix + name: value for name, value in settings.items()}
+
+
+def _draws(spec: ScenarioFile, imu: ImuPart) -> int:
+    """Sensor draws of an IMU."""
+    return min(spec.monte_carlo.sensor_draws, imu.sensor_draws or spec.monte_carlo.sensor_draws)
+
+
+def _sensing_count(spec: ScenarioFile) -> int:
+    return _size(spec, SENSING) * sum(_size(part) for part in spec.imu)
+
+
 def count(scenario: Scenario) -> tuple[int, int]:
     """Return the numbers of rides to simulate and of cells, without listing them."""
     spec = scenario.spec
-    rides = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * spec.track_draws
-    sensings = _size(spec, SENSING) * sum(_size(part) for part in spec.imu)
-    return rides, rides * sensings * spec.sensor_draws
+    worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * sample_count(spec)
+    rides = worlds * spec.monte_carlo.track_draws
+    return rides, rides * _size(spec, SENSING) * sum(_size(part) * _draws(spec, part) for part in spec.imu)
 
 
-def methods(scenario: Scenario) -> list[Method]:
-    """Return the estimators of a scenario, one for each combination of their options' axes."""
+def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:
+    """Return the estimators of a scenario, one for each combination of their options' axes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As read.
+    sample : int, optional
+        Whose values the options have that are distributions. Names are the same in every sample.
+    """
+    values = samples_of(scenario.spec)[sample]
     found = []
     for i, part in enumerate(scenario.spec.estimator):
-        for settings, concrete in expand(part):
+        for settings, listed in expand(part):
+            _, concrete = drawn(listed, values, prefix=f"estimator.{part.name}.")
             options = {name.removeprefix("options."): value for name, value in settings.items()}
             variant = ",".join(f"{key}={value}" for key, value in options.items())
             name = f"{part.name}[{variant}]" if variant else part.name

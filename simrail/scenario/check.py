@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 from simrail.errors import InputError
 from simrail.estimate import Estimator
-from simrail.scenario.build import Parts, estimator_of
-from simrail.scenario.cells import cells, count, methods
+from simrail.scenario.build import Parts
+from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
+from simrail.scenario.samples import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
 
@@ -33,7 +34,7 @@ class Plan:
     simulated_s : float
         Simulated time of all rides together.
     estimators : dict of str to Estimator
-        By their names in the tables.
+        By their names in the tables, with the options of the first sample.
     warnings : tuple of str
         What is unusual, one line each.
     content_hash : str
@@ -74,14 +75,14 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
             remedy="shorten a list or take fewer draws",
         )
     _judge_score(scenario)
-    estimators = _judge_estimators(scenario)
-    warnings: dict[str, None] = {}
+    estimators = parts.estimators(0)
+    for sample in range(1, sample_count(scenario.spec)):
+        parts.estimators(sample)
+    warnings: dict[str, None] = dict.fromkeys(_judge_samples(scenario))
     simulated = 0.0
     judged_rides: set[tuple[str, ...]] = set()
     judged_sensors: set[tuple[str, ...]] = set()
-    for cell in cells(scenario):
-        if cell.track_draw or cell.sensor_draw:
-            continue
+    for cell in first_cells(scenario):
         ride_key = (
             cell.spec.track,
             cell.spec.vehicle,
@@ -99,7 +100,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
             judged_rides.add((*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)))
             duration, found = judge_ride(scenario, cell, parts)
             warnings.update(dict.fromkeys(found))
-            simulated += duration * scenario.spec.track_draws
+            simulated += duration * scenario.spec.monte_carlo.track_draws
         if (*sensor_key, cell.spec.odometry, *ride_key) not in judged_sensors:
             judged_sensors.add((*sensor_key, cell.spec.odometry, *ride_key))
             judge_sensors(scenario, cell, parts)
@@ -124,16 +125,11 @@ def _judge_score(scenario: Scenario) -> None:
                 )
 
 
-def _judge_estimators(scenario: Scenario) -> dict[str, Estimator]:
-    made: dict[str, Estimator] = {}
-    for method in methods(scenario):
-        if method.name in made:
-            raise InputError(
-                "two estimators have this name",
-                file=scenario.file,
-                field=f"estimator[{method.index}].name",
-                value=method.name,
-                remedy="give each a name of its own",
-            )
-        made[method.name] = estimator_of(scenario, method)
-    return made
+def _judge_samples(scenario: Scenario) -> list[str]:
+    """Warn of samples that draw nothing, and of distributions that are drawn from once."""
+    monte_carlo, found = scenario.spec.monte_carlo, dimensions(scenario.spec)
+    if monte_carlo.samples > 1 and not found:
+        return [f"monte_carlo.samples = {monte_carlo.samples} counts for nothing: no value is a distribution"]
+    if monte_carlo.samples == 1 and found:
+        return [f"one sample only of {', '.join(found)}; set monte_carlo.samples"]
+    return []

@@ -17,7 +17,9 @@ from typing import Any
 from simrail.errors import InputError
 
 _STEP = re.compile(r"^([A-Za-z0-9_+-]+)(?:\[(\d+)\])?$")
-_EXAMPLE = "write e.g. --set ride[0].speed_kmh=70, --set sensor_draws=20 or --set imu.axle.grade=ideal"
+_EXAMPLE = (
+    "write e.g. --set ride[0].speed_kmh=70, --set monte_carlo.sensor_draws=20 or --set imu.axle.grade=ideal"
+)
 
 
 def override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:

@@ -28,6 +28,14 @@ odd_values = st.one_of(
         ["ideal", "front", "exudyn", "smooth_curve", "none", "truth", "../..", "", "a.toml", "x.py:Y", "\0"]
     ),
     st.lists(st.one_of(st.integers(-3, 3), st.floats(), st.text(max_size=3)), max_size=3),
+    st.builds(
+        lambda kind, given, bounds: {kind: given} | ({"bounds": bounds} if bounds else {}),
+        st.sampled_from(["uniform", "log_uniform", "normal", "choice"]),
+        st.lists(
+            st.one_of(st.integers(-3, 10**400), st.floats(), st.sampled_from([1, 2.0, "a"])), max_size=3
+        ),
+        st.lists(st.one_of(st.floats(), st.integers(-3, 3)), max_size=2),
+    ),
     st.dictionaries(st.text(max_size=5), st.integers(-3, 3), max_size=2),
 )
 

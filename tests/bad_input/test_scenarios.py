@@ -56,9 +56,89 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "speed_kmh = [50.0, 50.0]",
         ["ride[0].speed_kmh", "twice"],
     ),
+    "a normal distribution without bounds": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { normal = [50.0, 5.0] }",
+        ["ride[0].speed_kmh.normal", "without bounds", "[50.0, 5.0]", "[lowest, highest]", "add bounds"],
+    ),
+    "an infinite bound": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { uniform = [20.0, inf] }",
+        ["ride[0].speed_kmh.uniform", "finite", "inf"],
+    ),
+    "bounds in the wrong order": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { uniform = [70.0, 20.0] }",
+        ["ride[0].speed_kmh.uniform", "[70.0, 20.0]", "smaller bound first"],
+    ),
+    "draws that the field cannot have": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { normal = [50.0, 20.0], bounds = [-5.0, 90.0] }",
+        ["ride[0].speed_kmh", "-5.0", "> 0"],
+    ),
+    "a mean far from the bounds": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { normal = [50.0, 1.0], bounds = [70.0, 90.0] }",
+        ["ride[0].speed_kmh.bounds", "[70.0, 90.0]", "1 %", "move the mean"],
+    ),
+    "a standard deviation of nothing": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { normal = [50.0, 0.0], bounds = [40.0, 60.0] }",
+        ["ride[0].speed_kmh.normal", "0.0", "> 0"],
+    ),
+    "a logarithm of nothing": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { log_uniform = [0.0, 60.0] }",
+        ["ride[0].speed_kmh.log_uniform", "[0.0, 60.0]", "> 0", "take uniform"],
+    ),
+    "an empty choice": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { choice = [] }",
+        ["ride[0].speed_kmh.choice", "empty", "at least one"],
+    ),
+    "a wrong item in a choice": (
+        'grade = ["lord_3dm_gx4_25", "ideal"]',
+        'grade = { choice = ["ideal", 3] }',
+        ["imu[0].grade", "3", "text"],
+    ),
+    "a part of an impulse": (
+        "pulses_per_revolution = 1024",
+        "pulses_per_revolution = { uniform = [512, 1024] }",
+        ["encoder.pulses_per_revolution", "a whole number"],
+    ),
+    "a distribution that is none": (
+        "speed_kmh = 50.0",
+        "speed_kmh = { gamma = [1.0, 2.0] }",
+        ["ride[0].speed_kmh", "is no distribution", "gamma", "uniform", "one of these"],
+    ),
+    "an option without bounds": (
+        "compensated = true",
+        "compensated = true\ndoubt = { normal = [5.0, 1.0] }",
+        ["estimator[0].options.doubt", "without bounds", "add bounds"],
+    ),
+    "an option drawn outside its range": (
+        "compensated = true",
+        "compensated = { choice = [true, 3] }",
+        ["estimator[0].options.compensated", "3", "boolean"],
+    ),
+    "an odd number of Sobol points": (
+        "sensor_draws = 2",
+        'samples = 12\nmethod = "sobol"',
+        ["monte_carlo.samples", "12", "powers of two", "take 16"],
+    ),
+    "a design that is none": (
+        "sensor_draws = 2",
+        'samples = 12\nmethod = "halton"',
+        ["monte_carlo.method", "'halton'", "'latin_hypercube' or 'sobol'"],
+    ),
+    "a standstill the other way": (
+        "end_m = 590.0\nspeed_kmh = 50.0",
+        "reverse = true",
+        ["ride[0]", "cannot be reversed"],
+    ),
     "a negative seed": ("seed = 1", "seed = -1", ["seed", "-1", ">= 0"]),
     "a broken seed": ("seed = 1", "seed = 1.5", ["seed", "1.5", "whole number"]),
-    "no draws": ("sensor_draws = 2", "sensor_draws = 0", ["sensor_draws", "0", ">= 1"]),
+    "no draws": ("sensor_draws = 2", "sensor_draws = 0", ["monte_carlo.sensor_draws", "0", ">= 1"]),
     "too many cells": (
         "sensor_draws = 2",
         "sensor_draws = 1000000\ntrack_draws = 1000",
@@ -70,8 +150,8 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         ["engine", "'kinematik'", "'exudyn', 'compiled' or 'kinematic'", "did you mean kinematic?"],
     ),
     "a step that does not divide": (
-        "sensor_draws = 2",
-        "step_s = 0.0007",
+        'engine = "kinematic"',
+        'engine = "kinematic"\nstep_s = 0.0007',
         ["step_s", "0.0007", "divide", "0.0005"],
     ),
     "a track that is not shipped": (
@@ -337,7 +417,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         '[score]\nmetrics = ["rms", "mse"]\n\n[encoder]',
         ["score.metrics[1]", "'mse'", "rms, mean"],
     ),
-    "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 23", "quotes"]),
+    "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 25", "quotes"]),
     "a key twice": ("seed = 1", "seed = 1\nseed = 2", ["not valid TOML"]),
     "a table where a list belongs": ("[[ride]]", "[ride]", ["ride", "array of tables"]),
     "no rides": ("[[ride]]", "[[rides]]", ["rides", "unknown key", "did you mean ride?"]),

@@ -25,7 +25,7 @@ from simrail.columns import ATTITUDE, ATTITUDE_SD, IRREGULARITY, RELATIVE_POSITI
 from simrail.errors import InputError
 from simrail.recording import Recording
 from simrail.report.estimate_figures import innovation_figure
-from simrail.scenario.build import construct
+from simrail.scenario.build_estimator import construct
 from simrail.score_geometry import score_geometry
 from simrail.seeds import stream
 from simrail.testing import standing, time_reversed

@@ -23,6 +23,7 @@ seed = 1
 track = "test_line"
 vehicle = "none"
 engine = "kinematic"
+[monte_carlo]
 sensor_draws = 2
 [[ride]]
 name = "go"

@@ -11,7 +11,8 @@ from pydantic import Field
 
 from simrail.errors import InputError
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
-from simrail.scenario.build import Parts, encoder_of, estimator_of, magnetometer_of, mount_of, profile_of
+from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of, profile_of
+from simrail.scenario.build_estimator import estimator_of
 from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.files import Part, judge, shipped
@@ -130,8 +131,8 @@ def test_cells_are_the_product_of_axes_rides_imus_and_draws() -> None:
             "ride.out.speed_kmh=[20, 30, 50]",
             "irregularity.scale=[0.5, 1.0]",
             "odometry=['encoder', 'truth']",
-            "track_draws=2",
-            "sensor_draws=3",
+            "monte_carlo.track_draws=2",
+            "monte_carlo.sensor_draws=3",
         ],
     )
     listed = list(cells(scenario))
@@ -248,7 +249,7 @@ def test_dwell_and_stops_count_in_the_plan() -> None:
         load_scenario("quick_kinematic", overrides=["ride.stops=[{position_m=300.0, dwell_s=20.0}]"])
     )
     assert stop.simulated_s > base.simulated_s + 20.0
-    draws = judge_scenario(load_scenario("quick_kinematic", overrides=["track_draws=3"]))
+    draws = judge_scenario(load_scenario("quick_kinematic", overrides=["monte_carlo.track_draws=3"]))
     assert draws.simulated_s == pytest.approx(3 * base.simulated_s) and draws.rides == 3
 
 
@@ -286,7 +287,7 @@ spacing_m = 30.0
 
 def test_encoder_and_magnetometer_say_in_text_what_their_specifications_are() -> None:
     text = GOOD[: GOOD.index("[encoder]")] + SENSORS + GOOD[GOOD.index("[[estimator]]") :]
-    scenario = read_scenario(text, name="sensors", overrides=["track_draws=2"])
+    scenario = read_scenario(text, name="sensors", overrides=["monte_carlo.track_draws=2"])
     judge_scenario(scenario)
     listed = list(cells(scenario))
     assert len(listed) == 2 * 2 * 2 * 2 * 2  # quadrature, supply, grade, two draws each

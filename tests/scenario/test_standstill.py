@@ -130,7 +130,7 @@ def test_temperature_of_the_scenario_reaches_the_sensor(tmp_path):
     )
     text = QUICK.replace('["lord_3dm_gx4_25", "ideal"]', '"./warm.toml"')
     text += "\n[temperature]\nstart_c = 25.0\nambient_c = 65.0\ntime_constant_s = 10.0\n"
-    settings = ["ride.end_m=40.0", "sensor_draws=1"]
+    settings = ["ride.end_m=40.0", "monte_carlo.sensor_draws=1"]
     found = recordings(read_scenario(text, name="warm", folder=tmp_path, overrides=settings))
     (recording,) = found.values()
     bias = recording.imu["gyro_x_radps"].iloc[: 5 * 250]
@@ -142,7 +142,7 @@ def test_temperature_of_the_scenario_reaches_the_sensor(tmp_path):
 
 
 def test_an_imu_more_changes_no_other_bit_by_bit():
-    settings = ["ride.end_m=60.0", "sensor_draws=1", 'imu.axle.grade="lord_3dm_gx4_25"']
+    settings = ["ride.end_m=60.0", "monte_carlo.sensor_draws=1", 'imu.axle.grade="lord_3dm_gx4_25"']
     alone = recordings(read_scenario(QUICK, name="quick", overrides=settings))
     extra = '\n[[imu]]\nname = "second"\ngrade = "consumer"\nbody = "front"\nposition_m = [0.0, 0.0, 0.6]\n'
     together = recordings(

@@ -1,0 +1,136 @@
+"""From a scenario's words to an estimator: its class by name or file, its options judged by their types.
+
+A strange estimator in a person's own file is run here for the first time: what it does wrong is told,
+not raised.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import hashlib
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.errors import PydanticUserError
+
+from simrail.errors import InputError
+from simrail.estimate import Estimator, estimator_class
+from simrail.scenario.cells import Method
+from simrail.scenario.files import blame
+from simrail.scenario.scenario import Scenario
+
+
+def estimator_of(scenario: Scenario, method: Method) -> Estimator:
+    """Make an estimator from its class and the options of the scenario.
+
+    Raises
+    ------
+    InputError
+        If no such estimator is registered, it has no such option (the message lists those that it
+        has), or an option has a value that it cannot have.
+    """
+    field = f"estimator[{method.index}]"
+    with blame(scenario.file, f"{field}.method"):
+        known_class = class_named(method.part.method, scenario.folder)
+    with blame(scenario.file, f"{field}.options"):
+        estimator = construct(known_class, method.part.options)
+        if getattr(estimator, "magnetometer", False) is True and scenario.spec.magnetometer is None:
+            raise InputError(
+                "the scenario has no magnetometer",
+                field="magnetometer",
+                value=True,
+                remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
+            )
+        return estimator
+
+
+def class_named(name: str, folder: Path | None) -> type[Estimator]:
+    """Class of a method: a registered name, or ``"file.py:Class"`` for one's own file."""
+    path_name, colon, class_name = name.rpartition(":")
+    if not colon or not path_name.endswith(".py"):
+        return estimator_class(name)
+    candidates = [*([folder / path_name] if folder else []), Path(path_name)]
+    path = next((candidate for candidate in candidates if candidate.is_file()), None)
+    if path is None:
+        raise InputError(
+            "no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder"
+        )
+    # A name of its own per content: two files, or two versions of one, never share a module.
+    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
+    if module_name not in sys.modules:
+        spec = spec_from_file_location(module_name, path)
+        assert spec is not None and spec.loader is not None
+        module = module_from_spec(spec)
+        sys.modules[module_name] = module  # dataclasses look their module up there
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            del sys.modules[module_name]
+            raise InputError(
+                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
+            ) from error
+    found = getattr(sys.modules[module_name], class_name, None)
+    if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
+        raise InputError(
+            "the file has no such estimator class",
+            value=class_name,
+            limit="a class with a method estimate(recording)",
+            remedy="see 'simrail new estimator NAME'",
+        )
+    own: type[Estimator] = found
+    return own
+
+
+def construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:
+    """Make an estimator from its options, each judged against the type that its class declares."""
+    if not dataclasses.is_dataclass(known_class):
+        raise InputError(
+            "is no dataclass, so its options cannot be judged",
+            value=known_class.__qualname__,
+            remedy="make the estimator a frozen dataclass, as in 'simrail new estimator'",
+        )
+    known = {entry.name for entry in dataclasses.fields(known_class) if entry.init and entry.name != "causal"}
+    types = get_type_hints(known_class)
+    values: dict[str, Any] = {}
+    for name, value in options.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            raise InputError(
+                f"{known_class.__name__} has no such option",
+                field=name,
+                value=value,
+                limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
+                remedy=f"did you mean {near[0]}?" if near else "remove it",
+            )
+        values[name] = _option(types.get(name, Any), name, value)
+    try:
+        made: Estimator = known_class(**values)
+    except InputError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{known_class.__name__} refuses them: {error}", value=options) from error
+    return made
+
+
+def _option(kind: Any, name: str, value: Any) -> Any:
+    """Judge one option against the type that the class declares for it; tuples may be given as arrays."""
+    if isinstance(value, list):
+        value = tuple(tuple(item) if isinstance(item, list) else item for item in value)
+    try:
+        adapter = TypeAdapter(kind, config=ConfigDict(strict=True, allow_inf_nan=False))
+    except PydanticUserError:
+        return value
+    try:
+        return adapter.validate_python(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InputError(
+            "has the wrong type or value",
+            field=name,
+            value=value,
+            limit=first["msg"].removeprefix("Input should be "),
+        ) from None
