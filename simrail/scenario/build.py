@@ -18,7 +18,7 @@ from simrail.errors import InputError
 from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, rails_of
-from simrail.scenario.build_estimator import estimator_of
+from simrail.scenario.build_estimator import estimator_of, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import Distribution
 from simrail.scenario.files import Part, blame, load
@@ -122,6 +122,9 @@ class Parts:
                     )
                 known = None if is_drawn else first.get(method.name)
                 made[method.name] = known or estimator_of(self.scenario, method)
+                for option, content in option_files(made[method.name]).items():
+                    # What is in the files that its options name counts as the scenario's.
+                    self._content[f"estimator {method.name} {option} {sample}"] = content
             self._estimators[sample] = made
         return self._estimators[sample]
 
