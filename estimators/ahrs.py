@@ -44,6 +44,11 @@ class Vqf:
 
     causal = True
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The magnetometer, if it is asked for."""
+        return ("magnetometer",) if self.magnetometer else ()
+
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw.
 

@@ -110,6 +110,8 @@ class CurveMatchedOdometry:
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
 
+    needs = ("encoder",)
+
     @property
     def causal(self) -> bool:
         """The filter is causal, the smoother is not."""

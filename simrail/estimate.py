@@ -50,9 +50,17 @@ class Estimate:
     geometry: pd.DataFrame | None = None
 
 
+SENSORS = ("encoder", "magnetometer", "rail_sensor")
+"""What an estimator may need beside the IMU, by the names of a scenario's tables."""
+
+
 @runtime_checkable
 class Estimator(Protocol):
-    """One method. Parameters are fields of a frozen dataclass; `estimate` is its only verb."""
+    """One method. Parameters are fields of a frozen dataclass; `estimate` is its only verb.
+
+    A method that cannot do without some of `SENSORS` may name them in an attribute ``needs`` (tuple of
+    str): a scenario without them is refused before anything runs.
+    """
 
     causal: bool
     """True if the states at a time use nothing recorded later; `simrail.testing` checks it."""

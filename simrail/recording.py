@@ -212,3 +212,20 @@ class Recording:
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""
         return replace(self, odometry=odometry, odometry_source=source)
+
+
+def beginning(recording: Recording, *, samples: int) -> Recording:
+    """The first samples of a recording, counted by the IMU."""
+    imu = recording.imu.iloc[:samples]
+    encoder = recording.encoder
+    if encoder is not None:
+        encoder = encoder.loc[: imu.index[-1]]
+    magnetic, seen = recording.magnetometer, recording.rail_displacement
+    return replace(
+        recording,
+        imu=imu,
+        encoder=encoder,
+        odometry=recording.odometry.iloc[:samples],
+        magnetometer=None if magnetic is None else magnetic.iloc[:samples],
+        rail_displacement=None if seen is None else seen.iloc[:samples],
+    )

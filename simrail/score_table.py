@@ -168,6 +168,25 @@ def concat_scores(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+def in_order(scores: pd.DataFrame) -> pd.DataFrame:
+    """Rows in the order of the cells, words in that of the vocabulary and then of the rows.
+
+    What is returned depends on the rows of each cell alone, not on the order in which cells were stacked.
+    """
+    cell = scores["cell"].to_numpy()
+    if (np.diff(cell) < 0).any():
+        scores = scores.iloc[np.argsort(cell, kind="stable")].reset_index(drop=True)
+    columns: dict[str, object] = {}
+    for name in scores.columns:
+        column = scores[name]
+        if isinstance(column.dtype, pd.CategoricalDtype):
+            used = [column.cat.categories[code] for code in pd.unique(column.cat.codes)]
+            words = list(dict.fromkeys((*_CLOSED.get(name, ()), *used)))
+            column = column.cat.set_categories(words)
+        columns[name] = column
+    return pd.DataFrame(columns)
+
+
 def labelled(figures: pd.DataFrame, labels: dict[str, object]) -> pd.DataFrame:
     """Put the campaign's labels before the figures of one estimate.
 
@@ -198,72 +217,6 @@ def failed_figures(reason: str) -> pd.DataFrame:
     """The one row that stands for an estimate or a cell that could not be made."""
     first = ("roll", "full", "truth", "whole", "rms", np.nan, "deg", 0, reason.strip() or "failed")
     return as_score_table(pd.DataFrame([first], columns=list(FIGURE_COLUMNS)))
-
-
-def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.DataFrame:
-    """Average the figures over draws, the two levels of the Monte Carlo apart.
-
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        A score table with labels.
-    cells : pandas.DataFrame, optional
-        One row per cell (column ``cell``) with the values of the scenario's axes, in columns that
-        the score table does not have: figures of unlike axes are never averaged. Columns that differ
-        between the cells of one ``case`` are draws of a distribution, no axes, and are left out.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The text columns and axes, then ``value`` (mean over all draws that are ok), ``sd_sensor``
-        (pooled standard deviation between sensor draws of one track), ``sd_track`` (standard
-        deviation between the means of the tracks, of all samples), ``track_draws``, ``draws`` (ok),
-        ``failed``.
-        A standard deviation that the number of draws does not allow is empty.
-    """
-    axes: list[str] = []
-    track = ["track_draw"]
-    frame = scores.drop(columns=["n_samples"])
-    if cells is not None:
-        axes = axis_columns(cells)
-        track = [*(["sample"] if "sample" in cells else []), *track]
-        frame = frame.merge(cells[["cell", *axes, *track[:-1]]], on="cell", how="left")
-    # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
-    frame["failed"] = (~frame["status"].isin((OK, *LEFT_OPEN))).astype(np.int64)
-    labels = [name for name in LABEL_COLUMNS if name not in INTEGER_COLUMNS]
-    figure = [name for name in FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
-    keys = [*labels, *axes, *figure]
-    per_track = (
-        frame.groupby([*keys, *track], observed=True, dropna=False, sort=False)
-        .agg(mean=("value", "mean"), var=("value", "var"), draws=("value", "count"), failed=("failed", "sum"))
-        .reset_index()
-    )
-    per_track["total"] = per_track["mean"].fillna(0.0) * per_track["draws"]
-    per_track["spread"] = per_track["var"].fillna(0.0) * (per_track["draws"] - 1).clip(lower=0)
-    per_track["freedom"] = (per_track["draws"] - 1).clip(lower=0)
-    per_track["tracks"] = (per_track["draws"] > 0).astype(np.int64)
-    grouped = per_track.groupby(keys, observed=True, dropna=False, sort=False)
-    sums = grouped[["total", "draws", "failed", "spread", "freedom", "tracks"]].sum()
-    result = pd.DataFrame(
-        {
-            "value": sums["total"] / sums["draws"].where(sums["draws"] > 0),
-            "sd_sensor": np.sqrt(sums["spread"] / sums["freedom"].where(sums["freedom"] > 0)),
-            "sd_track": grouped["mean"].std(),
-            "track_draws": sums["tracks"],
-            "draws": sums["draws"],
-            "failed": sums["failed"],
-        }
-    )
-    return result.reset_index()
-
-
-def axis_columns(cells: pd.DataFrame) -> list[str]:
-    """Columns of the table of cells that tell its cases apart: neither labels nor draws."""
-    names = [str(name) for name in cells.columns if name not in (*SCORE_COLUMNS, "sample")]
-    if "case" not in names:
-        return names
-    most = cells.groupby("case")[names].nunique(dropna=False).max()
-    return [name for name in names if most[name] <= 1]
 
 
 def _categorical(name: str, column: pd.Series, bands: Sequence[str]) -> pd.Series:

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from simrail.aggregate import aggregate
 from simrail.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
 from simrail.errors import InputError
 from simrail.estimate import Estimate
@@ -23,7 +24,6 @@ from simrail.score_table import (
     OK,
     QUANTITY_UNITS,
     SCORE_COLUMNS,
-    aggregate,
     as_score_table,
     concat_scores,
     failed_figures,

@@ -8,6 +8,7 @@ import pytest
 
 from estimators.track_geometry import track_geometry
 from simrail import bands as band_module
+from simrail.aggregate import aggregate
 from simrail.bands import BANDS, TOO_SHORT, Band
 from simrail.campaign import run_campaign
 from simrail.columns import ATTITUDE, IRREGULARITY, ODOMETRY, ODOMETRY_SD, RELATIVE_POSITION
@@ -20,7 +21,7 @@ from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.score_geometry import score_geometry
-from simrail.score_table import FIGURE_COLUMNS, NO_TWIST, OK, UNOBSERVABLE, aggregate
+from simrail.score_table import FIGURE_COLUMNS, NO_TWIST, OK, UNOBSERVABLE
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import lay

@@ -18,6 +18,8 @@ from markupsafe import Markup
 
 from simrail.example import CellResult
 from simrail.report.attitude_figures import attitude_figure, error_figure
+from simrail.report.campaign.section import campaign_view
+from simrail.report.campaign.tables import write_tables
 from simrail.report.findings import Finding, findings
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.report.paper_000.section import paper_view
@@ -35,6 +37,9 @@ from simrail.score_table import LEFT_OPEN, NO_SAMPLES, OK
 
 MOST_RIDES = 6
 """Rides that are drawn; the tables hold all."""
+
+TABLES = "tables"
+"""Folder beside the page for the tables of a campaign, as CSV and LaTeX."""
 
 MOST_TABLES = 24
 """Cases whose table is on the page; ``scores.csv`` holds all."""
@@ -79,7 +84,7 @@ def write_report(
     examples: Sequence[CellResult],
     manifest: Mapping[str, Any],
 ) -> None:
-    """Write the report of a campaign.
+    """Write the report of a campaign; where it has axes, its tables into the folder `TABLES` beside it.
 
     Parameters
     ----------
@@ -101,6 +106,9 @@ def write_report(
     paper = None
     if scenario.spec.paper == "briales_2021":
         paper = paper_view(all_cases, methods(scenario), styles, examples)
+    campaign = campaign_view(scenario, scores, cells, styles, examples, manifest)
+    if campaign is not None:
+        write_tables(path.parent / TABLES, campaign.tables)
     rides = [
         _ride(example, all_cases, styles, scenario.spec.rail_condition) for example in examples[:MOST_RIDES]
     ]
@@ -118,6 +126,7 @@ def write_report(
         parts=parts(scenario, cells, examples),
         styles=styles,
         paper=paper,
+        campaign=campaign,
         tracks=_tracks(examples),
         rides=rides,
         rides_left_out=max(len(examples) - MOST_RIDES, 0),

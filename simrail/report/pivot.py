@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from simrail.score_table import CURVE_PREFIX, FULL, SCORE_COLUMNS, aggregate
+from simrail.aggregate import AGGREGATE_COLUMNS, aggregate
+from simrail.score_table import CURVE_PREFIX, FULL, SCORE_COLUMNS
 
 CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry")
 
@@ -81,7 +82,7 @@ def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Figures]:
     table = aggregate(scores, cell_table)
     if table.empty:
         return []
-    axes = [str(n) for n in table.columns if n not in (*SCORE_COLUMNS, *_AGGREGATES)]
+    axes = [str(n) for n in table.columns if n not in (*SCORE_COLUMNS, *AGGREGATE_COLUMNS)]
     keys = [*CASE_COLUMNS, *axes]
     result = []
     for values, rows in table.groupby(keys, observed=True, dropna=False, sort=False):
@@ -96,9 +97,6 @@ def of_cell(all_cases: list[Figures], cell: dict[str, object]) -> Figures | None
         if all(str(cell[name]) == value for name, value in case.labels.items() if name in cell):
             return case
     return None
-
-
-_AGGREGATES = ("sd_sensor", "sd_track", "track_draws", "draws", "failed")
 
 
 def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str, str], Figure]:

@@ -61,6 +61,10 @@ class Parts:
         self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the rails, for another process: they are laid faster than sent."""
+        return {**self.__dict__, "_laid": None}
+
     @property
     def hash(self) -> str:
         """SHA-256 over the content of the scenario and of the parts read so far, 16 digits.

@@ -11,9 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import hashlib
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -21,7 +18,8 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
 from simrail.errors import InputError
-from simrail.estimate import Estimator, estimator_class
+from simrail.estimate import SENSORS, Estimator, estimator_class
+from simrail.own_files import load_own
 from simrail.scenario.cells import Method
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
@@ -34,21 +32,43 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
     ------
     InputError
         If no such estimator is registered, it has no such option (the message lists those that it
-        has), or an option has a value that it cannot have.
+        has), an option has a value that it cannot have, or it needs a sensor that the scenario lacks.
     """
     field = f"estimator[{method.index}]"
     with blame(scenario.file, f"{field}.method"):
         known_class = class_named(method.part.method, scenario.folder)
     with blame(scenario.file, f"{field}.options"):
         estimator = construct(known_class, method.part.options, folder=scenario.folder)
-        if getattr(estimator, "magnetometer", False) is True and scenario.spec.magnetometer is None:
+    _judge_needs(scenario, method, estimator)
+    return estimator
+
+
+def _judge_needs(scenario: Scenario, method: Method, estimator: Estimator) -> None:
+    """Refuse an estimator that needs a sensor which the scenario lacks."""
+    for need in getattr(estimator, "needs", ()):
+        field = f"estimator[{method.index}]"
+        if need not in SENSORS:
             raise InputError(
-                "the scenario has no magnetometer",
-                field="magnetometer",
-                value=True,
-                remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
+                "needs what no scenario has",
+                file=scenario.file,
+                field=f"{field}.method",
+                value=need,
+                limit="one of " + ", ".join(SENSORS),
+                remedy="mend 'needs' of the estimator",
             )
-        return estimator
+        if getattr(scenario.spec, need) is not None:
+            continue
+        # Where an option of that name asks for the sensor, the option may as well be given up.
+        asked = method.part.options.get(need)
+        raise InputError(
+            f"the scenario has no {need.replace('_', ' ')}",
+            file=scenario.file,
+            field=f"{field}.options.{need}" if asked else f"{field}.method",
+            value=asked or method.part.method,
+            limit=f"a scenario with a table [{need}]",
+            remedy=f"add a [{need}] to the scenario, or "
+            + (f"set {need} = false" if asked is True else "remove this estimator"),
+        )
 
 
 def class_named(name: str, folder: Path | None) -> type[Estimator]:
@@ -56,22 +76,7 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
     path_name, colon, class_name = name.rpartition(":")
     if not colon or not path_name.endswith(".py"):
         return estimator_class(name)
-    path = _existing(path_name, folder)
-    # A name of its own per content: two files, or two versions of one, never share a module.
-    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
-    if module_name not in sys.modules:
-        spec = spec_from_file_location(module_name, path)
-        assert spec is not None and spec.loader is not None
-        module = module_from_spec(spec)
-        sys.modules[module_name] = module  # dataclasses look their module up there
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[module_name]
-            raise InputError(
-                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
-            ) from error
-    found = getattr(sys.modules[module_name], class_name, None)
+    found = getattr(load_own(_existing(path_name, folder), shown=path_name), class_name, None)
     if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
         raise InputError(
             "the file has no such estimator class",

@@ -125,7 +125,7 @@ def cells(scenario: Scenario) -> Iterator[Cell]:
     for world in _worlds(scenario.spec):
         for track_draw in range(scenario.spec.monte_carlo.track_draws):
             for sensing in _sensings(scenario.spec, world):
-                for sensor_draw in range(_draws(scenario.spec, sensing.imu)):
+                for sensor_draw in range(sensor_draws(scenario.spec, sensing.imu)):
                     yield replace(
                         sensing,
                         number=number,
@@ -146,7 +146,7 @@ def first_cells(scenario: Scenario) -> Iterator[Cell]:
         before = 0
         for sensing in _sensings(spec, world):
             yield replace(sensing, number=number + before, ride_number=w * draws)
-            before += _draws(spec, sensing.imu)
+            before += sensor_draws(spec, sensing.imu)
         number += before * draws
 
 
@@ -216,8 +216,8 @@ def _prefixed(prefix: str, settings: dict[str, Scalar]) -> dict[str, Scalar]:
     return {prefix + name: value for name, value in settings.items()}
 
 
-def _draws(spec: ScenarioFile, imu: ImuPart) -> int:
-    """Sensor draws of an IMU."""
+def sensor_draws(spec: ScenarioFile, imu: ImuPart) -> int:
+    """Number of sensor draws of an IMU."""
     return min(spec.monte_carlo.sensor_draws, imu.sensor_draws or spec.monte_carlo.sensor_draws)
 
 
@@ -230,7 +230,9 @@ def count(scenario: Scenario) -> tuple[int, int]:
     spec = scenario.spec
     worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * sample_count(spec)
     rides = worlds * spec.monte_carlo.track_draws
-    return rides, rides * _size(spec, SENSING) * sum(_size(part) * _draws(spec, part) for part in spec.imu)
+    return rides, rides * _size(spec, SENSING) * sum(
+        _size(part) * sensor_draws(spec, part) for part in spec.imu
+    )
 
 
 def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:

@@ -49,7 +49,7 @@ class Plan:
     content_hash: str
 
 
-def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
+def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool = False) -> Plan:
     """Judge everything about a scenario that can be judged without running it.
 
     Parameters
@@ -58,6 +58,8 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
         As read.
     parts : Parts, optional
         Its parts, to share what is read.
+    many : bool
+        Accept more than `MOST_CELLS` cells.
 
     Raises
     ------
@@ -66,13 +68,13 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None) -> Plan:
     """
     parts = parts or Parts(scenario)
     rides, total = count(scenario)
-    if total > MOST_CELLS:
+    if total > MOST_CELLS and not many:
         raise InputError(
             "has too many cells",
             file=scenario.file,
             value=total,
             limit=f"{MOST_CELLS}",
-            remedy="shorten a list or take fewer draws",
+            remedy="shorten a list or take fewer draws; 'simrail run --yes' runs them all",
         )
     _judge_score(scenario)
     estimators = parts.estimators(0)

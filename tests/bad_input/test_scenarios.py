@@ -142,7 +142,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "too many cells": (
         "sensor_draws = 2",
         "sensor_draws = 1000000\ntrack_draws = 1000",
-        ["too many cells", "2000000000", "1000000", "draws"],
+        ["too many cells", "2000000000", "1000000", "draws", "--yes"],
     ),
     "an engine that is none": (
         'engine = "kinematic"',
@@ -406,6 +406,16 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "compensated = true",
         "compensated = [true, 3]",
         ["estimator[0].options.compensated", "3", "boolean"],
+    ),
+    "an estimator without its sensor": (
+        'method = "DesignAngles"',
+        'method = "Vqf"\n[estimator.options]\nmagnetometer = [false, true]',
+        ["estimator[2].options.magnetometer", "no magnetometer", "True", "add a [magnetometer]", "= false"],
+    ),
+    "an estimator of the odometry without a wheel": (
+        '[encoder]\nwheel = "front.left"\npulses_per_revolution = 1024\nradius_error_sd = 0.001\n',
+        '[[estimator]]\nname = "way"\nmethod = "CurveMatchedOdometry"\n',
+        ["estimator[0].method", "no encoder", "'CurveMatchedOdometry'", "add a [encoder]", "remove this"],
     ),
     "a window that is none": (
         "[encoder]",

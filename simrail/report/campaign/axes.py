@@ -1,0 +1,127 @@
+"""Axes of a campaign as its report shows them, and the draws of a figure along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from simrail.aggregate import axis_columns
+from simrail.scenario.axes import axes_of
+from simrail.scenario.scenario import Scenario
+from simrail.score_table import CURVE_PREFIX, EVERY_CURVE, FULL
+
+_FIRST = ("speed_kmh", "direction", "imu", "irregularity.scale", "irregularity.spectrum", "vehicle")
+"""Columns of the table of cells that come first, and that stand for others which say the same."""
+
+_LAST = ("mount", "odometry", "track", "engine", "ride")
+_TITLES = {
+    "speed_kmh": "speed, km/h",
+    "direction": "direction",
+    "imu": "IMU",
+    "irregularity.scale": "irregularity, times its spectrum",
+    "irregularity.spectrum": "irregularity",
+}
+_UNITS = {
+    "kmh": "km/h",
+    "mps2": "m/s\u00b2",
+    "mps3": "m/s\u00b3",
+    "m": "m",
+    "s": "s",
+    "hz": "Hz",
+    "deg": "\u00b0",
+}
+
+
+@dataclass(frozen=True)
+class CampaignAxis:
+    """One axis: its column in the table of cells, how it is called, and its values with their words."""
+
+    column: str
+    title: str
+    values: tuple[object, ...]
+    words: tuple[str, ...]
+
+
+def is_campaign(scenario: Scenario) -> bool:
+    """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
+    spec = scenario.spec
+    found = set(axes_of(spec)) | {name for part in (*spec.ride, *spec.imu) for name in axes_of(part)}
+    return bool(found - {"grade"})
+
+
+def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
+    """The axes along which the cells differ, each told once, the usual ones first."""
+    named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry"))
+    varying = [n for n in named if n in cells and n != "case" and len(cells[n].unique()) > 1]
+    others = [name for name in varying if name not in (*_FIRST, *_LAST)]
+    ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
+    kept: list[str] = []
+    for name in ordered:
+        if not any(_says_the_same(cells, known, name) for known in kept):
+            kept.append(name)
+    return [_axis(cells, name) for name in kept]
+
+
+def draws_of(
+    scores: pd.DataFrame,
+    cells: pd.DataFrame,
+    axes: Sequence[CampaignAxis],
+    *,
+    quantity: str = "roll",
+    metric: str = "rms",
+    window: str = "whole",
+) -> pd.DataFrame:
+    """One row per cell and method that has the figure: value, axes, draws.
+
+    ``window`` may be ``curve:*``: every single curve, one row each.
+    """
+    chosen = (scores["quantity"] == quantity) & (scores["metric"] == metric)
+    chosen &= (scores["reference"] == "truth") & (scores["band"] == FULL) & scores["value"].notna()
+    if window == EVERY_CURVE:
+        curves = [name for name in scores["window"].cat.categories if name.startswith(CURVE_PREFIX)]
+        chosen &= scores["window"].isin(curves)
+    else:
+        chosen &= scores["window"] == window
+    columns = ["cell", "estimator", "window", "value", "track_draw", "sensor_draw"]
+    kept = scores.loc[chosen, columns]
+    beside = [axis.column for axis in axes] + [name for name in ("case", "sample") if name in cells]
+    return kept.merge(cells[["cell", *dict.fromkeys(beside)]], on="cell", how="left")
+
+
+def cluster_of(draws: pd.DataFrame) -> pd.Series:
+    """Number of the track that a draw was made over, the same in every case."""
+    names = [name for name in ("sample", "track_draw") if name in draws]
+    return draws.groupby(names, sort=True).ngroup()
+
+
+def _says_the_same(cells: pd.DataFrame, one: str, other: str) -> bool:
+    pairs = cells[[one, other]].drop_duplicates()
+    return len(pairs) == pairs[one].nunique(dropna=False) == pairs[other].nunique(dropna=False)
+
+
+def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:
+    values = list(cells[name].unique())
+    if pd.api.types.is_numeric_dtype(cells[name]) and not pd.api.types.is_bool_dtype(cells[name]):
+        values = sorted(values)
+    elif name == "direction":
+        values = sorted(values, reverse=True)  # standing, forward, backward
+    return CampaignAxis(name, _title(name), tuple(values), tuple(_words(value) for value in values))
+
+
+def _title(name: str) -> str:
+    if name in _TITLES:
+        return _TITLES[name]
+    *words, last = name.rpartition(".")[2].split("_")
+    if words and last in _UNITS:
+        return f"{' '.join(words)}, {_UNITS[last]}"
+    return " ".join([*words, last])
+
+
+def _words(value: object) -> str:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return f"{value:g}"
+    text = str(value)
+    return Path(text).stem if text.endswith(".toml") else text

@@ -1,0 +1,352 @@
+"""The section on a campaign: its axes, its figures and tables against the scores, and its size."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.example import CellResult
+from simrail.report.campaign.axes import campaign_axes, draws_of, is_campaign
+from simrail.report.campaign.figures import box_figure, curvature_figure, heat_figure, side_of
+from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
+from simrail.report.methods import MethodStyle, method_styles
+from simrail.report.page import TABLES, write_report
+from simrail.scenario.cells import methods
+from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
+from simrail.score_table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
+from simrail.statistics import compare
+
+SCENARIO = """
+title = "A campaign made up: speeds, directions, irregularity and grades"
+seed = 1
+track = "test_line"
+vehicle = "none"
+engine = "kinematic"
+[monte_carlo]
+track_draws = 10
+sensor_draws = 20
+[irregularity]
+spectrum = "erri_b176_low"
+scale = [0.5, 1.0, 2.0]
+[[ride]]
+name = "out"
+start_m = 10.0
+end_m = 560.0
+speed_kmh = [20.0, 40.0, 70.0]
+reverse = [false, true]
+[[imu]]
+name = "axle"
+grade = ["ideal", "tactical", "industrial", "consumer"]
+body = "body"
+position_m = [0.0, 0.0, 0.6]
+[[estimator]]
+name = "ekf_compensated"
+method = "AttitudeEkf"
+[[estimator]]
+name = "ekf_uncompensated"
+method = "AttitudeEkf"
+[estimator.options]
+compensated = false
+[[estimator]]
+name = "vqf"
+method = "Vqf"
+[[estimator]]
+name = "design_angles"
+method = "DesignAngles"
+"""
+
+SPEEDS = (20.0, 40.0, 70.0)
+SCALES = (0.5, 1.0, 2.0)
+GRADES = ("ideal", "tactical", "industrial", "consumer")
+METHODS = ("ekf_compensated", "ekf_uncompensated", "vqf", "design_angles")
+CURVES = ("curve:curve 3 R300", "curve:curve 7 R-150", "curve:curve 11 R800")
+RADIUS = {CURVES[0]: 300.0, CURVES[1]: 150.0, CURVES[2]: 800.0}
+FIGURES = [
+    *(("roll", "rms", window) for window in ("whole", "straight", "transition", "curve", *CURVES)),
+    *(("pitch", "rms", window) for window in ("whole", "curve")),
+    ("yaw_debiased", "rms", "whole"),
+    ("roll", "max", "whole"),
+    ("roll", "nees", "whole"),
+    ("roll", "coverage95", "whole"),
+    ("roll", "us_per_sample", "whole"),
+]
+
+
+def campaign(
+    *, tracks: int = 10, sensors: int = 20, seed: int = 1, methods: tuple[str, ...] = METHODS
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Scores and cells: 3 speeds x 2 directions x 3 irregularities x 4 grades x draws.
+
+    The roll error of a method that is not compensated grows with v^2/R, that of a grade with its
+    noise, all errors with the irregularity; tracks and sensors add a spread of their own.
+    """
+    rng = np.random.default_rng(seed)
+    worlds = list(product(SCALES, SPEEDS, (False, True)))
+    cells = pd.DataFrame(
+        [
+            (w * len(GRADES) + g, scale, speed, back, t, grade, s)
+            for w, (scale, speed, back) in enumerate(worlds)
+            for t in range(tracks)
+            for g, grade in enumerate(GRADES)
+            for s in range(sensors)
+        ],
+        columns=[
+            "case",
+            "irregularity.scale",
+            "ride.speed_kmh",
+            "ride.reverse",
+            "track_draw",
+            "imu",
+            "sensor_draw",
+        ],
+    )
+    cells.insert(0, "cell", np.arange(len(cells)))
+    cells["imu.grade"] = cells["imu"]
+    cells["sample"] = 0
+    cells["speed_kmh"] = cells["ride.speed_kmh"]
+    cells["direction"] = np.where(cells["ride.reverse"], "backward", "forward")
+    fixed = {"ride": "out", "vehicle": "none", "mount": "axle", "odometry": "encoder"}
+    for name, value in (fixed | {"track": "test_line", "engine": "kinematic"}).items():
+        cells[name] = value
+    n, rows = len(cells), len(methods) * len(FIGURES)
+    noise = cells["imu"].map(dict(zip(GRADES, (0.0, 0.02, 0.06, 0.2), strict=True))).to_numpy()
+    track = rng.normal(size=(len(SCALES) * 6 * tracks)).repeat(len(GRADES) * sensors)
+    rough = 0.05 * cells["irregularity.scale"].to_numpy() * np.exp(0.15 * track)
+    push = (cells["ride.speed_kmh"].to_numpy() / 3.6) ** 2 / 9.81
+    values = np.empty((n, len(methods), len(FIGURES)))
+    for m, method in enumerate(methods):
+        for f, (quantity, metric, window) in enumerate(FIGURES):
+            draw = np.exp(0.1 * rng.normal(size=n))
+            error = np.hypot(rough * (3.0 if method == "design_angles" else 1.0), noise * draw)
+            if method in ("ekf_uncompensated", "vqf") and "straight" not in window:
+                gain = 0.3 if method == "vqf" else 1.0
+                error = np.hypot(error, gain * np.rad2deg(push / RADIUS.get(window, 400.0)) * 0.5)
+            special = {"nees": 0.9 * draw, "coverage95": 1.0 - 0.05 * draw, "us_per_sample": 0.5 * draw}
+            scale = {"max": 3.5}.get(metric, 1.0) * {"pitch": 0.6}.get(quantity, 1.0)
+            values[:, m, f] = special.get(metric, scale * error)
+    repeated = {
+        name: pd.Categorical(cells[name].repeat(rows))
+        if name not in INTEGER_COLUMNS
+        else cells[name].repeat(rows).to_numpy()
+        for name in ("cell", "ride", "vehicle", "mount", "imu", "odometry", "track_draw", "sensor_draw")
+    }
+    units = {"nees": "1", "coverage95": "1", "us_per_sample": "us"}
+    columns = repeated | {
+        "scenario": "test",
+        "tuning": "default",
+        "estimator": np.tile(np.repeat(methods, len(FIGURES)), n),
+        "quantity": np.tile([quantity for quantity, _, _ in FIGURES], n * len(methods)),
+        "metric": np.tile([metric for _, metric, _ in FIGURES], n * len(methods)),
+        "window": np.tile([window for _, _, window in FIGURES], n * len(methods)),
+        "unit": np.tile([units.get(metric, "deg") for _, metric, _ in FIGURES], n * len(methods)),
+        "band": "full",
+        "reference": "truth",
+        "value": values.ravel(),
+        "n_samples": 1000,
+        "status": "ok",
+    }
+    return as_score_table(pd.DataFrame(columns)[list(SCORE_COLUMNS)]), cells
+
+
+MANIFEST = {"command": "simrail run made_up --set 'seed=2'", "seed": 2}
+
+
+@pytest.fixture(scope="module")
+def made_up() -> Scenario:
+    return read_scenario(SCENARIO, name="made_up")
+
+
+@pytest.fixture(scope="module")
+def styles(made_up: Scenario) -> list[MethodStyle]:
+    return list(method_styles(methods(made_up)).values())
+
+
+@pytest.fixture(scope="module")
+def small() -> tuple[pd.DataFrame, pd.DataFrame]:
+    return campaign(tracks=3, sensors=4)
+
+
+@pytest.fixture(scope="module")
+def tables(small: tuple[pd.DataFrame, pd.DataFrame], styles: list[MethodStyle]) -> CampaignTables:
+    scores, cells = small
+    return campaign_tables(scores, cells, campaign_axes(cells), styles, command=MANIFEST["command"])  # type: ignore[arg-type]
+
+
+def roll(small: tuple[pd.DataFrame, pd.DataFrame], window: str = "whole") -> pd.DataFrame:
+    """Roll rms, by plain pandas."""
+    scores, cells = small
+    rows = scores[(scores["quantity"] == "roll") & (scores["metric"] == "rms") & (scores["window"] == window)]
+    return rows.merge(cells.drop(columns=["imu", "track_draw", "sensor_draw", "ride", "vehicle"]), on="cell")
+
+
+def test_every_axis_is_told_once_and_in_order(small: tuple[pd.DataFrame, pd.DataFrame]) -> None:
+    found = campaign_axes(small[1])
+    assert [axis.column for axis in found] == ["speed_kmh", "direction", "imu", "irregularity.scale"]
+    assert found[0].values == SPEEDS and found[0].words == ("20", "40", "70")
+    assert found[1].values == ("forward", "backward") and found[2].values == GRADES
+
+
+def test_scenarios_without_lists_have_no_such_section() -> None:
+    assert not is_campaign(load_scenario("go20a"))  # a list of grades is no campaign
+    assert not is_campaign(load_scenario("metro_table3"))
+    for setting in (
+        "ride.speed_kmh=[20.0, 30.0]",
+        "irregularity.scale=[0.5, 1.0]",
+        "imu.roll_deg=[0.0, 5.0]",
+    ):
+        assert is_campaign(load_scenario("go20a", overrides=[setting]))
+
+
+def test_heat_maps_show_the_means(
+    small: tuple[pd.DataFrame, pd.DataFrame], styles: list[MethodStyle]
+) -> None:
+    scores, cells = small
+    axes = {axis.column: axis for axis in campaign_axes(cells)}
+    across, down = side_of(axes["speed_kmh"], axes["direction"]), side_of(axes["imu"])
+    svg = heat_figure(draws_of(scores, cells, list(axes.values())), styles[1:2], across, down, what="heat")
+    rows = roll(small)
+    rows = rows[rows["estimator"] == styles[1].name]
+    for grade in GRADES:
+        for speed in SPEEDS:
+            for way in ("forward", "backward"):
+                at = (rows["imu"] == grade) & (rows["speed_kmh"] == speed) & (rows["direction"] == way)
+                assert f">{rows.loc[at, 'value'].mean():.2f}</text>" in svg
+    assert "20 \u2192" in svg and "70 \u2190" in svg
+
+
+def test_boxes_and_curvature_are_drawn(
+    small: tuple[pd.DataFrame, pd.DataFrame], styles: list[MethodStyle], example: object
+) -> None:
+    scores, cells = small
+    axes = campaign_axes(cells)
+    svg = box_figure(draws_of(scores, cells, axes), styles, axes, what="boxes")
+    for word in ("consumer", "backward", "speed, km/h", "irregularity, times its spectrum"):
+        assert word in svg
+    one: CellResult = example()  # type: ignore[operator]
+    svg = curvature_figure([one], styles, words=["20 km/h"], what="curvature")
+    assert "curvature, 1/km" in svg and "20 km/h" in svg
+    straight = replace(one, motion=one.motion.assign(position_m=20.0))
+    assert curvature_figure([straight], styles, words=["x"], what="curvature") == ""
+
+
+def test_methods_have_the_mean_over_all_cells(
+    small: tuple[pd.DataFrame, pd.DataFrame], tables: CampaignTables
+) -> None:
+    rows = tables.methods[(tables.methods["quantity"] == "roll") & (tables.methods["window"] == "whole")]
+    plain = roll(small)
+    for row in rows.to_dict("records"):
+        values = plain.loc[plain["estimator"] == row["method"], "value"]
+        assert row["mean"] == pytest.approx(values.mean())
+        assert row["low95"] < row["mean"] < row["high95"] and row["tracks"] == 3
+        assert row["draws"] == len(values) == 3 * 2 * 3 * 4 * 3 * 4
+    # Spread within cases, not between them: speeds make 0.2 to 2.8 degrees of the uncompensated filter.
+    spread = rows.set_index("method").loc["ekf_uncompensated"]
+    assert spread["sd_sensor"] < 0.1 and spread["sd_track"] < 0.1
+
+
+def test_pairs_compare_the_same_recordings(
+    small: tuple[pd.DataFrame, pd.DataFrame], tables: CampaignTables
+) -> None:
+    plain = roll(small).pivot_table(index="cell", columns="estimator", values="value", observed=True)
+    tracks = small[1].set_index("cell")["track_draw"]
+    assert [(row["method"], row["against"]) for row in tables.pairs.to_dict("records")] == [
+        ("ekf_compensated", other) for other in ("ekf_uncompensated", "vqf", "design_angles")
+    ]
+    for row in tables.pairs.to_dict("records"):
+        found = compare(plain[row["method"]], plain[row["against"]], tracks.loc[plain.index])
+        assert row["difference"] == pytest.approx(found.difference.value)
+        assert row["difference_low95"] == pytest.approx(found.difference.low)
+        assert row["win_rate"] == found.win_rate.value and row["pairs"] == len(plain)
+
+
+def test_worst_cells_are_the_worst_and_say_how_to_make_them_again(
+    small: tuple[pd.DataFrame, pd.DataFrame], tables: CampaignTables
+) -> None:
+    cells, plain = small[1], roll(small)
+    ours = plain[plain["estimator"] == "ekf_compensated"].sort_values("value", ascending=False)
+    assert tables.worst["cell"].tolist() == ours["cell"].head(3).tolist()
+    assert set(tables.worst["method"]) == {"ekf_compensated"}  # baselines have no worst cells
+    for row in tables.worst.to_dict("records"):
+        cell = cells[cells["cell"] == row["cell"]].iloc[0]
+        assert row["IMU"] == cell["imu"] and row["speed, km/h"] == f"{cell['speed_kmh']:g}"
+        assert row["command"] == f"simrail run made_up --set 'seed=2' --cell {row['cell']}"
+
+
+def test_tables_are_written_as_csv_and_latex(tables: CampaignTables, tmp_path: Path) -> None:
+    write_tables(tmp_path, tables)
+    for name in ("methods", "axes", "pairs", "consistency", "worst"):
+        frame = getattr(tables, name)
+        read = pd.read_csv(tmp_path / f"{name}.csv")
+        assert list(read.columns) == list(frame.columns) and len(read) == len(frame)
+        for column in frame.columns:
+            if frame[column].dtype == np.float64:
+                assert read[column].to_numpy() == pytest.approx(
+                    frame[column].to_numpy(), rel=1e-5, nan_ok=True
+                )
+        text = (tmp_path / f"{name}.tex").read_text(encoding="utf-8")
+        body = text[text.index(r"\midrule") : text.index(r"\bottomrule")]
+        rows = [line for line in body.splitlines()[1:] if line.strip()]
+        assert len(rows) == len(frame)
+        assert all(line.rstrip().endswith(r"\\") for line in rows)
+        assert all(len(re.findall(r"(?<!\\)&", line)) == len(frame.columns) - 1 for line in rows)
+        assert not re.search(r"(?<!\\)_", text)  # an underscore by itself is an error in LaTeX
+
+
+def page_of(made_up: Scenario, scores: pd.DataFrame, cells: pd.DataFrame, folder: Path) -> str:
+    path = folder / "report.html"
+    write_report(path, scenario=made_up, scores=scores, cells=cells, examples=[], manifest=MANIFEST)
+    return path.read_text(encoding="utf-8")
+
+
+def test_the_page_has_the_section_and_its_tables(
+    made_up: Scenario, small: tuple[pd.DataFrame, pd.DataFrame], tmp_path: Path
+) -> None:
+    page = page_of(made_up, *small, tmp_path)
+    for words in (
+        'id="campaign"',
+        "864 cells over",
+        "Methods over all cells",
+        "Pairs of methods",
+        "Consistency",
+        "Worst cells",
+        "--cell ",
+        CURVES[0].removeprefix("curve:"),
+    ):
+        assert words in page, words
+    assert {path.suffix for path in (tmp_path / TABLES).iterdir()} == {".csv", ".tex"}
+    assert "nan" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL).lower().split()
+
+
+def test_methods_that_fail_leave_the_rest_standing(
+    made_up: Scenario, small: tuple[pd.DataFrame, pd.DataFrame], tmp_path: Path
+) -> None:
+    scores, cells = small
+    broken = (scores["estimator"] == "vqf").to_numpy() | (scores["cell"] < 30).to_numpy()
+    scores = scores.assign(
+        value=scores["value"].mask(broken),
+        status=pd.Categorical(
+            np.where(broken, "LinAlgError: singular", "ok"), categories=["ok", "LinAlgError: singular"]
+        ),
+    )
+    page = page_of(made_up, scores, cells, tmp_path)
+    assert "LinAlgError: singular" in page and 'id="campaign"' in page
+
+
+@pytest.mark.slow
+def test_a_million_rows_are_read_and_shown_within_half_a_minute(made_up: Scenario, tmp_path: Path) -> None:
+    """Processor time, since the machine is shared."""
+    scores, cells = campaign(tracks=10, sensors=25)
+    assert len(scores) > 1_000_000 and set(scores["estimator"]) == set(METHODS)
+    scores.to_parquet(tmp_path / "scores.parquet")
+    cells.to_parquet(tmp_path / "cells.parquet")
+    begun = time.process_time()
+    read = pd.read_parquet(tmp_path / "scores.parquet"), pd.read_parquet(tmp_path / "cells.parquet")
+    page_of(made_up, *read, tmp_path)
+    assert time.process_time() - begun < 30.0
