@@ -1,8 +1,10 @@
-"""Figures of rail geometry: true and estimated rails over distance with their 95 % band, and error by band."""
+"""Figures of rail geometry: true and estimated rails over distance with their 95 % band, and error by "
+"band."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -97,7 +99,7 @@ def rails_figure(
                     reach += [*true[at]]
                     if with_interval and np.isfinite(sd).any():
                         low, high = found[at] - 1.96 * sd[at], found[at] + 1.96 * sd[at]
-                        tint = {"color": style.colour, "alpha": 0.16, "lw": 0}
+                        tint: dict[str, Any] = {"color": style.colour, "alpha": 0.16, "lw": 0}
                         axis.fill_between(place[at], low, high, label="its 95 % interval", zorder=1, **tint)
                         reach += [*low, *high]
                 axis.plot(
@@ -119,7 +121,8 @@ def rails_figure(
 
 
 def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
-    """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without any."""
+    """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without "
+    "any."""
     bands = bands_of_case(case)
     shown = mappers(case, styles)
     if not bands or not shown:
@@ -168,6 +171,11 @@ def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
                 axis.set_ylabel("sd of the error, mm")
                 handles, labels = axis.get_legend_handles_labels()
         figure.legend(
-            handles, labels, loc="upper left", bbox_to_anchor=(left / WIDTH_IN - 0.01, 1.0), ncols=6, borderaxespad=0.1
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(left / WIDTH_IN - 0.01, 1.0),
+            ncols=6,
+            borderaxespad=0.1,
         )
         return to_svg(figure, description="Standard deviation of the error of the rail geometry by band")

@@ -1,4 +1,5 @@
-"""Tables and sentences of rail geometry: errors by band beside the baseline, and indicators against limits."""
+"""Tables and sentences of rail geometry: errors by band beside the baseline, and indicators against "
+"limits."""
 
 from __future__ import annotations
 
@@ -8,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from simrail.bands import BANDS, Band
-from simrail.columns import IRREGULARITY
 from simrail.report.findings import Finding, significant
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figure, Figures
@@ -83,9 +83,7 @@ def geometry_table(case: Figures, styles: Sequence[MethodStyle]) -> Table | None
                 found = case.get(style.name, quantity, "sd", band=band)
                 none = float("nan")
                 limit = case.get(floor.name, quantity, "sd", band=band).value if floor else none
-                others = [
-                    case.get(s.name, quantity, "sd", band=band).value for s in shown if not is_zero(s)
-                ]
+                others = [case.get(s.name, quantity, "sd", band=band).value for s in shown if not is_zero(s)]
                 marks = ["worse"] * (not is_zero(style) and found.value > limit)
                 marks += ["best"] * (not is_zero(style) and found.value == np.nanmin([*others, np.inf]))
                 cells.append(_cell(found, mark=" ".join(marks)))
@@ -129,7 +127,9 @@ def overview_table(all_cases: Sequence[Figures], styles: Sequence[MethodStyle]) 
             continue
         labels = case.labels
         note = ", an ablation" if labels["odometry"] == "truth" else ""
-        label = f"{labels['ride']} \u00b7 {labels['mount']} ({labels['imu']}) \u00b7 {labels['odometry']}{note}"
+        label = (
+            f"{labels['ride']} \u00b7 {labels['mount']} ({labels['imu']}) \u00b7 {labels['odometry']}{note}"
+        )
         rows.append(Row(label, "", "", cells))
     if not rows:
         return None
@@ -175,7 +175,8 @@ def _indicator(line: pd.Series | None, what: str, unit: float) -> Cell:
 def geometry_findings(
     case: Figures, styles: Sequence[MethodStyle], others: Sequence[Figures]
 ) -> list[Finding]:
-    """What the scores say of the rails: best method against the baseline in `BAND`, and what its error is of."""
+    """What the scores say of the rails: best method against the baseline in `BAND`, and what its error is "
+    "of."""
     floor = baseline_of(case, styles)
     result = []
     for quantity in JUDGED:
@@ -198,7 +199,8 @@ def geometry_findings(
         if both:
             least = sd_of(both, best, quantity)
             parts.append(
-                f"with both {significant(least)} mm, which is the vehicle between IMU and rails, and the method"
+                f"with both {significant(least)} mm, which is the vehicle between IMU and rails, and the "
+                f"method"
             )
         text += f". It would be: {'; '.join(parts)}." if parts else "."
         result.append(Finding(tone, text))
@@ -248,5 +250,3 @@ def _cell(found: Figure, *, decimals: int = 3, mark: str = "", scale: float = 1.
     spread = f"{scale * found.sd:.{decimals}f}" if found.sd > 0.0 else ""
     value = round(scale * found.value, decimals) + 0.0
     return Cell(f"{value:.{decimals}f}".replace("-", "\u2212"), spread, mark)
-
-

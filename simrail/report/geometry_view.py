@@ -52,8 +52,10 @@ def geometry_view(
     first = drawn[0]
     figures = [
         (
-            f"Rails over {LONG_M:.0f} m in the middle of the ride, unfiltered: as they lie (broad grey), and as "
-            f"{first.label} and others find them. The tinted band is the 95 % interval of {first.label}. What "
+            f"Rails over {LONG_M:.0f} m in the middle of the ride, unfiltered: as they lie (broad grey), "
+            f"and as "
+            f"{first.label} and others find them. The tinted band is the 95 % interval of {first.label}. "
+            f"What "
             "is far longer than a train, an inertial method cannot tell from its own drift.",
             rails_figure(
                 example,
@@ -68,7 +70,8 @@ def geometry_view(
     if _holds_band(example, first):
         figures.append(
             (
-                f"The same over {SHORT_M:.0f} m, filtered to {BAND}. A shift along the track is an error of the "
+                f"The same over {SHORT_M:.0f} m, filtered to {BAND}. A shift along the track is an error "
+                f"of the "
                 "odometry.",
                 rails_figure(
                     example,
@@ -83,7 +86,8 @@ def geometry_view(
     if case is not None:
         figures.append(
             (
-                "Standard deviation of the error by band of wavelengths, on a logarithmic axis; hollow: no IMU "
+                "Standard deviation of the error by band of wavelengths, on a logarithmic axis; hollow: no "
+                "IMU "
                 "at all, whose error is the rails themselves. Strokes: one standard deviation between draws.",
                 bands_figure(case, styles),
             )
@@ -134,7 +138,8 @@ def _indicators(
         for name, limit in limits.items()
     )
     text = (
-        f"Indicators in {BAND} of the true rails and of those that {style.label} finds, mm: standard deviation "
+        f"Indicators in {BAND} of the true rails and of those that {style.label} finds, mm: standard "
+        f"deviation "
         "over 200 m, largest distance from the mean, isolated defects. "
     )
     text += (
