@@ -140,13 +140,13 @@ def test_a_peak_can_be_missing() -> None:
 def test_what_was_not_run_is_not_judged() -> None:
     found = verdicts(planted(without=("cml", "cml_noise", "kom_end")), coverage=(), peak=(np.nan, np.nan))
     assert {claim.holds for claim in found.values()} == {None}
-    assert "KOM on the second part" in found["parts"].found
+    assert "KOM on part 2" in found["parts"].found
     assert errata_note(planted(without=("printed",))) == ""
 
 
 def test_what_misprints_cost_is_computed() -> None:
     assert "cross-level unfiltered from 0.400 to 0.200 mm" in errata_note(planted())
-    assert "They matter: at most 100 %" in errata_note(planted())
+    assert "up to 2.0 times as large" in errata_note(planted())
     same = {("printed", q): 0.5 for q in ("cross_level",)}
     assert "hardly matter" in errata_note(planted(same))
 
@@ -216,7 +216,10 @@ def test_sentences_lay_error_baseline_and_its_causes_side_by_side() -> None:
         "both 0.0300",
     ):
         assert words in said[0].text
-    lost = geometry_findings(case({("ours", "cross_level", "D1"): 4.0}), STYLES, [])
+    goals = {"cross_level": 0.5, "alignment": 0.5}
+    lost = geometry_findings(case({("ours", "cross_level", "D1"): 4.0}), STYLES, [], goals_mm=goals)
+    assert any("Asked were 0.5 mm: missed by 0.700 mm" in f.text and f.tone == "bad" for f in lost)
+    assert any("the alignment of ours" in f.text and "0.5 mm: kept" in f.text for f in lost)
     assert next(f for f in lost if "the cross-level of ours is off" in f.text).tone == "bad"
     assert any("50 %: too small" in f.text for f in lost)
 
@@ -317,7 +320,7 @@ def test_the_page_shows_rails_and_the_section(ran: tuple[Scenario, object, Path]
         "not observable",
         "Track quality by sections of 200 m",
         "alignment sd 0.01 mm",
-        "Not run in this scenario: CML estimation",
+        "Not run in this scenario: CML",
         "As Fig. A3",
         "0.162",
     ):
@@ -349,8 +352,8 @@ def test_the_section_holds_printed_and_own_rows(ran: tuple[Scenario, object, Pat
     view = paper_view(all_cases, methods(scenario), styles, result.examples)  # type: ignore[attr-defined]
     assert isinstance(view, PaperView)
     labels = [row.label for row in view.table.rows]
-    assert "CML estimation: printed" in labels and "CML estimation: ours, not run here" in labels
-    own = view.table.rows[labels.index("noise set by hand")]
+    assert "CML: printed" in labels and "CML: ours" not in labels
+    own = view.table.rows[labels.index("set by hand")]
     rows = rows_of(all_cases, methods(scenario), band="paper")
     assert rows is not None
     assert own.cells[1].text == f"{rows.get('hand', 'cross_level', 'sd', filtered=False).value:.3f}"

@@ -44,6 +44,7 @@ def geometry_view(
     styles: Sequence[MethodStyle],
     others: Sequence[Figures],
     limits: Mapping[str, Limits],
+    goals_mm: Mapping[str, float],
 ) -> GeometryView | None:
     """Make it; None if no method of the ride says what the rails look like."""
     drawn = with_rails(example, [style for style in styles if not is_zero(style)])
@@ -94,7 +95,7 @@ def geometry_view(
         )
     indicators, text = _indicators(example, first, limits)
     return GeometryView(
-        geometry_findings(case, styles, others) if case else [],
+        geometry_findings(case, styles, others, goals_mm=goals_mm) if case else [],
         [(caption, Markup(svg)) for caption, svg in figures if svg],
         indicators,
         text,

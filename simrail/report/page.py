@@ -33,7 +33,7 @@ from simrail.report.score_figures import curves_figure, rms_figure
 from simrail.report.tables import Table, consistency_table, error_table, odometry_table
 from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
-from simrail.scenario.build import limits_of
+from simrail.scenario.build import goals_mm, limits_of
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.score_table import LEFT_OPEN, NO_SAMPLES, OK
@@ -185,7 +185,7 @@ def _ride(
         odometry=Markup(odometry_figure(example)),
         rms=Markup(rms_figure(case, styles)) if case else nothing,
         curves=Markup(curves_figure(case, styles)) if case else nothing,
-        geometry=geometry_view(example, case, styles, all_cases, limits_of(spec)),
+        geometry=geometry_view(example, case, styles, all_cases, limits_of(spec), goals_mm(spec)),
     )
 
 

@@ -251,6 +251,12 @@ def limits_of(spec: ScenarioFile) -> dict[str, Limits]:
     }
 
 
+def goals_mm(spec: ScenarioFile) -> dict[str, float]:
+    """What the errors of rail geometry in D1 are asked to be at most, sd."""
+    limits = spec.geometry.limits.items()
+    return {name: part.error_sd_mm for name, part in limits if part.error_sd_mm is not None}
+
+
 def earth_of(cell: Cell) -> EarthRate | None:
     """Rotation of the Earth in a cell; None for an Earth at rest."""
     part = cell.spec.earth

@@ -207,10 +207,14 @@ class ScorePart(Part):
 
 
 class GeometryLimitsPart(Part):
-    """``[geometry.limits.<quantity>]``: limits that the report holds sections of 200 m against, mm."""
+    """``[geometry.limits.<quantity>]``: limits that the report holds sections of 200 m against, mm.
+
+    ``error_sd_mm`` is asked of the estimate, not of the rails: standard deviation of its error in D1.
+    """
 
     sd_mm: Positive | None = None
     defect_mm: Positive | None = None
+    error_sd_mm: Positive | None = None
 
 
 class GeometryPart(Part):

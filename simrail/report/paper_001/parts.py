@@ -11,15 +11,15 @@ from simrail.report.pivot import Figure, Figures
 from simrail.scenario.cells import Method
 
 PARTS: dict[str, str] = {
-    "cml": "CML estimation",
+    "cml": "CML",
     "kom": "KOM",
-    "kom_start": "KOM on the first part of the track",
-    "kom_end": "KOM on the second part of the track",
-    "cml_noise": "CML estimation with added noise",
-    "hand": "noise set by hand",
-    "filter": "noise set by hand, filter alone",
-    "printed": "noise set by hand, equations as printed",
-    "zero": "no IMU: rails as designed",
+    "kom_start": "KOM on part 1",
+    "kom_end": "KOM on part 2",
+    "cml_noise": "CML, noise added",
+    "hand": "set by hand",
+    "filter": "by hand, filter alone",
+    "printed": "by hand, misprints kept",
+    "zero": "no IMU",
 }
 """Parts that a method can play, in the order of the table. The first five have rows in the paper."""
 

@@ -116,7 +116,9 @@ def _table(rows: Rows, looks: dict[str, MethodStyle]) -> Table:
         style = looks.get("cml" if part == "cml_noise" else part)
         colour = style.colour if style else ""
         if part in TABLES:
-            cells = [Cell(f"{value:g}") for printed in TABLES[part] for value in printed]
+            cells = [
+                Cell(f"{value:.3f}".replace("-", "\u2212")) for printed in TABLES[part] for value in printed
+            ]
             result.append(Row(f"{label}: printed", "", "", cells))
         cells = [
             _number(rows, part, quantity, metric, filtered=filtered)
@@ -125,8 +127,6 @@ def _table(rows: Rows, looks: dict[str, MethodStyle]) -> Table:
         ]
         if rows.has(part):
             result.append(Row(f"{label}: ours" if part in TABLES else label, "", colour, cells))
-        elif part in TABLES:
-            result.append(Row(f"{label}: ours, not run here", "", "", cells))
     groups = [
         (f"{QUANTITIES[quantity]}, {'filtered' if filtered else 'unfiltered'}", 3)
         for quantity, filtered in COLUMNS
@@ -157,7 +157,7 @@ def coverage_of(example: CellResult, style: MethodStyle, band: Band) -> list[flo
 
 
 def _coverage_table(covered: dict[str, list[float]], looks: dict[str, MethodStyle]) -> Table:
-    rows = [Row("printed, CML estimation", "", "", [Cell(f"{value:g}") for value in COVERAGE])]
+    rows = [Row("CML: printed", "", "", [Cell(f"{value:g}") for value in COVERAGE])]
     for part, values in covered.items():
         if values:
             cells = [Cell(f"{value:.0f}") for value in values]
