@@ -66,6 +66,7 @@ def test_the_shipped_scenario_plays_them() -> None:
         "hand",
         "filter",
         "printed",
+        "",
         "zero",
     ]
 
