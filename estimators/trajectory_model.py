@@ -13,6 +13,7 @@ Not here: the loops (`estimators.kernels.trajectory`), the noise (`estimators.tr
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,9 @@ from estimators.kernels.trajectory_equations import STATES
 from estimators.rest_bias import rest_bias
 from estimators.trajectory_noise import Hyperparameters
 from simrail.columns import ACCEL, GYRO
-from simrail.jit import FloatArray
+from simrail.jit import FloatArray, IntArray
 from simrail.recording import Recording
+from simrail.track.design import STRAIGHT
 from simrail.track.frame import TrackFrame
 
 
@@ -36,6 +38,7 @@ class Model(NamedTuple):
     signals: FloatArray
     track: FloatArray
     slips: FloatArray
+    kinds: IntArray
     process: FloatArray
     noise: FloatArray
     virtual: FloatArray
@@ -88,9 +91,33 @@ def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray
     return [q * pair for q in values[:3]] + [q * triple for q in values[3:5]]
 
 
+def packed_process(parameters: Sequence[Hyperparameters], step_s: float) -> FloatArray:
+    """Upper triangles of the blocks of Q, row by row: (c, 18) for c sets of hyper-parameters."""
+    return np.array(
+        [
+            np.concatenate([q[np.triu_indices(len(q))] for q in process_noise(values, step_s)])
+            for values in parameters
+        ]
+    )
+
+
+def with_noise(model: Model, *parameters: Hyperparameters) -> Model:
+    """The model with other noise: one set for all samples, or one for each kind of them."""
+    kinds = model.kinds if len(parameters) > 1 else np.zeros_like(model.kinds)
+    noise = np.array([values.vector()[5:] for values in parameters])
+    return model._replace(kinds=kinds, process=packed_process(parameters, model.step_s), noise=noise)
+
+
+def kinds_of(recording: Recording) -> IntArray:
+    """0 on straights of the design track and 1 in its transitions and curves, (n,), by the odometry."""
+    track, place = recording.track, recording.odometry["position_m"].to_numpy(dtype=np.float64)
+    kind = track.kind(np.clip(place, track.start_m, track.end_m))
+    return np.ascontiguousarray(kind != STRAIGHT, dtype=np.int64)
+
+
 def model_of(
     recording: Recording,
-    parameters: Hyperparameters,
+    parameters: Sequence[Hyperparameters],
     *,
     use_rest_bias: bool = True,
     second_order: bool = True,
@@ -103,8 +130,8 @@ def model_of(
     ----------
     recording : Recording
         The recording.
-    parameters : Hyperparameters
-        Noise.
+    parameters : sequence of Hyperparameters
+        Noise: one set, or one for straights and one for transitions and curves (`kinds_of`).
     use_rest_bias, second_order, printed : bool
         See `estimators.trajectory_smoother.TrajectorySmoother`.
     start_sd : ndarray (12,)
@@ -122,20 +149,20 @@ def model_of(
     start[[0, 2, 4]] = frame.roll_rad[0], frame.pitch_rad[0], frame.yaw_rad[0]
     start[[1, 3, 5]] = speed[0] * frame.rates[0]
     start[[6, 9]] = lateral, height
-    return Model(
+    model = Model(
         signals=np.ascontiguousarray(signals),
         track=track_terms(recording, frame, printed=printed),
         slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
-        process=np.concatenate(
-            [q[np.triu_indices(len(q))] for q in process_noise(parameters, 1.0 / sheet.rate_hz)]
-        ),
-        noise=parameters.vector()[5:],
+        kinds=kinds_of(recording),
+        process=np.empty((0, 18)),
+        noise=np.empty((0, 8)),
         virtual=np.array([lateral, height]),
         start=start,
         start_variance=start_sd**2,
         step_s=1.0 / sheet.rate_hz,
         gravity=recording.gravity_mps2,
     )
+    return with_noise(model, *parameters)
 
 
 def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
@@ -235,10 +262,11 @@ def filterpy_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> 
     upper = np.triu_indices(STATES)
     ekf = ExtendedKalmanFilter(dim_x=STATES, dim_z=8)
     ekf.x, ekf.P, ekf.F = model.start.copy(), np.diag(model.start_variance), f
-    ekf.Q, ekf.R = _dense_process(model.process), np.diag(model.noise)
+    noises = [(_dense_process(q), np.diag(r)) for q, r in zip(model.process, model.noise, strict=True)]
     states, covariances = np.empty((n, STATES)), np.empty((n, STATES, STATES))
     innovations, likelihood = np.empty((n, 7)), 0.0
     for k in range(n):
+        ekf.Q, ekf.R = noises[model.kinds[k]]
         if k > 0:
             ekf.predict()
         slips = model.slips[k] if len(model.slips) else None
@@ -251,7 +279,9 @@ def filterpy_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> 
         spread = np.linalg.slogdet(s)[1] + len(e) * math.log(2.0 * math.pi)
         likelihood -= 0.5 * (e @ np.linalg.solve(s, e) + spread)
     if smoothed:
-        states, covariances, _, _ = rts_smoother(states, covariances, [f] * n, [ekf.Q] * n)
+        # filterpy's k-th Q is that of the step from k to k + 1; the filter's, that of the step to k.
+        steps = [noises[kind][0] for kind in model.kinds[1:n]]
+        states, covariances, _, _ = rts_smoother(states, covariances, [f] * n, [*steps, steps[-1]])
     packed = covariances[:, *upper] if with_covariance else np.empty((0, PACKED))
     return Found(states, packed, innovations, float(likelihood))
 

@@ -1,21 +1,13 @@
-"""Noise that the trajectory smoother assumes: the 13 hyper-parameters of paper 001, and their file.
+"""Noise that the trajectory smoother assumes: the 13 hyper-parameters of paper 001.
 
 Gonzalez-Carbajal et al. 2023, Eq. 16. The paper searches them by maximum likelihood or against a known output
-(section 4); the result of a search is a small TOML file:
-
-    [hyperparameters]
-    roll_rad2ps3 = 1e-2
-    ...
-
-with all 13 names. Not here: the search.
+(section 4). Not here: the search (`estimators.tuning`) and its file (`estimators.tuning_file`).
 """
 
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import astuple, dataclass, fields
-from pathlib import Path
 
 import numpy as np
 
@@ -77,41 +69,3 @@ class Hyperparameters:
     def from_vector(cls, values: FloatArray) -> Hyperparameters:
         """Make them from the 13 values in the paper's order."""
         return cls(*(float(value) for value in values))
-
-
-def read_hyperparameters(path: str | Path) -> Hyperparameters:
-    """Read a file of hyper-parameters.
-
-    Raises
-    ------
-    InputError
-        Naming the file, and the field that is missing, unknown or not positive.
-    """
-    file, table, remedy = Path(path), "hyperparameters", "write the file anew from its tuning"
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", file=file, remedy="mend the path; it is seen from here"
-        ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"is no TOML: {error}", file=file, remedy=remedy) from error
-    values = data.get(table)
-    if not isinstance(values, dict):
-        raise InputError("the table is missing", file=file, field=table, value=sorted(data), remedy=remedy)
-    known = [field.name for field in fields(Hyperparameters)]
-    for name in [*values, *known]:
-        if name not in known or name not in values:
-            raise InputError(
-                "is missing" if name in known else "is no hyper-parameter",
-                file=file,
-                field=f"{table}.{name}",
-                limit="the names " + ", ".join(known),
-                remedy=remedy,
-            )
-    try:
-        return Hyperparameters(**values)
-    except InputError as error:
-        raise InputError(
-            error.problem, file=file, field=f"{table}.{error.field}", value=error.value, limit=error.limit
-        ) from error

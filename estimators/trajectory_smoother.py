@@ -24,7 +24,8 @@ from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_back import trajectory_back
 from estimators.kernels.trajectory_equations import ROWS, STATES
 from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
-from estimators.trajectory_noise import Hyperparameters, read_hyperparameters
+from estimators.trajectory_noise import Hyperparameters
+from estimators.tuning_file import Tuning
 from simrail.columns import (
     ATTITUDE,
     ATTITUDE_SD,
@@ -58,8 +59,10 @@ class TrajectorySmoother:
         False stops after the filter, which is causal.
     hyperparameters : Hyperparameters
         Noise.
-    tuning : str
-        File of hyper-parameters to use instead (`estimators.trajectory_noise`); empty for none.
+    curve_hyperparameters : Hyperparameters, optional
+        Noise in the transitions and curves of the design track; the same as on straights if not given.
+    tuning : Tuning, optional
+        Hyper-parameters from a file (`estimators.tuning_file`) to use instead; in a scenario, its path.
     rest_bias : bool
         Subtract the gyro's mean over the rests so far.
     second_order : bool
@@ -78,7 +81,8 @@ class TrajectorySmoother:
 
     smoothed: bool = True
     hyperparameters: Hyperparameters = field(default_factory=Hyperparameters)
-    tuning: str = ""
+    curve_hyperparameters: Hyperparameters | None = None
+    tuning: Tuning | None = None
     rest_bias: bool = True
     second_order: bool = True
     printed: bool = False
@@ -92,25 +96,36 @@ class TrajectorySmoother:
             raise InputError(
                 "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
             )
-        if not isinstance(self.hyperparameters, Hyperparameters):
-            raise InputError(
-                "are no Hyperparameters",
-                field="hyperparameters",
-                value=self.hyperparameters,
-                remedy="in a scenario, name a file of them in the option tuning",
-            )
+        for name, kinds in (
+            ("hyperparameters", Hyperparameters),
+            ("curve_hyperparameters", Hyperparameters | None),
+            ("tuning", Tuning | None),
+        ):
+            if not isinstance(getattr(self, name), kinds):
+                raise InputError(
+                    "are no hyper-parameters",
+                    field=name,
+                    value=getattr(self, name),
+                    remedy="in a scenario, name a file of them in the option tuning",
+                )
         for name in ("start_sd_rad", "start_yaw_sd_rad"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
-        if self.tuning:
-            if self.hyperparameters != Hyperparameters():
-                raise InputError("a file and values cannot both be given", field="tuning", value=self.tuning)
-            read_hyperparameters(self.tuning)
+        given = self.hyperparameters != Hyperparameters() or self.curve_hyperparameters is not None
+        if self.tuning is not None and given:
+            raise InputError("a file and values cannot both be given", field="tuning")
 
     @property
     def causal(self) -> bool:
         """The filter is causal, the smoother is not."""
         return not self.smoothed
+
+    @property
+    def noise(self) -> tuple[Hyperparameters, ...]:
+        """The set of hyper-parameters, or those of straights and of transitions and curves."""
+        chosen = self if self.tuning is None else self.tuning
+        both = (chosen.hyperparameters, chosen.curve_hyperparameters)
+        return tuple(values for values in both if values is not None)
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate attitude and place in the track frame at every IMU sample."""
@@ -148,7 +163,7 @@ class TrajectorySmoother:
         pairs = [sd for pair in zip(angles, rates, strict=True) for sd in pair]
         return model_of(
             recording,
-            read_hyperparameters(self.tuning) if self.tuning else self.hyperparameters,
+            self.noise,
             use_rest_bias=self.rest_bias,
             second_order=self.second_order,
             printed=self.printed,
@@ -169,7 +184,7 @@ def log_likelihood(model: Model) -> float:
     """Log-likelihood alone: nothing is kept."""
     none = np.empty((0, STATES)), np.empty((0, PACKED))
     updates = np.empty((0, ROWS, STATES)), np.empty((0, ROWS, 2))
-    return trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)))
+    return trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), np.empty(0))
 
 
 def compiled_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> Found:
@@ -181,7 +196,7 @@ def compiled_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> 
     updates = np.empty((m, ROWS, STATES)), np.empty((m, ROWS, 2))
     innovations = np.empty((n, 7))
     before, after = (kept, none) if smoothed else (none, kept)
-    likelihood = trajectory_filter(*model, *before, *updates, *after, innovations)
+    likelihood = trajectory_filter(*model, *before, *updates, *after, innovations, np.empty(0))
     if smoothed:
         trajectory_back(
             model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance

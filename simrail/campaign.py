@@ -1,248 +1,237 @@
 """The campaign loop: every cell of a scenario, from simulation to scores. There is no second one.
 
 A cell is one recording (`simrail.scenario.cells`): a ride is simulated once and shared by its cells,
-each cell draws its sensors, every estimator runs on the recording, and each estimate is scored. What
-fails becomes a row with its reason and the others go on. Seeds belong to names, so the scores of a
-cell do not depend on which cells ran before it.
+each cell draws its sensors, every estimator runs on the recording, and each estimate is scored. Here
+cells are put into batches, batches are handed to a crew (`simrail.crew`), and each that is done is kept
+(`simrail.unfinished`) before its worker gets another; cells that have been kept before are not run.
 
-What is gathered on the way is in `simrail.ledger`. Nothing is written here: see `simrail.results`.
+Seeds belong to names, so neither the batches, nor their order, nor who runs them changes a score.
 """
 
 from __future__ import annotations
 
-import time
-from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+import tempfile
+from collections import Counter, deque
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import replace
 from itertools import groupby
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-import pandas as pd
-
-from simrail.estimate import Estimate, Estimator
-from simrail.example import CellResult
-from simrail.interrupts import Check, interruptible
-from simrail.ledger import Failure, Ledger, cell_record
-from simrail.line_odometry import with_odometry
-from simrail.measure import measure
-from simrail.recording import Recording, beginning
-from simrail.ride import is_cached, simulate
-from simrail.scenario.build import (
-    Parts,
-    bands_of,
-    earth_of,
-    encoder_of,
-    magnetometer_of,
-    mount_of,
-    rail_sensor_of,
-    temperature_of,
-)
-from simrail.scenario.cells import Cell, cells, methods
-from simrail.scenario.check import Plan, judge_scenario
+from simrail.batch import BatchResult, RideResult, forget, lost_batch, run_batch, run_ride
+from simrail.campaign_result import CampaignResult, chosen_cells, gather
+from simrail.crew import Crew, broken, crew_of, lost
+from simrail.interrupts import interruptible
+from simrail.job import Job, prepare
+from simrail.ride import is_cached
+from simrail.scenario.build import profile_of
+from simrail.scenario.cells import Cell
 from simrail.scenario.scenario import Scenario
-from simrail.score import reference_of, score, score_odometry, truth_at_imu
-from simrail.score_geometry import score_geometry
-from simrail.score_table import concat_scores
-from simrail.truth import Mount, Truth
+from simrail.unfinished import Unfinished
 from simrail.watcher import Watcher
 
+_MOST_CELLS, _MOST_SECONDS = 20, 600.0
+"""Largest batch: cells, and seconds of recordings together, which are held in memory at once."""
 
-@dataclass(frozen=True)
-class CampaignResult:
-    """What a campaign found.
-
-    Attributes
-    ----------
-    scores : pandas.DataFrame
-        The score table, columns `simrail.score_table.SCORE_COLUMNS`.
-    cells : pandas.DataFrame
-        One row per cell: its labels, and the values of the scenario's axes under their dotted names.
-    examples : list of CellResult
-        First draw of each ride, for figures.
-    rides : list of dict
-        What each engine said of its run; plain values.
-    wall_s : dict of str to float
-        Wall time of the stages ``simulate``, ``measure``, ``estimate``, ``score``.
-    failures : list of Failure
-        What failed; each is a row of the scores as well.
-    plan : Plan
-        What was planned, with its warnings.
-    """
-
-    scores: pd.DataFrame
-    cells: pd.DataFrame
-    examples: list[CellResult]
-    rides: list[dict[str, Any]]
-    wall_s: dict[str, float]
-    failures: list[Failure]
-    plan: Plan
+_MOST_TRIES = 3
+"""How often a cell is run whose worker dies each time; then it has failed."""
 
 
-@dataclass(frozen=True)
-class _RememberedTruth(Truth):
-    """A truth that works out the motion of each place once: all draws of a ride ask for it again."""
+class _Task(NamedTuple):
+    """A ride to simulate, for the cells that it has, or a batch of cells to run on it."""
 
-    remembered: dict[Mount, pd.DataFrame] = field(default_factory=dict)
+    is_ride: bool
+    cells: tuple[Cell, ...]
 
-    def motion(self, mount: Mount) -> pd.DataFrame:
-        """See `Truth.motion`; IMUs of any name in one place share it."""
-        place = replace(mount, name="")
-        if place not in self.remembered:
-            self.remembered[place] = super().motion(mount)
-        return self.remembered[place]
+    @property
+    def words(self) -> str:
+        """What it is, for messages."""
+        first, last = self.cells[0], self.cells[-1]
+        return f"ride {first.ride.name} is" if self.is_ride else f"cells {first.number} to {last.number} are"
+
+    @property
+    def name(self) -> tuple[bool, int, int]:
+        """What tells it from others."""
+        return self.is_ride, self.cells[0].number, len(self.cells)
 
 
-def run_campaign(scenario: Scenario, *, watcher: Watcher | None = None, many: bool = False) -> CampaignResult:
+def run_campaign(
+    scenario: Scenario | Job,
+    *,
+    workers: int | None = None,
+    cluster: str | None = None,
+    kept: Unfinished | None = None,
+    batch_cells: int | None = None,
+    only: int | None = None,
+    watcher: Watcher | None = None,
+) -> CampaignResult:
     """Run every cell of a scenario.
 
     Parameters
     ----------
-    scenario : Scenario
-        As read by `simrail.load_scenario`.
+    scenario : Scenario or Job
+        As read by `simrail.load_scenario`, or judged already.
+    workers, cluster : int, str, optional
+        Who runs it, see `simrail.crew.crew_of`.
+    kept : Unfinished, optional
+        Batches that have been run, and where those to come are kept; else they are kept for now only.
+    batch_cells : int, optional
+        Cells of a batch; as many as suit if not given.
+    only : int, optional
+        Run this one cell.
     watcher : Watcher, optional
         Is told of the progress.
-    many : bool
-        Accept more cells than `simrail.scenario.check.MOST_CELLS`.
 
     Raises
     ------
     InputError
-        If the scenario cannot be run; then nothing has been run.
+        If the scenario cannot be run; then nothing has been run. Or if a worker runs other code.
+    OSError
+        If a disk is full, or the cluster has gone. Batches that are complete are kept.
     KeyboardInterrupt
-        If interrupted; rides that were complete stay in the cache.
+        If interrupted; batches and rides that are complete are kept.
     """
-    watcher = watcher or Watcher()
-    parts = Parts(scenario)
-    plan = judge_scenario(scenario, parts, many=many)
-    chosen = {method.name: (method, plan.estimators[method.name]) for method in methods(scenario)}
-    ledger = Ledger(scenario, chosen)
-    records = []
-    with interruptible() as check:
-        for ride_number, group in groupby(cells(scenario), key=lambda cell: cell.ride_number):
-            ride_cells = list(group)
-            records += [cell_record(cell) for cell in ride_cells]
-            watcher.ride_begins(ride_number + 1, plan.rides, ride_cells[0].ride.name)
-            _run_ride(ride_cells, parts, ledger, watcher, check, plan.cells)
-    return CampaignResult(
-        scores=concat_scores(ledger.tables),
-        cells=pd.DataFrame.from_records(records),
-        examples=ledger.examples,
-        rides=ledger.rides,
-        wall_s=ledger.wall_s,
-        failures=ledger.failures,
-        plan=plan,
-    )
+    job = scenario if isinstance(scenario, Job) else prepare(scenario)
+    with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
+        kept = Unfinished(Path(spare)) if kept is None else kept
+        loop = _Loop(job, kept, watcher or Watcher(), only)
+        with interruptible():
+            try:
+                if loop.left:
+                    with crew_of(workers, cluster, cells=loop.left) as crew:
+                        loop.run(crew, batch_cells)
+                return gather(job, kept, only=only)
+            finally:
+                forget()
 
 
-def _run_ride(
-    ride_cells: list[Cell], parts: Parts, ledger: Ledger, watcher: Watcher, check: Check, cell_count: int
-) -> None:
-    """Simulate one ride and run its cells."""
-    first = ride_cells[0]
-    try:
-        with ledger.timed("simulate"):
-            ride = parts.ride(first)
-            found = is_cached(ride)
-            begun = time.perf_counter()
-            truth = simulate(ride, progress=watcher.ride_goes)
-            wall = time.perf_counter() - begun
-            truth = _RememberedTruth(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
-    except Exception as error:
-        check()
-        for cell in ride_cells:
-            for name in ledger.estimators:
-                ledger.failed(cell, name, error)
-        return
-    watcher.ride_ends()
-    said = {key: value for key, value in truth.manifest.items() if key != "versions"}
-    ledger.rides.append(
-        {**said, "ride": first.ride.name, "track_draw": first.track_draw, "from_cache": found, "took_s": wall}
-    )
-    for cell in ride_cells:
-        _run_cell(cell, truth, parts, ledger, watcher, check, cell_count)
+class _Loop:
+    """The loop over the cells that are not kept yet."""
 
+    def __init__(self, job: Job, kept: Unfinished, watcher: Watcher, only: int | None) -> None:
+        self.job, self.kept, self.watcher, self.only = job, kept, watcher, only
+        self.done = kept.cells()
+        self.total = job.plan.cells if only is None else 1
+        self.left = self.total - len(self.done)
+        self.failed = 0
+        self.rides: dict[int, RideResult] = {}
+        self.ready: deque[_Task] = deque()
+        self.suspects: deque[_Task] = deque()
+        self.tries: Counter[tuple[bool, int, int]] = Counter()
+        if kept.damaged:
+            self._tell(f"{kept.damaged} damaged file(s) of finished batches dropped: run again")
+        if self.done:
+            self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
-def _run_cell(
-    cell: Cell,
-    truth: Truth,
-    parts: Parts,
-    ledger: Ledger,
-    watcher: Watcher,
-    check: Check,
-    cell_count: int,
-) -> None:
-    """Record one cell, run every estimator on the recording, and score."""
-    keep = {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
-    try:
-        with ledger.timed("measure"):
-            recording = record_cell(cell, truth, parts)
-        with ledger.timed("score"):
-            motion = truth_at_imu(truth, recording)
-            reference = reference_of(motion, recording)
-            figures = score_odometry(recording, reference, **keep)
-            ledger.scored(cell, f"odometry:{recording.odometry_source}", figures)
-    except Exception as error:
-        check()
-        for name in ledger.estimators:
-            ledger.failed(cell, name, error)
-        return
-    estimates: dict[str, Estimate] = {}
-    count = cell_count * len(ledger.estimators)
-    for i, (name, estimator) in enumerate(parts.estimators(cell.sample).items()):
-        try:
-            estimate, us_per_sample = _timed_estimate(estimator, recording, name, ledger)
-            with ledger.timed("score"):
-                figures = score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)
-                ledger.scored(cell, name, figures)
-                if estimate.geometry is not None:
-                    figures = score_geometry(
-                        estimate,
-                        parts.rails(cell),
-                        recording,
-                        bands=bands_of(cell),
-                        twist_base_m=cell.spec.geometry.twist_base_m,
-                        **keep,
-                    )
-                    ledger.scored(cell, name, figures)
-            estimates[name] = estimate
-            ledger.judge_finite(cell, name, estimate)
-        except Exception as error:
-            check()
-            ledger.failed(cell, name, error)
-        watcher.estimate_made(cell.number * len(ledger.estimators) + i + 1, count, name)
-    ledger.show(cell, recording, motion, estimates)
+    def run(self, crew: Crew, batch_cells: int | None) -> None:
+        """Run what is left; each batch is kept before its worker gets another."""
+        self.kept.log(f"{self.left} cells to run, {crew.workers()} at once")
+        self.watcher.cells_begin(len(self.done), self.total)
+        waiting: dict[Future[Any], _Task] = {}
+        rides = self._rides()
+        while True:
+            while len(waiting) < (1 if self.suspects else crew.workers()):
+                task = self._next(rides, crew, batch_cells)
+                if task is None:
+                    break
+                waiting[self._submit(crew, task)] = task
+            if not waiting:
+                return
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            if any(broken(future.exception()) for future in done):
+                done = set(waiting)  # all that were under way are lost; which one it was, is not known
+                wait(done)
+                crew.renew()
+            for future in done:
+                self._take(waiting.pop(future), future, crew, batch_cells)
 
+    def _rides(self) -> Iterator[tuple[Cell, ...]]:
+        """The cells left of each ride."""
+        for _, group in groupby(chosen_cells(self.job, self.only), key=lambda cell: cell.ride_number):
+            left = tuple(cell for cell in group if cell.number not in self.done)
+            if left:
+                yield left
 
-def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
-    """Measure a cell: its sensors on its ride."""
-    recording = measure(
-        truth,
-        name=cell.ride.name,
-        mount=mount_of(cell),
-        grade=parts.grade(cell),
-        encoder=encoder_of(cell),
-        magnetometer=magnetometer_of(cell),
-        rail_sensor=rail_sensor_of(cell),
-        rails=None if rail_sensor_of(cell) is None else parts.rails(cell),
-        odometry="truth" if cell.spec.odometry == "truth" else "encoder",
-        seed=cell.sensor_seed,
-        draw=cell.sensor_draw,
-        earth_rate=earth_of(cell),
-        temperature=temperature_of(cell),
-    )
-    return with_odometry(recording, cell.spec.odometry)
+    def _next(self, rides: Iterator[tuple[Cell, ...]], crew: Crew, batch_cells: int | None) -> _Task | None:
+        """What to run next: suspects, alone; then batches of rides that are there; then another ride."""
+        if self.suspects:
+            return self.suspects.popleft()
+        if not self.ready and (ride := next(rides, None)) is not None:
+            self.watcher.ride_begins(ride[0].ride_number + 1, self.job.plan.rides, ride[0].ride.name)
+            if not is_cached(self.job.parts.ride(ride[0])):
+                return _Task(True, ride)
+            self._ride_is_there(ride, crew, batch_cells)
+        return self.ready.popleft() if self.ready else None
 
+    def _ride_is_there(self, ride: tuple[Cell, ...], crew: Crew, batch_cells: int | None) -> None:
+        """Make the batches of a ride: small enough for memory, and for every worker to have some."""
+        seconds = max(profile_of(ride[0]).duration_s, 1e-3)
+        most = min(_MOST_CELLS, int(_MOST_SECONDS / seconds), self.left // (4 * crew.workers()))
+        size = batch_cells or max(1, most)
+        self.ready.extend(_Task(False, ride[i : i + size]) for i in range(0, len(ride), size))
+        self.watcher.ride_ends()
 
-def _timed_estimate(
-    estimator: Estimator, recording: Recording, name: str, ledger: Ledger
-) -> tuple[Estimate, float]:
-    """Estimate, and the microseconds per sample that it took."""
-    if name not in ledger.warm:
-        # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
-        with ledger.timed("estimate"), suppress(Exception):
-            estimator.estimate(beginning(recording, samples=64))
-        ledger.warm.add(name)
-    with ledger.timed("estimate"):
-        begun = time.perf_counter()
-        estimate = estimator.estimate(recording)
-        seconds = time.perf_counter() - begun
-    return estimate, 1e6 * seconds / len(recording.imu)
+    def _submit(self, crew: Crew, task: _Task) -> Future[Any]:
+        """Hand a task to the crew."""
+        if not task.is_ride:
+            return crew.submit(run_batch, self.job.order, task.cells)
+        progress = (self.watcher.ride_goes,) if crew.here else ()
+        return crew.submit(run_ride, self.job.order, task.cells[0], *progress)
+
+    def _take(self, task: _Task, future: Future[Any], crew: Crew, batch_cells: int | None) -> None:
+        """Take what came of a task."""
+        error = future.exception()
+        if error is not None and not lost(error):
+            raise error
+        if error is not None:
+            self._lost(task, given_up=not broken(error))
+        elif not task.is_ride:
+            self._keep(future.result())
+        else:
+            ride: RideResult = future.result()
+            for note in ride.notes:
+                self._tell(note)
+            self.rides[task.cells[0].ride_number] = ride
+            if ride.reason:
+                self._keep(lost_batch(self.job.order, task.cells, ride.reason, ride.trace))
+            else:
+                self._ride_is_there(task.cells, crew, batch_cells)
+
+    def _lost(self, task: _Task, *, given_up: bool) -> None:
+        """A worker died over a task: run it again, alone; in the end, its cells have failed."""
+        self.tries[task.name] += 1
+        single = task.is_ride or len(task.cells) == 1
+        if not given_up and self.tries[task.name] < (_MOST_TRIES if single else _MOST_TRIES - 1):
+            self._tell(f"a worker died: {task.words} run again")
+            self.suspects.append(task)
+        elif not single:
+            # One of them is enough to kill a worker: the others shall not fail with it.
+            singles = [_Task(False, (cell,)) for cell in task.cells]
+            self.tries.update({one.name: _MOST_TRIES - 1 for one in singles})
+            self.suspects.extend(singles)
+        else:
+            reason = "the worker died, killed or out of memory, each time this was run"
+            self._keep(lost_batch(self.job.order, task.cells, reason, reason + "\n"))
+
+    def _keep(self, result: BatchResult) -> None:
+        """Keep a batch, with the ride that was simulated for it, and tell of it."""
+        ride = self.rides.pop(result.ride_number, None)
+        if ride is not None:
+            wall = result.wall_s | {"simulate": result.wall_s["simulate"] + ride.wall_s}
+            cpu = result.cpu_s | {"simulate": result.cpu_s["simulate"] + ride.cpu_s}
+            result = replace(result, ride=ride.facts, wall_s=wall, cpu_s=cpu)
+        self.kept.add(result)
+        for note in result.notes:
+            self._tell(note)
+        for failure in result.failures:
+            self.kept.log(f"cell {failure.cell}, {failure.estimator} failed: {failure.reason}")
+        self.done.update(result.cells)
+        self.left -= len(result.cells)
+        self.failed += len({failure.cell for failure in result.failures})
+        self.kept.log(f"{len(self.done)} of {self.total} cells done; the last by {result.worker}")
+        self.watcher.cells_done(len(self.done), self.total, self.failed, result.worker)
+
+    def _tell(self, line: str) -> None:
+        self.kept.log(line)
+        self.watcher.told(line)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -47,10 +47,13 @@ def call(arguments: list[str]) -> int:
         code = INTERRUPTED  # newer versions of typer return this code by themselves
     except OSError as error:
         place = f" ({Path(str(error.filename)).name})" if error.filename else ""
-        _say(f"simrail: {error.strerror or error}{place}; former results are as they were")
+        _say(
+            f"simrail: {error.strerror or error}{place}; former results are as they were, "
+            "and a run goes on from where it was"
+        )
         return CELL_FAILED
     if code == INTERRUPTED:
-        _say("simrail: interrupted; former results and complete rides are as they were")
+        _say("simrail: interrupted; former results are as they were, and a run goes on from where it was")
     return int(code or DONE)
 
 
@@ -94,6 +97,27 @@ def run(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder of the results; results/<name> if not given."),
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", min=1, metavar="N", help="Processes; all cores for many cells, if not given."
+        ),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", metavar="ADDRESS", help="A dask scheduler, e.g. tcp://host:8786."),
+    ] = None,
+    cell: Annotated[
+        int | None,
+        typer.Option("--cell", min=0, metavar="NUMBER", help="Run this one cell and print its scores."),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Only go on with an unfinished run (which a run does by itself).")
+    ] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Drop an unfinished run of the same plan.")] = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Run the failed cells of finished results again.")
+    ] = False,
     seed: Seed = None,
     settings: Settings = None,
     plan: Annotated[
@@ -107,14 +131,37 @@ def run(
     if plan:
         return _plan(scenario, seed, settings or [], many=yes)
 
-    from simrail.progress import ProgressWatcher, print_scores
+    from simrail.progress import ProgressWatcher, print_cell, print_scores
     from simrail.results import run as run_scenario
+    from simrail.results import run_cell
 
+    starts = {"resume": resume, "fresh": fresh, "retry-failed": retry_failed}
+    wanted = [name for name, is_wanted in starts.items() if is_wanted]
+    if len(wanted) > 1 or (cell is not None and (wanted or cluster or workers)):
+        raise InputError(
+            "these options do not go together",
+            field=" ".join(f"--{name}" for name in wanted) + (" --cell" if cell is not None else ""),
+            remedy="choose one of them; --cell runs in this process",
+        )
     console = Console()
     with ProgressWatcher(Console(stderr=True)) as watcher:
-        results = run_scenario(
-            scenario, out=out, seed=seed, overrides=settings or [], watcher=watcher, many=yes
-        )
+        if cell is not None:
+            alone = run_cell(scenario, cell, out=out, seed=seed, overrides=settings or [], watcher=watcher)
+        else:
+            results = run_scenario(
+                scenario,
+                out=out,
+                seed=seed,
+                overrides=settings or [],
+                workers=workers,
+                cluster=cluster,
+                start=cast("Any", wanted[0] if wanted else "auto"),
+                watcher=watcher,
+                many=yes,
+            )
+    if cell is not None:
+        print_cell(console, alone)
+        return CELL_FAILED if alone.failures else DONE
     print_scores(console, results)
     return CELL_FAILED if results.campaign.failures else DONE
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.campaign import record_cell
+from simrail.cell import record_cell
 from simrail.drafts import draft_of
 from simrail.errors import InputError
 from simrail.interrupts import interruptible

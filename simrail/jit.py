@@ -21,6 +21,9 @@ from numba.core.options import DefaultOptions
 FloatArray = npt.NDArray[np.float64]
 """A float64 array; every hot loop takes these, C-contiguous."""
 
+IntArray = npt.NDArray[np.int64]
+"""An int64 array, C-contiguous: which of several a sample belongs to."""
+
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 

@@ -1,6 +1,6 @@
-"""What a campaign gathers while it runs: tables with their labels, failures, examples, wall times.
+"""What is gathered while cells run: tables with their labels, failures, wall times.
 
-Nothing is run here; that is the campaign loop (`simrail.campaign`).
+Nothing is run here; that is done in `simrail.cell`.
 """
 
 from __future__ import annotations
@@ -10,22 +10,15 @@ import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
-from simrail.example import CellResult
-from simrail.recording import Recording
-from simrail.scenario.cells import Cell, Method
+from simrail.scenario.cells import Cell
 from simrail.scenario.parts import RidePart
-from simrail.scenario.scenario import Scenario
-from simrail.score_table import failed_figures, labelled
-
-MOST_EXAMPLES = 6
-"""Recordings that are kept for the report's figures, one per ride."""
+from simrail.score_table import failed_figures
 
 
 @dataclass(frozen=True)
@@ -38,72 +31,70 @@ class Failure:
     trace: str
 
 
+STAGES = ("simulate", "measure", "estimate", "score")
+
+
 @dataclass
 class Ledger:
-    """What the campaign loop gathers, cell by cell.
+    """What is gathered cell by cell.
 
     Attributes
     ----------
-    scenario : Scenario
-        What is run.
-    estimators : mapping of str to (Method, Estimator)
+    scenario : str
+        Name of what is run.
+    estimators : mapping of str to Estimator
         By their names in the tables.
-    tables : list of pandas.DataFrame
-        Rows of the score table, labelled.
+    tunings : mapping of str to str
+        How each is tuned, by the same names.
+    warm : set of str
+        Estimators whose kernels have been compiled in this process.
+    figures : list of (pandas.DataFrame, dict)
+        Figures of one estimate, and their labels.
     failures : list of Failure
         What failed.
-    examples : list of CellResult
-        First draw of each ride, at most `MOST_EXAMPLES` of them, for figures.
-    rides : list of dict
-        What each engine said of its run; plain values.
-    wall_s : dict of str to float
-        Wall time of the stages ``simulate``, ``measure``, ``estimate``, ``score``.
-    warm : set of str
-        Estimators whose kernels have been compiled.
-    shown : set of int
-        Numbers of the rides that have an example.
+    wall_s, cpu_s : dict of str to float
+        Wall time, and time of this process on the processor, of the stages `STAGES`.
     """
 
-    scenario: Scenario
-    estimators: Mapping[str, tuple[Method, Estimator]]
-    tables: list[pd.DataFrame] = field(default_factory=list)
-    failures: list[Failure] = field(default_factory=list)
-    examples: list[CellResult] = field(default_factory=list)
-    rides: list[dict[str, Any]] = field(default_factory=list)
-    wall_s: dict[str, float] = field(
-        default_factory=lambda: {"simulate": 0.0, "measure": 0.0, "estimate": 0.0, "score": 0.0}
-    )
+    scenario: str
+    estimators: Mapping[str, Estimator]
+    tunings: Mapping[str, str]
     warm: set[str] = field(default_factory=set)
-    shown: set[int] = field(default_factory=set)
+    figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    wall_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    cpu_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
-        """Add the wall time of a block to a stage."""
-        begun = time.perf_counter()
+        """Add the time of a block to a stage."""
+        begun, worked = time.perf_counter(), time.process_time()
         try:
             yield
         finally:
             self.wall_s[stage] += time.perf_counter() - begun
+            self.cpu_s[stage] += time.process_time() - worked
 
     def failed(self, cell: Cell, estimator: str, error: Exception) -> None:
         """Note a failure as a row with its reason."""
-        reason = _reason(error)
-        trace = "".join(traceback.format_exception(error))
+        self.lost(cell, estimator, reason_of(error), "".join(traceback.format_exception(error)))
+
+    def lost(self, cell: Cell, estimator: str, reason: str, trace: str) -> None:
+        """Note a failure whose reason is known in words."""
         self.failures.append(Failure(cell.number, estimator, reason, trace))
         self.scored(cell, estimator, failed_figures(reason))
 
     def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
         """Labels of a row of the score table."""
-        known = self.estimators.get(estimator)
         return {
             "cell": cell.number,
-            "scenario": self.scenario.name,
+            "scenario": self.scenario,
             "ride": cell.ride.name,
             "vehicle": cell.spec.vehicle,
             "mount": cell.imu.name,
             "imu": cell.imu.grade,
             "odometry": cell.spec.odometry,
-            "tuning": known[0].tuning if known else "default",
+            "tuning": self.tunings.get(estimator, "default"),
             "track_draw": cell.track_draw,
             "sensor_draw": cell.sensor_draw,
             "estimator": estimator,
@@ -111,7 +102,7 @@ class Ledger:
 
     def scored(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
         """Note the figures of one estimator, or of the odometry, on a cell."""
-        self.tables.append(labelled(figures, self.labels(cell, estimator)))
+        self.figures.append((figures, self.labels(cell, estimator)))
 
     def judge_finite(self, cell: Cell, estimator: str, estimate: Estimate) -> None:
         """Note an estimate that is not finite: its rows say so, and it is a failure of its cell as well."""
@@ -119,17 +110,6 @@ class Ledger:
         if bad:
             reason = f"estimate not finite in {bad} of {len(estimate.states)} samples"
             self.failures.append(Failure(cell.number, estimator, reason, reason + "\n"))
-
-    def show(
-        self, cell: Cell, recording: Recording, motion: pd.DataFrame, estimates: dict[str, Estimate]
-    ) -> None:
-        """Keep a cell for the figures if it is the first of its ride, up to `MOST_EXAMPLES`."""
-        first_of_ride = cell.track_draw == cell.sample == 0 and cell.ride_number not in self.shown
-        if first_of_ride and len(self.examples) < MOST_EXAMPLES:
-            self.shown.add(cell.ride_number)
-            described = {**self.labels(cell, ""), **cell_record(cell)}
-            del described["estimator"], described["tuning"]
-            self.examples.append(CellResult(described, recording, motion, estimates))
 
 
 def cell_record(cell: Cell) -> dict[str, object]:
@@ -160,7 +140,7 @@ def _direction(ride: RidePart) -> str:
     return "forward" if ride.end_m > ride.start_m else "backward"
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """One line that says why."""
     text = " ".join(str(error).split())
     named = text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import timedelta
 from types import TracebackType
 from typing import Self
 
@@ -13,6 +14,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.table import Table
 from rich.text import Text
 
+from simrail.campaign_result import CampaignResult
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.results import Results
 from simrail.scenario.cells import methods
@@ -28,6 +30,8 @@ COLUMNS = (
     ("pitch", "design", "curve"),
 )
 MOST_GROUPS = 12
+_EVERY_S = 10.0
+"""On a plain stream, how often the progress is told."""
 
 
 class ProgressWatcher(Watcher):
@@ -44,8 +48,10 @@ class ProgressWatcher(Watcher):
             disable=not console.is_terminal,
         )
         self._ride: TaskID | None = None
-        self._estimates: TaskID | None = None
-        self._begun = 0.0
+        self._cells: TaskID | None = None
+        self._begun = self._cells_begun = self._said = 0.0
+        self._before = self._done = 0
+        self._by_worker: dict[str, int] = {}
 
     def __enter__(self) -> Self:
         self._progress.__enter__()
@@ -81,13 +87,36 @@ class ProgressWatcher(Watcher):
     def ride_ends(self) -> None:
         """See `Watcher`."""
         if self._ride is not None:
-            self._progress.update(self._ride, total=1.0, completed=1.0, note="measuring and estimating")
+            self._progress.update(self._ride, total=1.0, completed=1.0, note="running its cells")
 
-    def estimate_made(self, number: int, count: int, name: str) -> None:
+    def cells_begin(self, done: int, count: int) -> None:
         """See `Watcher`."""
-        if self._estimates is None:
-            self._estimates = self._progress.add_task("estimates", total=count, note="")
-        self._progress.update(self._estimates, completed=number, note=f"{number} of {count}, {name}")
+        self._before = self._done = done
+        self._cells_begun = self._said = time.perf_counter()
+        self._cells = self._progress.add_task("cells", total=count, completed=done, note="")
+
+    def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
+        """See `Watcher`."""
+        now = time.perf_counter()
+        self._by_worker[worker] = self._by_worker.get(worker, 0) + done - self._done
+        self._done = done
+        seconds = max(now - self._cells_begun, 1e-6)
+        left = (count - done) * seconds / max(done - self._before, 1)
+        each = "+".join(map(str, self._by_worker.values()))
+        by = f", by {len(self._by_worker)} workers: {each}" if len(self._by_worker) > 1 else ""
+        note = (
+            f"{done} of {count}, {failed} failed, {(done - self._before) / seconds:.3g} per second, "
+            f"{timedelta(seconds=round(left))} left{by}"
+        )
+        if self._cells is not None:
+            self._progress.update(self._cells, completed=done, note=note)
+        if not self._console.is_terminal and (now > self._said + _EVERY_S or done == count):
+            self._said = now
+            self._console.print(f"cells: {note}", highlight=False, soft_wrap=True)
+
+    def told(self, line: str) -> None:
+        """See `Watcher`."""
+        self._console.print(line, highlight=False, soft_wrap=True)
 
     def recording_written(self, number: int, count: int, name: str) -> None:
         """See `Watcher`."""
@@ -120,6 +149,16 @@ def print_scores(console: Console, results: Results) -> None:
         highlight=False,
         soft_wrap=True,
     )
+
+
+def print_cell(console: Console, campaign: CampaignResult) -> None:
+    """Print every score of one cell."""
+    first = campaign.cells.iloc[0]
+    console.print(
+        f"[bold]cell {first['cell']}[/bold]: ride {first['ride']}, {first['imu']} on {first['mount']}"
+    )
+    columns = ["estimator", "quantity", "band", "reference", "window", "metric", "value", "unit", "status"]
+    print(campaign.scores[columns].to_string(index=False, float_format=lambda value: f"{value:.9g}"))
 
 
 def _block(rows: pd.DataFrame, members: pd.DataFrame, styles: dict[str, MethodStyle]) -> Group:

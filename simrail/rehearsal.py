@@ -18,15 +18,14 @@ from typing import TypeVar
 import pandas as pd
 
 from simrail import ride_cache
-from simrail.campaign import record_cell
-from simrail.estimate import Estimate, Estimator
+from simrail.cell import figures_of, kept_of, record_cell
+from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
 from simrail.recording import Recording, beginning
 from simrail.ride import Ride, simulate
-from simrail.scenario.build import Parts, bands_of, mount_of
+from simrail.scenario.build import Parts, mount_of
 from simrail.scenario.cells import Cell
-from simrail.score import Reference, reference_of, score, score_odometry, truth_at_imu
-from simrail.score_geometry import score_geometry
+from simrail.score import Reference, reference_of, score_odometry, truth_at_imu
 from simrail.score_windows import chosen_windows
 from simrail.truth import Truth
 
@@ -119,7 +118,7 @@ def rehearse_engine(cell: Cell, parts: Parts) -> tuple[EngineCost, Truth]:
 
 def rehearse_cell(cell: Cell, truth: Truth, parts: Parts) -> CellCost:
     """Record, estimate and score on the beginning of a ride, as the campaign does."""
-    keep = {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
+    keep = kept_of(cell)
     recording = record_cell(cell, truth, parts)
     motion = truth_at_imu(truth, recording)
 
@@ -162,21 +161,7 @@ def rehearse_cell(cell: Cell, truth: Truth, parts: Parts) -> CellCost:
 def _judged(
     cell: Cell, estimator: Estimator, recording: Recording, reference: Reference, parts: Parts
 ) -> list[pd.DataFrame]:
-    keep = {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}
-    estimate: Estimate = estimator.estimate(recording)
-    tables = [score(estimate, reference, recording, us_per_sample=1.0, **keep)]
-    if estimate.geometry is not None:
-        tables.append(
-            score_geometry(
-                estimate,
-                parts.rails(cell),
-                recording,
-                bands=bands_of(cell),
-                twist_base_m=cell.spec.geometry.twist_base_m,
-                **keep,
-            )
-        )
-    return tables
+    return figures_of(cell, estimator.estimate(recording), reference, recording, 1.0, parts)
 
 
 def _timed(call: Callable[[], _Result]) -> tuple[float, _Result]:

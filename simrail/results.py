@@ -1,7 +1,8 @@
 """Running a scenario and keeping what it found: the results folder, replaced as a whole or not at all.
 
 Everything is written into a draft folder beside the final one, which takes its place when it is
-complete; an interrupted run leaves the former results as they were. The manifest says what is needed
+complete; an interrupted run leaves the former results as they were, and what it had done beside them
+(`simrail.unfinished`). The manifest says what is needed
 to make the results again, and nothing of the machine's folders or users.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shutil
 import subprocess
 import time
 from collections.abc import Sequence
@@ -20,11 +22,15 @@ from pathlib import Path
 from typing import Any
 
 from simrail.aggregate import aggregate
-from simrail.campaign import CampaignResult, run_campaign
+from simrail.campaign import run_campaign
+from simrail.campaign_result import CampaignResult
 from simrail.drafts import draft_of
 from simrail.errors import InputError
+from simrail.job import prepare
 from simrail.report.page import write_report
+from simrail.retry import keep_good
 from simrail.scenario.scenario import Scenario, load_scenario
+from simrail.unfinished import LOG, Start, unfinished_of
 from simrail.watcher import Watcher
 
 PACKAGES = (
@@ -58,6 +64,9 @@ def run(
     out: str | Path | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
+    workers: int | None = None,
+    cluster: str | None = None,
+    start: Start = "auto",
     watcher: Watcher | None = None,
     many: bool = False,
 ) -> Results:
@@ -73,6 +82,11 @@ def run(
         Replaces the scenario's seed.
     overrides : sequence of str, optional
         Settings ``key=value`` that replace what the file says.
+    workers, cluster : int, str, optional
+        Who runs it, see `simrail.crew.crew_of`.
+    start : {"auto", "resume", "fresh", "retry-failed"}, optional
+        Whether to go on with an unfinished run of the same plan: if there is one, in any case, or not; or
+        to run the failed cells of finished results again.
     watcher : Watcher, optional
         Is told of the progress.
     many : bool
@@ -86,7 +100,10 @@ def run(
     Raises
     ------
     InputError
-        If the scenario cannot be run, or the folder is not one of results; nothing has been written.
+        If the scenario cannot be run, or the folder is not one of results; nothing has been written. Or if
+        there is nothing to resume, or to retry.
+    OSError
+        If a disk is full, or the cluster has gone; what is done is kept, and gone on with by the next run.
     """
     started, begun = datetime.now(UTC), time.perf_counter()
     if not isinstance(scenario, Scenario):
@@ -95,30 +112,85 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
-    campaign = run_campaign(scenario, watcher=watcher, many=many)
-    manifest = describe(scenario, campaign)
-    manifest["started_utc"] = started.isoformat(timespec="seconds")
-    with draft_of(folder) as draft:
-        campaign.scores.to_parquet(draft / "scores.parquet", index=False)
-        campaign.cells.to_parquet(draft / "cells.parquet", index=False)
-        aggregate(campaign.scores, campaign.cells).to_csv(
-            draft / "scores.csv", index=False, float_format="%.9g"
-        )
-        drawing = time.perf_counter()
-        write_report(
-            draft / "report.html",
-            scenario=scenario,
-            scores=campaign.scores,
-            cells=campaign.cells,
-            examples=campaign.examples,
-            manifest=manifest,
-        )
-        ended = time.perf_counter()
-        manifest["wall_s"] |= {"report": ended - drawing, "total": ended - begun}
-        (draft / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
-        if campaign.failures:
-            (draft / "failures.txt").write_text(_failures(campaign), encoding="utf-8")
+    job = prepare(scenario, many=many)
+    with unfinished_of(folder, job.key, start=start) as kept:
+        if start == "retry-failed":
+            keep_good(folder, job, kept)
+        campaign = run_campaign(job, workers=workers, cluster=cluster, kept=kept, watcher=watcher)
+        manifest = describe(scenario, campaign)
+        manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": job.key}
+        with draft_of(folder) as draft:
+            _write(draft, scenario, campaign, manifest, begun=begun)
+            shutil.copyfile(kept.folder / LOG, draft / LOG)
+        kept.remove()
     return Results(folder, scenario, campaign, manifest)
+
+
+def run_cell(
+    scenario: str | Path,
+    cell: int,
+    *,
+    out: str | Path | None = None,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    watcher: Watcher | None = None,
+) -> CampaignResult:
+    """Run one cell of a scenario alone: the same scores, to the bit, as in the table of them all.
+
+    Parameters
+    ----------
+    scenario, seed, overrides, watcher
+        As for `run`.
+    cell : int
+        Its number in the score table.
+    out : str or Path, optional
+        Folder of its results, as `run` writes them; nothing is written if not given.
+
+    Raises
+    ------
+    InputError
+        As for `run`, or if there is no such cell.
+    """
+    started, begun = datetime.now(UTC), time.perf_counter()
+    read = load_scenario(scenario, overrides=overrides, seed=seed)
+    if out is not None:
+        _judge_folder(Path(out))
+    job = prepare(read)
+    if not 0 <= cell < job.plan.cells:
+        raise InputError(
+            "the scenario has no such cell", field="--cell", value=cell, limit=f"0 to {job.plan.cells - 1}"
+        )
+    campaign = run_campaign(job, only=cell, watcher=watcher)
+    if out is not None:
+        manifest = describe(read, campaign)
+        manifest["started_utc"] = started.isoformat(timespec="seconds")
+        manifest["command"] += f" --cell {cell}"
+        with draft_of(Path(out)) as draft:
+            _write(draft, read, campaign, manifest, begun=begun)
+    return campaign
+
+
+def _write(
+    draft: Path, scenario: Scenario, campaign: CampaignResult, manifest: dict[str, Any], *, begun: float
+) -> None:
+    """Write the results of a campaign into a folder."""
+    campaign.scores.to_parquet(draft / "scores.parquet", index=False)
+    campaign.cells.to_parquet(draft / "cells.parquet", index=False)
+    aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
+    drawing = time.perf_counter()
+    write_report(
+        draft / "report.html",
+        scenario=scenario,
+        scores=campaign.scores,
+        cells=campaign.cells,
+        examples=campaign.examples,
+        manifest=manifest,
+    )
+    ended = time.perf_counter()
+    manifest["wall_s"] |= {"report": ended - drawing, "total": ended - begun}
+    (draft / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    if campaign.failures:
+        (draft / "failures.txt").write_text(_failures(campaign), encoding="utf-8")
 
 
 def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
@@ -146,6 +218,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
         ],
         "warnings": list(campaign.plan.warnings),
         "wall_s": dict(campaign.wall_s),
+        "cpu_s": dict(campaign.cpu_s),
         "versions": {"python": platform.python_version(), **_versions()},
         "git_revision": git_revision(),
         "platform": {

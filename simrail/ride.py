@@ -18,6 +18,7 @@ import numpy as np
 
 from simrail import ride_cache
 from simrail.profile import SpeedProfile
+from simrail.sources import source_hash
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import LaidTrack, lay
@@ -104,7 +105,7 @@ class Ride:
             "drive": self.drive,
             "conditions": [asdict(condition) for condition in self.conditions],
             "versions": {package: version(package) for package in packages},
-            "sources": ride_cache.source_hash(*_SOURCES),
+            "sources": source_hash(*_SOURCES),
         }
 
 
@@ -118,7 +119,9 @@ def is_cached(ride: Ride) -> bool:
     return (ride_cache.folder() / ride_cache.key_of(ride.describe()) / "truth.json").is_file()
 
 
-def simulate(ride: Ride, *, progress: Progress | None = None) -> Truth:
+def simulate(
+    ride: Ride, *, progress: Progress | None = None, told: Callable[[str], None] | None = None
+) -> Truth:
     """Simulate a ride, or find it in the cache.
 
     Parameters
@@ -127,6 +130,8 @@ def simulate(ride: Ride, *, progress: Progress | None = None) -> Truth:
         What to simulate.
     progress : callable, optional
         Called now and then with (seconds done, seconds in all, speed).
+    told : callable, optional
+        Called with one line if a ride in the cache was damaged; it is dropped and simulated again.
 
     Returns
     -------
@@ -143,8 +148,10 @@ def simulate(ride: Ride, *, progress: Progress | None = None) -> Truth:
     if place.exists():
         try:
             truth = load_truth(place)
-        except (OSError, ValueError, KeyError):
-            pass  # a damaged ride is made again; `new_ride` replaces it
+        except (OSError, ValueError, KeyError) as error:
+            ride_cache.drop(key)
+            if told is not None:
+                told(f"ride {ride.name} in the cache was damaged ({error}): simulated again")
         else:
             ride_cache.touch(place)
             return truth

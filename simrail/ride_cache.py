@@ -1,8 +1,8 @@
 """Rides on disk: each simulated once, found again by the hash of all that it depends on.
 
 A ride is a folder under the user's cache; a folder is written under another name and renamed when it
-is complete, so an interrupted or killed run leaves nothing that looks like a ride. The cache keeps
-below a size limit by dropping the rides that were used longest ago.
+is complete, so an interrupted or killed run leaves nothing that looks like a ride. Any number of processes
+may use it at once. The cache keeps below a size limit by dropping the rides that were used longest ago.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import secrets
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,8 +40,9 @@ def limit_bytes() -> int:
 
 
 def folder() -> Path:
-    """Where the rides are."""
-    return cache_folder() / "rides"
+    """Where the rides are: ``SIMRAIL_RIDES`` in the environment, or a folder of the user's cache."""
+    named = os.environ.get("SIMRAIL_RIDES")
+    return Path(named) if named else cache_folder() / "rides"
 
 
 def key_of(description: dict[str, Any]) -> str:
@@ -48,27 +50,18 @@ def key_of(description: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()
 
 
-def source_hash(*names: str) -> str:
-    """SHA-256 over source files and folders of this package: the code that makes the truth."""
-    here = Path(__file__).resolve().parent
-    digest = hashlib.sha256()
-    for name in names:
-        place = here / name
-        for source in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-            digest.update(source.name.encode() + b"\0" + source.read_bytes())
-    return digest.hexdigest()
-
-
 def rides() -> list[CachedRide]:
     """Every complete ride in the cache, the most recently used first."""
     found = []
     for place in folder().glob("[!.]*/truth.json"):
-        size = sum(file.stat().st_size for file in place.parent.iterdir())
-        try:
-            name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
-        except (ValueError, KeyError):
-            name = "damaged"
-        found.append(CachedRide(place.parent.name, name, size, place.stat().st_mtime))
+        with suppress(OSError):  # another process may drop it meanwhile
+            size = sum(file.stat().st_size for file in place.parent.iterdir())
+            used = place.stat().st_mtime
+            try:
+                name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
+            except (ValueError, KeyError):
+                name = "damaged"
+            found.append(CachedRide(place.parent.name, name, size, used))
     return sorted(found, key=lambda ride: -ride.last_used_s)
 
 
@@ -81,7 +74,16 @@ def clear() -> int:
 
 def touch(place: Path) -> None:
     """Note that a ride was used now."""
-    os.utime(place / "truth.json")
+    with suppress(OSError):  # another process may have dropped it, or the cache may be read only
+        os.utime(place / "truth.json")
+
+
+def drop(key: str) -> None:
+    """Take a ride out of the cache, at once."""
+    gone = folder() / f".{key}.{secrets.token_hex(8)}"
+    with suppress(OSError):
+        (folder() / key).replace(gone)
+    shutil.rmtree(gone, ignore_errors=True)
 
 
 @contextmanager
@@ -89,14 +91,15 @@ def new_ride(key: str) -> Iterator[Path]:
     """A folder to write a ride into; it enters the cache when the block ends without an exception."""
     folder().mkdir(parents=True, exist_ok=True)
     _drop_leftovers()
-    draft = folder() / f".{key}.{os.getpid()}"
-    shutil.rmtree(draft, ignore_errors=True)
+    draft = folder() / f".{key}.{secrets.token_hex(8)}"
     try:
         yield draft
         _make_room(sum(file.stat().st_size for file in draft.iterdir()))
-        final = folder() / key
-        shutil.rmtree(final, ignore_errors=True)
-        draft.replace(final)
+        try:
+            draft.replace(folder() / key)
+        except OSError:
+            if not (folder() / key).exists():  # else another process was faster with the same ride
+                raise
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
@@ -104,8 +107,9 @@ def new_ride(key: str) -> Iterator[Path]:
 def _drop_leftovers() -> None:
     """Remove drafts that a killed run left behind: those that nobody wrote to for a day."""
     for draft in folder().glob(".*"):
-        if draft.is_dir() and time.time() - draft.stat().st_mtime > 86400.0:
-            shutil.rmtree(draft, ignore_errors=True)
+        with suppress(OSError):
+            if draft.is_dir() and time.time() - draft.stat().st_mtime > 86400.0:
+                shutil.rmtree(draft, ignore_errors=True)
 
 
 def _make_room(size: int) -> None:
@@ -113,5 +117,5 @@ def _make_room(size: int) -> None:
     total = size + sum(ride.size_bytes for ride in kept)
     while kept and total > limit_bytes():
         oldest = kept.pop()
-        shutil.rmtree(folder() / oldest.key, ignore_errors=True)
+        drop(oldest.key)
         total -= oldest.size_bytes

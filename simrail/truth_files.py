@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import mmap
+import os
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,11 @@ def create_arrays(
     dict of str to ndarray
         ``time_s`` and ``reference_position_m`` (rows,), ``body_<i>`` (rows, 18), ``wheel_<i>`` (rows,)
         and, if `wheel_states` > 0, ``wheel_state_<i>`` (rows, wheel_states), mapped to .npy files.
+
+    Raises
+    ------
+    OSError
+        If the disk has no room for all of them.
     """
     shapes: dict[str, tuple[int, ...]] = {"time_s": (rows,), "reference_position_m": (rows,)}
     shapes |= {f"body_{i}": (rows, 3 * len(BODY_ARRAYS)) for i in range(bodies)}
@@ -38,10 +45,15 @@ def create_arrays(
     if wheel_states:
         shapes |= {f"wheel_state_{i}": (rows, wheel_states) for i in range(wheels)}
     folder.mkdir(parents=True, exist_ok=True)
-    return {
-        name: np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=np.float64, shape=shape)
-        for name, shape in shapes.items()
-    }
+    made: dict[str, FloatArray] = {}
+    for name, shape in shapes.items():
+        place = folder / f"{name}.npy"
+        made[name] = np.lib.format.open_memmap(place, mode="w+", dtype=np.float64, shape=shape)
+        # A mapped file has holes: a disk that is full when they are written to kills the process.
+        if hasattr(os, "posix_fallocate"):
+            with place.open("r+b") as file:
+                os.posix_fallocate(file.fileno(), 0, place.stat().st_size)
+    return made
 
 
 def let_go(arrays: dict[str, FloatArray]) -> None:
@@ -71,6 +83,7 @@ def write_header(
         "wheels": wheels,
         "gravity_mps2": gravity_mps2,
         "manifest": manifest,
+        "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))},
     }
     (folder / "truth.json").write_text(json.dumps(plain), encoding="utf-8")
 
@@ -112,6 +125,9 @@ def load_truth(folder: Path) -> Truth:
         If the folder is incomplete or damaged.
     """
     plain = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    for name, crc32 in plain["crc32"].items():
+        if _crc32(folder / name) != crc32:
+            raise ValueError(f"{name} is not what was written")
 
     def read(name: str) -> FloatArray:
         array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
@@ -140,3 +156,12 @@ def load_truth(folder: Path) -> Truth:
         gravity_mps2=plain["gravity_mps2"],
         manifest=plain["manifest"],
     )
+
+
+def _crc32(file: Path) -> int:
+    """Checksum of a file: a disk, or a copy between machines, may change bits in silence."""
+    found = 0
+    with file.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            found = zlib.crc32(block, found)
+    return found

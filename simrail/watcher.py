@@ -13,10 +13,16 @@ class Watcher:
         """The ride has been simulated so far."""
 
     def ride_ends(self) -> None:
-        """The ride is there; its cells are measured and estimated from now on."""
+        """The ride is there; its cells are run from now on."""
 
-    def estimate_made(self, number: int, count: int, name: str) -> None:
-        """Estimate `number` (from 1) of `count` has been made and scored, or has failed."""
+    def cells_begin(self, done: int, count: int) -> None:
+        """Cells are run from now on; `done` of `count` were done before."""
+
+    def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
+        """So many cells of `count` are done, `failed` of them failed; the last by this worker."""
+
+    def told(self, line: str) -> None:
+        """Something is worth a line to the user."""
 
     def recording_written(self, number: int, count: int, name: str) -> None:
         """Recording `number` (from 1) of `count` has been written, by an export."""

@@ -23,7 +23,7 @@ from simrail.score_table import SCORE_COLUMNS
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 QUICK = ["--set", "ride.end_m=200.0", "--set", "ride.rest_s=1.0", "--set", "imu.grade='lord_3dm_gx4_25'"]
-FILES = {"manifest.json", "scores.parquet", "scores.csv", "cells.parquet", "report.html"}
+FILES = {"manifest.json", "scores.parquet", "scores.csv", "cells.parquet", "report.html", "run.log"}
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
@@ -153,7 +153,15 @@ def test_former_results_survive_a_fault_while_writing(
     message = capsys.readouterr().err.splitlines()[-1]
     assert "former results" in message and "Traceback" not in message
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-    assert names_in(here / "results") == {"quick_kinematic"}
+    # What was done lies beside them, and a run of the same plan makes the results of it.
+    (unfinished,) = names_in(here / "results") - {"quick_kinematic"}
+    assert unfinished.startswith(".quick_kinematic.unfinished-")
+    monkeypatch.undo()
+    monkeypatch.chdir(here)
+    monkeypatch.setattr(results, "write_report", lambda path, **keywords: path.write_text("<html></html>"))
+    assert call(["run", "quick_kinematic", *QUICK, "--seed", "3", "--resume"]) == DONE
+    assert "2 of 2 cells are done" in capsys.readouterr().err
+    assert names_in(here / "results") == {"quick_kinematic"} and names_in(folder) == FILES
 
 
 def test_draft_takes_the_place_in_one_step_and_former_comes_back(

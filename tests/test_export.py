@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign import record_cell
+from simrail.cell import record_cell
 from simrail.cli import BAD_INPUT, DONE, call
 from simrail.columns import ENCODER, IMU, MOTION, ODOMETRY, ODOMETRY_SD
 from simrail.export import TRUTH_STEM, export

@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign import CampaignResult, run_campaign
+from simrail.campaign import run_campaign
+from simrail.campaign_result import CampaignResult
 from simrail.errors import InputError
 from simrail.report import write_report
 from simrail.report.methods import method_styles

@@ -85,7 +85,7 @@ def test_key_covers_vehicle_and_sources(ride, monkeypatch):
     bodies = (replace(ride.vehicle.bodies[0], mass_kg=1051.0), *ride.vehicle.bodies[1:])
     heavier = replace(ride, vehicle=replace(ride.vehicle, bodies=bodies))
     assert ride_cache.key_of(heavier.describe()) != key
-    monkeypatch.setattr(ride_cache, "source_hash", lambda *names: "other code")
+    monkeypatch.setattr(ride_module, "source_hash", lambda *names: "other code")
     assert ride_cache.key_of(ride.describe()) != key
 
 

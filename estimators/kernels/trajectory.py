@@ -35,7 +35,7 @@ from estimators.kernels.trajectory_equations import (
     measured,
     misprint,
 )
-from simrail.jit import FloatArray, njit, njit_borrowed
+from simrail.jit import FloatArray, IntArray, njit, njit_borrowed
 
 PACKED = STATES * (STATES + 1) // 2
 """Entries of a covariance's upper triangle, row by row."""
@@ -57,8 +57,8 @@ def mirror(p: FloatArray) -> None:
 
 
 @njit_borrowed
-def predict(x: FloatArray, p: FloatArray, q: FloatArray, dt: float) -> None:
-    """x <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); ``q`` (18,): see `process_noise`."""
+def predict(x: FloatArray, p: FloatArray, q: FloatArray, kind: int, dt: float) -> None:
+    """x <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is row ``kind`` of ``q`` (c, 18)."""
     half = 0.5 * dt * dt
     width = p.shape[1]
     for a in range(0, 6, 2):
@@ -82,17 +82,17 @@ def predict(x: FloatArray, p: FloatArray, q: FloatArray, dt: float) -> None:
         p[i, 10] += dt * p[i, 11]
     for block in range(3):
         a, b = 2 * block, 3 * block
-        p[a, a] += q[b]
-        p[a, a + 1] += q[b + 1]
-        p[a + 1, a + 1] += q[b + 2]
+        p[a, a] += q[kind, b]
+        p[a, a + 1] += q[kind, b + 1]
+        p[a + 1, a + 1] += q[kind, b + 2]
     for block in range(2):
         a, b = 6 + 3 * block, 9 + 6 * block
-        p[a, a] += q[b]
-        p[a, a + 1] += q[b + 1]
-        p[a, a + 2] += q[b + 2]
-        p[a + 1, a + 1] += q[b + 3]
-        p[a + 1, a + 2] += q[b + 4]
-        p[a + 2, a + 2] += q[b + 5]
+        p[a, a] += q[kind, b]
+        p[a, a + 1] += q[kind, b + 1]
+        p[a, a + 2] += q[kind, b + 2]
+        p[a + 1, a + 1] += q[kind, b + 3]
+        p[a + 1, a + 2] += q[kind, b + 4]
+        p[a + 2, a + 2] += q[kind, b + 5]
     mirror(p)
 
 
@@ -115,6 +115,7 @@ def trajectory_filter(
     signals: FloatArray,
     track: FloatArray,
     slips: FloatArray,
+    kinds: IntArray,
     process: FloatArray,
     noise: FloatArray,
     virtual: FloatArray,
@@ -129,6 +130,7 @@ def trajectory_filter(
     after: FloatArray,
     after_covariance: FloatArray,
     innovations: FloatArray,
+    likelihoods: FloatArray,
 ) -> float:
     """Run the filter; an output of no rows is not wanted and not written.
 
@@ -147,9 +149,11 @@ def trajectory_filter(
         `TERMS`.
     slips : ndarray (n, 3) or (0, 3)
         See `misprint`; of no rows for the corrected equations.
-    process : ndarray (18,)
+    kinds : ndarray of int (n,)
+        Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
+    process : ndarray (c, 18)
         Upper triangles of the five blocks of Q, row by row.
-    noise : ndarray (8,)
+    noise : ndarray (c, 8)
         Variances U of the measurements.
     virtual : ndarray (2,)
         Virtual positions y and z, m.
@@ -165,6 +169,8 @@ def trajectory_filter(
         Filtered.
     innovations : ndarray (n, 7), out
         Measured minus predicted rates and forces, and the normalised innovation squared of these six.
+    likelihoods : ndarray (n,), out
+        Log-likelihood of each sample given those before it.
 
     Returns
     -------
@@ -180,8 +186,9 @@ def trajectory_filter(
     for i in range(STATES):
         p[i, i] = start_variance[i]
     for k in range(n):
+        kind = kinds[k]
         if k > 0:
-            predict(x, p, process, step_s)
+            predict(x, p, process, kind, step_s)
         if before.shape[0] > 0:
             before[k] = x
             pack(p, before_covariance, k)
@@ -229,7 +236,7 @@ def trajectory_filter(
                     v[i] = p[a0, i]
                 spread = v[a0]
                 error = virtual[m - 6] - x[a0] - dx[a0]
-            s = spread + noise[m]
+            s = spread + noise[kind, m]
             inverse = 1.0 / s
             squares += error * error * inverse
             product *= s
@@ -242,7 +249,10 @@ def trajectory_filter(
                 scaled[k, m, 0], scaled[k, m, 1] = error * inverse, inverse
         for i in range(STATES):
             x[i] += dx[i]
-        likelihood -= 0.5 * (squares + math.log(product) + ROWS * math.log(2.0 * math.pi))
+        of_sample = -0.5 * (squares + math.log(product) + ROWS * math.log(2.0 * math.pi))
+        likelihood += of_sample
+        if likelihoods.shape[0] > 0:
+            likelihoods[k] = of_sample
         if innovations.shape[0] > 0:
             for i in range(6):
                 innovations[k, i] = signals[k, i] - g[i]

@@ -18,7 +18,7 @@ from simrail.errors import InputError
 from simrail.estimate import Estimator
 from simrail.profile import SpeedProfile
 from simrail.ride import Ride, rails_of
-from simrail.scenario.build_estimator import estimator_of
+from simrail.scenario.build_estimator import estimator_of, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import Distribution
 from simrail.scenario.files import Part, blame, load
@@ -60,6 +60,10 @@ class Parts:
         self._estimators: dict[int, dict[str, Estimator]] = {}
         self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the rails, for another process: they are laid faster than sent."""
+        return {**self.__dict__, "_laid": None}
 
     @property
     def hash(self) -> str:
@@ -122,6 +126,9 @@ class Parts:
                     )
                 known = None if is_drawn else first.get(method.name)
                 made[method.name] = known or estimator_of(self.scenario, method)
+                for option, content in option_files(made[method.name]).items():
+                    # What is in the files that its options name counts as the scenario's.
+                    self._content[f"estimator {method.name} {option} {sample}"] = content
             self._estimators[sample] = made
         return self._estimators[sample]
 

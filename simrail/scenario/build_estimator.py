@@ -2,23 +2,24 @@
 
 A strange estimator in a person's own file is run here for the first time: what it does wrong is told,
 not raised.
+
+An option may be a file: where the class declares a type that has `from_file(path)`, the scenario gives a
+path, seen from its own folder first. Nothing is estimated here.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-import hashlib
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
 from simrail.errors import InputError
 from simrail.estimate import SENSORS, Estimator, estimator_class
+from simrail.own_files import load_own
 from simrail.scenario.cells import Method
 from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
@@ -37,7 +38,7 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
     with blame(scenario.file, f"{field}.method"):
         known_class = class_named(method.part.method, scenario.folder)
     with blame(scenario.file, f"{field}.options"):
-        estimator = construct(known_class, method.part.options)
+        estimator = construct(known_class, method.part.options, folder=scenario.folder)
     _judge_needs(scenario, method, estimator)
     return estimator
 
@@ -75,27 +76,7 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
     path_name, colon, class_name = name.rpartition(":")
     if not colon or not path_name.endswith(".py"):
         return estimator_class(name)
-    candidates = [*([folder / path_name] if folder else []), Path(path_name)]
-    path = next((candidate for candidate in candidates if candidate.is_file()), None)
-    if path is None:
-        raise InputError(
-            "no such file", value=path_name, remedy="mend the path; it is seen from the scenario's folder"
-        )
-    # A name of its own per content: two files, or two versions of one, never share a module.
-    module_name = f"simrail_own_{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
-    if module_name not in sys.modules:
-        spec = spec_from_file_location(module_name, path)
-        assert spec is not None and spec.loader is not None
-        module = module_from_spec(spec)
-        sys.modules[module_name] = module  # dataclasses look their module up there
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[module_name]
-            raise InputError(
-                f"cannot be imported: {type(error).__name__}: {error}", value=path_name
-            ) from error
-    found = getattr(sys.modules[module_name], class_name, None)
+    found = getattr(load_own(_existing(path_name, folder), shown=path_name), class_name, None)
     if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
         raise InputError(
             "the file has no such estimator class",
@@ -107,8 +88,31 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
     return own
 
 
-def construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimator:
-    """Make an estimator from its options, each judged against the type that its class declares."""
+def _existing(name: str, folder: Path | None) -> Path:
+    """A file by its path, seen from a folder (that of the scenario), or from here."""
+    for candidate in (*([folder / name] if folder else []), Path(name)):
+        if candidate.is_file():
+            return candidate
+    raise InputError(
+        "no such file", value=name, remedy="mend the path; it is seen from the scenario's folder"
+    )
+
+
+def option_files(estimator: Estimator) -> dict[str, str]:
+    """What was read from files that options named, as text, by option."""
+    if not dataclasses.is_dataclass(estimator):
+        return {}
+    values = {entry.name: getattr(estimator, entry.name) for entry in dataclasses.fields(estimator)}
+    return {name: repr(value) for name, value in values.items() if hasattr(value, "from_file")}
+
+
+def construct(
+    known_class: type[Estimator], options: dict[str, Any], *, folder: Path | None = None
+) -> Estimator:
+    """Make an estimator from its options, each judged against the type that its class declares.
+
+    ``folder`` is where files that options name are looked for, before the working folder.
+    """
     if not dataclasses.is_dataclass(known_class):
         raise InputError(
             "is no dataclass, so its options cannot be judged",
@@ -128,7 +132,7 @@ def construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimato
                 limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
                 remedy=f"did you mean {near[0]}?" if near else "remove it",
             )
-        values[name] = _option(types.get(name, Any), name, value)
+        values[name] = _option(types.get(name, Any), name, value, folder)
     try:
         made: Estimator = known_class(**values)
     except InputError:
@@ -138,8 +142,14 @@ def construct(known_class: type[Estimator], options: dict[str, Any]) -> Estimato
     return made
 
 
-def _option(kind: Any, name: str, value: Any) -> Any:
+def _option(kind: Any, name: str, value: Any, folder: Path | None) -> Any:
     """Judge one option against the type that the class declares for it; tuples may be given as arrays."""
+    of_file = next((part for part in (kind, *get_args(kind)) if hasattr(part, "from_file")), None)
+    if of_file is not None:
+        if not isinstance(value, str):
+            raise InputError("has the wrong type", field=name, value=value, limit="the path of a file")
+        with blame(None, name):
+            return of_file.from_file(_existing(value, folder))
     if isinstance(value, list):
         value = tuple(tuple(item) if isinstance(item, list) else item for item in value)
     try:

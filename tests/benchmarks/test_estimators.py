@@ -192,7 +192,7 @@ def run_trajectory(model: Model, *, with_covariance: bool) -> Callable[[], None]
     updates, innovations = (np.empty((n, ROWS, STATES)), np.empty((n, ROWS, 2))), np.empty((n, 7))
 
     def run() -> None:
-        trajectory_filter(*model, *kept, *updates, *none, innovations)
+        trajectory_filter(*model, *kept, *updates, *none, innovations, np.empty(0))
         trajectory_back(
             model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance
         )

@@ -26,7 +26,7 @@ from estimators.kernels.odometry import (
 )
 from estimators.kernels.smoothing import smooth
 from estimators.odometry import CurveMatchedOdometry, line_table
-from simrail.campaign import record_cell
+from simrail.cell import record_cell
 from simrail.columns import GYRO
 from simrail.errors import InputError
 from simrail.measure import measure

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from estimators.kernels.trajectory_equations import STATES
-from estimators.trajectory_model import Model, measured, process_noise, transition
+from estimators.trajectory_model import Model, measured, packed_process, process_noise, transition
 from estimators.trajectory_noise import Hyperparameters
 from estimators.trajectory_smoother import compiled_backend
 from simrail.seeds import stream
@@ -57,7 +57,7 @@ def run(scale: float = 1.0) -> dict[bool, tuple[np.ndarray, np.ndarray]]:
     root, sd = np.linalg.cholesky(q), np.sqrt(NOISE.vector()[5:])
     start = np.zeros(STATES)
     start[[0, 5, 9]] = CANT, SPEED / RADIUS, 0.6
-    process = np.concatenate([b[np.triu_indices(len(b))] for b in process_noise(NOISE, STEP)])
+    kinds, process = np.zeros(SAMPLES, dtype=np.int64), packed_process([NOISE], STEP)
     upper = np.triu_indices(STATES)
     found: dict[bool, tuple[np.ndarray, np.ndarray]] = {}
     nees, nis = (
@@ -73,8 +73,8 @@ def run(scale: float = 1.0) -> dict[bool, tuple[np.ndarray, np.ndarray]]:
             truth[k] = x
             signals[k] = measured(x, track[k], GRAVITY)[0][:6] + scale * sd[:6] * rng.standard_normal(6)
         model = Model(
-            signals, track, np.empty((0, 3)), process, NOISE.vector()[5:], np.array([0.0, 0.6]), start,
-            START_SD**2, STEP, GRAVITY,
+            signals, track, np.empty((0, 3)), kinds, process, NOISE.vector()[None, 5:], np.array([0.0, 0.6]),
+            start, START_SD**2, STEP, GRAVITY,
         )  # fmt: skip
         for smoothed in (False, True):
             result = compiled_backend(model, smoothed=smoothed, with_covariance=True)

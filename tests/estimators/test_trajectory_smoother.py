@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import asdict, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,10 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from estimators.kernels.trajectory_equations import TERMS
-from estimators.trajectory_model import Found, Model, process_noise
-from estimators.trajectory_noise import Hyperparameters, read_hyperparameters
+from estimators.trajectory_model import Found, Model, kinds_of, packed_process
+from estimators.trajectory_noise import Hyperparameters
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend, log_likelihood
+from estimators.tuning_file import Tuning
 from simrail.columns import ATTITUDE, ATTITUDE_SD, RELATIVE_POSITION, RELATIVE_POSITION_SD
 from simrail.errors import InputError
 from simrail.recording import Recording
@@ -45,6 +45,10 @@ WHERE = {
 }
 
 
+OTHER = Hyperparameters(roll_rad2ps3=0.05, lateral_m2ps5=2.0, gyro_z_rad2ps2=1e-5, accel_y_m2ps4=0.01)
+"""Noise unlike the default."""
+
+
 def compare(ours: Found, theirs: Found) -> None:
     sd = np.sqrt(theirs.covariance[:, DIAGONAL])
     np.testing.assert_allclose(ours.states / sd, theirs.states / sd, rtol=0, atol=1e-7)
@@ -65,6 +69,31 @@ def test_kernels_equal_filterpy(line_recording: Callable, where: str, printed: b
         ours = TrajectorySmoother(printed=printed, smoothed=smoothed)
         theirs = replace(ours, backend="filterpy")
         compare(ours.trace(recording), theirs.trace(recording))
+
+
+def test_two_sets_of_noise_equal_filterpy(line_recording: Callable) -> None:
+    """Where a straight ends within the samples, each side has its own noise, and the order matters."""
+    recording = line_recording(70.0, 1, 0)
+    kinds = kinds_of(recording)
+    change = int(np.flatnonzero(np.diff(kinds[6000:]))[0]) + 6000
+    recording = part(recording, change - 400, 800)
+    assert 0 < kinds_of(recording).sum() < 800
+    two = TrajectorySmoother(curve_hyperparameters=OTHER)
+    for smoothed in (False, True):
+        ours = replace(two, smoothed=smoothed)
+        compare(ours.trace(recording), replace(ours, backend="filterpy").trace(recording))
+    likelihoods = {
+        smoother.log_likelihood(recording)
+        for smoother in (
+            two,
+            TrajectorySmoother(),
+            TrajectorySmoother(hyperparameters=OTHER),
+            TrajectorySmoother(hyperparameters=OTHER, curve_hyperparameters=Hyperparameters()),
+        )
+    }
+    assert len(likelihoods) == 4
+    same = TrajectorySmoother(curve_hyperparameters=Hyperparameters())
+    assert np.array_equal(same.trace(recording).states, TrajectorySmoother().trace(recording).states)
 
 
 def test_the_likelihood_alone_and_the_means_alone_are_the_same(line_recording: Callable) -> None:
@@ -195,55 +224,16 @@ def test_states_and_covariance_are_those_of_the_trace(line_recording: Callable) 
         assert smoother.causal is not smoother.smoothed
 
 
-def test_hyperparameters_are_read_from_a_file(tmp_path: Path, line_recording: Callable) -> None:
-    parameters = Hyperparameters(lateral_m2ps5=3.0, accel_x_m2ps4=0.5)
-    path = tmp_path / "tuned.toml"
-    path.write_text(file_text(asdict(parameters)))
-    assert read_hyperparameters(path) == parameters
-    assert Hyperparameters.from_vector(parameters.vector()) == parameters
-    recording = WHERE["curve"](line_recording)
-    given = TrajectorySmoother(hyperparameters=parameters).trace(recording)
-    read = TrajectorySmoother(tuning=str(path)).trace(recording)
-    assert np.array_equal(given.states, read.states)
-    assert not np.array_equal(given.states, TrajectorySmoother().trace(recording).states)
-
-
-def file_text(values: dict[str, object]) -> str:
-    return "[hyperparameters]\n" + "".join(f"{name} = {value!r}\n" for name, value in values.items())
-
-
-GOOD = asdict(Hyperparameters())
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("nonsense", ["no TOML"]),
-        ("", ["hyperparameters", "missing"]),
-        ("hyperparameters = 3", ["hyperparameters", "missing"]),
-        (file_text({**GOOD, "accel_x_m2ps4": -1.0}), ["hyperparameters.accel_x_m2ps4", "-1.0", "> 0"]),
-        (file_text({**GOOD, "accel_x_m2ps4": "much"}), ["hyperparameters.accel_x_m2ps4", "much"]),
-        (file_text({**GOOD, "accel_w_m2ps4": 1.0}), ["hyperparameters.accel_w_m2ps4", "no hyper-parameter"]),
-        (file_text(dict(list(GOOD.items())[:-1])), ["hyperparameters.vertical_position_m2", "missing"]),
-    ],
-)
-def test_a_bad_file_is_named(tmp_path: Path, text: str, words: list[str]) -> None:
-    path = tmp_path / "tuned.toml"
-    path.write_text(text)
-    with pytest.raises(InputError) as caught:
-        TrajectorySmoother(tuning=str(path))
-    for word in ["tuned.toml", *words]:
-        assert word in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("options", "field"),
     [
         ({"backend": "matlab"}, "backend"),
         ({"start_sd_rad": 0.0}, "start_sd_rad"),
         ({"start_yaw_sd_rad": float("nan")}, "start_yaw_sd_rad"),
-        ({"tuning": "nowhere.toml"}, "nowhere.toml"),
-        ({"tuning": "a.toml", "hyperparameters": Hyperparameters(lateral_m2ps5=2.0)}, "tuning"),
+        ({"tuning": "tuned.toml"}, "tuning"),
+        ({"curve_hyperparameters": 3.0}, "curve_hyperparameters"),
+        ({"tuning": Tuning(), "hyperparameters": OTHER}, "tuning"),
+        ({"tuning": Tuning(), "curve_hyperparameters": Hyperparameters()}, "tuning"),
     ],
 )
 def test_a_bad_option_is_named(options: dict[str, Any], field: str) -> None:
@@ -269,8 +259,9 @@ def test_steady_for_hours() -> None:
         signals=signals,
         track=np.zeros((n, len(TERMS))),
         slips=np.empty((0, 3)),
-        process=np.concatenate([q[np.triu_indices(len(q))] for q in process_noise(parameters, 0.1)]),
-        noise=parameters.vector()[5:],
+        kinds=np.zeros(n, dtype=np.int64),
+        process=packed_process([parameters], 0.1),
+        noise=parameters.vector()[None, 5:],
         virtual=np.array([0.0, 0.6]),
         start=np.array([0.0] * 9 + [0.6, 0.0, 0.0]),
         start_variance=np.full(12, 1e-6),

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail import campaign
+from simrail import batch
 from simrail.aggregate import aggregate
-from simrail.campaign import CampaignResult, run_campaign
+from simrail.campaign import run_campaign
+from simrail.campaign_result import CampaignResult
 from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
@@ -120,15 +121,13 @@ def test_draws_differ_and_rides_over_one_draw_are_paired(two_draws: CampaignResu
 class Counter(Watcher):
     def __init__(self) -> None:
         self.rides: list[str] = []
-        self.estimates = 0
-        self.last = (0, 0)
+        self.last = (0, 0, 0)
 
     def ride_begins(self, number: int, count: int, name: str) -> None:
         self.rides.append(f"{number}/{count} {name}")
 
-    def estimate_made(self, number: int, count: int, name: str) -> None:
-        self.estimates += 1
-        self.last = (number, count)
+    def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
+        self.last = (done, count, failed)
 
 
 FAILING = """
@@ -180,18 +179,18 @@ def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
     )
     assert (good["status"] == OK).all() and set(good["cell"]) == set(range(6))
     assert counter.rides == ["1/1 out"]
-    assert counter.estimates == 36 and counter.last == (36, 36)
+    assert counter.last == (6, 6, 6)
 
 
 def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = campaign.simulate
+    real = batch.simulate
 
-    def derail(ride, *, progress=None):  # type: ignore[no-untyped-def]
+    def derail(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
         if ride.profile.speed_mps > 10.0:
             raise RuntimeError("derailed: axle front left the rail at s = 100.0 m")
         return real(ride, progress=progress)
 
-    monkeypatch.setattr(campaign, "simulate", derail)
+    monkeypatch.setattr(batch, "simulate", derail)
     found = run_campaign(short("ride.speed_kmh=[50.0, 30.0]", "monte_carlo.sensor_draws=1"))
     assert len(found.cells) == 2 and len(found.rides) == 1
     statuses = found.scores.groupby("cell")["status"].agg(lambda column: sorted(set(column.astype(str))))
@@ -206,7 +205,7 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
 ) -> None:
     calls = []
 
-    def swallow(ride, *, progress=None):  # type: ignore[no-untyped-def]
+    def swallow(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
         # What a C++ library does with an exception in its callback.
         calls.append(ride.name)
         try:
@@ -214,7 +213,7 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
         except KeyboardInterrupt:
             raise RuntimeError("the integrator stopped") from None
 
-    monkeypatch.setattr(campaign, "simulate", swallow)
+    monkeypatch.setattr(batch, "simulate", swallow)
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         run_campaign(short("monte_carlo.sensor_draws=1", "ride.speed_kmh=[30.0, 50.0]"))

@@ -1,0 +1,91 @@
+"""A scenario that names a tuning: found beside it, part of its content, and refused by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from estimators.trajectory_noise import Hyperparameters
+from estimators.tuning_file import Tuning
+from simrail.errors import InputError
+from simrail.scenario.build import Parts
+from simrail.scenario.check import judge_scenario
+from simrail.scenario.files import shipped
+from simrail.scenario.scenario import Scenario, load_scenario
+
+GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
+SMOOTHER = """
+[[estimator]]
+name = "smoother"
+method = "TrajectorySmoother"
+[estimator.options]
+tuning = "tunings/mine.toml"
+"""
+MINE = Tuning(Hyperparameters(lateral_m2ps5=3.0))
+
+
+@pytest.fixture
+def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scenario:
+    """Read from a folder that is not the working one."""
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    folder = tmp_path / "scenarios"
+    (folder / "tunings").mkdir(parents=True)
+    (folder / "mine.toml").write_text(GOOD + SMOOTHER, encoding="utf-8")
+    MINE.write(folder / "tunings" / "mine.toml")
+    return load_scenario(folder / "mine.toml")
+
+
+def test_found_beside_the_scenario(scenario: Scenario) -> None:
+    made = judge_scenario(scenario).estimators["smoother"]
+    assert made.tuning == MINE  # type: ignore[attr-defined]
+    assert made.noise == (MINE.hyperparameters,)  # type: ignore[attr-defined]
+
+
+def test_its_content_is_in_the_hash(scenario: Scenario) -> None:
+    assert scenario.folder is not None
+    file = scenario.folder / "tunings" / "mine.toml"
+    plain = judge_scenario(scenario).content_hash
+    assert judge_scenario(scenario, Parts(scenario)).content_hash == plain
+    file.write_text("# a comment does not count\n" + file.read_text())
+    assert judge_scenario(scenario).content_hash == plain
+    Tuning(replace(MINE.hyperparameters, yaw_rad2ps3=0.5)).write(file)
+    assert judge_scenario(scenario).content_hash != plain
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        (None, ["options.tuning", "no such file", "tunings/mine.toml", "mend the path"]),
+        ("lateral_m2ps5 = -3.0", ["hyperparameters.lateral_m2ps5", "-3.0", "> 0"]),
+        ("lateral_m2ps5 = 3.0\nmine = 3.0", ["hyperparameters.mine", "no such hyper-parameter", "remove it"]),
+    ],
+)
+def test_faults_are_named(scenario: Scenario, new: str | None, words: list[str]) -> None:
+    assert scenario.folder is not None
+    file = scenario.folder / "tunings" / "mine.toml"
+    text = file.read_text()
+    file.unlink()
+    if new is not None:
+        file.write_text(text.replace("lateral_m2ps5 = 3.0", new))
+    with pytest.raises(InputError) as caught:
+        judge_scenario(scenario)
+    for word in ["mine.toml", *words]:
+        assert word in str(caught.value)
+
+
+def test_an_option_that_is_a_file_takes_a_path_only(scenario: Scenario) -> None:
+    wrong = load_scenario(f"{scenario.folder}/mine.toml", overrides=["estimator.smoother.options.tuning=3.0"])
+    with pytest.raises(InputError, match=r"options\.tuning: has the wrong type; found 3\.0"):
+        judge_scenario(wrong)
+
+
+def test_two_tunings_are_two_variants(scenario: Scenario) -> None:
+    assert scenario.folder is not None
+    MINE.write(scenario.folder / "other.toml")
+    listed = 'estimator.smoother.options.tuning=["tunings/mine.toml", "other.toml"]'
+    both = judge_scenario(load_scenario(f"{scenario.folder}/mine.toml", overrides=[listed]))
+    names = [name for name in both.estimators if name.startswith("smoother")]
+    assert names == ["smoother[tuning=tunings/mine.toml]", "smoother[tuning=other.toml]"]
