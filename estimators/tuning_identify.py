@@ -1,8 +1,8 @@
 """What a tuning knows of each hyper-parameter: identified, held at an edge of the search, or flat.
 
-About an optimum the objective f is a bowl in the logarithms of the parameters. A parameter is judged by how far
-it can go before f rises by a tolerance: along its own axis the others stay, along the bowl's valley they follow
-(the profile). With the likelihood of a model that is true, the inverse of n times the curvature is the
+About an optimum the objective f is a bowl in the logarithms of the parameters. A parameter is judged by how
+far it can go before f rises by a tolerance: along its own axis the others stay, along the bowl's valley they
+follow (the profile). With the likelihood of a model that is true, the inverse of n times the curvature is the
 covariance of the estimate (Cramer-Rao); on a real ride the model is not true and that is but a scale.
 
 Not here: how the optimum was found (`estimators.tuning`).
@@ -43,8 +43,8 @@ class Identification:
     Attributes
     ----------
     table : pandas.DataFrame
-        One row per hyper-parameter (index ``parameter``): ``value``; ``status``; ``tenth`` and ``tenfold``, the
-        rise of the objective if the value is divided by or multiplied with ten and the others stay (negative
+        One row per hyper-parameter (index ``parameter``): ``value``; ``status``; ``tenth`` and ``tenfold``,
+        the rise of the objective if the value is divided by or multiplied with ten and the others stay (negative
         where the optimum lies beyond what was allowed); ``curvature`` along its own axis and
         ``profile_curvature`` along the valley, second derivatives by the natural logarithm; ``span_decades``,
         how many powers of ten it can go along the valley until the objective has risen by the tolerance; and,
@@ -75,8 +75,8 @@ def identify(
 ) -> Identification:
     """Judge every hyper-parameter at an optimum of a search.
 
-    A parameter that is held is ``held``. One that can be divided by and multiplied with ten, as far as box and
-    constraint allow, at less than the tolerance is ``flat``, and so is one inside the box whose span is more
+    A parameter that is held is ``held``. One that can be divided by and multiplied with ten, as far as box
+    and constraint allow, at less than the tolerance is ``flat``, and so is one inside the box whose span is more
     than one decade; one at an end of its range is ``at the lower edge``, ``at the upper edge`` or
     ``at the constraint``; any other is ``identified``.
 
@@ -119,30 +119,30 @@ def identify(
     curvature = curvature / STEP**2
     curvatures, directions = np.linalg.eigh(curvature)
 
-    table = pd.DataFrame(
-        {"value": parameters.vector(), "status": "", "tenth": tenth, "tenfold": tenfold},
-        index=pd.Index(NAMES, name="parameter"),
-    )
     # A direction without curvature has no end to its span: its eigenvalue counts as hardly positive.
     spread = (directions**2 / np.maximum(curvatures, 1e-12)).sum(axis=1)
-    names = [NAMES[number] for number in inside]
-    table.loc[names, "curvature"] = np.diag(curvature)
-    table.loc[names, "profile_curvature"] = 1.0 / spread
-    table.loc[names, "span_decades"] = np.sqrt(2.0 * tolerance * spread) / math.log(10.0)
+    columns = {
+        "curvature": np.diag(curvature),
+        "profile_curvature": 1.0 / spread,
+        "span_decades": np.sqrt(2.0 * tolerance * spread) / math.log(10.0),
+    }
     if isinstance(objective, Likelihood):
-        table.loc[names, "sd_decades"] = np.sqrt(spread / objective.samples) / math.log(10.0)
-    for number, name in enumerate(NAMES):
-        end = ends[number]
-        # At an end only the way back counts; what lies beyond is not on offer.
-        down = -math.inf if end == LOWER else tenth[number]
-        up = -math.inf if end in (UPPER, CONSTRAINT) else tenfold[number]
-        if end == HELD:
-            status = HELD
-        elif max(down, up) < tolerance or (end == "" and table.loc[name, "span_decades"] > 1.0):
-            status = FLAT
-        else:
-            status = end or IDENTIFIED
-        table.loc[name, "status"] = status
+        columns["sd_decades"] = np.sqrt(spread / objective.samples) / math.log(10.0)
+    spans = dict(zip(inside, columns["span_decades"], strict=True))
+    table = pd.DataFrame(
+        {
+            "value": parameters.vector(),
+            "status": [
+                _status(ends[number], tenth[number], tenfold[number], spans.get(number, 0.0), tolerance)
+                for number in range(len(NAMES))
+            ],
+            "tenth": tenth,
+            "tenfold": tenfold,
+        },
+        index=pd.Index(NAMES, name="parameter"),
+    )
+    names = [NAMES[number] for number in inside]
+    table = table.join(pd.DataFrame(columns, index=names))
     return Identification(table, tuple(names), curvature, curvatures, directions)
 
 
@@ -156,3 +156,11 @@ def _end(number: int, values: FloatArray, space: SearchSpace) -> str:
     if high - at < EDGE * width:
         return UPPER if high > math.log(space.box[1]) - EDGE * width else CONSTRAINT
     return ""
+
+
+def _status(end: str, tenth: float, tenfold: float, span: float, tolerance: float) -> str:
+    """Judge one parameter; at an end only the way back counts, since what lies beyond is not on offer."""
+    if end == HELD:
+        return HELD
+    ways = [tenth] * (end != LOWER) + [tenfold] * (end not in (UPPER, CONSTRAINT))
+    return FLAT if max(ways) < tolerance or span > 1.0 else end or IDENTIFIED
