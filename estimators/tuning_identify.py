@@ -44,8 +44,8 @@ class Identification:
     ----------
     table : pandas.DataFrame
         One row per hyper-parameter (index ``parameter``): ``value``; ``status``; ``tenth`` and ``tenfold``,
-        the rise of the objective if the value is divided by or multiplied with ten and the others stay (negative
-        where the optimum lies beyond what was allowed); ``curvature`` along its own axis and
+        the rise of the objective if the value is divided by or multiplied with ten and the others stay
+        (negative where the optimum lies beyond what was allowed); ``curvature`` along its own axis and
         ``profile_curvature`` along the valley, second derivatives by the natural logarithm; ``span_decades``,
         how many powers of ten it can go along the valley until the objective has risen by the tolerance; and,
         for a likelihood, ``sd_decades``, the standard deviation of its logarithm if the model were true. The
@@ -76,8 +76,8 @@ def identify(
     """Judge every hyper-parameter at an optimum of a search.
 
     A parameter that is held is ``held``. One that can be divided by and multiplied with ten, as far as box
-    and constraint allow, at less than the tolerance is ``flat``, and so is one inside the box whose span is more
-    than one decade; one at an end of its range is ``at the lower edge``, ``at the upper edge`` or
+    and constraint allow, at less than the tolerance is ``flat``, and so is one inside the box whose span is
+    more than one decade; one at an end of its range is ``at the lower edge``, ``at the upper edge`` or
     ``at the constraint``; any other is ``identified``.
 
     Parameters

@@ -72,8 +72,9 @@ def tune_scenario(
         File of the tuning. A former tuning is replaced when the new one is there. What has been found before
         lies beside it, and an interrupted search with the same arguments goes on from there.
     estimator : str
-        Name of the estimator in the scenario: a trajectory smoother. Its options hold, but a tuning that they
-        name is not read: it may be the one that is made here.
+        Name of the estimator in the scenario, a trajectory smoother, or ``"TrajectorySmoother"`` for one
+        without options. Options hold, but a tuning that they name is not read: it may be the one that is made
+        here.
     method : str
         ``"cml"`` or ``"kom"``.
     rides : sequence of str
@@ -166,13 +167,14 @@ def alone(scenario: Scenario, estimator: str) -> Scenario:
     """The scenario with one estimator, without its tuning; the others only keep places, for messages."""
     spec = scenario.spec
     names = [part.name for part in spec.estimator]
-    if estimator not in names:
+    own = () if estimator in names else (EstimatorPart(name=estimator, method=estimator),)
+    if own and estimator != TrajectorySmoother.__name__:
         raise InputError(
             "the scenario has no such estimator",
             file=scenario.file,
             field="--estimator",
             value=estimator,
-            limit="one of " + ", ".join(names),
+            limit="one of " + ", ".join([*names, TrajectorySmoother.__name__]),
         )
     parts = [
         part.model_copy(update={"options": {k: v for k, v in part.options.items() if k != "tuning"}})
@@ -180,6 +182,7 @@ def alone(scenario: Scenario, estimator: str) -> Scenario:
         else EstimatorPart(name=part.name, method="DesignAngles")
         for part in spec.estimator
     ]
+    parts += own
     return replace(scenario, spec=spec.model_copy(update={"estimator": parts}))
 
 

@@ -19,7 +19,12 @@ def tune(
         str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")
     ],
     estimator: Annotated[
-        str, typer.Option("--estimator", metavar="NAME", help="A trajectory smoother of the scenario.")
+        str,
+        typer.Option(
+            "--estimator",
+            metavar="NAME",
+            help="A trajectory smoother of the scenario, or TrajectorySmoother.",
+        ),
     ],
     method: Annotated[
         str,
