@@ -1,4 +1,4 @@
-"""Who is told how a campaign, an export or a tuning goes. What it shows is its own: see `simrail.progress`."""
+"""Who is told how a campaign, an export or a tuning goes; what it shows, see `simrail.progress`."""
 
 from __future__ import annotations
 
