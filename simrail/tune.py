@@ -21,7 +21,7 @@ from estimators.tuning_identify import Identification, identify
 from estimators.tuning_objectives import KINDS, objective_of
 from estimators.tuning_space import SearchSpace
 from simrail.bands import Band
-from simrail.campaign import record_cell
+from simrail.cell import record_cell
 from simrail.errors import InputError
 from simrail.interrupts import interruptible
 from simrail.recording import Recording
