@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from simrail.campaign import run_campaign
-from simrail.cli import DONE
+from simrail.cli import DONE, INTERRUPTED
 from simrail.scenario.scenario import load_scenario
 from simrail.unfinished import Unfinished
 
@@ -131,3 +131,21 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     log = (folder / "mine" / "run.log").read_text()
     # Where no main process died after a batch was done, there was nothing to go on with.
     assert ("going on with an unfinished run" in log) == (kept > 0)
+
+
+def test_ctrl_c_ends_all_processes_in_one_line(noting_file: Path, notes: Notes, tmp_path: Path) -> None:
+    """The terminal sends it to the main process and to its workers alike."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    slow = ["--set", "estimator.noting.options.sleep_s=0.5", "--workers", str(WORKERS)]
+    words = [sys.executable, str(program), str(BATCH_CELLS), "run", str(noting_file), *slow]
+    process = subprocess.Popen(
+        words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True
+    )
+    wait_while(lambda: process.poll() is None and len({pid for pid, _ in notes}) < WORKERS, at_most_s=120.0)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == INTERRUPTED
+    assert said.decode().splitlines()[-1].startswith("simrail: interrupted") and b"Traceback" not in said
+    wait_while(lambda: any(alive(pid) for pid, _ in notes), at_most_s=5.0)
+    assert not any(alive(pid) for pid, _ in notes)
