@@ -25,7 +25,6 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.rotation import rotation_matrix
-from simrail.track.elements import RAIL_BASE_M
 
 GAUGE = IRREGULARITY.index("gauge_m")
 FINE = 8
@@ -46,12 +45,11 @@ def track_geometry(
     recording: Recording,
     *,
     step_m: float = 0.25,
-    rail_base_m: float | None = None,
 ) -> pd.DataFrame:
     """Irregularities of the rails from a trajectory.
 
     With A the rotation from body to track frame, y and z the IMU's place in that frame, u_l and u_r the rails
-    seen from the IMU in body axes, and b half the distance of the nominal rails:
+    seen from the IMU in body axes, and b half the design track's rail base:
 
         r_l = (0, y, z) + A u_l,     d_l = r_l - (0, b, 0)        (r_r and d_r alike, with -b)
         alignment        = (d_l,y + d_r,y)/2        cross-level = d_l,z - d_r,z
@@ -73,34 +71,31 @@ def track_geometry(
         Distance of the places, whole multiples of it. Samples of the same eighth of a step are averaged,
         whenever they were taken: in a stop, running backwards, or passing again. Then a low-pass without
         shift takes off what the step cannot carry.
-    rail_base_m : float, optional
-        Distance 2 b of the nominal rails; that of the rail sensor, or 1.5 m.
 
     Returns
     -------
     pandas.DataFrame
         Indexed by ``position_m`` (uniform), columns `IRREGULARITY`, and `IRREGULARITY_SD` where known.
         ``gauge_m`` is NaN throughout without a rail sensor: it is not observable. No rows if the train moved
-        by less than a step. Standard deviations speak of the trajectory and the sensor only, not of what a
-        wheelset does between the rails, nor of an error of the position along the track.
+        by less than a step. Standard deviations speak of the trajectory, the sensor, and the position along
+        the track as far as its own sd is known (``position_sd_m``), but not of what a wheelset does between
+        the rails, nor of the design cant that a wrong position takes off a transition.
 
     Raises
     ------
     InputError
-        If the states lack a column or a number, or step or base are not positive.
+        If the states lack a column or a number, or the step is not positive.
     """
     states = estimate.states
     require(states, (*ATTITUDE, *RELATIVE_POSITION), what="states")
     sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
-    known_base = RAIL_BASE_M if sheet is None else sheet.rail_base_m
-    base = known_base if rail_base_m is None else rail_base_m
-    for name, value in (("step_m", step_m), ("rail_base_m", base)):
-        if not 0.0 < value < np.inf:
-            raise InputError("is out of range", field=name, value=value, limit="> 0 m")
+    if not 0.0 < step_m < np.inf:
+        raise InputError("is out of range", field="step_m", value=step_m, limit="> 0 m")
     known = states if "position_m" in states.columns else recording.odometry
     if len(known) != len(states):
         raise InputError("states are not at the recording's times", field="states", value=len(states))
     track = recording.track
+    base = track.rail_base_m
     place = np.clip(known["position_m"].to_numpy(dtype=np.float64), track.start_m, track.end_m)
     values = states[[*ATTITUDE, *RELATIVE_POSITION]].to_numpy(dtype=np.float64)
     if not (np.isfinite(place).all() and np.isfinite(values).all()):
@@ -115,13 +110,19 @@ def track_geometry(
     if sheet is not None:
         use, noise_sd = trusted(seen[:, :, 1:].reshape(-1, 4), sheet.noise_m), sheet.noise_m
     covariance = _covariance(estimate)
-    variance = None if covariance is None else _variance(arms, covariance)[use]
+    variance = None
+    if covariance is not None:
+        place_sd = (
+            known["position_sd_m"].to_numpy(dtype=np.float64) if "position_sd_m" in known else 0.0 * place
+        )
+        variance = np.column_stack([_variance(arms, covariance), place_sd**2])[use]
     found = over_space(place[use], irregularities(rails)[use], step_m=step_m, variance=variance)
     columns = dict(zip(IRREGULARITY, found.values.T, strict=True))
     if found.variance is not None:
         # Of mean and difference of two rails with equal, independent noise.
         white = found.noise_gain[:, None] * noise_sd**2 * np.array([0.5, 0.5, 2.0, 2.0])
-        sds = np.sqrt(found.variance + white)
+        moved = displaced(found.position_m, found.values, np.sqrt(found.variance[:, 4]))
+        sds = np.sqrt(found.variance[:, :4] + white + moved)
         columns |= dict(zip(IRREGULARITY_SD, sds.T, strict=True))
     if sheet is None:
         for name in [column for column in columns if column.startswith("gauge")]:
@@ -181,6 +182,20 @@ def _variance(arms: FloatArray, covariance: FloatArray) -> FloatArray:
     slope = np.zeros((n, 4, 3))
     slope[:, :, 0], slope[:, 0, 1], slope[:, 1, 2] = moved, 1.0, 1.0
     return np.einsum("nij,njk,nik->ni", slope, covariance, slope)
+
+
+def displaced(position: FloatArray, lines: FloatArray, sd: FloatArray) -> FloatArray:
+    """Mean square (n, m) by which lines over places change if they are moved along, by normal displacements.
+
+    By Gauss and Hermite's quadrature of five points, so that it holds for displacements that are not small
+    against the waves of the lines as well. Beyond their ends the lines stay as they are there.
+    """
+    if len(position) == 0 or not sd.any():
+        return np.zeros_like(lines)
+    roots, weights = np.polynomial.hermite_e.hermegauss(5)
+    between = CubicSpline(position, lines)
+    moved = [between(np.clip(position + root * sd, position[0], position[-1])) for root in roots]
+    return np.einsum("k,knm->nm", weights / weights.sum(), np.square(np.array(moved) - lines))
 
 
 class OverSpace(NamedTuple):

@@ -116,7 +116,9 @@ def look_at(
     for name, estimator in ledger.estimators.items():
         with suppress(Exception):
             (estimates[name],) = estimate_many(estimator, [recording])
-    return CellResult(described, recording, truth_at_imu(truth, recording), estimates)
+    speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
+    rails = parts.rails(cell) if speaks_of_rails else None
+    return CellResult(described, recording, truth_at_imu(truth, recording), estimates, rails)
 
 
 def _record(cell: Cell, truth: Truth, parts: Parts, ledger: Ledger) -> _Recorded:

@@ -64,7 +64,7 @@ class Estimator(Protocol):
     """
 
     causal: bool
-    """True if the estimate at a time uses nothing recorded later; `simrail.testing` checks it."""
+    """True if the states at a time use nothing recorded later; `simrail.testing` checks it."""
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate from a recording and nothing else."""

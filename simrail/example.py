@@ -11,6 +11,7 @@ import pandas as pd
 
 from simrail.estimate import Estimate
 from simrail.recording import Recording
+from simrail.score_geometry import HasRails
 
 
 @dataclass(frozen=True)
@@ -28,9 +29,12 @@ class CellResult:
         True motion of the mount at the IMU times (`simrail.score.truth_at_imu`).
     estimates : dict of str to Estimate
         By the estimator's name in the scenario, in the scenario's order; failed ones are left out.
+    rails : LaidTrack, optional
+        The rails that the ride was run on, if an estimate speaks of rails.
     """
 
     cell: dict[str, object]
     recording: Recording
     motion: pd.DataFrame
     estimates: dict[str, Estimate]
+    rails: HasRails | None = None

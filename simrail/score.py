@@ -180,7 +180,10 @@ def score_odometry(
     against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
     chosen, keep = chosen_windows(against.windows, windows), kept_metrics(metrics)
     rows: list[Row] = []
-    for series in _other_series(recording.odometry, against.motion):
+    states = recording.odometry
+    if recording.odometry_source == "truth":
+        states = states[list(ODOMETRY)]  # its sds are zero, of which nothing can be scored
+    for series in _other_series(states, against.motion):
         rows += figures(series, chosen, keep)
     return table_of(rows)
 

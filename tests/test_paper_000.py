@@ -16,8 +16,8 @@ from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult
 from simrail.errors import InputError
 from simrail.report import write_report
+from simrail.report.claim import Claim
 from simrail.report.methods import method_styles
-from simrail.report.paper_000.claim import Claim
 from simrail.report.paper_000.figures import spread_of
 from simrail.report.paper_000.method_claims import method_claims
 from simrail.report.paper_000.printed import TABLE_3, TIME_CONSTANTS_S

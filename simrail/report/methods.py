@@ -18,7 +18,9 @@ _COLOURS = {
     "AttitudeGda": ("#D55E00", "#E69F00"),
     "Vqf": ("#AA4499", "#CC79A7"),
     "DesignAngles": ("#6b7280", "#6b7280"),
+    "ZeroTrack": ("#6b7280", "#6b7280"),
 }
+_NO_IMU = ("DesignAngles", "ZeroTrack")
 _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 _SPELLED = {
@@ -44,7 +46,7 @@ class MethodStyle:
     baseline : str
         ``""`` for a method under test, else what kind of baseline it is.
     uses_imu : bool
-        False for "design angles only".
+        False for "design angles only", and for rails that lie as designed.
     twin : str
         Name of the method that differs in compensation only; "" if there is none.
     compensated : bool or None
@@ -83,7 +85,7 @@ def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
         pair = _COLOURS.get(family) or _OTHERS[other_classes.index(family) % len(_OTHERS)]
         twins = [m.name for m in methods if m is not method and _is_twin(method, m, compensated)]
         baseline = ""
-        if family == "DesignAngles":
+        if family in _NO_IMU:
             baseline = "no IMU"
         elif flag is False:
             baseline = "uncompensated" if twins else "general purpose"
@@ -91,7 +93,7 @@ def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
             name=method.name,
             label=readable(method.name),
             baseline=baseline,
-            uses_imu=family != "DesignAngles",
+            uses_imu=family not in _NO_IMU,
             twin=twins[0] if twins else "",
             compensated=flag,
             colour=pair[1] if flag is False else pair[0],

@@ -6,7 +6,7 @@ from the scores (`simrail.report.findings`); how it looks is in ``page.html.j2``
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,11 @@ from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.campaign.section import campaign_view
 from simrail.report.campaign.tables import write_tables
 from simrail.report.findings import Finding, findings
+from simrail.report.geometry_tables import geometry_table, overview_table
+from simrail.report.geometry_view import GeometryView, geometry_view
 from simrail.report.methods import MethodStyle, method_styles
-from simrail.report.paper_000.section import paper_view
+from simrail.report.paper_000.section import paper_view as beside_briales
+from simrail.report.paper_001.section import paper_view as beside_gonzalez
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.provenance import facts, parts
 from simrail.report.ride_figures import direction_of, imu_figure, odometry_figure, speed_figure
@@ -30,9 +33,9 @@ from simrail.report.score_figures import curves_figure, rms_figure
 from simrail.report.tables import Table, consistency_table, error_table, odometry_table
 from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
+from simrail.scenario.build import goals_mm, limits_of
 from simrail.scenario.cells import methods
-from simrail.scenario.parts import RailConditionPart
-from simrail.scenario.scenario import Scenario
+from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.score_table import LEFT_OPEN, NO_SAMPLES, OK
 
 MOST_RIDES = 6
@@ -43,6 +46,10 @@ TABLES = "tables"
 
 MOST_TABLES = 24
 """Cases whose table is on the page; ``scores.csv`` holds all."""
+
+
+_PAPERS: dict[str, Callable[..., Any]] = {"briales_2021": beside_briales, "gonzalez_2023": beside_gonzalez}
+"""Sections that set a scenario beside a publication."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,7 @@ class RideView:
     odometry: Markup
     rms: Markup
     curves: Markup
+    geometry: GeometryView | None
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,7 @@ class CaseView:
     truth: Table
     design: Table
     consistency: Table
+    geometry: Table | None
 
 
 def write_report(
@@ -104,14 +113,12 @@ def write_report(
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
     paper = None
-    if scenario.spec.paper == "briales_2021":
-        paper = paper_view(all_cases, methods(scenario), styles, examples)
+    if scenario.spec.paper is not None:
+        paper = _PAPERS[scenario.spec.paper](all_cases, methods(scenario), styles, examples)
     campaign = campaign_view(scenario, scores, cells, styles, examples, manifest)
     if campaign is not None:
         write_tables(path.parent / TABLES, campaign.tables)
-    rides = [
-        _ride(example, all_cases, styles, scenario.spec.rail_condition) for example in examples[:MOST_RIDES]
-    ]
+    rides = [_ride(example, all_cases, styles, scenario.spec) for example in examples[:MOST_RIDES]]
     environment = Environment(
         loader=PackageLoader("simrail.report", "."),
         autoescape=select_autoescape(default=True),
@@ -131,6 +138,7 @@ def write_report(
         rides=rides,
         rides_left_out=max(len(examples) - MOST_RIDES, 0),
         cases=[_case(case, styles) for case in all_cases[:MOST_TABLES]],
+        rails=overview_table(all_cases, styles),
         cases_left_out=max(len(all_cases) - MOST_TABLES, 0),
         odometry=odometry_table(all_cases[:MOST_TABLES]),
         failures=_failures(scores),
@@ -144,7 +152,7 @@ def _ride(
     example: CellResult,
     all_cases: list[Figures],
     styles: list[MethodStyle],
-    conditions: Sequence[RailConditionPart],
+    spec: ScenarioFile,
 ) -> RideView:
     name = example.recording.name
     drawn = [style for style in styles if style.name in example.estimates]
@@ -167,7 +175,7 @@ def _ride(
         facts=_ride_facts(example),
         tiles=tiles(case, styles) if case else [],
         findings=said,
-        speed=Markup(speed_figure(example, conditions=conditions)),
+        speed=Markup(speed_figure(example, conditions=spec.rail_condition)),
         imu=Markup(imu_figure(example)),
         attitude=Markup(attitude_figure(example, first or drawn, what=f"Attitude, {name}"))
         if drawn
@@ -177,6 +185,7 @@ def _ride(
         odometry=Markup(odometry_figure(example)),
         rms=Markup(rms_figure(case, styles)) if case else nothing,
         curves=Markup(curves_figure(case, styles)) if case else nothing,
+        geometry=geometry_view(example, case, styles, all_cases, limits_of(spec), goals_mm(spec)),
     )
 
 
@@ -257,6 +266,7 @@ def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
         error_table(case, styles, reference="truth"),
         error_table(case, styles, reference="design"),
         consistency_table(case, styles),
+        geometry_table(case, styles),
     )
 
 

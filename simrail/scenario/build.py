@@ -23,7 +23,7 @@ from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import Distribution
 from simrail.scenario.files import Part, blame, load
 from simrail.scenario.imu_file import ImuFile
-from simrail.scenario.scenario import Scenario
+from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.track_file import TrackFile
 from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec
@@ -36,6 +36,7 @@ from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid import LaidTrack
 from simrail.track.rail_condition import FRICTION, RailCondition
+from simrail.track_quality import Limits
 from simrail.truth import Mount
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.profile_files import profiles_digest
@@ -237,6 +238,23 @@ def bands_of(cell: Cell) -> tuple[Band, ...]:
     part = cell.spec.geometry
     own = (Band(name, *wavelengths) for name, wavelengths in part.own_bands.items())
     return (*(BANDS[name] for name in part.bands), *own)
+
+
+def limits_of(spec: ScenarioFile) -> dict[str, Limits]:
+    """Limits of rail geometry, m."""
+    return {
+        name: Limits(
+            sd_m=None if part.sd_mm is None else 1e-3 * part.sd_mm,
+            defect_m=None if part.defect_mm is None else 1e-3 * part.defect_mm,
+        )
+        for name, part in spec.geometry.limits.items()
+    }
+
+
+def goals_mm(spec: ScenarioFile) -> dict[str, float]:
+    """What the errors of rail geometry in D1 are asked to be at most, sd."""
+    limits = spec.geometry.limits.items()
+    return {name: part.error_sd_mm for name, part in limits if part.error_sd_mm is not None}
 
 
 def earth_of(cell: Cell) -> EarthRate | None:

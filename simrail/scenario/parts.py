@@ -206,15 +206,30 @@ class ScorePart(Part):
     metrics: tuple[str, ...] | None = None
 
 
+class GeometryLimitsPart(Part):
+    """``[geometry.limits.<quantity>]``: limits that the report holds sections of 200 m against, mm.
+
+    ``error_sd_mm`` is asked of the estimate, not of the rails: standard deviation of its error in D1.
+    """
+
+    sd_mm: Positive | None = None
+    defect_mm: Positive | None = None
+    error_sd_mm: Positive | None = None
+
+
 class GeometryPart(Part):
     """``[geometry]``: in which wavelength bands, and over which base of twist, rail geometry is scored.
 
     ``bands`` are those of `simrail.bands` by name; ``own_bands`` are others, name = [shortest, longest], m.
+    ``limits`` change no score: what lies beyond them is marked in the report.
     """
 
     bands: tuple[Literal["D0", "D1", "D2", "D3"], ...] = ("D0", "D1", "D2", "D3")
     own_bands: dict[Name, tuple[Positive, Positive]] = Field(default_factory=dict)
     twist_base_m: Annotated[float, Field(gt=0.0, le=50.0)] = 3.0
+    limits: dict[Literal["alignment", "vertical_profile", "cross_level"], GeometryLimitsPart] = Field(
+        default_factory=dict
+    )
 
     @field_validator("own_bands")
     @classmethod

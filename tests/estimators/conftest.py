@@ -15,7 +15,7 @@ from simrail.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.measure import measure
 from simrail.profile import SpeedProfile
 from simrail.recording import ImuSheet, Recording
-from simrail.ride import Ride, simulate
+from simrail.ride import Ride, rails_of, simulate
 from simrail.scenario.files import load
 from simrail.scenario.imu_file import load_grade
 from simrail.scenario.track_file import track_by_name
@@ -181,21 +181,24 @@ def record_bogie(speed_kmh: float, direction: int, draw: int) -> Recording:
 METRO_AT = {"axle": AXLE_AT, "frame": Mount("frame", "frame", (0.0, 0.0, 0.6))}
 
 
-@lru_cache
-def metro_truth(speed_kmh: float, direction: int) -> Truth:
+def metro_ride(speed_kmh: float, direction: int) -> Ride:
     """The bogie's ride by the compiled engine."""
     start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
-    return simulate(
-        Ride(
-            name="trajectory",
-            track=track_by_name("condequinto_olivar"),
-            irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 40.0),
-            track_seed=1,
-            vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
-            profile=SpeedProfile(start, end, speed_kmh / 3.6),
-            engine="compiled",
-        )
+    return Ride(
+        name="trajectory",
+        track=track_by_name("condequinto_olivar"),
+        irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 40.0),
+        track_seed=1,
+        vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
+        profile=SpeedProfile(start, end, speed_kmh / 3.6),
+        engine="compiled",
     )
+
+
+@lru_cache
+def metro_truth(speed_kmh: float, direction: int) -> Truth:
+    """The truth of that ride."""
+    return simulate(metro_ride(speed_kmh, direction))
 
 
 @lru_cache(maxsize=4)
@@ -217,6 +220,12 @@ def record_metro(speed_kmh: float, direction: int, mount: str, draw: int) -> Rec
 @pytest.fixture
 def metro_recording() -> Callable[..., Recording]:
     return record_metro
+
+
+@pytest.fixture
+def metro_rails() -> Callable[..., LaidTrack]:
+    """The rails of that ride."""
+    return lambda speed_kmh, direction: rails_of(metro_ride(speed_kmh, direction))
 
 
 @pytest.fixture

@@ -86,9 +86,7 @@ def seeing(recording: Recording, spec: RailSensorSpec, *, draw: int = 0) -> Reco
     seen = sample_rails(
         recording.imu, recording.imu.index, spec, LAID, seed=1, draw=draw, name=recording.mount
     )
-    return replace(
-        recording, rail_displacement=seen, rail_sensor_sheet=RailSensorSheet(spec.noise_m, spec.rail_base_m)
-    )
+    return replace(recording, rail_displacement=seen, rail_sensor_sheet=RailSensorSheet(spec.noise_m))
 
 
 def error_mm(geometry: pd.DataFrame, band: str | None = None) -> pd.DataFrame:
@@ -127,8 +125,12 @@ def test_a_wrong_roll_height_base_or_place_is_seen(fault):
         recording = replace(recording, mount_position_m=(x, y, 0.0))
     elif fault == "across":
         recording = replace(recording, mount_position_m=(x, -y, z))
-    base = 1.435 if fault == "base" else None
-    error = error_mm(track_geometry(estimate, recording, rail_base_m=base))
+    elif fault == "base":
+        # The cant with it, so that the design still lies as it did.
+        curve = replace(LINE.elements[2], cant_m=0.08 * 1.435 / 1.5)
+        elements = (*LINE.elements[:2], curve, *LINE.elements[3:])
+        recording = replace(recording, track=replace(LINE, elements=elements, rail_base_m=1.435))
+    error = error_mm(track_geometry(estimate, recording))
     assert error[list(IRREGULARITY[:3])].std().max() > 0.06
 
 
@@ -216,6 +218,30 @@ def test_errors_of_the_states_are_as_large_as_the_standard_deviations_say():
     np.testing.assert_allclose(np.std(errors, axis=0), expected, rtol=4.0 / np.sqrt(600.0))
 
 
+@pytest.mark.parametrize("sd_m", [0.1, 1.0])
+def test_an_error_of_the_position_is_as_large_as_the_standard_deviations_say(sd_m):
+    """Also where it is no longer small against the waves: over 1 m those of 3 m turn by half."""
+    recording, estimate = ride("forward")
+    still = dict.fromkeys(("roll_sd_rad", "lateral_sd_m", "vertical_sd_m"), 0.0)
+    estimate = replace(estimate, states=estimate.states.assign(**still))
+    known = recording.odometry.assign(position_sd_m=sd_m)
+    told = track_geometry(estimate, replace(recording, odometry=known))
+    assert (track_geometry(estimate, recording)[list(IRREGULARITY_SD[:3])] == 0.0).all(axis=None)
+    # Inside of the straight at the end, where the design does not change with the position.
+    places = np.arange(240.0, 320.25, 0.25)
+    rails = LAID.irregularities(places)
+    rng = np.random.default_rng(8)
+    squares = 0.0
+    for off in rng.standard_normal(200) * sd_m:
+        squares = squares + np.square(LAID.irregularities(places + off).to_numpy() - rails.to_numpy())
+    found = np.sqrt(squares[:, :3] / 200)
+    said = told.loc[places, list(IRREGULARITY_SD[:3])].to_numpy()
+    # Over all places: four standard errors of the sd of 200, and what five points make of a large sd.
+    ratio = np.sqrt(np.mean(said**2, axis=0) / np.mean(found**2, axis=0))
+    np.testing.assert_allclose(ratio, 1.0, rtol=4.0 / np.sqrt(400.0))
+    assert np.corrcoef(said[:, 2], found[:, 2])[0, 1] > 0.9
+
+
 def test_samples_of_one_place_are_averaged_whenever_they_came():
     rng = np.random.default_rng(1)
     there = np.linspace(0.0, 30.0, 6000)
@@ -264,9 +290,28 @@ def test_bad_input_is_named():
         track_geometry(lacking, recording)
     with pytest.raises(InputError, match="step_m"):
         track_geometry(estimate, recording, step_m=0.0)
-    with pytest.raises(InputError, match="rail_base_m"):
-        track_geometry(estimate, recording, rail_base_m=0.0)
     with pytest.raises(InputError, match="not finite"):
         track_geometry(replace(estimate, states=estimate.states.assign(roll_rad=np.nan)), recording)
     with pytest.raises(InputError, match="not at the recording's times"):
         track_geometry(replace(estimate, states=estimate.states.iloc[:10]), recording)
+
+
+def test_on_a_narrow_track_cross_level_is_a_height_over_its_own_base():
+    """A body rolls ten times as much over rails a tenth as far apart."""
+    narrow = replace(LINE, name="narrow", elements=(Straight(350.0),), gradients=(), rail_base_m=0.15)
+    laid = lay(narrow, Irregularity("erri_b176_low", (1.5, 100.0), 20.0, 0.1), seed=5)
+    truth = kinematic_truth(
+        narrow, STOPS["forward"], channels=rail_following(laid, height_m=0.05), height_m=0.05
+    )
+    mount = Mount("axle", "body", (0.0, 0.0, 0.05))
+    motion = truth.motion(mount).iloc[::4]
+    odometry = motion[list(ODOMETRY)].copy()
+    odometry[list(ODOMETRY_SD)] = 0.0
+    recording = replace(
+        ride("forward")[0], imu=motion, track=narrow, odometry=odometry, mount_position_m=mount.position_m
+    )
+    estimate = Estimate(motion[[*ATTITUDE, *RELATIVE_POSITION]], mount.name)
+    found = track_geometry(estimate, recording)
+    error = 1e3 * (found - laid.irregularities(found.index.to_numpy()))
+    assert 1e3 * found["cross_level_m"].std() > 0.1
+    assert np.abs(error[list(IRREGULARITY[:3])]).max(axis=None) < 0.01

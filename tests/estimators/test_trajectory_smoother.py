@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,16 +13,20 @@ import pandas as pd
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from estimators.baselines import ZeroTrack
 from estimators.kernels.trajectory_equations import TERMS
+from estimators.track_geometry import track_geometry
 from estimators.trajectory_model import Found, Model, kinds_of, packed_process
 from estimators.trajectory_noise import Hyperparameters
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend, log_likelihood
 from estimators.tuning_file import Tuning
-from simrail.columns import ATTITUDE, ATTITUDE_SD, RELATIVE_POSITION, RELATIVE_POSITION_SD
+from simrail.bands import BANDS, band_pass
+from simrail.columns import ATTITUDE, ATTITUDE_SD, IRREGULARITY, RELATIVE_POSITION, RELATIVE_POSITION_SD
 from simrail.errors import InputError
 from simrail.recording import Recording
 from simrail.report.estimate_figures import innovation_figure
 from simrail.scenario.build_estimator import construct
+from simrail.score_geometry import score_geometry
 from simrail.seeds import stream
 from simrail.testing import standing, time_reversed
 from simrail.truth import Mount
@@ -213,7 +218,10 @@ def test_time_and_memory_grow_with_the_ride(line_recording: Callable) -> None:
 
 def test_states_and_covariance_are_those_of_the_trace(line_recording: Callable) -> None:
     recording = WHERE["curve"](line_recording)
-    for smoother in (TrajectorySmoother(), TrajectorySmoother(smoothed=False)):
+    for smoother in (
+        TrajectorySmoother(sensor_bias=False),
+        TrajectorySmoother(sensor_bias=False, smoothed=False),
+    ):
         estimate, found = smoother.estimate(recording), smoother.trace(recording)
         assert estimate.covariance is not None
         assert estimate.covariance_of == tuple(NAMES)
@@ -224,12 +232,73 @@ def test_states_and_covariance_are_those_of_the_trace(line_recording: Callable) 
         assert smoother.causal is not smoother.smoothed
 
 
+def test_an_offset_of_the_accelerometer_is_taken_for_tilt_and_told(line_recording: Callable) -> None:
+    """Offsets uniform within the bound of the data sheet go to roll and pitch as a whole, not to y and z."""
+    recording = part(line_recording(70.0, 1, 0), 6000, 6000)
+    bound = recording.imu_sheet.accel_turn_on_bias_mps2
+    smoother = TrajectorySmoother(sensor_bias=False, geometry_step_m=0.0)
+    before = smoother.estimate(recording).states
+    told = replace(smoother, sensor_bias=True).estimate(recording).states
+    added = np.square(told[["roll_sd_rad", "pitch_sd_rad"]]) - np.square(
+        before[["roll_sd_rad", "pitch_sd_rad"]]
+    )
+    np.testing.assert_allclose(added, (bound / 9.81) ** 2 / 3.0, rtol=1e-9)
+    same = ["yaw_sd_rad", *RELATIVE_POSITION_SD]
+    assert np.array_equal(told[same], before[same])
+    # The smoother is linear enough: one offset on each axis says what all of them do.
+    imu = recording.imu.copy()
+    imu[["accel_x_mps2", "accel_y_mps2"]] += bound / math.sqrt(3.0)
+    moved = smoother.estimate(replace(recording, imu=imu)).states - before
+    middle = moved.iloc[2500:-2500]
+    tilt = bound / math.sqrt(3.0) / 9.81
+    np.testing.assert_allclose(np.abs(middle[["roll_rad", "pitch_rad"]]), tilt, rtol=0.1)
+    assert np.abs(middle[list(RELATIVE_POSITION)]).mean().max() < 1e-3
+
+
+def test_the_rails_follow_from_the_trajectory(line_recording: Callable) -> None:
+    """Its geometry is that of its own states, at the step asked for; with sds, gauge left open; or none."""
+    recording = WHERE["curve"](line_recording)
+    for smoother in (TrajectorySmoother(), TrajectorySmoother(smoothed=False, geometry_step_m=0.5)):
+        estimate = smoother.estimate(recording)
+        by_hand = track_geometry(estimate, recording, step_m=smoother.geometry_step_m)
+        assert estimate.geometry is not None
+        pd.testing.assert_frame_equal(estimate.geometry, by_hand, check_exact=True)
+        assert np.diff(by_hand.index).mean() == pytest.approx(smoother.geometry_step_m)
+        assert by_hand["gauge_m"].isna().all()
+        assert (by_hand[["alignment_sd_m", "vertical_profile_sd_m", "cross_level_sd_m"]] > 0.0).all(axis=None)
+    means = TrajectorySmoother(with_covariance=False).estimate(recording).geometry
+    assert means is not None and list(means) == list(IRREGULARITY)
+    assert TrajectorySmoother(geometry_step_m=0.0).estimate(recording).geometry is None
+
+
+def test_its_geometry_beats_that_of_no_sensor(metro_recording: Callable, metro_rails: Callable) -> None:
+    """In D1, at 70 km/h from the axle. That of no sensor errs by the true rails, to the digit."""
+    recording, rails = metro_recording(70.0, 1, "axle", 0), metro_rails(70.0, 1)
+    zero = ZeroTrack().estimate(recording)
+    assert zero.geometry is not None
+    place = zero.geometry.index.to_numpy()
+    ours, none = (
+        score_geometry(estimate, rails, recording, windows=["whole"], metrics=["sd"]).set_index(
+            ["quantity", "band"]
+        )["value"]
+        for estimate in (TrajectorySmoother().estimate(recording), zero)
+    )
+    for name in IRREGULARITY[:3]:
+        quantity = name.removesuffix("_m")
+        true = 1e3 * rails.irregularities(place)[name].to_numpy()
+        passed = band_pass(true, BANDS["D1"].edges_m(quantity), step_m=0.25)
+        assert none[quantity, "full"] == pytest.approx(true.std(), rel=1e-9)
+        assert none[quantity, "D1"] == pytest.approx(np.nanstd(passed), rel=1e-9)
+        assert ours[quantity, "D1"] < none[quantity, "D1"]
+
+
 @pytest.mark.parametrize(
     ("options", "field"),
     [
         ({"backend": "matlab"}, "backend"),
         ({"start_sd_rad": 0.0}, "start_sd_rad"),
         ({"start_yaw_sd_rad": float("nan")}, "start_yaw_sd_rad"),
+        ({"geometry_step_m": -0.25}, "geometry_step_m"),
         ({"tuning": "tuned.toml"}, "tuning"),
         ({"curve_hyperparameters": 3.0}, "curve_hyperparameters"),
         ({"tuning": Tuning(), "hyperparameters": OTHER}, "tuning"),

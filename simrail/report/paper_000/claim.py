@@ -1,11 +1,9 @@
-"""A claim of the paper and its verdict, and the limits that verdicts follow from.
+"""The limits that verdicts on the paper's claims (`simrail.report.claim`) follow from.
 
-A verdict is computed, never written down beforehand, and its limit stands in the sentence.
+Each stands in the sentence of its verdict.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 from simrail.report.paper_000.rides import Rides
 
@@ -29,41 +27,6 @@ REPEATS_FACTOR = 1.2
 
 SIZE_FACTOR = 2.0
 """Figures agree in size if they lie within this factor."""
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One claim of the paper and what became of it.
-
-    Attributes
-    ----------
-    key : str
-        Short name, for tests.
-    said : str
-        What the paper says, and where.
-    holds : bool or None
-        Whether it reproduces; None if the methods that it speaks of were not run.
-    found : str
-        Our figures and the limit that the verdict follows from.
-    cause : str
-        Why it does not reproduce, or what else the figures show; may be empty.
-    """
-
-    key: str
-    said: str
-    holds: bool | None
-    found: str
-    cause: str = ""
-
-    @property
-    def verdict(self) -> str:
-        """The verdict in words."""
-        return {True: "Reproduces.", False: "Does not reproduce.", None: "Not asked."}[self.holds]
-
-    @property
-    def tone(self) -> str:
-        """How the page marks it."""
-        return {True: "good", False: "bad", None: "note"}[self.holds]
 
 
 def cropped(rides: Rides, part: str, quantity: str) -> float:

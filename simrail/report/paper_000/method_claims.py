@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from simrail.report.claim import Claim
 from simrail.report.findings import degrees
 from simrail.report.paper_000.claim import (
     FAILS_DEG,
@@ -15,7 +16,6 @@ from simrail.report.paper_000.claim import (
     SAME_YAW,
     SAME_YAW_DEG,
     SIZE_FACTOR,
-    Claim,
     cropped,
     near,
 )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from simrail.report.claim import Claim
 from simrail.report.findings import degrees, significant
 from simrail.report.paper_000.claim import (
     FAILS_BACKWARD_FACTOR,
     REPEATS_FACTOR,
     SAME_DIRECTION_DEG,
     SIZE_FACTOR,
-    Claim,
     cropped,
 )
 from simrail.report.paper_000.printed import QUANTITIES, TABLE_3

@@ -13,9 +13,9 @@ from markupsafe import Markup
 
 from simrail.example import CellResult
 from simrail.report.attitude_figures import attitude_figure
+from simrail.report.claim import Claim
 from simrail.report.findings import degrees
 from simrail.report.methods import MethodStyle
-from simrail.report.paper_000.claim import Claim
 from simrail.report.paper_000.figures import (
     compensation_figure,
     repeatability_figure,
@@ -48,6 +48,8 @@ class PaperView:
     terms: Table
     terms_text: str
     figures: list[tuple[str, Markup]]
+    heading: str = "Briales et al. 2021"
+    template: str = "paper_000/section.html.j2"
 
 
 def paper_view(

@@ -1,0 +1,181 @@
+"""Figures of rail geometry: true and estimated rails over distance with their 95 % band, and error by "
+"band."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from simrail.bands import Band, band_pass, why_not
+from simrail.example import CellResult
+from simrail.jit import FloatArray
+from simrail.report.geometry_tables import JUDGED, QUANTITIES, bands_of_case, is_zero, mappers
+from simrail.report.methods import MethodStyle
+from simrail.report.pivot import Figures
+from simrail.report.ride_figures import direction_of
+from simrail.report.style import (
+    INK,
+    TRUTH,
+    WIDTH_IN,
+    distance_axis,
+    legend_above,
+    log_ticks,
+    look,
+    pad_limits,
+    panels,
+    shade_track,
+    to_svg,
+)
+
+
+def stretch_of(example: CellResult, *, length_m: float) -> tuple[float, float]:
+    """A stretch about the middle of the ride."""
+    position = example.motion["position_m"]
+    middle = 0.5 * float(position.min() + position.max())
+    return middle - 0.5 * length_m, middle + 0.5 * length_m
+
+
+def lines_of(example: CellResult, name: str, quantity: str, band: Band | None) -> tuple[FloatArray, ...]:
+    """Places, true rails, estimated rails and their sd (NaN if unknown), mm; in a band or unfiltered.
+
+    The sd is always that of the unfiltered rails, as the paper has it.
+    """
+    geometry = example.estimates[name].geometry
+    assert geometry is not None and example.rails is not None
+    place = geometry.index.to_numpy(dtype=np.float64)
+    column = f"{quantity}_m"
+    true = 1e3 * example.rails.irregularities(place)[column].to_numpy()
+    found = 1e3 * geometry[column].to_numpy(dtype=np.float64)
+    sd_name = f"{quantity}_sd_m"
+    sd = 1e3 * geometry[sd_name].to_numpy() if sd_name in geometry else np.full(len(place), np.nan)
+    if band is not None:
+        edges = band.edges_m(quantity)
+        step = float(place[1] - place[0]) if len(place) > 1 else 0.0
+        if why_not(edges, count=len(place), step_m=step):
+            nothing = np.full(len(place), np.nan)
+            return place, nothing, nothing, nothing
+        true, found = (band_pass(line, edges, step_m=step) for line in (true, found))
+    return place, true, found, sd
+
+
+def rails_figure(
+    example: CellResult,
+    styles: Sequence[MethodStyle],
+    *,
+    band: Band | None,
+    limits: tuple[float, float],
+    with_interval: bool,
+    what: str,
+) -> str:
+    """Vertical profile, cross-level and alignment over a stretch: truth, and some methods.
+
+    Parameters
+    ----------
+    example : CellResult
+        The ride, with its rails.
+    styles : sequence of MethodStyle
+        Methods to draw, the first on top and the one whose 95 % interval is drawn.
+    band : Band, optional
+        Wavelengths to show.
+    limits : tuple of float
+        First and last place, m.
+    with_interval : bool
+        Whether to draw the interval.
+    what : str
+        Description for those who cannot see it.
+    """
+    with look():
+        figure, axes = panels([1.55] * len(JUDGED))
+        for axis, quantity in zip(axes, JUDGED, strict=True):
+            reach = [0.0]
+            for order, style in enumerate(styles):
+                place, true, found, sd = lines_of(example, style.name, quantity, band)
+                at = (place >= limits[0]) & (place <= limits[1]) & np.isfinite(found)
+                if order == 0:
+                    axis.plot(place[at], true[at], color=TRUTH, lw=2.6, label="truth", zorder=2)
+                    reach += [*true[at]]
+                    if with_interval and np.isfinite(sd).any():
+                        low, high = found[at] - 1.96 * sd[at], found[at] + 1.96 * sd[at]
+                        tint: dict[str, Any] = {"color": style.colour, "alpha": 0.16, "lw": 0}
+                        axis.fill_between(place[at], low, high, label="its 95 % interval", zorder=1, **tint)
+                        reach += [*low, *high]
+                axis.plot(
+                    place[at],
+                    found[at],
+                    color=style.colour,
+                    ls=style.stroke,
+                    lw=1.1,
+                    label=style.label,
+                    zorder=9 - 0.1 * order,
+                )
+                reach += [*found[at]]
+            pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
+            axis.set_ylabel(f"{QUANTITIES[quantity]},\nmm")
+        legend_above(axes[0])
+        shade_track(axes, example.recording.track, limits=limits)
+        distance_axis(axes[-1], direction=direction_of(example))
+        return to_svg(figure, description=what)
+
+
+def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
+    """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without "
+    "any."""
+    bands = bands_of_case(case)
+    shown = mappers(case, styles)
+    if not bands or not shown:
+        return ""
+    with look():
+        height, gap, left, top, bottom = 3.0, 0.42, 0.62, 0.62, 0.42
+        figure = Figure(figsize=(WIDTH_IN, height))
+        wide = (WIDTH_IN - left - 0.15 - 2 * gap) / 3
+        step = 0.7 / max(len(shown), 1)
+        for i, quantity in enumerate(JUDGED):
+            box = (
+                (left + i * (wide + gap)) / WIDTH_IN,
+                bottom / height,
+                wide / WIDTH_IN,
+                1.0 - (top + bottom) / height,
+            )
+            axis = figure.add_axes(box)
+            for order, style in enumerate(shown):
+                found = [case.get(style.name, quantity, "sd", band=band) for band in bands]
+                value, sd = np.array([f.value for f in found]), np.nan_to_num([f.sd for f in found])
+                x = np.arange(len(bands)) + (order + 0.5) * step - 0.35
+                hollow = is_zero(style)
+                axis.errorbar(
+                    x,
+                    value,
+                    [np.minimum(sd, 0.7 * value), sd],
+                    fmt="D" if hollow else "osv^"[order % 4],
+                    ms=5.0,
+                    color=style.colour,
+                    mfc="white" if hollow else style.colour,
+                    mew=1.2,
+                    lw=1.0,
+                    label=style.label,
+                )
+            for at in range(1, len(bands)):
+                axis.axvline(at - 0.5, color="#d0d5dd", lw=0.7)
+            axis.set_yscale("log")
+            log_ticks(axis.yaxis)
+            axis.grid(axis="x", visible=False)
+            axis.grid(axis="y", which="minor", color="#f2f4f7", lw=0.5)
+            axis.set_xlim(-0.5, len(bands) - 0.5)
+            axis.set_xticks(range(len(bands)), ["all" if band == "full" else band for band in bands])
+            axis.tick_params(axis="x", length=0)
+            axis.set_title(QUANTITIES[quantity], color=INK)
+            if i == 0:
+                axis.set_ylabel("sd of the error, mm")
+                handles, labels = axis.get_legend_handles_labels()
+        figure.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(left / WIDTH_IN - 0.01, 1.0),
+            ncols=6,
+            borderaxespad=0.1,
+        )
+        return to_svg(figure, description="Standard deviation of the error of the rail geometry by band")

@@ -1,0 +1,202 @@
+"""The section itself: tables, claims, notes and figures, gathered for the template.
+
+Everything of ours is looked up in the scores, or computed from the first draw of the ride that is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from simrail.bands import Band
+from simrail.example import CellResult
+from simrail.report.claim import Claim
+from simrail.report.geometry_figures import lines_of, rails_figure, stretch_of
+from simrail.report.geometry_tables import QUANTITIES
+from simrail.report.geometry_view import with_rails
+from simrail.report.methods import MethodStyle
+from simrail.report.paper_001.claims import claims, errata_note
+from simrail.report.paper_001.parts import PARTS, Rows, rows_of
+from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
+from simrail.report.pivot import Figures, of_cell
+from simrail.report.tables import Cell, Row, Table
+from simrail.scenario.cells import Method
+
+SCALED = Band("paper", 0.3, 7.0)
+FULL_SIZE = Band("paper", 3.0, 70.0)
+"""The paper's filter on its 1:10 track, and what it is at full size; scenarios call the band ``paper``."""
+
+MODEL_M = 200.0
+"""Length below which a track is taken for the 1:10 one."""
+
+START_M = 20.0
+"""First metres of a ride."""
+
+DRAWN_M = 300.0
+"""Stretch that is drawn at full size; of the model's, all."""
+
+
+@dataclass(frozen=True)
+class PaperView:
+    """The section as the template needs it."""
+
+    where: str
+    size: str
+    table: Table
+    coverage: Table
+    claims: list[Claim]
+    notes: list[str]
+    figures: list[tuple[str, Markup]]
+    heading: str = "Gonzalez-Carbajal et al. 2023"
+    template: str = "paper_001/section.html.j2"
+
+
+def paper_view(
+    all_cases: Sequence[Figures],
+    methods: Sequence[Method],
+    styles: Sequence[MethodStyle],
+    examples: Sequence[CellResult],
+) -> PaperView | None:
+    """Make the section; None if no case has rail geometry.
+
+    Parameters
+    ----------
+    all_cases : sequence of Figures
+        The scores.
+    methods, styles : sequence
+        The scenario's methods and how they look.
+    examples : sequence of CellResult
+        First draw of each ride.
+    """
+    rows = rows_of(all_cases, methods, band=SCALED.name)
+    if rows is None:
+        return None
+    example = next((e for e in examples if of_cell(list(all_cases), e.cell) is rows.case), None)
+    example = example or next((e for e in examples if e.rails is not None), None)
+    looks = {part: style for part, name in rows.names.items() for style in styles if style.name == name}
+    band = _band_of(example)
+    main = looks.get(rows.main)
+    drawn = main if example and main and with_rails(example, [main]) else None
+    covered: dict[str, list[float]] = {
+        part: coverage_of(example, looks[part], band)
+        for part in ("cml", "kom", "hand", "printed")
+        if example and part in looks and with_rails(example, [looks[part]])
+    }
+    labels = rows.case.labels
+    return PaperView(
+        where=f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), "
+        f"odometry {labels['odometry']}",
+        size="a 1:10 track" if band is SCALED else "full size",
+        table=_table(rows, looks),
+        coverage=_coverage_table(covered, looks),
+        claims=claims(
+            rows,
+            coverage=covered.get(rows.main, []),
+            peak=_peak(example, drawn) if example and drawn else (np.nan, np.nan),
+        ),
+        notes=[note for note in (errata_note(rows), *_not_run(rows)) if note],
+        figures=_figures(rows, looks, example, band) if example else [],
+    )
+
+
+def _band_of(example: CellResult | None) -> Band:
+    if example is None:
+        return FULL_SIZE
+    length = example.recording.track.length_m
+    return SCALED if length < MODEL_M else FULL_SIZE
+
+
+def _table(rows: Rows, looks: dict[str, MethodStyle]) -> Table:
+    """Tables 1 and 2: what is printed, and ours below it."""
+    result = []
+    for part, label in PARTS.items():
+        style = looks.get("cml" if part == "cml_noise" else part)
+        colour = style.colour if style else ""
+        if part in TABLES:
+            cells = [
+                Cell(f"{value:.3f}".replace("-", "\u2212")) for printed in TABLES[part] for value in printed
+            ]
+            result.append(Row(f"{label}: printed", "", "", cells))
+        cells = [
+            _number(rows, part, quantity, metric, filtered=filtered)
+            for quantity, filtered in COLUMNS
+            for metric in ("mean", "sd", "max")
+        ]
+        if rows.has(part):
+            result.append(Row(f"{label}: ours" if part in TABLES else label, "", colour, cells))
+    groups = [
+        (f"{QUANTITIES[quantity]}, {'filtered' if filtered else 'unfiltered'}", 3)
+        for quantity, filtered in COLUMNS
+    ]
+    return Table(groups, ["\u03bc", "\u03c3", "max"] * len(COLUMNS), result)
+
+
+def _number(rows: Rows, part: str, quantity: str, metric: str, *, filtered: bool) -> Cell:
+    found = rows.get(part, quantity, metric, filtered=filtered)
+    if not found.draws or not np.isfinite(found.value):
+        return Cell("\u2013", mark="none")
+    return Cell(f"{found.value:.3f}".replace("-", "\u2212"))
+
+
+def coverage_of(example: CellResult, style: MethodStyle, band: Band) -> list[float]:
+    """Share of the track inside a method's 95 % interval, %, in the order of `COLUMNS`; [] without sds.
+
+    As in the paper, the interval about filtered rails is that of the unfiltered ones.
+    """
+    shares = []
+    for quantity, filtered in COLUMNS:
+        _, true, found, sd = lines_of(example, style.name, quantity, band if filtered else None)
+        known = np.isfinite(found) & np.isfinite(sd)
+        if not known.any():
+            return []
+        shares.append(100.0 * float(np.mean(np.abs(found - true)[known] <= 1.96 * sd[known])))
+    return shares
+
+
+def _coverage_table(covered: dict[str, list[float]], looks: dict[str, MethodStyle]) -> Table:
+    rows = [Row("CML: printed", "", "", [Cell(f"{value:g}") for value in COVERAGE])]
+    for part, values in covered.items():
+        if values:
+            cells = [Cell(f"{value:.0f}") for value in values]
+            rows.append(Row(PARTS[part], "", looks[part].colour, cells))
+    columns = [f"{QUANTITIES[q]}, {'filtered' if f else 'unfiltered'}" for q, f in COLUMNS]
+    return Table([("inside the 95 % interval, %", len(columns))], columns, rows)
+
+
+def _peak(example: CellResult, style: MethodStyle) -> tuple[float, float]:
+    """Largest unfiltered alignment error over the first metres of the ride, and sd of the rest, mm."""
+    place, true, found, _ = lines_of(example, style.name, "alignment", None)
+    error = found - true
+    away = np.abs(place - float(example.motion["position_m"].iloc[0]))
+    first = away < START_M
+    if not first.any() or first.all():
+        return float("nan"), float("nan")
+    return float(np.abs(error[first]).max()), float(error[~first].std())
+
+
+def _not_run(rows: Rows) -> list[str]:
+    missing = [PARTS[part] for part in TABLES if not rows.has(part)]
+    return [f"Not run in this scenario: {', '.join(missing)}."] if missing else []
+
+
+def _figures(
+    rows: Rows, looks: dict[str, MethodStyle], example: CellResult, band: Band
+) -> list[tuple[str, Markup]]:
+    """Our versions of Figs. A1 and A3; A2, with added noise, where it was run."""
+    there = {part: style for part, style in looks.items() if part != "zero" and with_rails(example, [style])}
+    limits = stretch_of(example, length_m=DRAWN_M if band is FULL_SIZE else 1e3)
+    ride = example.recording.name
+    figures: list[tuple[str, Markup]] = []
+    first = [there[part] for part in ("cml", "kom", "hand") if part in there]
+    if first:
+        named = " and ".join(style.label for style in first)
+        text = f"As Fig. A1: rails of ride {ride} as {named} find{'s' * (len(first) == 1)} them, filtered."
+        svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
+        figures.append((text, Markup(svg)))
+        text = f"As Fig. A3: the same, filtered, with the 95 % interval of {first[0].label}."
+        svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
+        figures.append((text, Markup(svg)))
+    return figures
