@@ -25,7 +25,6 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.rotation import rotation_matrix
-from simrail.track.elements import RAIL_BASE_M
 
 GAUGE = IRREGULARITY.index("gauge_m")
 FINE = 8
@@ -46,12 +45,11 @@ def track_geometry(
     recording: Recording,
     *,
     step_m: float = 0.25,
-    rail_base_m: float | None = None,
 ) -> pd.DataFrame:
     """Irregularities of the rails from a trajectory.
 
     With A the rotation from body to track frame, y and z the IMU's place in that frame, u_l and u_r the rails
-    seen from the IMU in body axes, and b half the distance of the nominal rails:
+    seen from the IMU in body axes, and b half the design track's rail base:
 
         r_l = (0, y, z) + A u_l,     d_l = r_l - (0, b, 0)        (r_r and d_r alike, with -b)
         alignment        = (d_l,y + d_r,y)/2        cross-level = d_l,z - d_r,z
@@ -73,8 +71,6 @@ def track_geometry(
         Distance of the places, whole multiples of it. Samples of the same eighth of a step are averaged,
         whenever they were taken: in a stop, running backwards, or passing again. Then a low-pass without
         shift takes off what the step cannot carry.
-    rail_base_m : float, optional
-        Distance 2 b of the nominal rails; that of the rail sensor, or 1.5 m.
 
     Returns
     -------
@@ -88,20 +84,18 @@ def track_geometry(
     Raises
     ------
     InputError
-        If the states lack a column or a number, or step or base are not positive.
+        If the states lack a column or a number, or the step is not positive.
     """
     states = estimate.states
     require(states, (*ATTITUDE, *RELATIVE_POSITION), what="states")
     sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
-    known_base = RAIL_BASE_M if sheet is None else sheet.rail_base_m
-    base = known_base if rail_base_m is None else rail_base_m
-    for name, value in (("step_m", step_m), ("rail_base_m", base)):
-        if not 0.0 < value < np.inf:
-            raise InputError("is out of range", field=name, value=value, limit="> 0 m")
+    if not 0.0 < step_m < np.inf:
+        raise InputError("is out of range", field="step_m", value=step_m, limit="> 0 m")
     known = states if "position_m" in states.columns else recording.odometry
     if len(known) != len(states):
         raise InputError("states are not at the recording's times", field="states", value=len(states))
     track = recording.track
+    base = track.rail_base_m
     place = np.clip(known["position_m"].to_numpy(dtype=np.float64), track.start_m, track.end_m)
     values = states[[*ATTITUDE, *RELATIVE_POSITION]].to_numpy(dtype=np.float64)
     if not (np.isfinite(place).all() and np.isfinite(values).all()):

@@ -123,6 +123,7 @@ def model_of(
     second_order: bool = True,
     printed: bool = False,
     start_sd: FloatArray,
+    around: FloatArray | None = None,
 ) -> Model:
     """Gather what the filter takes.
 
@@ -136,6 +137,8 @@ def model_of(
         See `estimators.trajectory_smoother.TrajectorySmoother`.
     start_sd : ndarray (12,)
         Standard deviations about the start that is assumed: the design's angles and rates, centred.
+    around : ndarray (n, 12), optional
+        States about which `second_order` is taken; the design's angles and rates if not given.
     """
     sheet = recording.imu_sheet
     frame = design_frame(recording)
@@ -143,7 +146,12 @@ def model_of(
     signals[:, :3] -= rest_bias(recording, enabled=use_rest_bias).bias
     speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
     if second_order and not printed:
-        signals -= beyond_first_order(frame, speed, recording.gravity_mps2)
+        angles, rates = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]), frame.rates
+        if around is None:
+            rates = speed[:, None] * rates
+        else:
+            angles, rates = around[:, [0, 2, 4]], around[:, [1, 3, 5]]
+        signals -= beyond_first_order(angles, rates, recording.gravity_mps2)
     _, lateral, height = recording.mount_position_m
     start = np.zeros(STATES)
     start[[0, 2, 4]] = frame.roll_rad[0], frame.pitch_rad[0], frame.yaw_rad[0]
@@ -181,28 +189,36 @@ def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = Fals
     )
 
 
-def beyond_first_order(frame: TrackFrame, speed: FloatArray, gravity: float) -> FloatArray:
-    """What the equations leave out, of first order in cant and slope as they are, at the design's own angles.
+def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) -> FloatArray:
+    """What the equations, of first order in roll and pitch as they are, leave out of rates and gravity.
 
-    C' g e_z and the body's rate of a body that keeps to the design, less their first order: 0.05 m/s2 along
-    Z with 0.1 rad of cant, which the filter would take for a body that rises for the length of the curve.
+    C' g e_z and the body's rate at these angles, less their first order: 0.05 m/s2 along Z at 0.1 rad of
+    roll, which the filter would take for a body that rises.
+
+    Parameters
+    ----------
+    angles, rates : ndarray (n, 3)
+        Roll, pitch and yaw, and their derivatives by time.
+    gravity : float
+        m/s2.
 
     Returns
     -------
     ndarray (n, 6)
         rad/s and m/s2.
     """
-    roll, pitch = frame.roll_rad, frame.pitch_rad
+    roll, pitch, _ = angles.T
+    _, pitch_rate, yaw_rate = rates.T
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    roll_rate, pitch_rate, yaw_rate = (speed[:, None] * frame.rates).T
-    rates = speed[:, None] * frame.k
-    first = [
-        roll_rate - pitch * yaw_rate,
-        pitch_rate + roll * yaw_rate,
-        yaw_rate - roll * pitch_rate,
+    beyond = [
+        (pitch - sp) * yaw_rate,
+        (cr - 1.0) * pitch_rate + (sr * cp - roll) * yaw_rate,
+        (roll - sr) * pitch_rate + (cr * cp - 1.0) * yaw_rate,
+        gravity * (pitch - sp),
+        gravity * (sr * cp - roll),
+        gravity * (cr * cp - 1.0),
     ]
-    forces = gravity * np.column_stack([pitch - sp, sr * cp - roll, cr * cp - 1.0])
-    return np.hstack([rates - np.column_stack(first), forces])
+    return np.column_stack(beyond)
 
 
 def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:

@@ -51,6 +51,9 @@ START_RATE_SD = 0.02
 START_PLACE_SD = (0.01, 0.02, 0.2)
 """m, m/s, m/s2: place in the track frame and its derivatives."""
 
+MOST_PASSES = 5
+"""Each pass takes the error of the angles squared: two are enough, three change nothing."""
+
 
 @dataclass(frozen=True)
 class TrajectorySmoother:
@@ -72,6 +75,10 @@ class TrajectorySmoother:
         Take what the paper's equations, of first order in cant and slope, leave out off the signals, for a
         body that keeps to the design (`estimators.trajectory_model.beyond_first_order`). False for the
         paper's.
+    passes : int
+        How often to smooth. After the first pass, what is beyond first order is taken at the angles of the
+        pass before, in place of the design's: on rails so narrow or so rough that bodies roll by 10 mrad and
+        more, g roll^2/2 would else pass for a motion along Z.
     printed : bool
         The equations as paper 001 prints them (EQUATIONS 1.3), to show what it costs.
     backend : str
@@ -84,6 +91,8 @@ class TrajectorySmoother:
     geometry_step_m : float
         Distance of the places of the rail geometry; 0 leaves the geometry out. It lies over the track and is
         made after the ride, also of the filter's states, which are causal.
+    rail_sensor : bool
+        False makes the geometry without a rail sensor, though the recording has one: to show what it gives.
     start_sd_rad, start_yaw_sd_rad : float
         Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
     """
@@ -94,11 +103,13 @@ class TrajectorySmoother:
     tuning: Tuning | None = None
     rest_bias: bool = True
     second_order: bool = True
+    passes: int = 1
     printed: bool = False
     backend: str = "compiled"
     with_covariance: bool = True
     sensor_bias: bool = True
     geometry_step_m: float = 0.25
+    rail_sensor: bool = True
     start_sd_rad: float = math.radians(1.0)
     start_yaw_sd_rad: float = math.radians(0.3)
 
@@ -122,6 +133,14 @@ class TrajectorySmoother:
         for name in ("start_sd_rad", "start_yaw_sd_rad"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
+        again = self.smoothed and self.second_order and not self.printed
+        if self.passes != 1 and not (again and self.passes in range(1, MOST_PASSES + 1)):
+            raise InputError(
+                "cannot be",
+                field="passes",
+                value=self.passes,
+                limit=f"1 to {MOST_PASSES}; 1 unless smoothed, of second order and not as printed",
+            )
         if not 0.0 <= self.geometry_step_m < math.inf:
             raise InputError(
                 "is out of range",
@@ -150,6 +169,8 @@ class TrajectorySmoother:
         estimate = self._trajectory(recording)
         if not self.geometry_step_m:
             return estimate
+        if not self.rail_sensor:
+            recording = replace(recording, rail_displacement=None, rail_sensor_sheet=None)
         return replace(estimate, geometry=track_geometry(estimate, recording, step_m=self.geometry_step_m))
 
     def _trajectory(self, recording: Recording) -> Estimate:
@@ -176,16 +197,19 @@ class TrajectorySmoother:
 
     def trace(self, recording: Recording) -> Found:
         """All twelve states with their covariances, the innovations, and the log-likelihood."""
-        return BACKENDS[self.backend](
-            self.model(recording), smoothed=self.smoothed, with_covariance=self.with_covariance
-        )
+        run, around = BACKENDS[self.backend], None
+        for _ in range(self.passes - 1):
+            model = self.model(recording, around=around)
+            around = run(model, smoothed=True, with_covariance=False).states
+        model = self.model(recording, around=around)
+        return run(model, smoothed=self.smoothed, with_covariance=self.with_covariance)
 
     def log_likelihood(self, recording: Recording) -> float:
         """Log-likelihood of the recording by prediction-error decomposition."""
         return log_likelihood(self.model(recording))
 
-    def model(self, recording: Recording) -> Model:
-        """What the backends take of a recording."""
+    def model(self, recording: Recording, *, around: FloatArray | None = None) -> Model:
+        """What the backends take of a recording; `around` is the states (n, 12) of a pass before."""
         rates, place = [START_RATE_SD] * 3, START_PLACE_SD
         angles = [self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad]
         pairs = [sd for pair in zip(angles, rates, strict=True) for sd in pair]
@@ -196,6 +220,7 @@ class TrajectorySmoother:
             second_order=self.second_order,
             printed=self.printed,
             start_sd=np.array([*pairs, *place, *place]),
+            around=around,
         )
 
 

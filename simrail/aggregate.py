@@ -19,6 +19,10 @@ AGGREGATE_COLUMNS = ("value", "low95", "high95", "sd_sensor", "sd_track", "track
 """What `aggregate` says of a figure."""
 
 
+_SIGNED = ("mean", "final")
+"""Metrics that may be negative; the interval of any other ends at 0."""
+
+
 def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.DataFrame:
     """Average the figures over draws, the two levels of the Monte Carlo apart.
 
@@ -86,7 +90,9 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
             "failed": sums["failed"],
         }
     )
-    return result.reset_index()
+    result = result.reset_index()
+    result["low95"] = result["low95"].clip(lower=0.0).where(~result["metric"].isin(_SIGNED), result["low95"])
+    return result
 
 
 def axis_columns(cells: pd.DataFrame) -> list[str]:

@@ -32,7 +32,7 @@ from simrail.own_files import install, sources_of
 from simrail.ride import Progress, is_cached, simulate
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, methods
-from simrail.score_table import concat_scores
+from simrail.score_table import labelled_all
 from simrail.sources import score_code_hash
 from simrail.truth import Mount, Truth
 
@@ -255,9 +255,8 @@ def _at_desk(order: Order) -> Iterator[tuple[_Desk, Check]]:
         if order.code != score_code_hash():
             raise InputError(
                 "the worker runs other code than the campaign, and would give other bits",
-                field="--cluster",
                 value=_worker(),
-                remedy="install the same simrail on every machine",
+                remedy="change no source while a campaign runs, and install the same on every machine",
             )
         if _desk is None or _desk.key != order.key:
             sources, data = pickle.loads(order.data)
@@ -290,7 +289,7 @@ def _result(
     return BatchResult(
         cells=tuple(cell.number for cell in cells),
         ride_number=cells[0].ride_number,
-        scores=concat_scores(ledger.tables),
+        scores=labelled_all(ledger.figures),
         failures=tuple(ledger.failures),
         ride=facts,
         wall_s=ledger.wall_s,

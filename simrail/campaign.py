@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from simrail.batch import BatchResult, RideResult, forget, lost_batch, run_batch, run_ride
 from simrail.campaign_result import CampaignResult, chosen_cells, gather
-from simrail.crew import Crew, broken, crew_of, lost
+from simrail.crew import Crew, broken, crew_of, error_of, lost
 from simrail.interrupts import interruptible
 from simrail.job import Job, prepare
 from simrail.ride import is_cached
@@ -139,7 +139,7 @@ class _Loop:
             if not waiting:
                 return
             done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            if any(broken(future.exception()) for future in done):
+            if any(broken(error_of(future)) for future in done):
                 done = set(waiting)  # all that were under way are lost; which one it was, is not known
                 wait(done)
                 crew.renew()
@@ -181,7 +181,7 @@ class _Loop:
 
     def _take(self, task: _Task, future: Future[Any], crew: Crew, batch_cells: int | None) -> None:
         """Take what came of a task."""
-        error = future.exception()
+        error = error_of(future)
         if error is not None and not lost(error):
             raise error
         if error is not None:

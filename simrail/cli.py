@@ -1,4 +1,4 @@
-"""The command line: ``simrail run | list | check | export | estimate | vehicle | imu | new | cache``.
+"""The command line: ``simrail run | list | check | export | estimate | tune | vehicle | imu | new | cache``.
 
 Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
 imports stand inside the commands, so that those that need little answer at once.
@@ -13,6 +13,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from simrail.errors import InputError
+from simrail.tune_command import tune
 
 app = typer.Typer(
     name="simrail",
@@ -369,6 +370,9 @@ def new(
     written, next_step = write_template(kind, name, folder=folder)
     print(f"wrote {written}\n{next_step}")
     return DONE
+
+
+app.command()(tune)
 
 
 @app.command()

@@ -6,13 +6,14 @@ processes made by joblib and dask. What is run, and in which order, is decided i
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
 from simrail import ride_cache
@@ -47,6 +48,11 @@ class Crew(Protocol):
     def close(self) -> None:
         """End all work, also what is under way."""
         ...
+
+
+def error_of(future: Future[Any]) -> BaseException | None:
+    """What went wrong with work that has ended; None if nothing did."""
+    return ClusterGone() if future.cancelled() else future.exception()
 
 
 def lost(error: BaseException) -> bool:
@@ -175,9 +181,13 @@ class _Cluster:
                 remedy='pip install -e ".[cluster]"',
             ) from None
         self._address = address
+        self._log = logging.getLogger("distributed")
+        self._log_level = self._log.level
+        self._log.setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
         try:
             self._client = Client(address, timeout=_WAIT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
+            self._log.setLevel(self._log_level)
             raise InputError(
                 "no dask scheduler answers there",
                 field="--cluster",
@@ -227,27 +237,32 @@ class _Cluster:
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.
-        return max(1, len(self._client.nthreads()))
+        try:
+            return max(1, len(self._client.nthreads()))
+        except (OSError, CancelledError, RuntimeError) as error:
+            raise ClusterGone from error
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         try:
             future: Future[Any] = self._pool.submit(function, *arguments)
         except (CancelledError, RuntimeError) as error:
-            raise ClusterGone(self._address) from error
+            raise ClusterGone from error
         return future
 
     def renew(self) -> None:
         pass  # dask replaces workers, and runs again what they had
 
     def close(self) -> None:
-        self._client.close(timeout=2)
+        with suppress(Exception):  # a scheduler that has gone cannot be told
+            self._client.close(timeout=2)
+        self._log.setLevel(self._log_level)
 
 
 class ClusterGone(OSError):
     """The scheduler has gone; what was done is kept."""
 
-    def __init__(self, address: str) -> None:
-        super().__init__(None, f"the dask scheduler {address} has gone")
+    def __init__(self) -> None:
+        super().__init__("the dask scheduler has gone")
 
 
 def _begin_worker(parent: int) -> None:

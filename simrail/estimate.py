@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import entry_points
 from typing import Protocol, runtime_checkable
 
@@ -70,6 +71,7 @@ class Estimator(Protocol):
         ...
 
 
+@cache
 def estimator_class(method: str) -> type[Estimator]:
     """Find an estimator by the name it is registered under.
 

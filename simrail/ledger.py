@@ -18,7 +18,7 @@ from simrail.errors import InputError
 from simrail.estimate import Estimate, Estimator
 from simrail.scenario.cells import Cell
 from simrail.scenario.parts import RidePart
-from simrail.score_table import failed_figures, labelled
+from simrail.score_table import failed_figures
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class Ledger:
         How each is tuned, by the same names.
     warm : set of str
         Estimators whose kernels have been compiled in this process.
-    tables : list of pandas.DataFrame
-        Rows of the score table, labelled.
+    figures : list of (pandas.DataFrame, dict)
+        Figures of one estimate, and their labels.
     failures : list of Failure
         What failed.
     wall_s, cpu_s : dict of str to float
@@ -60,7 +60,7 @@ class Ledger:
     estimators: Mapping[str, Estimator]
     tunings: Mapping[str, str]
     warm: set[str] = field(default_factory=set)
-    tables: list[pd.DataFrame] = field(default_factory=list)
+    figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     wall_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
     cpu_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
@@ -102,7 +102,7 @@ class Ledger:
 
     def scored(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
         """Note the figures of one estimator, or of the odometry, on a cell."""
-        self.tables.append(labelled(figures, self.labels(cell, estimator)))
+        self.figures.append((figures, self.labels(cell, estimator)))
 
     def judge_finite(self, cell: Cell, estimator: str, estimate: Estimate) -> None:
         """Note an estimate that is not finite: its rows say so, and it is a failure of its cell as well."""

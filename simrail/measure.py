@@ -167,9 +167,7 @@ def measure(
         magnetometer=magnetic,
         magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
         rail_displacement=seen,
-        rail_sensor_sheet=None
-        if rail_sensor is None
-        else RailSensorSheet(rail_sensor.noise_m, rail_sensor.rail_base_m),
+        rail_sensor_sheet=None if rail_sensor is None else RailSensorSheet(rail_sensor.noise_m),
     )
 
 

@@ -177,12 +177,12 @@ def print_forecast(console: Console, scenario: Scenario, told: Forecast, *, core
     """Print a forecast as a table."""
     plan = told.plan
     new = plan.rides if told.cached is None else plan.rides - told.cached
-    known = "not looked for: too many" if told.cached is None else f"{told.cached:,} in the cache"
+    known = "cache not searched" if told.cached is None else f"{told.cached:,} in the cache"
     table = Table(
         title=f"{scenario.name}: what it will run", title_justify="left", show_header=False, box=None
     )
-    table.add_column(style="cyan")
-    table.add_column(justify="right")
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column(justify="right", no_wrap=True)
     table.add_column(style="dim")
     table.add_row(
         "rides to simulate", f"{new:,}", f"of {plan.rides:,}, {_time(plan.simulated_s)} of riding; {known}"
@@ -208,7 +208,7 @@ def print_forecast(console: Console, scenario: Scenario, told: Forecast, *, core
 def _cache_words(size: float) -> str:
     limit = ride_cache.limit_bytes()
     words = f"of rides; the cache keeps {limit / 1e9:g} GB"
-    return words if size <= limit else words + ", so that the first of them will be gone at the end"
+    return words if size <= limit else f"of rides, more than the {limit / 1e9:g} GB that the cache keeps"
 
 
 def _bytes(size: float) -> str:

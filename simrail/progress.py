@@ -52,6 +52,7 @@ class ProgressWatcher(Watcher):
         self._begun = self._cells_begun = self._said = 0.0
         self._before = self._done = 0
         self._by_worker: dict[str, int] = {}
+        self._searches: dict[str, TaskID] = {}
 
     def __enter__(self) -> Self:
         self._progress.__enter__()
@@ -124,6 +125,15 @@ class ProgressWatcher(Watcher):
             self._progress.update(self._ride, note=f"{number} of {count} recordings written, {name}")
         if not self._console.is_terminal:
             self._console.print(f"wrote {name} ({number} of {count})", highlight=False)
+
+    def search_goes(self, name: str, evaluations: int, value: float) -> None:
+        """See `Watcher`."""
+        if self._searches.get(name) is None:
+            self._searches[name] = self._progress.add_task(f"search, {name}", total=None, note="")
+            if not self._console.is_terminal:
+                self._console.print(f"search, {name}", highlight=False)
+        note = f"{evaluations} evaluations, {value:.6f}"
+        self._progress.update(self._searches[name], note=note)
 
 
 def print_scores(console: Console, results: Results) -> None:

@@ -134,12 +134,9 @@ class RailSensorSheet:
     ----------
     noise_m : float
         Standard deviation of each of its values, outliers apart.
-    rail_base_m : float
-        Distance of the two nominal rails: what it sees of each is measured against that rail's.
     """
 
     noise_m: float
-    rail_base_m: float = 1.5
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.score_metrics import IntArray, Row, Series, figures, nis_figures
-from simrail.score_table import OK
-from simrail.score_windows import chosen_windows, kept_metrics, table_of, windows_of
+from simrail.score_table import OK, table_of
+from simrail.score_windows import chosen_windows, kept_metrics, windows_of
 from simrail.truth import Mount
 
 

@@ -23,8 +23,8 @@ from simrail.estimate import Estimate
 from simrail.jit import FloatArray
 from simrail.recording import Recording
 from simrail.score_metrics import Row, Series, figures
-from simrail.score_table import NO_TWIST, UNOBSERVABLE
-from simrail.score_windows import chosen_windows, kept_metrics, table_of, windows_of
+from simrail.score_table import NO_TWIST, UNOBSERVABLE, table_of
+from simrail.score_windows import chosen_windows, kept_metrics, windows_of
 
 TWIST_BASE_M = 3.0
 """Base of the twist, unless a scenario says otherwise."""

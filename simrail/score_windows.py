@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 
 import numpy as np
-import pandas as pd
 
 from simrail.errors import InputError
 from simrail.jit import FloatArray
-from simrail.score_metrics import IntArray, Row
+from simrail.score_metrics import IntArray
 from simrail.score_table import (
     CURVE_PREFIX,
     EVERY_CURVE,
-    FIGURE_COLUMNS,
     METRICS,
     WINDOWS,
-    as_score_table,
 )
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, TrackDesign
 
@@ -77,8 +74,3 @@ def kept_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
         if name not in METRICS:
             raise InputError("no such metric", value=name, limit="one of " + ", ".join(METRICS))
     return tuple(name for name in METRICS if name in wanted)
-
-
-def table_of(rows: list[Row], *, bands: Sequence[str] = ()) -> pd.DataFrame:
-    """Rows as a score table."""
-    return as_score_table(pd.DataFrame(rows, columns=list(FIGURE_COLUMNS)), bands=bands)

@@ -1,4 +1,4 @@
-"""Who is told how a campaign or an export goes. What it then shows is its own: see `simrail.progress`."""
+"""Who is told how a campaign, an export or a tuning goes; what it shows, see `simrail.progress`."""
 
 from __future__ import annotations
 
@@ -26,3 +26,6 @@ class Watcher:
 
     def recording_written(self, number: int, count: int, name: str) -> None:
         """Recording `number` (from 1) of `count` has been written, by an export."""
+
+    def search_goes(self, name: str, evaluations: int, value: float) -> None:
+        """A tuning has evaluated its objective so often for a set of parameters; its least value so far."""

@@ -102,7 +102,7 @@ def test_interrupted_simulation_leaves_no_ride(ride, own_cache, monkeypatch):
     assert list(own_cache.iterdir()) == []
 
 
-@pytest.mark.parametrize("damage", ["truncated array", "missing array", "broken header"])
+@pytest.mark.parametrize("damage", ["truncated array", "missing array", "broken header", "one bit"])
 def test_damaged_ride_is_made_again(ride, own_cache, damage):
     first = simulate(ride)
     kept = [np.array(array) for array in all_arrays(first)]
@@ -112,11 +112,20 @@ def test_damaged_ride_is_made_again(ride, own_cache, damage):
             file.truncate(1000)
     elif damage == "missing array":
         (place / "wheel_0.npy").unlink()
+    elif damage == "one bit":
+        content = bytearray((place / "body_1.npy").read_bytes())
+        content[len(content) // 2] ^= 1
+        (place / "body_1.npy").write_bytes(content)
     else:
         (place / "truth.json").write_text("{")
-    again = simulate(ride)
+    told = []
+    again = simulate(ride, told=told.append)
     for array, expected in zip(all_arrays(again), kept, strict=True):
         np.testing.assert_array_equal(array, expected)
+    assert len(told) == 1 and "damaged" in told[0] and "\n" not in told[0]
+    assert [path.name for path in own_cache.iterdir()] == [place.name]
+    simulate(ride, told=told.append)
+    assert len(told) == 1
 
 
 def test_oldest_rides_make_room(ride, own_cache, monkeypatch):

@@ -166,10 +166,15 @@ def _general_purpose(case: Figures, styles: Sequence[MethodStyle]) -> list[Findi
     return result
 
 
+_OF_THE_IMU = ("imu", "imu.grade", "mount", "case")
+"""Labels in which the case of the ideal IMU differs by its nature; it may be an IMU of its own."""
+
+
 def _floor(case: Figures, styles: Sequence[MethodStyle], others: Sequence[Figures]) -> list[Finding]:
     if case.labels["imu"] == "ideal":
         return []
-    same = ("ride", "vehicle", "odometry")
+    # The same ride in every other respect: speed, irregularity and whatever else there is an axis for.
+    same = [name for name in case.labels if name not in _OF_THE_IMU]
     ideal = [
         c for c in others if c.labels["imu"] == "ideal" and all(c.labels[k] == case.labels[k] for k in same)
     ]
@@ -209,11 +214,20 @@ def _odometry(case: Figures) -> list[Finding]:
     for name in case.estimators():
         if name.startswith("odometry:"):
             error, last = case.get(name, "position", "rms").value, case.get(name, "position", "max").value
+            # A scenario says which metrics it keeps.
+            known = {"rms": error, "at most": last}
+            sizes = [
+                f"{significant(size)} m {word}" if word == "rms" else f"{word} {significant(size)} m"
+                for word, size in known.items()
+                if size >= 0.0
+            ]
+            if not sizes:
+                continue
             source = name.removeprefix("odometry:")
             told = ", the true one: an ablation, not something that a train has" if source == "truth" else ""
             text = (
                 f"All methods take position and speed from the odometry '{source}'{told}; "
-                f"its position error is {significant(error)} m rms and at most {significant(last)} m."
+                f"its position error is {_listed(sizes)}."
             )
             result.append(Finding("note", text))
     return result

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from simrail.jit import FloatArray
 from simrail.report.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
-from simrail.track.elements import RAIL_BASE_M
 
 _KIND_COLOUR = {STRAIGHT: "#98a1af", TRANSITION: "#56B4E9", CURVE: "#D55E00"}
 _KIND_WORD = {STRAIGHT: "straight", TRANSITION: "transition", CURVE: "curve"}
@@ -76,7 +75,7 @@ def profile_figure(track: TrackDesign) -> str:
         axes[0].set_ylabel("height, m")
         axes[1].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
         axes[1].set_ylabel("curvature, 1/km")
-        axes[2].plot(s, -1e3 * RAIL_BASE_M * np.sin(frame.roll_rad), color="#0072B2", lw=1.4)
+        axes[2].plot(s, -1e3 * track.rail_base_m * np.sin(frame.roll_rad), color="#0072B2", lw=1.4)
         axes[2].set_ylabel("cant, mm")
         for axis in axes[1:]:
             axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)

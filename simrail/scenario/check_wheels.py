@@ -1,4 +1,4 @@
-"""Judging what wheels and rails of a ride do to each other: traction, and what lies on the rails."""
+"""Judging what wheels and rails of a ride do to each other: gauge, traction, and what lies on the rails."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ from simrail.track.design import TrackDesign
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.model import VehicleModel
 
+MOST_BASE_PER_GAUGE = 1.1
+"""The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
+
 
 def judge_wheels(scenario: Scenario, cell: Cell, track: TrackDesign, vehicle: VehicleModel) -> None:
-    """Refuse wheels that cannot drive, and rail conditions that are not on the track or mean nothing."""
+    """Refuse wheels beside the rails or that cannot drive, and conditions off the track or without sense."""
+    _judge_gauge(scenario, track, vehicle)
     followed = cell.spec.engine == "kinematic"
     if cell.ride.drive == "wheels" and (followed or vehicle.traction is None):
         raise InputError(
@@ -39,3 +43,18 @@ def judge_wheels(scenario: Scenario, cell: Cell, track: TrackDesign, vehicle: Ve
     except InputError as error:
         error.file = scenario.file
         raise
+
+
+def _judge_gauge(scenario: Scenario, track: TrackDesign, vehicle: VehicleModel) -> None:
+    """Refuse a vehicle of another gauge: what a rail is off would not turn it as it turns the track."""
+    low, high = vehicle.wheel_rail.gauge_m, MOST_BASE_PER_GAUGE * vehicle.wheel_rail.gauge_m
+    if not low < track.rail_base_m < high:
+        raise InputError(
+            f"vehicle {vehicle.name!r} does not fit track {track.name!r}: the running tables of its gauge of "
+            f"{1e3 * vehicle.wheel_rail.gauge_m:g} mm are not as far apart as the track's",
+            file=scenario.file,
+            field="vehicle",
+            value=f"rail_base_mm = {1e3 * track.rail_base_m:g} in the track file",
+            limit=f"{1e3 * low:g} to {1e3 * high:g} mm",
+            remedy="choose a vehicle of the track's gauge, or correct the track's rail_base_mm",
+        )

@@ -141,7 +141,7 @@ class RailSignalPart(SignalPart):
     Attributes
     ----------
     sheet : RailSensorSheet
-        Its noise, and the distance of the nominal rails.
+        Its noise.
     """
 
     sheet: RailSensorSheet
@@ -154,15 +154,14 @@ class RailSignalPart(SignalPart):
     @field_validator("sheet")
     @classmethod
     def _possible(cls, value: RailSensorSheet) -> RailSensorSheet:
-        for field, most in (("noise_m", 0.1), ("rail_base_m", 2.0)):
-            if not 0.0 < getattr(value, field) <= most:
-                raise InputError(
-                    "is out of range",
-                    field=field,
-                    value=getattr(value, field),
-                    limit=f"> 0, <= {most:g} m",
-                    remedy="give it in metres",
-                )
+        if not 0.0 < value.noise_m <= 0.1:
+            raise InputError(
+                "is out of range",
+                field="noise_m",
+                value=value.noise_m,
+                limit="> 0, <= 0.1 m",
+                remedy="give it in metres",
+            )
         return value
 
 

@@ -166,16 +166,11 @@ class MagnetometerPart(Part):
 
 
 class RailSensorPart(Part):
-    """``[rail_sensor]``: a sensor beside each IMU that sees both rails from its body.
-
-    ``rail_base_mm`` is the distance of the nominal rails that cross-level is a height over: 1500 mm at full
-    size.
-    """
+    """``[rail_sensor]``: a sensor beside each IMU that sees both rails from its body."""
 
     noise_mm: Listed[Annotated[float, Field(ge=0.0, lt=100.0)]] = 0.1
     outlier_fraction: Listed[Annotated[float, Field(ge=0.0, le=0.2)]] = 0.01
     outlier_mm: Listed[Annotated[float, Field(ge=0.0, lt=1000.0)]] = 5.0
-    rail_base_mm: Listed[Annotated[float, Field(ge=50.0, le=2000.0)]] = 1500.0
 
     def spec(self) -> RailSensorSpec:
         """The sensor, with no axis left."""
@@ -183,5 +178,4 @@ class RailSensorPart(Part):
             noise_m=self.noise_mm / 1e3,
             outlier_fraction=self.outlier_fraction,
             outlier_m=self.outlier_mm / 1e3,
-            rail_base_m=self.rail_base_mm / 1e3,
         )

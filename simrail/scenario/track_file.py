@@ -14,7 +14,15 @@ from pydantic import Field, model_validator
 
 from simrail.errors import InputError
 from simrail.scenario.files import Part, load, toml_text
-from simrail.track.design import Curve, Element, Gradient, Straight, TrackDesign, Transition
+from simrail.track.design import (
+    RAIL_BASE_LIMITS_M,
+    Curve,
+    Element,
+    Gradient,
+    Straight,
+    TrackDesign,
+    Transition,
+)
 
 Length = Annotated[float, Field(gt=0.0)]
 
@@ -84,6 +92,9 @@ class TrackFile(Part):
         Global place and heading there, as in `TrackDesign`.
     cant_ramp, vertical_radius_m, vertical_ramp_m
         As in `TrackDesign`.
+    rail_base_mm : float
+        Lateral distance of the running tables, which cant and cross-level are heights over; 1500 mm at normal
+        gauge.
     segment, gradient : tuple
         The plan and the gradients, in the order of s.
     """
@@ -98,6 +109,9 @@ class TrackFile(Part):
     cant_ramp: Literal["smooth", "linear"] = "smooth"
     vertical_radius_m: float | tuple[float, ...] = 2000.0
     vertical_ramp_m: float = Field(default=5.0, ge=0.0)
+    rail_base_mm: float = Field(
+        default=1500.0, ge=1000.0 * RAIL_BASE_LIMITS_M[0], le=1000.0 * RAIL_BASE_LIMITS_M[1]
+    )
     segment: tuple[SegmentPart, ...] = Field(min_length=1)
     gradient: tuple[GradientPart, ...] = ()
 
@@ -123,6 +137,7 @@ class TrackFile(Part):
             vertical_radius_m=self.vertical_radius_m,
             vertical_ramp_m=self.vertical_ramp_m,
             cant_ramp=self.cant_ramp,
+            rail_base_m=self.rail_base_mm / 1000.0,
             source=self.source,
             synthetic=self.synthetic,
             start_position_m=self.start_position_m,
@@ -161,6 +176,7 @@ def track_text(design: TrackDesign) -> str:
         "cant_ramp": design.cant_ramp,
         "vertical_radius_m": design.vertical_radius_m,
         "vertical_ramp_m": design.vertical_ramp_m,
+        "rail_base_mm": _thousandths(design.rail_base_m, "rail_base_mm"),
     }
     segments = []
     for i, element in enumerate(design.elements):

@@ -18,7 +18,6 @@ from simrail.errors import InputError
 from simrail.jit import FloatArray
 from simrail.rotation import rotation_matrix
 from simrail.seeds import stream
-from simrail.track.elements import RAIL_BASE_M
 from simrail.track.laid import LaidTrack
 
 
@@ -34,14 +33,11 @@ class RailSensorSpec:
         Share of the values that are outliers.
     outlier_m : float
         Standard deviation of what an outlier adds; synthetic.
-    rail_base_m : float
-        Distance of the two nominal rails, +-rail_base_m/2 beside the track's centre.
     """
 
     noise_m: float = 0.1e-3
     outlier_fraction: float = 0.01
     outlier_m: float = 5e-3
-    rail_base_m: float = RAIL_BASE_M
 
 
 def sample_rails(
@@ -90,7 +86,7 @@ def sample_rails(
 
     position, angles = at_times(*POSITION), at_times(*ATTITUDE)
     guess = at_times("position_m")[:, 0]
-    left, right = rails_seen(position, angles, guess, rails, base_m=spec.rail_base_m)
+    left, right = rails_seen(position, angles, guess, rails)
     values = np.column_stack([left, right])
 
     def term(stem: str) -> np.random.Generator:
@@ -103,7 +99,7 @@ def sample_rails(
 
 
 def rails_seen(
-    position: FloatArray, angles: FloatArray, guess: FloatArray, rails: LaidTrack, *, base_m: float
+    position: FloatArray, angles: FloatArray, guess: FloatArray, rails: LaidTrack
 ) -> tuple[FloatArray, FloatArray]:
     """Where the left and the right rail (n, 2 each: y, z) pass through the plane X = 0 of a body.
 
@@ -114,9 +110,8 @@ def rails_seen(
     guess : ndarray (n,)
         Places s to begin from, within some metres.
     rails : LaidTrack
-        The rails: each stands at (0, +-base_m/2, 0) plus its deviation in the track frame.
-    base_m : float
-        Distance of the nominal rails.
+        The rails: each stands at (0, +-b, 0) plus its deviation in the track frame, b half the design's
+        rail base.
     """
     body = rotation_matrix(angles)
     found = []
@@ -128,7 +123,7 @@ def rails_seen(
             track = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
             place = np.zeros((len(s), 3))
             place[:, 1:] = rails.rails(s)[:, first : first + 2]
-            place[:, 1] += side * base_m
+            place[:, 1] += side * rails.design.rail_base_m
             head = frame.position + np.einsum("nij,nj->ni", track, place)
             seen = np.einsum("nji,nj->ni", body, head - position)
             # A metre of s carries the rail about a metre along the body: the rest is for the next turn.
@@ -155,4 +150,3 @@ def check_rail_sensor(spec: RailSensorSpec) -> None:
     require(0.0 <= spec.noise_m < 0.1, "noise_m", "0 to 0.1 m")
     require(0.0 <= spec.outlier_fraction <= 0.2, "outlier_fraction", "0 to 0.2: beyond it no median helps")
     require(0.0 <= spec.outlier_m < 1.0, "outlier_m", "0 to 1 m")
-    require(0.05 <= spec.rail_base_m <= 2.0, "rail_base_m", "0.05 to 2 m")

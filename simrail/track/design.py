@@ -54,6 +54,10 @@ __all__ = [
 ]
 
 
+RAIL_BASE_LIMITS_M = (0.05, 2.0)
+"""From a model railway to a track of 1880 mm: beyond lies a wrong unit."""
+
+
 class _Shape(NamedTuple):
     """Piecewise polynomials of a design, made once and kept."""
 
@@ -85,6 +89,8 @@ class TrackDesign:
         pitch rate steps.
     cant_ramp : str
         ``"smooth"`` (quintic) or ``"linear"``.
+    rail_base_m : float
+        Lateral distance of the two running tables: cant and cross-level are heights over it.
     source : str
         Where the design comes from.
     synthetic : bool
@@ -102,6 +108,7 @@ class TrackDesign:
     vertical_radius_m: float | tuple[float, ...] = 2000.0
     vertical_ramp_m: float = 5.0
     cant_ramp: str = "smooth"
+    rail_base_m: float = RAIL_BASE_M
     source: str = ""
     synthetic: bool = False
     start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -133,7 +140,12 @@ class TrackDesign:
         require_number(self.vertical_ramp_m, "vertical_ramp_m", least=0.0)
         if self.cant_ramp not in ("smooth", "linear"):
             raise InputError("is unknown", field="cant_ramp", value=self.cant_ramp, limit="smooth or linear")
-        check_elements(self.elements)
+        if not RAIL_BASE_LIMITS_M[0] <= self.rail_base_m <= RAIL_BASE_LIMITS_M[1]:
+            low, high = RAIL_BASE_LIMITS_M
+            raise InputError(
+                "is out of range", field="rail_base_m", value=self.rail_base_m, limit=f"{low:g} to {high:g} m"
+            )
+        check_elements(self.elements, rail_base_m=self.rail_base_m)
         check_gradients(self.gradients, end_m=self.end_m)
         x, y, z = self.start_position_m
         plan = build_plan(self.elements, self.start_m, position_m=(x, y), yaw_rad=self.start_yaw_rad)
@@ -174,7 +186,7 @@ class TrackDesign:
         shape = self._shape
         x, y = shape.plan.xy(s)
         yaw, yaw1, yaw2 = shape.plan.state(s)
-        u, u1, u2 = (cant(s) / RAIL_BASE_M for cant in shape.cant)
+        u, u1, u2 = (cant(s) / self.rail_base_m for cant in shape.cant)
         z, z1, z2, z3 = (height(s) for height in shape.height)
         # roll = asin(u), pitch = -atan(z1), and their derivatives
         level = 1.0 / np.sqrt(1.0 - u * u)

@@ -20,9 +20,10 @@ STRAIGHT, TRANSITION, CURVE = 0, 1, 2
 """Values of `TrackDesign.kind`."""
 
 RAIL_BASE_M = 1.5
-"""Lateral distance of the two running tables, over which cant and cross-level are measured."""
+"""Lateral distance of the two running tables of a track of normal gauge, over which cant and cross-level are
+measured: that of every track whose file names no other one."""
 
-MAX_CANT_M = 0.5 * RAIL_BASE_M
+MAX_CANT_PER_BASE = 0.5
 MAX_SLOPE = 0.5
 """Bounds of the geometry (30 deg, 27 deg), not of any standard: they catch a wrong unit."""
 
@@ -63,7 +64,7 @@ class Curve:
     radius_m : float
         Radius of the horizontal projection, positive for a curve to the left.
     cant_m : float
-        Height of the outer above the inner rail over 1.5 m, turned about the centreline.
+        Height of the outer above the inner rail over the track's rail base, turned about the centreline.
     """
 
     length_m: float
@@ -143,8 +144,15 @@ def element_from_dict(data: dict[str, Any]) -> Element:
     return _ELEMENTS[values.pop("kind")](**values)
 
 
-def check_elements(elements: Sequence[Element]) -> None:
+def check_elements(elements: Sequence[Element], *, rail_base_m: float = RAIL_BASE_M) -> None:
     """Refuse elements that cannot be joined to a line of continuous curvature and cant.
+
+    Parameters
+    ----------
+    elements : sequence of Straight, Curve, Transition
+        The plan, in the order of s.
+    rail_base_m : float
+        What cant is a height over.
 
     Raises
     ------
@@ -158,7 +166,7 @@ def check_elements(elements: Sequence[Element]) -> None:
         require_number(element.length_m, f"{here}.length_m", above=0.0)
         if isinstance(element, Curve):
             require_number(element.radius_m, f"{here}.radius_m", zero=False)
-            require_number(element.cant_m, f"{here}.cant_m", within=MAX_CANT_M)
+            require_number(element.cant_m, f"{here}.cant_m", within=MAX_CANT_PER_BASE * rail_base_m)
         after = elements[i + 1] if i + 1 < len(elements) else None
         if isinstance(element, Transition):
             if i == 0 or after is None or isinstance(after, Transition):

@@ -80,7 +80,7 @@ class Spectrum:
         Its name in a scenario, and where it comes from.
     densities : mapping of str to RationalPsd
         One for each of `simrail.columns.IRREGULARITY`: alignment and vertical profile (mean of the
-        rails), cross-level (left minus right height over 1.5 m), gauge (left minus right lateral).
+        rails), cross-level (left minus right height), gauge (left minus right lateral).
     """
 
     name: str

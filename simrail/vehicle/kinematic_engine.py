@@ -17,7 +17,6 @@ from simrail.jit import FloatArray
 from simrail.profile import SpeedProfile
 from simrail.rotation import euler_angles, rotation_matrix
 from simrail.track.design import TrackDesign
-from simrail.track.elements import RAIL_BASE_M
 from simrail.track.laid import RAILS, LaidTrack
 from simrail.truth import BodyMotion, Truth
 
@@ -69,7 +68,7 @@ def rail_following(laid: LaidTrack, *, height_m: float = 0.0) -> dict[str, Chann
     knots = laid.table_start_m + laid.table_step_m * np.arange(laid.table.shape[0] + 1)
     rails = PPoly(laid.table[:, RAILS].transpose(2, 0, 1), knots)
     half = 0.5
-    base = RAIL_BASE_M
+    base = laid.design.rail_base_m
     lean = height_m / base
 
     def mix(weights: tuple[float, float, float, float]) -> Channel:

@@ -18,6 +18,11 @@ WHEEL_FAULTS: dict[str, tuple[str, str, list[str]]] = {
         'vehicle = "irw_car"',
         ["ride[0].drive", "no [traction]", "irw_car", "give the vehicle file a [traction]"],
     ),
+    "a vehicle of another gauge than the track": (
+        'vehicle = "metro_irw_bogie"',
+        'vehicle = "scale_vehicle"',
+        ["vehicle", "scale_vehicle", "rail_base_mm = 1500", "127 to 139.7 mm", "gauge"],
+    ),
     "wheels of a body that follows the rails": (
         'engine = "compiled"',
         'engine = "kinematic"',

@@ -331,11 +331,6 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "[magnetometer]\ninclination = 55.0\n\n[encoder]",
         ["magnetometer.inclination", "unknown key", "inclination_deg?"],
     ),
-    "a rail sensor in metres": (
-        "[encoder]",
-        "[rail_sensor]\nrail_base_mm = 1.5\n\n[encoder]",
-        ["rail_sensor.rail_base_mm", "1.5", ">= 50"],
-    ),
     "a rail sensor with more outliers than values": (
         "[encoder]",
         "[rail_sensor]\noutlier_fraction = 1.0\n\n[encoder]",

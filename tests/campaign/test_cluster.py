@@ -18,8 +18,9 @@ import pandas as pd
 import pytest
 
 import simrail
+from simrail import results
 from simrail.campaign import run_campaign
-from simrail.cli import BAD_INPUT, call
+from simrail.cli import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.errors import InputError
 from simrail.scenario.scenario import load_scenario
 from simrail.unfinished import Unfinished
@@ -105,6 +106,36 @@ def test_a_campaign_on_a_cluster_with_a_worker_killed_midway(
     assert_same(whole.scores, found.scores)
     assert found.failures == []
     assert notes.repeated(main=os.getpid()) <= 2  # one batch of the worker that was killed
+
+
+def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_it(
+    cluster: Cluster,
+    noting_file: Path,
+    notes: Notes,
+    here: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(results, "write_report", lambda path, **keywords: path.write_text("<html></html>"))
+    monkeypatch.setattr("simrail.crew._WAIT_S", 5.0)
+    cluster.add_worker()
+    words = ["run", str(noting_file), "--set", "estimator.noting.options.sleep_s=0.3"]
+    done: list[int] = []
+
+    def kill() -> None:
+        while not list((here / "results").glob(".mine.unfinished-*/*.parquet")):
+            time.sleep(0.01)
+        cluster.scheduler.kill()
+        done.append(1)
+
+    thread = threading.Thread(target=kill, daemon=True)
+    thread.start()
+    assert call([*words, "--cluster", cluster.address]) == CELL_FAILED
+    assert done
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("simrail:")]
+    assert len(said) == 1 and "the dask scheduler has gone" in said[0] and "goes on" in said[0]
+    assert call([*words, "--resume"]) == DONE
+    assert "of 8 cells are done" in capsys.readouterr().err
 
 
 def test_a_cluster_that_cannot_be_used_is_refused_in_one_line(

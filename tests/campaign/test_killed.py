@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from simrail.campaign import run_campaign
-from simrail.cli import DONE
+from simrail.cli import DONE, INTERRUPTED
 from simrail.scenario.scenario import load_scenario
 from simrail.unfinished import Unfinished
 
@@ -52,9 +52,12 @@ def alive(pid: int) -> bool:
     return status != "Z"
 
 
-def run_with_kills(kills: int, words: list[str], notes: Notes, folder: Path, *, cells: int, seed: int) -> int:
+def run_with_kills(
+    kills: int, words: list[str], notes: Notes, folder: Path, *, cells: int, seed: int
+) -> tuple[int, int]:
     """Run until it ends by itself, killing the main process or a worker so many times at random moments.
 
+    Returns how many were killed, and how many cells the last session found done.
     Asserts after each session that no more than one batch of each worker was lost per kill.
     """
     chance = random.Random(seed)
@@ -89,7 +92,7 @@ def run_with_kills(kills: int, words: list[str], notes: Notes, folder: Path, *, 
         asked = sum(pid != process.pid for pid, _ in list(notes)[seen:])
         if process.returncode == DONE:
             assert asked - (cells - before) <= in_session * WORKERS * BATCH_CELLS
-            return done
+            return done, before
         assert process.returncode == -signal.SIGKILL, said.decode()
         folders = list((folder / "results").glob(".mine.unfinished-*"))
         kept = len(Unfinished(folders[0]).cells()) if folders else 0
@@ -118,7 +121,7 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     whole = run_campaign(load_scenario(noting_file, overrides=[settings[1]]))
     notes.file.unlink()
     words = [sys.executable, str(program), str(BATCH_CELLS), "run", str(noting_file), *settings]
-    killed = run_with_kills(
+    killed, kept = run_with_kills(
         kills, [*words, "--workers", str(WORKERS)], notes, tmp_path, cells=cells, seed=kills
     )
     assert killed == kills
@@ -126,4 +129,23 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     assert_same(whole.scores, pd.read_parquet(folder / "mine" / "scores.parquet"))
     assert [path.name for path in folder.iterdir()] == ["mine"]
     log = (folder / "mine" / "run.log").read_text()
-    assert "going on with an unfinished run" in log
+    # Where no main process died after a batch was done, there was nothing to go on with.
+    assert ("going on with an unfinished run" in log) == (kept > 0)
+
+
+def test_ctrl_c_ends_all_processes_in_one_line(noting_file: Path, notes: Notes, tmp_path: Path) -> None:
+    """The terminal sends it to the main process and to its workers alike."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    slow = ["--set", "estimator.noting.options.sleep_s=0.5", "--workers", str(WORKERS)]
+    words = [sys.executable, str(program), str(BATCH_CELLS), "run", str(noting_file), *slow]
+    process = subprocess.Popen(
+        words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True
+    )
+    wait_while(lambda: process.poll() is None and len({pid for pid, _ in notes}) < WORKERS, at_most_s=120.0)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == INTERRUPTED
+    assert said.decode().splitlines()[-1].startswith("simrail: interrupted") and b"Traceback" not in said
+    wait_while(lambda: any(alive(pid) for pid, _ in notes), at_most_s=5.0)
+    assert not any(alive(pid) for pid, _ in notes)

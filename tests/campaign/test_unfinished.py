@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 import subprocess
 import time
 from collections.abc import Callable
@@ -96,6 +97,27 @@ def test_damaged_batches_are_dropped_and_run_again(
     )
     assert_same(whole, mended)
     assert hidden(here) == []
+
+
+def test_a_damaged_ride_and_one_that_is_gone_are_simulated_again(
+    mine: list[str],
+    here: Path,
+    rides: Path,
+    capsys: pytest.CaptureFixture[str],
+    assert_same: Same,
+) -> None:
+    assert call(mine) == DONE
+    whole = pd.read_parquet(here / "results" / "mine" / "scores.parquet")
+    damaged, gone = sorted(rides.iterdir())
+    array = bytearray((damaged / "body_0.npy").read_bytes())
+    array[len(array) // 2] ^= 1
+    (damaged / "body_0.npy").write_bytes(array)
+    shutil.rmtree(gone)
+    capsys.readouterr()
+    assert call(mine) == DONE
+    said = [line for line in capsys.readouterr().err.splitlines() if "damaged" in line]
+    assert len(said) == 1 and "simulated again" in said[0]
+    assert_same(whole, pd.read_parquet(here / "results" / "mine" / "scores.parquet"))
 
 
 def test_a_full_disk_ends_in_one_line_and_the_next_run_goes_on(

@@ -169,7 +169,8 @@ def test_terms_of_the_track_give_the_acceleration_of_a_body_that_moves_in_it() -
 def test_what_is_beyond_first_order_makes_the_design_exact() -> None:
     """A body that keeps to the design: first order and what is beyond it give rates and gravity exactly."""
     speed = recording().odometry["speed_mps"].to_numpy()
-    beyond = beyond_first_order(frame(), speed, 9.81)
+    angles = np.column_stack([frame().roll_rad, frame().pitch_rad, frame().yaw_rad])
+    beyond = beyond_first_order(angles, speed[:, None] * frame().rates, 9.81)
     for k in range(len(TIMES)):
         x = np.zeros(12)
         x[:6:2], x[1:6:2] = (

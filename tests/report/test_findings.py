@@ -134,3 +134,34 @@ def test_roles_follow_from_the_scenario_not_from_names(scenario: Scenario) -> No
 )
 def test_numbers_have_three_significant_digits(value: float, text: str) -> None:
     assert significant(value) == text
+
+
+def test_metrics_that_were_not_kept_are_not_spoken_of(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    scores, cells = tables(example())
+    text = said(scenario, scores[scores["metric"] == "rms"], cells)
+    assert "position error is 0.500 m rms." in text and "at most" not in text
+    text = said(scenario, scores[scores["metric"] == "sd"], cells)
+    assert "nan" not in text.lower() and "position error" not in text
+
+
+def test_the_floor_is_that_of_the_same_speed(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    """Cases of other speeds have an ideal IMU, too: it is not this one's floor."""
+    one = example()
+    ideal = CellResult(one.cell | {"imu": "ideal"}, one.recording, one.motion, one.estimates)
+    scores, cells = tables(one, ideal, draws=1)
+    styles = list(method_styles(methods(scenario)).values())
+
+    def floor_with(speeds: list[float]) -> str:
+        found = cases(scores, cells.assign(**{"ride.speed_kmh": speeds}))
+        return "\n".join(finding.text for finding in findings(found[0], styles, others=found))
+
+    assert "With an ideal IMU" in floor_with([20.0, 20.0])
+    assert "No ideal IMU was run" in floor_with([20.0, 70.0])

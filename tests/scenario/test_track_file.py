@@ -9,7 +9,7 @@ import pytest
 
 from simrail.errors import InputError
 from simrail.scenario.files import shipped
-from simrail.scenario.track_file import track_by_name
+from simrail.scenario.track_file import track_by_name, track_text
 from simrail.track.design import CURVE, STRAIGHT
 
 GOOD = """
@@ -63,14 +63,32 @@ def test_ramps_pass_through(tmp_path: Path) -> None:
     assert chosen.name == "mine"
 
 
+def test_cant_is_a_height_over_the_rail_base(tmp_path: Path) -> None:
+    narrow = GOOD.replace("cant_mm = 60.0", "cant_mm = 6.0").replace(
+        "start_m", "rail_base_mm = 150.0\nstart_m", 1
+    )
+    design, full = track_by_name(write(tmp_path, narrow)), track_by_name(write(tmp_path, GOOD))
+    assert (design.rail_base_m, full.rail_base_m) == (0.15, 1.5)
+    s = np.linspace(-10.0, 110.0, 41)
+    # A tenth of the cant over a tenth of the base: the same roll, whose end is asin(6/150).
+    assert design.frame(110.0).roll_rad == pytest.approx(-np.arcsin(0.04), abs=1e-15)
+    np.testing.assert_allclose(design.frame(s).k, full.frame(s).k, atol=1e-15)
+    (tmp_path / "again.toml").write_text(track_text(design), encoding="utf-8")
+    assert track_by_name(str(tmp_path / "again.toml")) == design
+
+
 @pytest.mark.parametrize("name", sorted(shipped("track")))
 def test_shipped_tracks_are_sound(name: str) -> None:
     design = track_by_name(name)
     assert design.source
     frame = design.frame(np.linspace(design.start_m, design.end_m, 5001))
     assert all(np.isfinite(part).all() for part in frame)
-    assert np.abs(1.5 * np.sin(frame.roll_rad)).max() <= 0.160 + 1e-9  # EN 13803, normal cant
-    assert np.abs(1.5 * frame.rates[:, 0]).max() <= 3.5e-3  # twist, m/m: the quintic is 15/8 of a linear ramp
+    base = design.rail_base_m
+    size = base / 1.5
+    assert np.abs(base * np.sin(frame.roll_rad)).max() <= 0.160 * size + 1e-9  # EN 13803, normal cant
+    assert (
+        np.abs(base * frame.rates[:, 0]).max() <= 3.5e-3
+    )  # twist, m/m: the quintic is 15/8 of a linear ramp
     assert np.abs(frame.pitch_rad).max() <= 0.040
 
 
@@ -111,6 +129,10 @@ def test_condequinto_olivar_is_the_line_of_the_station_coordinates() -> None:
         ("from_m = 20.0", "from_m = 200.0", ("gradient[0].from_m", "found 200.0", "110")),
         ("permil = 12.0", "permil = 1200.0", ("gradient[0]", "1.2")),
         ("vertical_radius_m = [500.0]", "vertical_radius_m = [500.0, 1.0]", ("vertical_radius_m", "1 radii")),
+        # At most half of the base: 750 mm over 1500 mm, 50 mm over 100 mm.
+        ("cant_mm = 60.0", "cant_mm = 800.0", ("segment[2].cant_m", "0.8", "<= 0.75")),
+        ("start_m = -10.0", "rail_base_mm = 100.0", ("segment[2].cant_m", "0.06", "<= 0.05")),
+        ("start_m = -10.0", "rail_base_mm = 1.5", ("rail_base_mm", "1.5", ">= 50")),
         ("start_m = -10.0", "start_km = -10.0", ("start_km", "did you mean start_m?")),
     ],
 )

@@ -1,5 +1,7 @@
 """The sensor of the rails: closed forms of what it sees, its noise, its streams, and measure's side of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -66,13 +68,15 @@ def test_irregular_rails_show_as_they_were_laid():
     s = np.linspace(30.0, 170.0, 57)
     angles = np.zeros((len(s), 3))
     position = np.column_stack([s, np.zeros(len(s)), np.full(len(s), 0.4)])
-    left, right = rails_seen(position, angles, s + 0.3, ROUGH, base_m=1.5)
+    left, right = rails_seen(position, angles, s + 0.3, ROUGH)
     expected = ROUGH.rails(s)
     np.testing.assert_allclose(left, expected[:, :2] + [0.75, -0.4], atol=1e-9)
     np.testing.assert_allclose(right, expected[:, 2:] + [-0.75, -0.4], atol=1e-9)
     # On a narrower base, as of a scale track, the nominal rails move and their deviations stay.
-    narrow = rails_seen(position, angles, s, ROUGH, base_m=0.13)[0]
-    np.testing.assert_allclose(narrow, left - [0.75 - 0.065, 0.0], atol=1e-9)
+    narrow = replace(ROUGH, design=replace(LEVEL, rail_base_m=0.13))
+    seen_left, seen_right = rails_seen(position, angles, s, narrow)
+    np.testing.assert_allclose(seen_left, left - [0.75 - 0.065, 0.0], atol=1e-9)
+    np.testing.assert_allclose(seen_right, right - [0.065 - 0.75, 0.0], atol=1e-9)
 
 
 def test_in_a_canted_curve_the_rails_lie_in_the_track_frame():
@@ -87,7 +91,7 @@ def test_in_a_canted_curve_the_rails_lie_in_the_track_frame():
     s = np.linspace(100.0, 160.0, 31)
     frame = track.frame(s)
     angles = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad])
-    left, right = rails_seen(frame.position, angles, s, laid, base_m=1.5)
+    left, right = rails_seen(frame.position, angles, s, laid)
     nominal = np.array([0.75, 0.0])
     np.testing.assert_allclose(left - nominal, laid.rails(s)[:, :2], atol=1e-8)
     np.testing.assert_allclose(right + nominal, laid.rails(s)[:, 2:], atol=1e-8)
@@ -123,7 +127,6 @@ def test_impossible_sensors_are_named():
         ("noise_m", np.nan),
         ("outlier_fraction", 0.5),
         ("outlier_m", -1.0),
-        ("rail_base_m", 1500.0),
     ):
         with pytest.raises(InputError, match=f"{field}: is impossible"):
             check_rail_sensor(RailSensorSpec(**{field: value}))
@@ -149,7 +152,7 @@ def test_measure_puts_it_into_the_recording_and_changes_nothing_else():
     assert with_it.imu.equals(without.imu) and with_it.odometry.equals(without.odometry)
     assert without.rail_displacement is None and without.rail_sensor_sheet is None
     assert with_it.rail_displacement.index.equals(with_it.imu.index)
-    assert with_it.rail_sensor_sheet.noise_m == 1e-4 and with_it.rail_sensor_sheet.rail_base_m == 1.5
+    assert with_it.rail_sensor_sheet.noise_m == 1e-4
     again = recorded(rail_sensor=RailSensorSpec(), rails=ROUGH)
     assert with_it.rail_displacement.equals(again.rail_displacement)
     with pytest.raises(InputError, match=r"rails: a rail sensor needs rails"):

@@ -62,6 +62,12 @@ def test_a_consistent_method_lies_in_the_bounds_as_often_as_said(draws: int, dim
     assert power > 0.5
 
 
+def test_bounds_are_those_of_the_tables_of_chi_square() -> None:
+    """Ten degrees of freedom, 2.5 and 97.5 %: 3.247 and 20.483 in any table."""
+    assert anees_bounds(10) == pytest.approx((0.3247, 2.0483), abs=5e-5)
+    assert anees_bounds(5, dimension=2) == anees_bounds(10)
+
+
 def test_errors_that_last_raise_no_false_alarm() -> None:
     """Rides of samples that hang together: averages over rides stay within the bounds for draws."""
     rng, draws = np.random.default_rng(4), 20

@@ -69,6 +69,7 @@ def designs(draw: st.DrawFn) -> TrackDesign:
         vertical_radius_m=min(150.0, total),
         vertical_ramp_m=draw(st.sampled_from([0.0, 1.0])),
         cant_ramp=draw(st.sampled_from(["smooth", "linear"])),
+        rail_base_m=draw(st.sampled_from([1.5, 1.0, 1.8])),
         start_yaw_rad=draw(st.floats(-3.0, 3.0)),
     )
 
@@ -295,6 +296,8 @@ def test_a_design_is_not_worked_on_before_it_is_used() -> None:
         ({"gradients": (Gradient(50.0, 0.01),), "vertical_radius_m": (900.0, 900.0)}, "vertical_radius_m"),
         ({"vertical_ramp_m": -1.0}, "vertical_ramp_m"),
         ({"cant_ramp": "cosine"}, "cant_ramp"),
+        ({"rail_base_m": 1500.0}, "rail_base_m"),
+        ({"rail_base_m": float("nan")}, "rail_base_m"),
         ({"start_m": float("nan")}, "start_m"),
     ],
 )
