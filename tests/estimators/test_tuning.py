@@ -253,7 +253,7 @@ def test_kom_does_better_on_sensors_that_it_has_not_seen(
     CMA-ES alone does it; the descent after it takes long.
     """
     monkeypatch.setattr("estimators.tuning_search.ROUNDS", 0)
-    first, count = 6000, 1500
+    first, count = 13000, 2500
     ride = piece(metro_recording(70.0, 1, "axle", 0), first, count)
     smoother, space = TrajectorySmoother(), SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=3e-3)
     tuning = tune(
