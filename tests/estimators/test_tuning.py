@@ -104,6 +104,7 @@ def found_in(goal: Likelihood, seed: int = 1) -> Hyperparameters:
     return Hyperparameters.from_vector(SYNTHETIC.values(found.point))
 
 
+@pytest.mark.slow
 def test_cml_recovers_the_noise_of_its_own_model() -> None:
     """Each within its Cramer-Rao interval, and all together as chi-square of 11 has it, two-sided."""
     goal = synthetic()
