@@ -52,6 +52,7 @@ def tune(
     band: Band | None = None,
     step_m: float = STEP_M,
     evaluations: int = EVALUATIONS,
+    at_most: int | None = None,
     seed: int = 1,
     threads: int | None = None,
     unfinished: Path | None = None,
@@ -79,6 +80,8 @@ def tune(
         Distance of the places at which KOM compares.
     evaluations : int
         Of CMA-ES; L-BFGS-B adds about as many times three.
+    at_most : int, optional
+        Of the whole search of each set; without a limit a known output may take thousands to settle.
     seed : int
         Of the search.
     threads : int, optional
@@ -151,6 +154,7 @@ def tune(
                 start=space.point(smoother.noise[0].vector()),
                 generator=stream(seed, "tuning", method, name),
                 evaluations=evaluations,
+                at_most=at_most,
                 record=record,
                 report=report,
             )

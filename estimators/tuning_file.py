@@ -8,6 +8,9 @@
     [search]                   # optional: how they were found
     method = "cml"
     ...
+    [status]                   # optional: what the search knows of each; [curve_status] of the second set
+    roll_rad2ps3 = "identified"
+    ...
 
 Parameters that lie outside the box of their own search are refused: somebody has changed one of the two. For
 parameters set by hand, leave [search] out. Not here: the search (`estimators.tuning`).
@@ -24,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from estimators.trajectory_noise import Hyperparameters
-from estimators.tuning_space import SearchSpace
+from estimators.tuning_space import NAMES, STATUSES, SearchSpace
 from simrail.errors import InputError
 
 REMEDY = "tune anew with 'simrail tune', or leave out [search] for values set by hand"
@@ -77,11 +80,16 @@ class Tuning:
         For its transitions and curves.
     search : Search, optional
         How they were found; None for values set by hand.
+    status, curve_status : mapping of str to str, optional
+        What the search knows of each hyper-parameter of the first and of the second set: one of
+        `estimators.tuning_space.STATUSES`. It changes no estimate.
     """
 
     hyperparameters: Hyperparameters = field(default_factory=Hyperparameters)
     curve_hyperparameters: Hyperparameters | None = None
     search: Search | None = None
+    status: Mapping[str, str] | None = None
+    curve_status: Mapping[str, str] | None = None
 
     @classmethod
     def from_file(cls, path: str | Path) -> Tuning:
@@ -97,7 +105,10 @@ class Tuning:
         tables = _tables(file)
         search = _search(tables["search"], file) if "search" in tables else None
         sets = [_hyperparameters(tables[name], name, search, file) for name in SETS if name in tables]
-        return cls(sets[0], sets[1] if len(sets) > 1 else None, search)
+        for name in (name for name in STATUS if name in tables):
+            _judge_status(tables[name], name, file)
+        known = [tables.get(name) for name in STATUS]
+        return cls(sets[0], sets[1] if len(sets) > 1 else None, search, *known)
 
     def text(self) -> str:
         """The file's text; numbers read back bit by bit."""
@@ -110,7 +121,11 @@ class Tuning:
                 lines.append(f"[{name}]\n{_lines(asdict(values))}\n")
         if self.search is not None:
             table = asdict(self.search)
-            lines.append(f"[search]\n{_lines(table | table.pop('space'))}")
+            lines.append(f"[search]\n{_lines(table | table.pop('space'))}\n")
+        for name in STATUS:
+            known = getattr(self, name)
+            if known is not None:
+                lines.append(f"[{name}]\n{_lines(known)}\n")
         return "".join(lines).rstrip("\n") + "\n"
 
     def write(self, path: str | Path) -> None:
@@ -127,6 +142,9 @@ class Tuning:
 SETS = ("hyperparameters", "curve_hyperparameters")
 """Tables of hyper-parameters."""
 
+STATUS = ("status", "curve_status")
+"""Tables of what is known of each."""
+
 
 def _tables(file: Path) -> dict[str, dict[str, Any]]:
     try:
@@ -137,7 +155,7 @@ def _tables(file: Path) -> dict[str, dict[str, Any]]:
         ) from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"is no TOML: {error}", file=file.name, remedy=REMEDY) from error
-    _judge_names(data, (*SETS, "search"), needed=SETS[:1], file=file, what="table")
+    _judge_names(data, (*SETS, "search", *STATUS), needed=SETS[:1], file=file, what="table")
     for name, table in data.items():
         if not isinstance(table, dict):
             raise InputError("is no table", file=file.name, field=name, value=table, remedy=f"write [{name}]")
@@ -163,6 +181,20 @@ def _judge_names(
                 value=data.get(name),
                 limit=f"the {what}s " + ", ".join(known),
                 remedy=REMEDY if name in known else "remove it",
+            )
+
+
+def _judge_status(table: dict[str, Any], name: str, file: Path) -> None:
+    _judge_names(table, NAMES, needed=NAMES, file=file, what="hyper-parameter", prefix=f"{name}.")
+    for parameter, status in table.items():
+        if status not in STATUSES:
+            raise InputError(
+                "is no status",
+                file=file.name,
+                field=f"{name}.{parameter}",
+                value=status,
+                limit="one of " + ", ".join(STATUSES),
+                remedy="tune anew with 'simrail tune', or leave the table out",
             )
 
 

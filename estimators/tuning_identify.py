@@ -20,7 +20,16 @@ import pandas as pd
 
 from estimators.trajectory_noise import Hyperparameters
 from estimators.tuning_objectives import Likelihood, Objective
-from estimators.tuning_space import NAMES, SearchSpace
+from estimators.tuning_space import (
+    CONSTRAINT,
+    FLAT,
+    HELD,
+    IDENTIFIED,
+    LOWER,
+    NAMES,
+    UPPER,
+    SearchSpace,
+)
 from simrail.jit import FloatArray
 
 TOLERANCE = 1e-3
@@ -31,9 +40,6 @@ STEP = 0.1
 
 EDGE = 1e-3
 """Of an axis of the cube: closer to an end than this is at it."""
-
-IDENTIFIED, FLAT, HELD = "identified", "flat", "held"
-LOWER, UPPER, CONSTRAINT = "at the lower edge", "at the upper edge", "at the constraint"
 
 
 @dataclass(frozen=True)

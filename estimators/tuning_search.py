@@ -16,6 +16,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,6 +73,10 @@ class Least:
     point: FloatArray
     value: float
     evaluations: int
+
+
+class _Enough(Exception):
+    """As many points as were allowed have been asked for."""
 
 
 class Record:
@@ -143,6 +148,7 @@ def least(
     start: FloatArray,
     generator: np.random.Generator,
     evaluations: int = EVALUATIONS,
+    at_most: int | None = None,
     record: Record | None = None,
     report: Report | None = None,
 ) -> Least:
@@ -158,6 +164,8 @@ def least(
         Of CMA-ES; numpy's global one is neither used nor touched.
     evaluations : int
         Of CMA-ES, rounded up to whole generations of `POPULATION`; L-BFGS-B then goes on from its best.
+    at_most : int, optional
+        Ends the search, wherever it is, with the batch by which so many points have been asked for.
     record : Record, optional
         What an earlier, interrupted search of the same function has evaluated; goes on growing.
     report : Report, optional
@@ -174,16 +182,19 @@ def least(
         values = kept.values(points, evaluate)
         if report is not None:
             report(kept.asked, *kept.best())
+        if at_most is not None and kept.asked >= at_most:
+            raise _Enough
         return values
 
-    ask(np.clip(start, 0.0, 1.0)[None])
-    _cma(ask, start, generator, evaluations)
-    for _ in range(ROUNDS):
-        _descend(ask, kept.best()[0])
-        point, value = kept.best()
-        ask(along_axes(point))
-        if kept.best()[1] > value - GAIN:
-            break
+    with suppress(_Enough):
+        ask(np.clip(start, 0.0, 1.0)[None])
+        _cma(ask, start, generator, evaluations)
+        for _ in range(ROUNDS):
+            _descend(ask, kept.best()[0])
+            point, value = kept.best()
+            ask(along_axes(point))
+            if kept.best()[1] > value - GAIN:
+                break
     point, value = kept.best()
     return Least(point, value, kept.asked)
 

@@ -27,6 +27,12 @@ RATIO = 10.0
 """A constrained accelerometer's variance (m2/s4) is at most the position's (m2) over this (paper, Eq. 19)."""
 
 
+IDENTIFIED, FLAT, HELD = "identified", "flat", "held"
+LOWER, UPPER, CONSTRAINT = "at the lower edge", "at the upper edge", "at the constraint"
+STATUSES = (IDENTIFIED, FLAT, HELD, LOWER, UPPER, CONSTRAINT)
+"""What can become of a parameter in a search: see `estimators.tuning_identify.identify`."""
+
+
 @dataclass(frozen=True)
 class SearchSpace:
     """Box and constraints; the defaults are the paper's.

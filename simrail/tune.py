@@ -59,6 +59,7 @@ def tune_scenario(
     within_m: tuple[float, float] | None = None,
     step_m: float = 0.25,
     evaluations: int = 480,
+    at_most: int | None = None,
     command: str = "",
     watcher: Watcher | None = None,
 ) -> Tuned:
@@ -90,6 +91,8 @@ def tune_scenario(
         this far apart.
     evaluations : int
         Of CMA-ES.
+    at_most : int, optional
+        Evaluations of the whole search of each set.
     command : str
         What to write into the file as the command that makes it.
     watcher : Watcher, optional
@@ -109,6 +112,8 @@ def tune_scenario(
         raise InputError("belongs to a known output", field=field, remedy="use --method kom, or leave it out")
     if evaluations < 0:
         raise InputError("is out of range", field="--evaluations", value=evaluations, limit=">= 0")
+    if at_most is not None and at_most < 1:
+        raise InputError("is out of range", field="--at-most", value=at_most, limit=">= 1")
     _judge_file(out)
     watcher = watcher or Watcher()
     scenario = alone(scenario, estimator)
@@ -130,17 +135,18 @@ def tune_scenario(
             if method == "kom":
                 references.append(reference_of(cell, parts, within_m, step_m))
         space = SearchSpace() if space is None else space
-        known = references if method == "kom" else None
+        rails = references if method == "kom" else None
         with blame(scenario.file, "tuning"):
             found = tune(
                 recordings,
                 smoother,
-                references=known,
+                references=rails,
                 space=space,
                 by_kind=by_kind,
                 band=wanted,
                 step_m=step_m,
                 evaluations=evaluations,
+                at_most=at_most,
                 seed=scenario.spec.seed,
                 unfinished=unfinished(out),
                 progress=watcher.search_goes,
@@ -151,9 +157,11 @@ def tune_scenario(
         values = [found.hyperparameters, found.curve_hyperparameters]
         identified = {}
         for (name, kind), parameters in zip(sets.items(), values, strict=False):
-            goal = objective_of(recordings, smoother, kind=kind, references=known, band=wanted, step_m=step_m)
+            goal = objective_of(recordings, smoother, kind=kind, references=rails, band=wanted, step_m=step_m)
             assert parameters is not None
             identified[name] = identify(goal, parameters, space)
+    known = [dict(judged.table["status"]) for judged in identified.values()]
+    found = replace(found, status=known[0], curve_status=known[1] if by_kind else None)
     found.write(out)
     return Tuned(found, out, identified)
 

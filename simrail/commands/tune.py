@@ -75,6 +75,10 @@ def tune(
     evaluations: Annotated[
         int, typer.Option("--evaluations", metavar="N", help="Of CMA-ES, before L-BFGS-B takes over.")
     ] = 480,
+    at_most: Annotated[
+        int | None,
+        typer.Option("--at-most", metavar="N", help="Evaluations after which the search ends as it is."),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -112,6 +116,7 @@ def tune(
         ("--within", within, None),
         ("--step", step, 0.25),
         ("--evaluations", evaluations, 480),
+        ("--at-most", at_most, None),
         ("--seed", seed, None),
     ):
         if given != usual:
@@ -138,6 +143,7 @@ def tune(
                 within_m=within,
                 step_m=step,
                 evaluations=evaluations,
+                at_most=at_most,
                 command=command_of(words),
                 watcher=watcher,
             )

@@ -6,7 +6,7 @@ from the scores (`simrail.report.findings`); how it looks is in ``page.html.j2``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from simrail.report.geometry_view import GeometryView, geometry_view
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.report.paper_000.section import paper_view as beside_briales
 from simrail.report.paper_001.section import paper_view as beside_gonzalez
+from simrail.report.paper_001.tunings import tunings_of
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.provenance import facts, parts
 from simrail.report.ride_figures import direction_of, imu_figure, odometry_figure, speed_figure
@@ -46,10 +47,6 @@ TABLES = "tables"
 
 MOST_TABLES = 24
 """Cases whose table is on the page; ``scores.csv`` holds all."""
-
-
-_PAPERS: dict[str, Callable[..., Any]] = {"briales_2021": beside_briales, "gonzalez_2023": beside_gonzalez}
-"""Sections that set a scenario beside a publication."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +109,7 @@ def write_report(
     """
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
-    paper = None
-    if scenario.spec.paper is not None:
-        paper = _PAPERS[scenario.spec.paper](all_cases, methods(scenario), styles, examples)
+    paper = _beside_paper(scenario, all_cases, styles, examples)
     campaign = campaign_view(scenario, scores, cells, styles, examples, manifest)
     if campaign is not None:
         write_tables(path.parent / TABLES, campaign.tables)
@@ -146,6 +141,22 @@ def write_report(
         imus=len(scores[["mount", "imu"]].drop_duplicates()),
     )
     path.write_text(text, encoding="utf-8")
+
+
+def _beside_paper(
+    scenario: Scenario,
+    all_cases: list[Figures],
+    styles: Sequence[MethodStyle],
+    examples: Sequence[CellResult],
+) -> Any:
+    """The section that sets a scenario beside a publication; None if it names none."""
+    ran = methods(scenario)
+    if scenario.spec.paper == "briales_2021":
+        return beside_briales(all_cases, ran, styles, examples)
+    if scenario.spec.paper == "gonzalez_2023":
+        tunings = tunings_of(ran, scenario.folder)
+        return beside_gonzalez(all_cases, ran, styles, examples, tunings=tunings)
+    return None
 
 
 def _ride(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from estimators.tuning_file import Tuning
 from simrail.report.claim import Claim
 from simrail.report.findings import significant
 from simrail.report.geometry_tables import QUANTITIES
 from simrail.report.paper_001.parts import PARTS, Rows
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
+from simrail.report.paper_001.tunings import constraint_claim
 
 SAME_FACTOR = 1.5
 """Two tunings are about as accurate if their errors lie within this factor."""
@@ -23,7 +25,13 @@ MATTERS_FACTOR = 1.05
 """Misprints matter if an error is more than so many times as large with them."""
 
 
-def claims(rows: Rows, *, coverage: Sequence[float], peak: tuple[float, float]) -> list[Claim]:
+def claims(
+    rows: Rows,
+    *,
+    coverage: Sequence[float],
+    peak: tuple[float, float],
+    tuning: Tuning | None = None,
+) -> list[Claim]:
     """All of them, in the order of the paper.
 
     Parameters
@@ -34,8 +42,11 @@ def claims(rows: Rows, *, coverage: Sequence[float], peak: tuple[float, float]) 
         Share of the track inside the interval of `Rows.main`, %, in the order of `COLUMNS`; empty if unknown.
     peak : tuple of float
         Of the unfiltered alignment error of `Rows.main`: largest in the first metres, sd of the rest, mm.
+    tuning : Tuning, optional
+        That of CML, with what the search knows.
     """
     return [
+        constraint_claim(tuning),
         _same("tunings", "Section 6.1: CML and KOM are about as accurate.", rows, ("cml", "kom")),
         _same(
             "parts",

@@ -16,6 +16,7 @@ PARTS: dict[str, str] = {
     "kom_start": "KOM on part 1",
     "kom_end": "KOM on part 2",
     "cml_noise": "CML, noise added",
+    "cml_held": "CML, virtual positions held",
     "hand": "set by hand",
     "filter": "by hand, filter alone",
     "printed": "by hand, misprints kept",
@@ -42,7 +43,7 @@ def part_of(method: Method) -> str:
     if printed or not smoothed:
         return ""
     if "cml" in words:
-        return "cml"
+        return "cml_noise" if NOISY in words else "cml_held" if "held" in words else "cml"
     if "kom" in words:
         return "kom_start" if "start" in words else "kom_end" if "end" in words else "kom"
     return ""
@@ -72,10 +73,14 @@ class Rows:
     def get(self, part: str, quantity: str, metric: str, *, filtered: bool) -> Figure:
         """One figure; NaN and no draws if it was not run."""
         case = self.noisy if part == "cml_noise" else self.case
-        name = self.names.get("cml" if part == "cml_noise" else part, "")
+        name = self.names.get(self.played_by(part), "")
         if case is None:
             return Figure(float("nan"), float("nan"), 0)
         return case.get(name, quantity, metric, band=self.band if filtered else "full")
+
+    def played_by(self, part: str) -> str:
+        """Part whose method plays a part: CML on noisy signals, where none was tuned on them, is that of CML."""
+        return "cml" if part == "cml_noise" and part not in self.names else part
 
     def has(self, *parts: str) -> bool:
         """Whether all parts were run."""

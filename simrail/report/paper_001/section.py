@@ -5,12 +5,13 @@ Everything of ours is looked up in the scores, or computed from the first draw o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
 
+from estimators.tuning_file import Tuning
 from simrail.bands import Band
 from simrail.example import CellResult
 from simrail.report.claim import Claim
@@ -21,6 +22,7 @@ from simrail.report.methods import MethodStyle
 from simrail.report.paper_001.claims import claims, errata_note
 from simrail.report.paper_001.parts import PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
+from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
 from simrail.report.pivot import Figures, of_cell
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.cells import Method
@@ -47,6 +49,8 @@ class PaperView:
     size: str
     table: Table
     coverage: Table
+    tunings: Table | None
+    commands: list[tuple[str, str]]
     claims: list[Claim]
     notes: list[str]
     figures: list[tuple[str, Markup]]
@@ -59,6 +63,8 @@ def paper_view(
     methods: Sequence[Method],
     styles: Sequence[MethodStyle],
     examples: Sequence[CellResult],
+    *,
+    tunings: Mapping[str, Tuning] | None = None,
 ) -> PaperView | None:
     """Make the section; None if no case has rail geometry.
 
@@ -69,7 +75,9 @@ def paper_view(
     methods, styles : sequence
         The scenario's methods and how they look.
     examples : sequence of CellResult
-        First draw of each ride.
+        First draw of each ride, and of an IMU with noise added.
+    tunings : mapping of str to Tuning, optional
+        Tunings by the method that names them.
     """
     rows = rows_of(all_cases, methods, band=SCALED.name)
     if rows is None:
@@ -82,22 +90,26 @@ def paper_view(
     drawn = main if example and main and with_rails(example, [main]) else None
     covered: dict[str, list[float]] = {
         part: coverage_of(example, looks[part], band)
-        for part in ("cml", "kom", "hand", "printed")
+        for part in ("cml", "cml_held", "kom", "hand", "printed")
         if example and part in looks and with_rails(example, [looks[part]])
     }
     labels = rows.case.labels
+    tuned = by_part(rows.names, tunings or {})
     return PaperView(
         where=f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), "
         f"odometry {labels['odometry']}",
         size="a 1:10 track" if band is SCALED else "full size",
         table=_table(rows, looks),
         coverage=_coverage_table(covered, looks),
+        tunings=status_table(tuned),
+        commands=commands(tuned),
         claims=claims(
             rows,
             coverage=covered.get(rows.main, []),
             peak=_peak(example, drawn) if example and drawn else (np.nan, np.nan),
+            tuning=tuned.get("cml"),
         ),
-        notes=[note for note in (errata_note(rows), *_not_run(rows)) if note],
+        notes=[note for note in (*notes(tuned), errata_note(rows), *_not_run(rows)) if note],
         figures=_figures(rows, looks, example, band) if example else [],
     )
 
@@ -113,7 +125,7 @@ def _table(rows: Rows, looks: dict[str, MethodStyle]) -> Table:
     """Tables 1 and 2: what is printed, and ours below it."""
     result = []
     for part, label in PARTS.items():
-        style = looks.get("cml" if part == "cml_noise" else part)
+        style = looks.get(rows.played_by(part))
         colour = style.colour if style else ""
         if part in TABLES:
             cells = [
