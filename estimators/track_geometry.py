@@ -230,8 +230,8 @@ def over_space(
     """
     first, last = (np.ceil(place.min() / step_m - 1e-9), np.floor(place.max() / step_m + 1e-9))
     if last - first < 1:
-        nothing = np.empty((0, values.shape[1]))
-        return OverSpace(np.empty(0), nothing, None if variance is None else nothing, np.empty(0))
+        nothing, spread = np.empty((0, values.shape[1])), None if variance is None else variance[:0]
+        return OverSpace(np.empty(0), nothing, spread, np.empty(0))
     cell_m = step_m / FINE
     kinds = np.unique(np.floor(place / cell_m).astype(np.int64), return_inverse=True)[1]
     at = np.bincount(kinds, place) / np.bincount(kinds)

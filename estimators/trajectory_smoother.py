@@ -11,6 +11,10 @@ The model has no sensor bias. An offset of the accelerometer is wholly taken for
 by the data sheet is added to theirs afterwards (`sensor_bias`). What one of the gyro does to yaw is not in
 the standard deviations. Place is another matter: the virtual measurements hold it.
 
+What the model lacks is balanced from both sides within a ride, and from one side only at its two ends. A gyro
+bias that no rest has told, a start attitude that is believed too firmly, or virtual positions that are too
+soft show there as a peak of the alignment over some metres, such as paper 001 found and left open.
+
 The model stands in `estimators.trajectory_model`, the noise in `estimators.trajectory_noise`.
 """
 

@@ -160,23 +160,20 @@ def indicator_table(
         for quantity in quantities:
             at = (start, quantity)
             there = at in both
-            for what, unit in (("sd_m", 1e3), ("peak_m", 1e3), ("defects", 1.0)):
+            for what in ("sd_m", "peak_m"):
                 for name in ("true", "found"):
-                    line = lines[name].loc[at] if there else None
-                    cells.append(_indicator(line, what, unit))
+                    cells.append(_indicator(lines[name].loc[at] if there else None, what))
         rows.append(Row(f"{start:.0f} to {start + 200.0:.0f} m", "", "", cells))
-    groups = [(QUANTITIES[q], 6) for q in quantities]
-    columns = ["sd", "found", "peak", "found", "defects", "found"] * len(quantities)
+    groups = [(QUANTITIES[q], 4) for q in quantities]
+    columns = ["sd", "found", "peak", "found"] * len(quantities)
     return Table(groups, columns, rows)
 
 
-def _indicator(line: pd.Series | None, what: str, unit: float) -> Cell:
+def _indicator(line: pd.Series | None, what: str) -> Cell:
     if line is None:
         return Cell("\u2013", mark="none")
-    value = unit * float(line[what])
-    beyond = bool(line["sd_exceeded"]) if what == "sd_m" else what == "defects" and value > 0
-    text = f"{value:.0f}" if what == "defects" else f"{value:.2f}".replace("-", "\u2212")
-    return Cell(text, mark="worse" if beyond else "")
+    beyond = bool(line["sd_exceeded"]) if what == "sd_m" else line["defects"] > 0
+    return Cell(f"{1e3 * float(line[what]):.2f}".replace("-", "\u2212"), mark="worse" if beyond else "")
 
 
 def geometry_findings(
@@ -261,7 +258,7 @@ def _twin(case: Figures, others: Sequence[Figures], what: str) -> Figures | None
         odometry_true = labels["odometry"] == "truth"
         same_odometry = labels["odometry"] == wanted["odometry"]
         fits = {
-            "odometry": not is_ideal and odometry_true and labels["imu"] == wanted["imu"],
+            "odometry": odometry_true and labels["imu"] == wanted["imu"],
             "imu": is_ideal and same_odometry,
             "both": is_ideal and odometry_true,
         }

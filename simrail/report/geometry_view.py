@@ -141,7 +141,7 @@ def _indicators(
     text = (
         f"Indicators in {BAND} of the true rails and of those that {style.label} finds, mm: standard "
         f"deviation "
-        "over 200 m, largest distance from the mean, isolated defects. "
+        "over 200 m, largest distance from the mean. "
     )
     text += (
         f"Marked: beyond the scenario's limits ({told})."

@@ -281,6 +281,9 @@ def test_a_train_that_stands_says_nothing_of_the_rails():
     part = replace(recording, imu=recording.imu.iloc[still], odometry=recording.odometry.iloc[still])
     geometry = track_geometry(replace(estimate, states=estimate.states.iloc[still]), part)
     assert len(geometry) == 0 and list(geometry) == list(IRREGULARITY)
+    sds = dict.fromkeys(("roll_sd_rad", "lateral_sd_m", "vertical_sd_m"), 1e-3)
+    told = track_geometry(replace(estimate, states=estimate.states.iloc[still].assign(**sds)), part)
+    assert len(told) == 0 and set(told) == {*IRREGULARITY, *IRREGULARITY_SD}
 
 
 def test_bad_input_is_named():

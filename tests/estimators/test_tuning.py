@@ -1,7 +1,7 @@
 """CML and KOM: what a search finds in data whose noise is known, and what it must keep to.
 
 The synthetic data are drawn from the smoother's own model: states from its prior and its process, signals
-from its measurements. The virtual positions, which are constants and no draw, get a variance that says nothing.
+from its measurements. The virtual positions, constants and no draw, get a variance that says nothing.
 """
 
 from __future__ import annotations
@@ -104,6 +104,7 @@ def found_in(goal: Likelihood, seed: int = 1) -> Hyperparameters:
     return Hyperparameters.from_vector(SYNTHETIC.values(found.point))
 
 
+@pytest.mark.slow
 def test_cml_recovers_the_noise_of_its_own_model() -> None:
     """Each within its Cramer-Rao interval, and all together as chi-square of 11 has it, two-sided."""
     goal = synthetic()
@@ -219,7 +220,7 @@ def test_ends_flats_and_constraints_are_told_apart() -> None:
         def value(self, parameters: Hyperparameters) -> float:
             logs = np.log(parameters.vector())
             weight = np.array([1.0, 1e-6, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1])
-            floor = np.log([1e-2] * 9 + [1e4, 1e-2, 1e-2, 1e-2])
+            floor = np.log([1e-2] * 5 + [1e-6, 1e6] + [1e-2] * 2 + [1e4] + [1e-2] * 3)
             together = (logs[3] + logs[4] - 2 * floor[3]) ** 2  # only their product is known
             weight[3] = weight[4] = 0.0
             return float((weight * (logs - floor) ** 2).sum() + together)
@@ -245,13 +246,19 @@ def rails_of(recording: Recording) -> pd.DataFrame:
     return laid.irregularities(np.arange(place.min() + 5.0, place.max() - 5.0, 0.25))
 
 
-def test_kom_does_better_on_sensors_that_it_has_not_seen(metro_recording: Callable[..., Recording]) -> None:
-    """Tuned on one draw of the sensors, the rails of others come out better than from hand-set values."""
-    first, count = 6000, 5000
+def test_kom_does_better_on_sensors_that_it_has_not_seen(
+    metro_recording: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tuned on one draw of the sensors, the rails of others come out better than from hand-set values.
+
+    CMA-ES alone does it; the descent after it takes long.
+    """
+    monkeypatch.setattr("estimators.tuning_search.ROUNDS", 0)
+    first, count = 13000, 2500
     ride = piece(metro_recording(70.0, 1, "axle", 0), first, count)
     smoother, space = TrajectorySmoother(), SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=3e-3)
     tuning = tune(
-        [ride], smoother, references=[rails_of(ride)], space=space, band=BANDS["D0"], evaluations=96
+        [ride], smoother, references=[rails_of(ride)], space=space, band=BANDS["D0"], evaluations=240
     )
     assert tuning.search is not None and tuning.search.method == "kom"
     by_hand = replace(Hyperparameters(), lateral_position_m2=3e-3, vertical_position_m2=3e-3)

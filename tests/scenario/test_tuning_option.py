@@ -89,3 +89,11 @@ def test_two_tunings_are_two_variants(scenario: Scenario) -> None:
     both = judge_scenario(load_scenario(f"{scenario.folder}/mine.toml", overrides=[listed]))
     names = [name for name in both.estimators if name.startswith("smoother")]
     assert names == ["smoother[tuning=tunings/mine.toml]", "smoother[tuning=other.toml]"]
+
+
+def test_shipped_tunings_can_be_read_and_those_that_were_searched_say_how() -> None:
+    found = sorted((shipped("scenario")["quick_kinematic"].parent / "tunings").glob("*.toml"))
+    assert found
+    for file in found:
+        search = Tuning.from_file(file).search
+        assert search is None or (search.finished and search.command.startswith("simrail tune "))

@@ -107,12 +107,14 @@ def _intervals(rows: Rows, coverage: Sequence[float]) -> Claim:
     )
     parts = []
     if not narrow:
-        parts.append(
-            "cross-level is not too narrow, since what the accelerometer's bias does to roll is in our "
-            "intervals"
-        )
+        named = [
+            word for word, v in zip(("unfiltered", "filtered"), coverage, strict=False) if v >= TOO_NARROW
+        ]
+        parts.append(f"cross-level {' and '.join(named)} is not too narrow")
     if wide:
-        parts.append("those of filtered rails are too wide, as in the paper, since they are of all waves")
+        parts.append(
+            "alignment and vertical profile, whose intervals are of all waves, are too wide as in the paper"
+        )
     cause = f"{'; '.join(parts)[:1].upper()}{'; '.join(parts)[1:]}." if parts else ""
     return Claim("intervals", said, narrow and wide, found, cause)
 
