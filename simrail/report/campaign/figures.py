@@ -152,7 +152,8 @@ def box_figure(
 ) -> str:
     """How the figure spreads over all cells with a value of an axis, for each axis a panel."""
     styles = [style for style in styles if (draws["estimator"] == style.name).any()]
-    if not styles or not axes:
+    positive = draws.loc[draws["value"] > 0.0, "value"]
+    if not styles or not axes or positive.empty:
         return ""
     across = 2 if len(axes) > 1 else 1
     rows = -(-len(axes) // across)
@@ -160,7 +161,6 @@ def box_figure(
     height = top + rows * tall + (rows - 1) * gap + bottom
     wide = (WIDTH_IN - LEFT_IN - 0.2 - 0.7 * (across - 1)) / across
     found = {style.name: draws[draws["estimator"] == style.name] for style in styles}
-    positive = draws.loc[draws["value"] > 0.0, "value"]
     with look():
         figure = Figure(figsize=(WIDTH_IN, height))
         for number, axis_of in enumerate(axes):
