@@ -86,18 +86,21 @@ def gather(job: Job, kept: Unfinished, *, only: int | None = None) -> CampaignRe
 
 
 def _examples(job: Job, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
-    """The first cell of each ride over the first draw that did not fail altogether."""
+    """The first cell of each ride over the first draw that did not fail altogether, and of added noise."""
     failed: dict[int, int] = {}
     for failure in failures:
         failed[failure.cell] = failed.get(failure.cell, 0) + 1
     shown: set[int] = set()
+    noise_shown = False
     found: list[CellResult] = []
     for cell in listed:
         if len(found) == MOST_EXAMPLES:
             break
         lost = failed.get(cell.number, 0) >= len(job.plan.estimators)
-        if cell.track_draw == cell.sample == 0 and cell.ride_number not in shown and not lost:
+        first = cell.ride_number not in shown or (cell.imu.noise_added and not noise_shown)
+        if cell.track_draw == cell.sample == 0 and first and not lost:
             shown.add(cell.ride_number)
+            noise_shown |= cell.imu.noise_added
             with suppress(Exception):
                 found.append(example_of(job.order, cell))
     return found

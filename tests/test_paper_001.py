@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from estimators.trajectory_noise import Hyperparameters
+from estimators.tuning_file import Search, Tuning
+from estimators.tuning_space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER, SearchSpace
 from simrail.bands import BANDS
 from simrail.campaign import run_campaign
 from simrail.columns import IRREGULARITY
@@ -21,9 +24,11 @@ from simrail.report.paper_001.claims import claims, errata_note
 from simrail.report.paper_001.parts import Rows, part_of, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.section import FULL_SIZE, PaperView, coverage_of, paper_view
+from simrail.report.paper_001.tunings import by_part, notes, status_table, tunings_of
 from simrail.report.pivot import Figure, Figures, cases
 from simrail.results import describe
 from simrail.scenario.cells import Method, methods
+from simrail.scenario.imu_file import load_grade
 from simrail.scenario.parts import EstimatorPart
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.track_quality import Limits
@@ -48,6 +53,8 @@ def method(name: str, kind: str = "TrajectorySmoother", **options: object) -> Me
         (method("x", printed=True), "printed"),
         (method("x", printed=True, smoothed=False), ""),
         (method("a_cml", tuning="a.toml"), "cml"),
+        (method("a_cml_noise", tuning="a.toml"), "cml_noise"),
+        (method("a_cml_held", tuning="a.toml"), "cml_held"),
         (method("a_kom", tuning="a.toml"), "kom"),
         (method("a_kom_start", tuning="a.toml"), "kom_start"),
         (method("a_kom_end", tuning="a.toml"), "kom_end"),
@@ -64,11 +71,46 @@ def test_parts_follow_from_class_options_and_words(one: Method, part: str) -> No
 def test_the_shipped_scenario_plays_them() -> None:
     assert [part_of(m) for m in methods(load_scenario("metro_geometry"))] == [
         "hand",
+        "cml",
+        "cml_noise",
+        "cml_held",
+        "kom",
+        "kom_start",
+        "kom_end",
         "filter",
         "printed",
         "",
         "zero",
     ]
+
+
+def test_its_tunings_are_what_their_names_say() -> None:
+    """Where each search looked, what it was judged by and on which signals: read from the files."""
+    scenario = load_scenario("metro_geometry")
+    ran = methods(scenario)
+    found = by_part({part_of(m): m.name for m in ran}, tunings_of(ran, scenario.folder))
+    assert list(found) == ["cml", "kom", "kom_start", "kom_end", "cml_noise", "cml_held"]
+    searches = {part: tuning.search for part, tuning in found.items()}
+    for part, search in searches.items():
+        assert search is not None and search.finished
+        assert search.method == part.split("_")[0]
+        assert search.command.startswith("simrail tune metro_geometry ")
+        assert ("axle_noise" in search.fitted_on[0]) == (part == "cml_noise")
+        paper = part in ("cml", "cml_noise")
+        assert (search.space == SearchSpace()) == paper
+    assert "--within 20.0 1050.0" in searches["kom_start"].command  # type: ignore[union-attr]
+    assert "--within 1050.0 1520.0" in searches["kom_end"].command  # type: ignore[union-attr]
+
+
+def test_added_noise_is_ten_times_that_of_the_sheet_and_nothing_else() -> None:
+    quiet, loud = (load_grade(f"lord_3dm_gx4_25{tail}") for tail in ("", "_noise_added"))
+    changed = {
+        field.name: getattr(loud, field.name) / getattr(quiet, field.name)
+        for field in fields(quiet)
+        if field.name != "name" and getattr(loud, field.name) != getattr(quiet, field.name)
+    }
+    assert changed == {name: pytest.approx(10.0) for name in changed}
+    assert len(changed) == 2 and all("noise" in name for name in changed)
 
 
 # ---- verdicts, from planted scores -------------------------------------------------------------
@@ -101,13 +143,73 @@ def verdicts(
     *,
     coverage: tuple[float, ...] = COVERAGE,
     peak: tuple[float, float] = (6.9, 0.7),
+    tuning: Tuning | None = None,
 ) -> dict[str, Claim]:
-    return {claim.key: claim for claim in claims(rows, coverage=coverage, peak=peak)}
+    return {claim.key: claim for claim in claims(rows, coverage=coverage, peak=peak, tuning=tuning)}
+
+
+def tuned(*, space: SearchSpace | None = None, **status: str) -> Tuning:
+    """A tuning by CML that identifies everything but what is said otherwise."""
+    search = Search(
+        method="cml",
+        objective=(-17.0,),
+        unit="negative log-likelihood per sample",
+        space=space or SearchSpace(),
+        seed=1,
+        evaluations=100,
+        command="simrail tune short --method cml",
+    )
+    values = Hyperparameters(**dict.fromkeys(NAMES, 0.0002))  # type: ignore[arg-type]
+    values = replace(values, lateral_position_m2=2e-2, vertical_position_m2=2e-2)
+    return Tuning(values, None, search, dict.fromkeys(NAMES, IDENTIFIED) | status)
+
+
+@pytest.mark.parametrize("axis", ["lateral", "vertical"])
+@pytest.mark.parametrize(("status", "holds"), [(LOWER, False), (UPPER, False), (FLAT, True)])
+def test_the_constraint_fails_where_a_virtual_position_runs_into_an_edge(
+    axis: str, status: str, holds: bool
+) -> None:
+    claim = verdicts(planted(), tuning=tuned(**{f"{axis}_position_m2": status}))["constraint"]
+    assert claim.holds is holds and bool(claim.cause) is not holds
+    assert f"{axis}_position_m2 0.0200, {status}" in claim.found
+
+
+@pytest.mark.parametrize(
+    "space", [SearchSpace(constrained=()), SearchSpace(constrained=("y", "z")), SearchSpace(position_m2=1e-2)]
+)
+def test_another_constraint_says_nothing_of_that_of_the_paper(space: SearchSpace) -> None:
+    assert verdicts(planted(), tuning=tuned(space=space))["constraint"].holds is None
+
+
+def test_what_a_search_knows_is_counted() -> None:
+    one = tuned(roll_rad2ps3=FLAT, gyro_x_rad2ps2=LOWER, accel_y_m2ps4=CONSTRAINT, accel_z_m2ps4=HELD)
+    (note,) = notes({"cml": one})
+    assert note == (
+        "CML identifies 9 of the 12 parameters that it searches; at an edge or at the constraint: "
+        "gyro_x_rad2ps2, accel_y_m2ps4; flat: roll_rad2ps3."
+    )
+    table = status_table({"cml": one, "kom": tuned()})
+    assert table is not None and table.columns == ["CML", "KOM"]
+    by_name = {row.label: row.cells for row in table.rows}
+    assert list(by_name) == list(NAMES)
+    assert [cell.spread.strip() for cell in by_name["gyro_x_rad2ps2"]] == [LOWER, IDENTIFIED]
+    assert [cell.mark for cell in by_name["gyro_x_rad2ps2"]] == ["", "best"]
+    assert by_name["lateral_position_m2"][0].text == "2.0e\u221202"
+    assert status_table({}) is None
+    assert by_part({"cml": "a", "kom": "b"}, {"a": replace(one, status=None), "c": one}) == {}
+
+
+def test_added_noise_is_told_of_the_tuning_that_was_made_on_it() -> None:
+    """Where there is one; else of that of the quiet IMU."""
+    rows = planted()
+    assert rows.played_by("cml_noise") == "cml"
+    assert replace(rows, names=rows.names | {"cml_noise": "b"}).played_by("cml_noise") == "cml_noise"
 
 
 def test_all_claims_hold_where_the_paper_is_right() -> None:
-    assert {key: claim.holds for key, claim in verdicts(planted()).items()} == dict.fromkeys(
-        ("tunings", "parts", "peak", "intervals", "noise"), True
+    found = verdicts(planted(), tuning=tuned())
+    assert {key: claim.holds for key, claim in found.items()} == dict.fromkeys(
+        ("constraint", "tunings", "parts", "peak", "intervals", "noise"), True
     )
 
 
@@ -277,6 +379,11 @@ name = "axle"
 grade = "lord_3dm_gx4_25"
 body = "front"
 position_m = [0.0, 0.0, 0.6]
+[[imu]]
+name = "axle_noise"
+grade = "lord_3dm_gx4_25_noise_added"
+body = "front"
+position_m = [0.0, 0.0, 0.6]
 [geometry]
 own_bands = { paper = [3.0, 70.0] }
 [geometry.limits.alignment]
@@ -284,6 +391,11 @@ sd_mm = 0.01
 [[estimator]]
 name = "smoother"
 method = "TrajectorySmoother"
+[[estimator]]
+name = "smoother_cml"
+method = "TrajectorySmoother"
+[estimator.options]
+tuning = "tuned.toml"
 [[estimator]]
 name = "printed"
 method = "TrajectorySmoother"
@@ -300,7 +412,8 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scenario, object, Pat
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
         patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
-        scenario = read_scenario(TEXT, name="short")
+        tuned(accel_y_m2ps4=CONSTRAINT).write(folder / "tuned.toml")
+        scenario = read_scenario(TEXT, name="short", folder=folder)
         result = run_campaign(scenario, workers=1)
         path = tmp_path_factory.mktemp("page") / "report.html"
         write_report(
@@ -322,8 +435,11 @@ def test_the_page_shows_rails_and_the_section(ran: tuple[Scenario, object, Path]
         "not observable",
         "Track quality by sections of 200 m",
         "alignment sd 0.01 mm",
-        "Not run in this scenario: CML",
+        "Not run in this scenario: KOM",
+        "As Fig. A2",
         "As Fig. A3",
+        "CML identifies 12 of the 13",
+        "<code>simrail tune short --method cml</code>",
         "0.162",
     ):
         assert words in page, words
@@ -354,11 +470,22 @@ def test_the_section_holds_printed_and_own_rows(ran: tuple[Scenario, object, Pat
     view = paper_view(all_cases, methods(scenario), styles, result.examples)  # type: ignore[attr-defined]
     assert isinstance(view, PaperView)
     labels = [row.label for row in view.table.rows]
-    assert "CML: printed" in labels and "CML: ours" not in labels
+    assert "KOM: printed" in labels and "KOM: ours" not in labels
+    assert "CML: ours" in labels and "CML, noise added: ours" in labels
+    assert view.tunings is None  # none was handed over
     own = view.table.rows[labels.index("set by hand")]
     rows = rows_of(all_cases, methods(scenario), band="paper")
     assert rows is not None
     assert own.cells[1].text == f"{rows.get('hand', 'cross_level', 'sd', filtered=False).value:.3f}"
     assert {len(row.cells) for row in view.table.rows} == {12}
+    noisy = view.table.rows[labels.index("CML, noise added: ours")]
+    found = next(c for c in all_cases if c.labels["mount"] == "axle_noise").get(
+        "smoother_cml", "cross_level", "sd"
+    )
+    assert (
+        noisy.cells[1].text
+        == f"{found.value:.3f}"
+        != view.table.rows[labels.index("CML: ours")].cells[1].text
+    )
     without = [replace(c, found={}) for c in all_cases]
     assert paper_view(without, methods(scenario), styles, []) is None

@@ -48,6 +48,11 @@ def test_makes_the_file_that_the_scenario_names(place: Path, capsys: pytest.Capt
     assert tuning.search is not None and tuning.search.finished
     assert tuning.search.command == "simrail " + " ".join([*WORDS[:4], "--method", "cml", *WORDS[4:]])
     assert "out, axle on front, lord_3dm_gx4_25" in tuning.search.fitted_on[0]
+    # What it says of each parameter is what it has written.
+    assert tuning.status is not None and tuning.curve_status is None
+    told = {line.split()[0][:12]: line for line in said.splitlines() if "e-" in line or "0." in line}
+    for name, status in tuning.status.items():
+        assert status.split()[0] in told[name[:12]]
     made = judge_scenario(load_scenario("mine.toml")).estimators["smoother"]
     assert made.tuning == tuning  # type: ignore[attr-defined]
     assert call(tuning.search.command.split()[1:]) == DONE

@@ -118,6 +118,10 @@ class RailConditionPart(Part):
         return what if self.rails == "both" else f"{what}, {self.rails} rail"
 
 
+NOISE = "noise"
+"""Word in the name of an IMU or of its grade that says that noise was added to its signals."""
+
+
 class ImuPart(Part):
     """``[[imu]]``: an IMU of some grade, mounted on a body of the vehicle.
 
@@ -133,6 +137,11 @@ class ImuPart(Part):
     pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
     yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
     sensor_draws: Draws | None = None
+
+    @property
+    def noise_added(self) -> bool:
+        """Whether it stands for another one with noise added, as a report sets the two side by side."""
+        return NOISE in self.name or NOISE in str(self.grade)
 
     @field_validator("position_m")
     @classmethod

@@ -9,7 +9,7 @@ import pytest
 
 from estimators.trajectory_noise import Hyperparameters
 from estimators.tuning_file import Search, Tuning
-from estimators.tuning_space import SearchSpace
+from estimators.tuning_space import FLAT, IDENTIFIED, LOWER, NAMES, SearchSpace
 from simrail.errors import InputError
 
 HAND = Hyperparameters(gyro_x_rad2ps2=1e-4 / 3.0, lateral_m2ps5=3.0)
@@ -25,6 +25,7 @@ SEARCH = Search(
     fitted_on=('a "quoted" ride', "Größe"),
     command="simrail tune mine --estimator smoother --method cml",
 )
+KNOWN = dict.fromkeys(NAMES, IDENTIFIED)
 
 
 @pytest.mark.parametrize(
@@ -33,6 +34,7 @@ SEARCH = Search(
         Tuning(HAND),
         Tuning(HAND, FOUND),
         Tuning(FOUND, replace(FOUND, roll_rad2ps3=0.2), SEARCH),
+        Tuning(FOUND, replace(FOUND, roll_rad2ps3=0.2), SEARCH, KNOWN, KNOWN | {"roll_rad2ps3": LOWER}),
         Tuning(FOUND, None, replace(SEARCH, space=replace(WIDE, position_m2=3e-3), finished=False)),
     ],
 )
@@ -107,6 +109,16 @@ def changed(old: str, new: str) -> str:
         (changed("box = [1e-08, 10000.0]", "box = [1e4, 1e-8]"), ["search.box", "least < greatest"]),
         (changed('constrained = ["z"]', 'constrained = ["x"]'), ["search.constrained", "y, z"]),
         (changed('method = "cml"', "method = 3"), ["search.method", "3", "text"]),
+        (
+            FITTED + table("status", KNOWN | {"roll_rad2ps3": "sure"}),
+            ["status.roll_rad2ps3", "sure", "one of identified, flat", "leave the table out"],
+        ),
+        (FITTED + table("status", KNOWN | {"roll_rad2ps3": [1]}), ["status.roll_rad2ps3", "[1]"]),
+        (FITTED + table("status", KNOWN | {"roll": FLAT}), ["status.roll", "no such hyper-parameter"]),
+        (
+            FITTED + table("curve_status", dict(list(KNOWN.items())[1:])),
+            ["curve_status.roll_rad2ps3", "is missing"],
+        ),
     ],
 )
 def test_a_bad_file_is_named(tmp_path: Path, text: str, words: list[str]) -> None:

@@ -75,6 +75,20 @@ def test_same_seed_same_bits_whatever_numpy_was_doing() -> None:
     assert not np.array_equal(first.point, search(bowl, seed=2).point)
 
 
+@pytest.mark.parametrize("at_most", [1, 100, 700])
+def test_a_limit_ends_the_search_and_without_it_the_search_goes_on(tmp_path: Path, at_most: int) -> None:
+    """It ends with the batch that reaches the limit, at the best so far; lifted, the same bits as without."""
+    whole = search(bowl)
+    batch = 4 * 17  # the largest: along all axes
+    assert whole.evaluations > 700 + batch
+    record = Record(tmp_path / "best.npz", "key")
+    short = search(bowl, record=record, at_most=at_most)
+    assert at_most <= short.evaluations < at_most + batch
+    assert bowl(short.point[None])[0] == short.value >= whole.value
+    again = search(bowl, record=Record(tmp_path / "best.npz", "key"))
+    assert np.array_equal(again.point, whole.point) and again.evaluations == whole.evaluations
+
+
 @pytest.mark.parametrize("batches", [1, 7, 33])
 def test_resumed_is_uninterrupted(tmp_path: Path, batches: int) -> None:
     """Interrupted in CMA-ES or in the descent: the same bits, and nothing is evaluated twice."""

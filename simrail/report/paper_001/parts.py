@@ -9,6 +9,7 @@ import numpy as np
 
 from simrail.report.pivot import Figure, Figures
 from simrail.scenario.cells import Method
+from simrail.scenario.parts import NOISE
 
 PARTS: dict[str, str] = {
     "cml": "CML",
@@ -23,9 +24,6 @@ PARTS: dict[str, str] = {
     "zero": "no IMU",
 }
 """Parts that a method can play, in the order of the table. The first five have rows in the paper."""
-
-NOISY = "noise"
-"""Word in the name of an IMU or of its grade by which its signals have noise added."""
 
 
 def part_of(method: Method) -> str:
@@ -43,7 +41,7 @@ def part_of(method: Method) -> str:
     if printed or not smoothed:
         return ""
     if "cml" in words:
-        return "cml_noise" if NOISY in words else "cml_held" if "held" in words else "cml"
+        return "cml_noise" if NOISE in words else "cml_held" if "held" in words else "cml"
     if "kom" in words:
         return "kom_start" if "start" in words else "kom_end" if "end" in words else "kom"
     return ""
@@ -79,7 +77,7 @@ class Rows:
         return case.get(name, quantity, metric, band=self.band if filtered else "full")
 
     def played_by(self, part: str) -> str:
-        """Part whose method plays a part: CML on noisy signals, where none was tuned on them, is that of CML."""
+        """Part whose method plays a part: on noisy signals CML, unless a method was tuned on them."""
         return "cml" if part == "cml_noise" and part not in self.names else part
 
     def has(self, *parts: str) -> bool:
@@ -111,4 +109,4 @@ def rows_of(all_cases: Sequence[Figures], methods: Sequence[Method], *, band: st
 
 
 def _is_noisy(case: Figures) -> bool:
-    return NOISY in case.labels["imu"] or NOISY in case.labels["mount"]
+    return NOISE in case.labels["imu"] or NOISE in case.labels["mount"]

@@ -6,7 +6,7 @@ Everything of ours is looked up in the scores, or computed from the first draw o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from markupsafe import Markup
@@ -84,6 +84,7 @@ def paper_view(
         return None
     example = next((e for e in examples if of_cell(list(all_cases), e.cell) is rows.case), None)
     example = example or next((e for e in examples if e.rails is not None), None)
+    noisy = next((e for e in examples if rows.noisy and of_cell(list(all_cases), e.cell) is rows.noisy), None)
     looks = {part: style for part, name in rows.names.items() for style in styles if style.name == name}
     band = _band_of(example)
     main = looks.get(rows.main)
@@ -110,7 +111,10 @@ def paper_view(
             tuning=tuned.get("cml"),
         ),
         notes=[note for note in (*notes(tuned), errata_note(rows), *_not_run(rows)) if note],
-        figures=_figures(rows, looks, example, band) if example else [],
+        figures=[
+            *(_figures(rows, looks, example, band) if example else []),
+            *(_noise_figure(rows, looks, example, noisy, band) if example and noisy else []),
+        ],
     )
 
 
@@ -197,7 +201,7 @@ def _not_run(rows: Rows) -> list[str]:
 def _figures(
     rows: Rows, looks: dict[str, MethodStyle], example: CellResult, band: Band
 ) -> list[tuple[str, Markup]]:
-    """Our versions of Figs. A1 and A3; A2, with added noise, where it was run."""
+    """Our versions of Figs. A1 and A3."""
     there = {part: style for part, style in looks.items() if part != "zero" and with_rails(example, [style])}
     limits = stretch_of(example, length_m=DRAWN_M if band is FULL_SIZE else 1e3)
     ride = example.recording.name
@@ -212,3 +216,24 @@ def _figures(
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
         figures.append((text, Markup(svg)))
     return figures
+
+
+def _noise_figure(
+    rows: Rows, looks: dict[str, MethodStyle], example: CellResult, noisy: CellResult, band: Band
+) -> list[tuple[str, Markup]]:
+    """Our version of Fig. A2: CML on a ride without and with noise added to the IMU; [] where one is missing."""
+    quiet, loud = looks.get("cml"), looks.get(rows.played_by("cml_noise"))
+    if quiet is None or loud is None or not (with_rails(example, [quiet]) and with_rails(noisy, [loud])):
+        return []
+    # The two are of two recordings: for one figure, the second goes beside the first under its own name.
+    added = replace(
+        loud, name="noise added", label=PARTS["cml_noise"], colour="#D55E00", stroke=(0, (4, 1.5))
+    )
+    estimates = {quiet.name: example.estimates[quiet.name], added.name: noisy.estimates[loud.name]}
+    limits = stretch_of(example, length_m=DRAWN_M if band is FULL_SIZE else 1e3)
+    text = (
+        f"As Fig. A2: rails of ride {example.recording.name} by CML, without and with noise added, filtered."
+    )
+    both = replace(example, estimates=estimates)
+    svg = rails_figure(both, [quiet, added], band=band, limits=limits, with_interval=False, what=text)
+    return [(text, Markup(svg))]

@@ -13,7 +13,7 @@ from simrail.report.claim import Claim
 from simrail.report.findings import significant
 from simrail.report.paper_001.parts import PARTS
 from simrail.report.tables import Cell, Row, Table
-from simrail.scenario.build_estimator import construct
+from simrail.scenario.build_estimator import class_named, construct
 from simrail.scenario.cells import Method
 
 POSITIONS = ("lateral_position_m2", "vertical_position_m2")
@@ -29,7 +29,7 @@ def tunings_of(methods: Sequence[Method], folder: Path | None) -> dict[str, Tuni
         if method.part.method != TrajectorySmoother.__name__ or "tuning" not in method.part.options:
             continue
         try:
-            made = construct(TrajectorySmoother, method.part.options, folder=folder)
+            made = construct(class_named(method.part.method, folder), method.part.options, folder=folder)
         except InputError:
             continue
         if isinstance(made, TrajectorySmoother) and made.tuning is not None:
