@@ -54,8 +54,8 @@ class Identification:
         (negative where the optimum lies beyond what was allowed); ``curvature`` along its own axis and
         ``profile_curvature`` along the valley, second derivatives by the natural logarithm; ``span_decades``,
         how many powers of ten it can go along the valley until the objective has changed by the tolerance;
-        and, for a likelihood, ``sd_decades``, the standard deviation of its logarithm if the model were true. The
-        last four are of the parameters inside the box only, NaN for others.
+        and, for a likelihood, ``sd_decades``, the standard deviation of its logarithm if the model were
+        true. The last four are of the parameters inside the box only, NaN for others.
     inside : tuple of str
         The parameters inside the box.
     curvature : ndarray (k, k)
@@ -126,7 +126,7 @@ def identify(
     curvatures, directions = np.linalg.eigh(curvature)
 
     # A direction without curvature ends at the box: with no end at all, any parameter that it holds a trace
-    # of would count as flat. Where a search was cut short, it may curve down: then the fall tells values apart.
+    # of would count as flat. Where a search was cut short, it may curve down: the fall tells too.
     least = 2.0 * tolerance / math.log(space.box[1] / space.box[0]) ** 2
     spread = (directions**2 / np.maximum(np.abs(curvatures), least)).sum(axis=1)
     columns = {

@@ -221,7 +221,7 @@ def _figures(
 def _noise_figure(
     rows: Rows, looks: dict[str, MethodStyle], example: CellResult, noisy: CellResult, band: Band
 ) -> list[tuple[str, Markup]]:
-    """Our version of Fig. A2: CML on a ride without and with noise added to the IMU; [] where one is missing."""
+    """Our version of Fig. A2: CML without and with noise added to the IMU; [] where one is missing."""
     quiet, loud = looks.get("cml"), looks.get(rows.played_by("cml_noise"))
     if quiet is None or loud is None or not (with_rails(example, [quiet]) and with_rails(noisy, [loud])):
         return []

@@ -88,11 +88,11 @@ def notes(tunings: Mapping[str, Tuning]) -> list[str]:
 
 
 def constraint_claim(tuning: Tuning | None) -> Claim:
-    """Whether the paper's constraint keeps CML from believing that the vehicle never leaves the design line."""
+    """Whether the paper's constraint keeps CML from trusting the virtual positions without end."""
     said = (
-        "Section 4.2.1: plain likelihood may trust the virtual positions too much, as if the vehicle never left "
-        "the design line; the constraint that the variance of the lateral accelerometer is at most a tenth of "
-        "that of the lateral virtual position keeps it from that."
+        "Section 4.2.1: plain likelihood may trust the virtual positions too much, as if the vehicle never "
+        "left the design line; the constraint that the variance of the lateral accelerometer is at most a "
+        "tenth of that of the lateral virtual position keeps it from that."
     )
     if tuning is None or tuning.status is None or tuning.search is None:
         return Claim("constraint", said, None, "Not run here: CML.")
@@ -105,13 +105,13 @@ def constraint_claim(tuning: Tuning | None) -> Claim:
     low, high = tuning.search.space.box
     kept = [tuning.status[name] not in EDGES for name in POSITIONS]
     found = (
-        f"CML in the box {low:g} to {high:g}: {'; '.join(told)} (holds if no virtual position lies at an edge of "
-        "what is allowed)."
+        f"CML in the box {low:g} to {high:g}: {'; '.join(told)} (holds if no virtual position lies at an "
+        "edge of what is allowed)."
     )
     cause = (
         ""
         if all(kept)
-        else "What is constant is the more likely the smaller its variance is said to be: only the box, or the "
-        "constraint, ends the search."
+        else "What is constant is the more likely the smaller its variance is said to be: only the box, or "
+        "the constraint, ends the search."
     )
     return Claim("constraint", said, all(kept), found, cause)
