@@ -60,6 +60,9 @@ def method(name: str, kind: str = "TrajectorySmoother", **options: object) -> Me
         (method("a_kom_end", tuning="a.toml"), "kom_end"),
         (method("a_cml", tuning="a.toml", smoothed=False), ""),
         (method("a_cml"), "hand"),
+        (method("x", tuning="tunings/scale_by_hand.toml"), "hand"),
+        (method("x", tuning="tunings/scale_by_hand.toml", rail_sensor=False), "blind"),
+        (method("x", tuning="tunings/handy.toml"), ""),
         (method("zero", "ZeroTrack"), "zero"),
         (method("cml", "AttitudeEkf"), ""),
     ],
@@ -82,6 +85,20 @@ def test_the_shipped_scenario_plays_them() -> None:
         "",
         "zero",
     ]
+
+
+def test_on_the_scale_track_the_paper_is_set_beside_the_smoother_that_sees_the_rails() -> None:
+    scenario = load_scenario("scale_track")
+    assert scenario.spec.paper == "gonzalez_2023" and "paper" in scenario.spec.geometry.own_bands
+    parts = {}
+    for one in methods(scenario):
+        parts.setdefault(part_of(one), one.name)
+    assert parts == {
+        "hand": "smoother",
+        "blind": "smoother_camera_free",
+        "": "design_angles",
+        "zero": "zero_track",
+    }
 
 
 def test_its_tunings_are_what_their_names_say() -> None:
@@ -186,6 +203,9 @@ def test_what_a_search_knows_is_counted() -> None:
         "CML identifies 9 of the 12 parameters that it searches; at an edge or at the constraint: "
         "gyro_x_rad2ps2, accel_y_m2ps4; flat: roll_rad2ps3."
     )
+    other = replace(tuned(), hyperparameters=replace(one.hyperparameters, yaw_rad2ps3=2e-1))
+    *_, apart = notes({"kom": one, "kom_end": other})
+    assert "up to 3.0 decades apart (yaw_rad2ps3), at least 0.0" in apart
     table = status_table({"cml": one, "kom": tuned()})
     assert table is not None and table.columns == ["CML", "KOM"]
     by_name = {row.label: row.cells for row in table.rows}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -19,11 +20,23 @@ PARTS: dict[str, str] = {
     "cml_noise": "CML, noise added",
     "cml_held": "CML, virtual positions held",
     "hand": "set by hand",
+    "blind": "by hand, no sight of the rails",
     "filter": "by hand, filter alone",
     "printed": "by hand, misprints kept",
     "zero": "no IMU",
 }
 """Parts that a method can play, in the order of the table. The first five have rows in the paper."""
+
+COLOURS: dict[str, str] = {
+    "cml": "#0072B2",
+    "kom": "#D55E00",
+    "kom_start": "#E69F00",
+    "kom_end": "#CC79A7",
+    "cml_noise": "#D55E00",
+    "cml_held": "#56B4E9",
+    "hand": "#009E73",
+}
+"""Of the parts, which are all the same smoother: Okabe and Ito's. Fig. A2 is without KOM."""
 
 
 def part_of(method: Method) -> str:
@@ -34,7 +47,10 @@ def part_of(method: Method) -> str:
         return ""
     options, words = method.part.options, method.name.split("_")
     printed, smoothed = bool(options.get("printed", False)), bool(options.get("smoothed", True))
-    if "tuning" not in options and "hyperparameters" not in options:
+    by_hand = "hand" in Path(str(options.get("tuning", ""))).stem.split("_")
+    if by_hand and smoothed and not printed and not options.get("rail_sensor", True):
+        return "blind"
+    if by_hand or ("tuning" not in options and "hyperparameters" not in options):
         if printed:
             return "printed" if smoothed else ""
         return "hand" if smoothed else "filter"

@@ -20,7 +20,7 @@ from simrail.report.geometry_tables import QUANTITIES
 from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
 from simrail.report.paper_001.claims import claims, errata_note
-from simrail.report.paper_001.parts import PARTS, Rows, rows_of
+from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
 from simrail.report.pivot import Figures, of_cell
@@ -85,7 +85,12 @@ def paper_view(
     example = next((e for e in examples if of_cell(list(all_cases), e.cell) is rows.case), None)
     example = example or next((e for e in examples if e.rails is not None), None)
     noisy = next((e for e in examples if rows.noisy and of_cell(list(all_cases), e.cell) is rows.noisy), None)
-    looks = {part: style for part, name in rows.names.items() for style in styles if style.name == name}
+    looks = {
+        part: replace(style, colour=COLOURS.get(part, style.colour), stroke="-")
+        for part, name in rows.names.items()
+        for style in styles
+        if style.name == name
+    }
     band = _band_of(example)
     main = looks.get(rows.main)
     drawn = main if example and main and with_rails(example, [main]) else None
@@ -226,9 +231,7 @@ def _noise_figure(
     if quiet is None or loud is None or not (with_rails(example, [quiet]) and with_rails(noisy, [loud])):
         return []
     # The two are of two recordings: for one figure, the second goes beside the first under its own name.
-    added = replace(
-        loud, name="noise added", label=PARTS["cml_noise"], colour="#D55E00", stroke=(0, (4, 1.5))
-    )
+    added = replace(loud, name="noise added", label=PARTS["cml_noise"], colour=COLOURS["cml_noise"])
     estimates = {quiet.name: example.estimates[quiet.name], added.name: noisy.estimates[loud.name]}
     limits = stretch_of(example, length_m=DRAWN_M if band is FULL_SIZE else 1e3)
     text = (

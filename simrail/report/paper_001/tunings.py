@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from estimators.trajectory_smoother import TrajectorySmoother
 from estimators.tuning_file import Tuning
 from estimators.tuning_space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER
@@ -84,7 +86,22 @@ def notes(tunings: Mapping[str, Tuning]) -> list[str]:
             those = [name for name in NAMES if tuning.status[name] in kinds]
             text += f"; {words}: {', '.join(those)}" if those else ""
         told.append(text + ".")
-    return told
+    return told + _apart(tunings)
+
+
+def _apart(tunings: Mapping[str, Tuning]) -> list[str]:
+    """How far searches of the same kind over other parts of the track came from each other."""
+    same = [part for part in ("kom", "kom_start", "kom_end") if part in tunings]
+    if len(same) < 2:
+        return []
+    logs = np.log10([[getattr(tunings[part].hyperparameters, name) for name in NAMES] for part in same])
+    decades = np.ptp(logs, axis=0)
+    widest = int(np.argmax(decades))
+    return [
+        f"{', '.join(PARTS[part] for part in same)}: their values lie up to {decades[widest]:.1f} decades apart "
+        f"({NAMES[widest]}), at least {decades.min():.1f}. Identified is meant of one search and about the place "
+        "where it ended; what differs so between parts of one ride is no property of the vehicle."
+    ]
 
 
 def constraint_claim(tuning: Tuning | None) -> Claim:
