@@ -98,9 +98,9 @@ def _apart(tunings: Mapping[str, Tuning]) -> list[str]:
     decades = np.ptp(logs, axis=0)
     widest = int(np.argmax(decades))
     return [
-        f"{', '.join(PARTS[part] for part in same)}: their values lie up to {decades[widest]:.1f} decades apart "
-        f"({NAMES[widest]}), at least {decades.min():.1f}. Identified is meant of one search and about the place "
-        "where it ended; what differs so between parts of one ride is no property of the vehicle."
+        f"{', '.join(PARTS[part] for part in same)}: their values lie up to {decades[widest]:.1f} decades "
+        f"apart ({NAMES[widest]}), at least {decades.min():.1f}. Identified is meant of one search and about "
+        "the place where it ended; what differs so between parts of one ride is no property of the vehicle."
     ]
 
 
