@@ -16,10 +16,12 @@ from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult
 from simrail.cli import CELL_FAILED, DONE, call
 from simrail.job import prepare
+from simrail.retry import keep_good
 from simrail.scenario.cells import cells
-from simrail.scenario.scenario import Scenario
+from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.stop_rule import Look, StopRule, stop_rule_of
 from simrail.unfinished import Unfinished
+from simrail.watcher import Watcher
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
@@ -266,6 +268,27 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
         assert_same(rows_of(all_draws, 8), found.scores)
 
 
+def test_progress_counts_the_cells_of_a_round(
+    all_draws: CampaignResult, rides: Path, short: Short, tmp_path: Path
+) -> None:
+    class Counting(Watcher):
+        def __init__(self) -> None:
+            self.begun: list[tuple[int, int]] = []
+            self.done: list[tuple[int, int]] = []
+
+        def cells_begin(self, done: int, count: int) -> None:
+            self.begun.append((done, count))
+
+        def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
+            self.done.append((done, count))
+
+    watcher = Counting()
+    scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width_for(all_draws, 8)))
+    run_campaign(scenario, workers=1, batch_cells=20, watcher=watcher)
+    assert watcher.begun == [(0, 6), (6, 10), (10, 16)]
+    assert watcher.done == [(3, 6), (6, 6), (8, 10), (10, 10), (13, 16), (16, 16)]
+
+
 def test_not_reached_after_all_draws_names_the_widest_case(
     all_draws: CampaignResult, rides: Path, short: Short, assert_same: Same
 ) -> None:
@@ -329,6 +352,12 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     assert call(words) == CELL_FAILED
     (here / "broken").unlink()
     capsys.readouterr()
+    had = set(pd.read_parquet(here / "results" / "mine" / "scores.parquet")["cell"])
+    job, kept = prepare(load_scenario(noting_file, overrides=settings)), Unfinished(here / "kept")
+    keep_good(here / "results" / "mine", job, kept)
+    failed = json.loads((here / "results" / "mine" / "manifest.json").read_text())["failures"]
+    assert len(had) == 8 and kept.cells() == had - {failure["cell"] for failure in failed}
+    assert 0 < len(kept.cells()) < 8
     assert call([*words, "--retry-failed"]) == DONE
     whole, again = (pd.read_parquet(here / "results" / name / "scores.parquet") for name in ("whole", "mine"))
     assert set(whole["sensor_draw"]) == {0, 1, 2, 3}
