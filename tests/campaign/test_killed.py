@@ -139,12 +139,12 @@ def test_killed_with_a_stop_rule_it_stops_where_it_would_have(
     tmp_path: Path,
     assert_same: Callable[[pd.DataFrame, pd.DataFrame], None],
 ) -> None:
-    """The main process is killed in the first round and in the second one; two are all it takes."""
+    """The main process is killed after 6 and after 20 estimates, repeated ones among them."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     plain = ["monte_carlo.sensor_draws=40", "estimator.noting.options.sleep_s=0.1"]
     figure = 'estimator="ekf", quantity="roll", metric="rms", least_draws=8'
-    # The interval of 12 draws is narrower than that of 8 in most samples; in this one, it is.
+    # A little less than the width after 8 draws: a later look reaches it, before all 40.
     first = run_campaign(load_scenario(noting_file, overrides=[*plain, f"stop={{{figure}, width=9.0}}"]))
     assert first.stopped is not None and first.stopped.draws == 8 and first.stopped.width is not None
     settings = [*plain, f"stop={{{figure}, width={0.999 * first.stopped.width!r}}}"]
