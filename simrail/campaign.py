@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from simrail.batch import BatchResult, RideResult, forget, lost_batch, run_batch, run_ride
-from simrail.campaign_result import CampaignResult, chosen_cells, gather
+from simrail.campaign_result import CampaignResult, chosen_cells, gather, look_at_draws
 from simrail.crew import Crew, broken, crew_of, error_of, lost
 from simrail.interrupts import interruptible
 from simrail.job import Job, prepare
@@ -28,6 +28,7 @@ from simrail.ride import is_cached
 from simrail.scenario.build import profile_of
 from simrail.scenario.cells import Cell
 from simrail.scenario.scenario import Scenario
+from simrail.stop_rule import Look, stop_rule_of
 from simrail.unfinished import Unfinished
 from simrail.watcher import Watcher
 
@@ -98,16 +99,15 @@ def run_campaign(
         loop = _Loop(job, kept, watcher or Watcher(), only)
         with interruptible():
             try:
-                if loop.left:
-                    with crew_of(workers, cluster, cells=loop.left) as crew:
-                        loop.run(crew, batch_cells)
-                return gather(job, kept, only=only)
+                with crew_of(workers, cluster if loop.left else None, cells=loop.left) as crew:
+                    stopped = loop.run(crew, batch_cells)
+                return gather(job, kept, only=only, stopped=stopped)
             finally:
                 forget()
 
 
 class _Loop:
-    """The loop over the cells that are not kept yet."""
+    """The loop over the cells that are not kept yet; with a stop rule, from look to look."""
 
     def __init__(self, job: Job, kept: Unfinished, watcher: Watcher, only: int | None) -> None:
         self.job, self.kept, self.watcher, self.only = job, kept, watcher, only
@@ -124,12 +124,30 @@ class _Loop:
         if self.done:
             self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
-    def run(self, crew: Crew, batch_cells: int | None) -> None:
-        """Run what is left; each batch is kept before its worker gets another."""
+    def run(self, crew: Crew, batch_cells: int | None) -> Look | None:
+        """Run what is left, or as much as the stop rule asks for; its last look."""
+        rule = stop_rule_of(self.job.scenario) if self.only is None else None
+        if rule is None:
+            self._run(crew, batch_cells)
+            return None
+        for draws in rule.looks:
+            numbers = {cell.number for cell in chosen_cells(self.job, draws=draws)}
+            self.total, self.left = len(numbers), len(numbers - self.done)
+            self._run(crew, batch_cells, draws=draws)
+            look = look_at_draws(self.job, self.kept, rule, draws)
+            self._tell(look.words)
+            if look.reached:
+                break
+        return look
+
+    def _run(self, crew: Crew, batch_cells: int | None, *, draws: int | None = None) -> None:
+        """Run what is left of these draws; each batch is kept before its worker gets another."""
+        if not self.left:
+            return
         self.kept.log(f"{self.left} cells to run, {crew.workers()} at once")
-        self.watcher.cells_begin(len(self.done), self.total)
+        self.watcher.cells_begin(self.total - self.left, self.total)
         waiting: dict[Future[Any], _Task] = {}
-        rides = self._rides()
+        rides = self._rides(draws)
         while True:
             while len(waiting) < (1 if self.suspects else crew.workers()):
                 task = self._next(rides, crew, batch_cells)
@@ -146,9 +164,10 @@ class _Loop:
             for future in done:
                 self._take(waiting.pop(future), future, crew, batch_cells)
 
-    def _rides(self) -> Iterator[tuple[Cell, ...]]:
+    def _rides(self, draws: int | None) -> Iterator[tuple[Cell, ...]]:
         """The cells left of each ride."""
-        for _, group in groupby(chosen_cells(self.job, self.only), key=lambda cell: cell.ride_number):
+        chosen = chosen_cells(self.job, self.only, draws=draws)
+        for _, group in groupby(chosen, key=lambda cell: cell.ride_number):
             left = tuple(cell for cell in group if cell.number not in self.done)
             if left:
                 yield left
@@ -229,8 +248,9 @@ class _Loop:
         self.done.update(result.cells)
         self.left -= len(result.cells)
         self.failed += len({failure.cell for failure in result.failures})
-        self.kept.log(f"{len(self.done)} of {self.total} cells done; the last by {result.worker}")
-        self.watcher.cells_done(len(self.done), self.total, self.failed, result.worker)
+        done = self.total - self.left
+        self.kept.log(f"{done} of {self.total} cells done; the last by {result.worker}")
+        self.watcher.cells_done(done, self.total, self.failed, result.worker)
 
     def _tell(self, line: str) -> None:
         self.kept.log(line)

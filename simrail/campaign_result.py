@@ -8,18 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pandas as pd
 
-from simrail.batch import example_of
+from simrail.batch import BatchResult, example_of
 from simrail.example import CellResult
 from simrail.job import Job
 from simrail.ledger import STAGES, Failure, cell_record
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import Plan
 from simrail.score_table import concat_scores, in_order
+from simrail.stop_rule import Look, StopRule, stop_rule_of
 from simrail.unfinished import Unfinished
 
 MOST_EXAMPLES = 6
@@ -46,6 +47,8 @@ class CampaignResult:
         What failed; each is a row of the scores as well.
     plan : Plan
         What was planned, with its warnings.
+    stopped : Look, optional
+        The last look of the scenario's stop rule: the tables hold the draws that it looked at.
     """
 
     scores: pd.DataFrame
@@ -56,23 +59,37 @@ class CampaignResult:
     cpu_s: dict[str, float]
     failures: list[Failure]
     plan: Plan
+    stopped: Look | None = None
 
 
-def chosen_cells(job: Job, only: int | None) -> Iterator[Cell]:
-    """The cells of a job, or the one that is wanted."""
-    return (cell for cell in cells(job.scenario) if only is None or cell.number == only)
+def chosen_cells(job: Job, only: int | None = None, *, draws: int | None = None) -> Iterator[Cell]:
+    """The cells of a job: all, the one that is wanted, or those of the first draws of its stop rule."""
+    rule = stop_rule_of(job.scenario)
+    for cell in cells(job.scenario):
+        beyond = rule is not None and draws is not None and not rule.has(cell, draws)
+        if not beyond and (only is None or cell.number == only):
+            yield cell
 
 
-def gather(job: Job, kept: Unfinished, *, only: int | None = None) -> CampaignResult:
-    """Put together the batches that are kept."""
+def look_at_draws(job: Job, kept: Unfinished, rule: StopRule, draws: int) -> Look:
+    """Ask a stop rule about the first so many draws, all of whose cells are kept."""
+    return rule.look(chosen_cells(job), (result.scores for result in kept.results()), draws)
+
+
+def gather(
+    job: Job, kept: Unfinished, *, only: int | None = None, stopped: Look | None = None
+) -> CampaignResult:
+    """Put together the batches that are kept, up to where the stop rule ended the campaign."""
+    listed = list(chosen_cells(job, only, draws=None if stopped is None else stopped.draws))
     results = list(kept.results())
+    if stopped is not None:
+        results = _without_others(results, {cell.number for cell in listed})
     failures = [failure for result in results for failure in result.failures]
     rides: dict[int, dict[str, Any]] = {}
     for result in results:
         known = rides.get(result.ride_number)
         if result.ride and (known is None or (known["from_cache"] and not result.ride["from_cache"])):
             rides[result.ride_number] = result.ride
-    listed = list(chosen_cells(job, only))
     return CampaignResult(
         scores=in_order(concat_scores(result.scores for result in results)),
         cells=pd.DataFrame.from_records([cell_record(cell) for cell in listed]),
@@ -82,7 +99,21 @@ def gather(job: Job, kept: Unfinished, *, only: int | None = None) -> CampaignRe
         cpu_s={stage: sum(result.cpu_s[stage] for result in results) for stage in STAGES},
         failures=sorted(failures, key=lambda failure: failure.cell),
         plan=job.plan,
+        stopped=stopped,
     )
+
+
+def _without_others(results: list[BatchResult], numbers: set[int]) -> list[BatchResult]:
+    """Batches with the cells of these numbers only; a run whose failed cells are tried again has others."""
+    found = []
+    for result in results:
+        if not numbers.issuperset(result.cells):
+            scores = result.scores[result.scores["cell"].isin(numbers)].reset_index(drop=True)
+            failures = tuple(failure for failure in result.failures if failure.cell in numbers)
+            result = replace(result, scores=scores, failures=failures)
+        if numbers.intersection(result.cells):
+            found.append(result)
+    return found
 
 
 def _examples(job: Job, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:

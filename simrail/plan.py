@@ -22,6 +22,7 @@ from simrail.scenario.cells import Cell, first_cells, sensor_draws
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
 from simrail.score_windows import chosen_windows, windows_of
+from simrail.stop_rule import LEVELS, stop_rule_of
 from simrail.truth import Truth
 
 SCORE_ROW_BYTES = 8.0
@@ -199,6 +200,12 @@ def print_forecast(console: Console, scenario: Scenario, told: Forecast, *, core
         "[bold]about[/bold]", f"[bold]{_time(told.total_s)}[/bold]", f"on one of {cores} cores; an estimate"
     )
     console.print(table)
+    rule = stop_rule_of(scenario)
+    if rule is not None:
+        first = f"{rule.asked.least_draws} of {rule.draws} {LEVELS[rule.level]}"
+        console.print(
+            f"these are upper limits: the stop rule may end it after {first}, or later", highlight=False
+        )
     for name, reason in told.failed.items():
         console.print(f"[yellow]not in it:[/yellow] {name} could not be rehearsed: {reason}", highlight=False)
     for warning in plan.warnings:

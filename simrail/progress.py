@@ -94,6 +94,8 @@ class ProgressWatcher(Watcher):
         """See `Watcher`."""
         self._before = self._done = done
         self._cells_begun = self._said = time.perf_counter()
+        if self._cells is not None:
+            self._progress.remove_task(self._cells)
         self._cells = self._progress.add_task("cells", total=count, completed=done, note="")
 
     def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
@@ -146,6 +148,10 @@ def print_scores(console: Console, results: Results) -> None:
             console.print(f"... and {cells['case'].nunique() - number} more cases: see scores.csv")
             break
         console.print(_block(scores[scores["cell"].isin(members["cell"])], members, styles))
+    if campaign.stopped is not None:
+        # What was not reached is to be seen; what was, is no less than what was asked for.
+        colour = "green" if campaign.stopped.reached else "yellow"
+        console.print(Text(campaign.stopped.words, style=colour), soft_wrap=True)
     for warning in campaign.plan.warnings:
         console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False)
     reasons = list(dict.fromkeys((failure.estimator, failure.reason) for failure in campaign.failures))

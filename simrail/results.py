@@ -216,6 +216,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
             {"cell": failure.cell, "estimator": failure.estimator, "reason": failure.reason}
             for failure in campaign.failures
         ],
+        "stop": None if campaign.stopped is None else campaign.stopped.record,
         "warnings": list(campaign.plan.warnings),
         "wall_s": dict(campaign.wall_s),
         "cpu_s": dict(campaign.cpu_s),

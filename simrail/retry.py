@@ -53,10 +53,11 @@ def keep_good(results: Path, job: Job, kept: Unfinished) -> None:
     failed = {failure["cell"] for failure in manifest["failures"]}
     if not failed:
         raise refuse("nothing failed there", "there is nothing to do")
+    had = set(scores["cell"])  # a run that its stop rule ended has not all
     said = {ride["number"]: ride for ride in manifest["rides"]}
     good: dict[int, list[int]] = {}
     for cell in cells(job.scenario):
-        if cell.number not in failed:
+        if cell.number in had - failed:
             good.setdefault(cell.ride_number, []).append(cell.number)
     wall, cpu = ({stage: manifest[name][stage] for stage in STAGES} for name in ("wall_s", "cpu_s"))
     for ride_number, numbers in good.items():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 _NO_MATTER = (
     *("report", "catalogue.py", "cli.py", "export.py", "new.py", "new_ride.py", "progress.py"),
-    *("aggregate.py", "bootstrap.py", "statistics.py", "plan.py", "rehearsal.py"),
+    *("aggregate.py", "statistics.py", "plan.py", "rehearsal.py"),
 )
 """Parts of this package that no score depends on."""
 

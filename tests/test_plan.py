@@ -113,6 +113,17 @@ def test_the_command_shows_it_and_runs_nothing(here: Path, capsys: pytest.Captur
     assert list(here.iterdir()) == []
 
 
+def test_with_a_stop_rule_the_numbers_are_called_upper_limits(capsys: pytest.CaptureFixture[str]) -> None:
+    rule = 'estimator="ekf_compensated", quantity="roll", metric="rms", width=0.1, least_draws=2'
+    words = ["run", "quick_kinematic", "--plan", "--set", "monte_carlo.sensor_draws=4"]
+    assert call(words) == DONE
+    assert "upper limits" not in capsys.readouterr().out
+    assert call([*words, "--set", f"stop={{{rule}}}"]) == DONE
+    text = " ".join(capsys.readouterr().out.split())
+    assert "upper limits: the stop rule may end it after 2 of 4 draws of the sensors" in text
+    assert re.search("cells 8 recordings", text)
+
+
 @pytest.mark.parametrize("command", ["run", "check", "plan"])
 def test_more_than_a_million_cells_need_a_yes(
     command: str, here: Path, message_of: Callable[[list[str]], str]

@@ -89,7 +89,7 @@ def facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
         value = manifest.get(key)
         if value is None or value in ([], {}, ""):
             continue
-        listed.append((word, _plain(value)))
+        listed.append((word, value["told"] if key == "stop" else _plain(value)))
     return listed
 
 
@@ -103,6 +103,7 @@ _WORDS = {
     "real_time_factor": "real-time factor of the simulation",
     "cells": "cells",
     "failed": "failed",
+    "stop": "stop rule",
     "warnings": "warnings",
     "wall_s": "wall time, s",
     "started_utc": "started (UTC)",

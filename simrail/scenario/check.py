@@ -19,6 +19,7 @@ from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.samples import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
+from simrail.stop_rule import judge_stop_rule
 
 MOST_CELLS = 1_000_000
 
@@ -80,6 +81,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
     estimators = parts.estimators(0)
     for sample in range(1, sample_count(scenario.spec)):
         parts.estimators(sample)
+    judge_stop_rule(scenario, estimators)
     warnings: dict[str, None] = dict.fromkeys(_judge_samples(scenario))
     simulated = 0.0
     judged_rides: set[tuple[str, ...]] = set()

@@ -205,6 +205,22 @@ class MonteCarloPart(Part):
         return self
 
 
+class StopRulePart(Part):
+    """``[stop]``: draw no more once the 95 % interval of a mean is narrower than ``width``, in every case.
+
+    The mean over the draws of one figure of the score table, in its unit there; see `simrail.stop_rule`.
+    """
+
+    estimator: str
+    quantity: str
+    metric: str
+    width: Positive
+    window: str = "whole"
+    reference: Literal["truth", "design"] = "truth"
+    band: str = "full"
+    least_draws: Annotated[int, Field(ge=2, le=1_000_000)] = 10
+
+
 class ScorePart(Part):
     """``[score]``: what of the score table is kept; everything, unless said otherwise.
 

@@ -31,6 +31,7 @@ from simrail.scenario.parts import (
     RailConditionPart,
     RidePart,
     ScorePart,
+    StopRulePart,
     TemperaturePart,
 )
 from simrail.scenario.sensor_parts import EncoderPart, MagnetometerPart, RailSensorPart
@@ -63,6 +64,7 @@ class ScenarioFile(Part):
     temperature: TemperaturePart | None = None
     estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
     score: ScorePart = ScorePart()
+    stop: StopRulePart | None = None
     geometry: GeometryPart = GeometryPart()
 
     @field_validator("step_s")

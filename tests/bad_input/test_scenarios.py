@@ -12,6 +12,15 @@ from simrail.scenario.files import shipped
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 
+
+def _stop(**changes: object) -> str:
+    """A stop rule, with changes; it is put before the table ``[encoder]``."""
+    rule: dict[str, object] = {"estimator": "ekf_compensated", "quantity": "roll", "metric": "rms"}
+    rule |= {"width": 0.1, "least_draws": 2} | changes
+    lines = [f"{key} = {value!r}" for key, value in rule.items() if value is not None]
+    return "\n".join(["[stop]", *lines, "", "[encoder]"])
+
+
 # name: (text of the good scenario, what stands there instead, parts of the message)
 FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "unknown key": (
@@ -421,6 +430,66 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "[encoder]",
         '[score]\nmetrics = ["rms", "mse"]\n\n[encoder]',
         ["score.metrics[1]", "'mse'", "rms, mean"],
+    ),
+    "a stop rule for an estimator that is none": (
+        "[encoder]",
+        _stop(estimator="ekf"),
+        ["stop.estimator", "'ekf'", "ekf_compensated, ekf_uncompensated, design_angles", "name one"],
+    ),
+    "a stop rule for a quantity that is none": (
+        "[encoder]",
+        _stop(quantity="rol"),
+        ["stop.quantity", "'rol'", "roll, pitch", "name one"],
+    ),
+    "a stop rule for a metric that is none": (
+        "[encoder]",
+        _stop(metric="mse"),
+        ["stop.metric", "'mse'", "rms, mean", "name one"],
+    ),
+    "a stop rule for the time that it takes": (
+        "[encoder]",
+        _stop(metric="us_per_sample"),
+        ["stop.metric", "'us_per_sample'", "one of rms", "coverage95; remedy"],
+    ),
+    "a stop rule for a metric that is not kept": (
+        "[encoder]",
+        '[score]\nmetrics = ["sd"]\n\n' + _stop(),
+        ["stop.metric", "'rms'", "one of sd;", "keep another in [score]"],
+    ),
+    "a stop rule for a window that is not kept": (
+        "[encoder]",
+        '[score]\nwindows = ["curve", "curve:*"]\n\n' + _stop(),
+        ["stop.window", "'whole'", "curve", "keep another in [score]"],
+    ),
+    "a stop rule for a band that is none": (
+        "[encoder]",
+        _stop(band="D4"),
+        ["stop.band", "'D4'", "full, D0", "name one"],
+    ),
+    "a stop rule for no width": (
+        "[encoder]",
+        _stop(width=0.0),
+        ["stop.width", "0.0", "> 0"],
+    ),
+    "a stop rule that looks at one draw": (
+        "[encoder]",
+        _stop(least_draws=1),
+        ["stop.least_draws", "1", ">= 2"],
+    ),
+    "a stop rule that wants more draws than there are": (
+        "[encoder]",
+        _stop(least_draws=3),
+        ["stop.least_draws", "3", "2 to 2", "draws of the sensors", "raise"],
+    ),
+    "a stop rule with one draw": (
+        "sensor_draws = 2\n",
+        "sensor_draws = 1\n\n" + _stop().replace("[encoder]", ""),
+        ["stop.least_draws", "2", "at least 2 draws, this scenario has 1", "raise"],
+    ),
+    "a stop rule without a width": (
+        "[encoder]",
+        _stop(width=None),
+        ["stop.width", "is required"],
     ),
     "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 25", "quotes"]),
     "a key twice": ("seed = 1", "seed = 1\nseed = 2", ["not valid TOML"]),

@@ -133,6 +133,39 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     assert ("going on with an unfinished run" in log) == (kept > 0)
 
 
+def test_killed_with_a_stop_rule_it_stops_where_it_would_have(
+    noting_file: Path,
+    notes: Notes,
+    tmp_path: Path,
+    assert_same: Callable[[pd.DataFrame, pd.DataFrame], None],
+) -> None:
+    """The main process is killed in the first round and in the second one; two are all it takes."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    plain = ["monte_carlo.sensor_draws=40", "estimator.noting.options.sleep_s=0.1"]
+    figure = 'estimator="ekf", quantity="roll", metric="rms", least_draws=8'
+    # The interval of 12 draws is narrower than that of 8 in most samples; in this one, it is.
+    first = run_campaign(load_scenario(noting_file, overrides=[*plain, f"stop={{{figure}, width=9.0}}"]))
+    assert first.stopped is not None and first.stopped.draws == 8 and first.stopped.width is not None
+    settings = [*plain, f"stop={{{figure}, width={0.999 * first.stopped.width!r}}}"]
+    whole = run_campaign(load_scenario(noting_file, overrides=settings))
+    assert whole.stopped is not None and whole.stopped.reached and 8 < whole.stopped.draws < 40
+    notes.file.unlink()
+    options = [word for setting in settings for word in ("--set", setting)]
+    words = [sys.executable, str(program), str(BATCH_CELLS), "run", str(noting_file), *options]
+    for cells in (6, 20):
+        process = subprocess.Popen([*words, "--workers", str(WORKERS)], cwd=tmp_path)
+        wait_while(lambda: process.poll() is None and len(list(notes)) < cells, at_most_s=120.0)  # noqa: B023
+        assert process.poll() is None
+        process.kill()
+        process.wait()
+    process = subprocess.run([*words, "--workers", "1"], cwd=tmp_path, timeout=300, check=False)
+    assert process.returncode == DONE
+    folder = tmp_path / "results" / "mine"
+    assert_same(whole.scores, pd.read_parquet(folder / "scores.parquet"))
+    assert "going on with an unfinished run" in (folder / "run.log").read_text()
+
+
 def test_ctrl_c_ends_all_processes_in_one_line(noting_file: Path, notes: Notes, tmp_path: Path) -> None:
     """The terminal sends it to the main process and to its workers alike."""
     program = tmp_path / "program.py"

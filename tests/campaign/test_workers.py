@@ -79,8 +79,8 @@ def test_order_of_rides_changes_no_bit(
 ) -> None:
     real = campaign.chosen_cells
 
-    def shuffled(*arguments):  # type: ignore[no-untyped-def]
-        listed = list(real(*arguments))
+    def shuffled(*arguments, **keywords):  # type: ignore[no-untyped-def]
+        listed = list(real(*arguments, **keywords))
         random.Random(1).shuffle(listed)
         return sorted(listed, key=lambda cell: -cell.ride_number)
 
