@@ -60,7 +60,7 @@ def run(
     if len(wanted) > 1 or (cell is not None and (wanted or cluster or workers)):
         raise InputError(
             "these options do not go together",
-            field=" ".join(f"--{name}" for name in wanted) + (" --cell" if cell is not None else ""),
+            field=" ".join([*(f"--{name}" for name in wanted), *(["--cell"] if cell is not None else [])]),
             remedy="choose one of them; --cell runs in this process",
         )
     console = Console()
