@@ -6,7 +6,10 @@ All of it follows from the scenario (class and options of each estimator), not f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.colors import to_hex, to_rgb
 
 from simrail.errors import InputError
 from simrail.estimate import estimator_class
@@ -22,6 +25,8 @@ _COLOURS = {
 }
 _NO_IMU = ("DesignAngles", "ZeroTrack")
 _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
+_MOST_ALIKE = 3
+"""So many methods of one class share its colour, told apart by their strokes; more get shades of it."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 _SPELLED = {
     "sabatini": "Sabatini",
@@ -100,7 +105,27 @@ def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
             stroke=_STROKES[seen.count((family, flag)) % len(_STROKES)],
         )
         seen.append((family, flag))
-    return styles
+    return _shaded(styles)
+
+
+def _shaded(styles: dict[str, MethodStyle]) -> dict[str, MethodStyle]:
+    """Give shades to methods that share a colour with too many others, from dark to light."""
+    sharing: dict[str, list[str]] = {}
+    for style in styles.values():
+        if style.uses_imu:
+            sharing.setdefault(style.colour, []).append(style.name)
+    shaded = dict(styles)
+    for colour, names in sharing.items():
+        if len(names) > _MOST_ALIKE:
+            for place, name in zip(np.linspace(-0.6, 0.6, len(names)), names, strict=True):
+                shaded[name] = replace(styles[name], colour=_mixed(colour, float(place)))
+    return shaded
+
+
+def _mixed(colour: str, share: float) -> str:
+    """A colour with a share of white, or of black if it is negative."""
+    red, green, blue = ((1.0 - abs(share)) * part + max(share, 0.0) for part in to_rgb(colour))
+    return to_hex((red, green, blue))
 
 
 def _compensated(method: cells.Method) -> bool | None:

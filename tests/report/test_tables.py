@@ -13,7 +13,7 @@ from simrail.report.methods import method_styles
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.tables import error_table
 from simrail.scenario.cells import methods
-from simrail.scenario.scenario import Scenario
+from simrail.scenario.scenario import Scenario, load_scenario
 
 
 def case_of(scores: pd.DataFrame, cells: pd.DataFrame) -> Figures:
@@ -59,3 +59,12 @@ def test_cases_are_found_by_their_labels(
     assert found is not None and found.labels["ride"] == "back"
     assert of_cell(all_cases, {"ride": "elsewhere"}) is None
     assert all_cases[0].curves() == ["curve:curve 3 R300"]
+
+
+def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
+    styles = method_styles(methods(load_scenario("metro_geometry")))
+    smoothers = [style.colour for name, style in styles.items() if name.startswith(("smoother", "filter"))]
+    assert len(smoothers) > 3
+    assert len(set(smoothers)) == len(smoothers)
+    few = method_styles(methods(load_scenario("validation_quick")))
+    assert few["ekf_compensated"].colour == "#0072B2"
