@@ -250,7 +250,9 @@ def test_trajectory_time_is_linear_in_the_ride() -> None:
     """Four times the ride takes four times as long, new memory included."""
     model = trajectory_model()
     long = model._replace(
-        signals=np.tile(model.signals, (4, 1)), track=np.ascontiguousarray(np.tile(model.track, (4, 1)))
+        signals=np.tile(model.signals, (4, 1)),
+        track=np.ascontiguousarray(np.tile(model.track, (4, 1))),
+        kinds=np.tile(model.kinds, 4),
     )
     times = [
         best_us(lambda m=m: compiled_backend(m, smoothed=True, with_covariance=True), len(m.signals))
