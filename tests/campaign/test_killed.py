@@ -95,9 +95,11 @@ def run_with_kills(
             return done, before
         assert process.returncode == -signal.SIGKILL, said.decode()
         folders = list((folder / "results").glob(".mine.unfinished-*"))
-        kept = len(Unfinished(folders[0]).cells()) if folders else 0
+        # Killed as it ended, it has left whole results; the next session then begins anew.
+        whole = not folders and (folder / "results" / "mine" / "scores.parquet").exists()
+        kept = cells if whole else len(Unfinished(folders[0]).cells()) if folders else 0
         assert asked - (kept - before) <= in_session * WORKERS * BATCH_CELLS
-        before = kept
+        before = 0 if whole else kept
 
 
 def wait_while(condition: Callable[[], bool], *, at_most_s: float) -> None:
