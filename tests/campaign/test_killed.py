@@ -126,7 +126,8 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     killed, kept = run_with_kills(
         kills, [*words, "--workers", str(WORKERS)], notes, tmp_path, cells=cells, seed=kills
     )
-    assert killed == kills
+    # A quick machine may be done before the last of a few kills.
+    assert killed == kills if cells > 100 else 0 < killed <= kills
     folder = tmp_path / "results"
     assert_same(whole.scores, pd.read_parquet(folder / "mine" / "scores.parquet"))
     assert [path.name for path in folder.iterdir()] == ["mine"]
