@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 
 _NO_MATTER = (
-    *("report", "catalogue.py", "cli.py", "export.py", "new.py", "new_ride.py", "progress.py"),
-    *("aggregate.py", "statistics.py", "plan.py", "rehearsal.py"),
+    *("commands", "report", "catalogue.py", "cli.py", "export.py", "new.py", "new_ride.py", "progress.py"),
+    *("aggregate.py", "statistics.py", "plan.py", "rehearsal.py", "tune.py"),
 )
 """Parts of this package that no score depends on."""
 

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from simrail import results, unfinished
+from simrail import results, sources, unfinished
 from simrail.campaign import run_campaign
 from simrail.cli import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.errors import InputError
@@ -200,6 +201,17 @@ def test_another_plan_or_other_code_is_not_gone_on_with(
     assert with_other_file != key
     monkeypatch.setattr("simrail.job.score_code_hash", lambda: "other code")
     assert prepare(load_scenario(mine[1], overrides=[mine[3]])).key not in (key, with_other_file)
+
+
+def test_code_that_is_left_out_of_the_key_is_there_and_makes_no_score() -> None:
+    """A batch imports none of it; a new command or page must not abandon a run that is under way."""
+    left_out = {name.removesuffix(".py") for name in sources._NO_MATTER}
+    assert {"cli", "commands", "report"} <= left_out
+    assert all((Path(sources.__file__).parent / name).exists() for name in sources._NO_MATTER)
+    program = "import sys, simrail.batch; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    own = {name.split(".")[1] for name in loaded.stdout.split() if name.startswith("simrail.")}
+    assert "cell" in own and not own & left_out
 
 
 def test_two_processes_do_not_run_one_plan_into_one_folder(tmp_path: Path) -> None:
