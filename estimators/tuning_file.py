@@ -19,7 +19,6 @@ parameters set by hand, leave [search] out. Not here: the search (`estimators.tu
 from __future__ import annotations
 
 import json
-import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
@@ -28,6 +27,7 @@ from typing import Any
 
 from estimators.trajectory_noise import Hyperparameters
 from estimators.tuning_space import NAMES, STATUSES, SearchSpace
+from simrail.drafts import whole_file
 from simrail.errors import InputError
 
 REMEDY = "tune anew with 'simrail tune', or leave out [search] for values set by hand"
@@ -130,13 +130,8 @@ class Tuning:
 
     def write(self, path: str | Path) -> None:
         """Write the file: whole or not at all."""
-        file = Path(path)
-        draft = file.with_name(f".{file.name}.{os.getpid()}.draft")
-        try:
-            draft.write_text(self.text(), encoding="utf-8")
-            draft.replace(file)
-        finally:
-            draft.unlink(missing_ok=True)
+        with whole_file(Path(path)) as stream:
+            stream.write(self.text().encode())
 
 
 SETS = ("hyperparameters", "curve_hyperparameters")

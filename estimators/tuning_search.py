@@ -13,7 +13,6 @@ alone, so it is run again from the start on the values that are on record (`Reco
 
 from __future__ import annotations
 
-import os
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -24,6 +23,7 @@ import cma
 import numpy as np
 from scipy.optimize import minimize
 
+from simrail.drafts import whole_file
 from simrail.jit import FloatArray
 
 Batch = Callable[[FloatArray], FloatArray]
@@ -133,13 +133,8 @@ class Record:
     def _save(self) -> None:
         if self._path is None:
             return
-        draft = self._path.with_name(f".{self._path.name}.{os.getpid()}.draft")
-        try:
-            with draft.open("wb") as file:
-                np.savez(file, key=self._key, points=self._points, values=self._values)
-            draft.replace(self._path)
-        finally:
-            draft.unlink(missing_ok=True)
+        with whole_file(self._path) as file:
+            np.savez(file, key=self._key, points=self._points, values=self._values)
 
 
 def least(

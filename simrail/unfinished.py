@@ -14,7 +14,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import shutil
 import sys
 import time
@@ -29,6 +28,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from simrail.batch import BatchResult
+from simrail.drafts import whole_file
 from simrail.errors import InputError
 from simrail.ledger import Failure
 
@@ -75,16 +75,8 @@ class Unfinished:
             If it cannot be written; then nothing of it is there.
         """
         content = _content_of(result)
-        final = self.folder / f"{min(result.cells):09d}-{_hash(content)}.parquet"
-        draft = self.folder / f".{final.name}.draft"
-        try:
-            with draft.open("wb") as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
-            draft.replace(final)
-        finally:
-            draft.unlink(missing_ok=True)
+        with whole_file(self.folder / f"{min(result.cells):09d}-{_hash(content)}.parquet") as stream:
+            stream.write(content)
 
     def results(self) -> Iterator[BatchResult]:
         """Every batch, in the order of its first cell."""
