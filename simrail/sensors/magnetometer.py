@@ -13,6 +13,7 @@ that of the commercial IMU in Briales et al. 2021 was (rms 52 deg, Table 3). Wha
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,7 @@ import pandas as pd
 from simrail.columns import ATTITUDE, MAGNETIC, RELATIVE_ATTITUDE, RELATIVE_POSITION
 from simrail.errors import InputError
 from simrail.jit import FloatArray
+from simrail.resample import interpolated
 from simrail.rotation import rotation_matrix
 from simrail.seeds import stream
 from simrail.sensors.magnetic_surroundings import (
@@ -153,10 +155,7 @@ def sample_magnetometer(
     """
     check_magnetometer(spec)
     wanted = times.to_numpy(dtype=np.float64)
-    known = motion.index.to_numpy(dtype=np.float64)
-
-    def at_times(*columns: str) -> FloatArray:
-        return np.column_stack([np.interp(wanted, known, motion[column].to_numpy()) for column in columns])
+    at_times = partial(interpolated, motion, wanted)
 
     field = _into(at_times(*ATTITUDE), np.broadcast_to(spec.field.vector_t, (len(wanted), 3)))
     if spec.traction is not None or spec.steel is not None:

@@ -9,6 +9,7 @@ axes are those of the body without error, and it samples with the IMU.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ import pandas as pd
 from simrail.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
 from simrail.errors import InputError
 from simrail.jit import FloatArray
+from simrail.resample import interpolated
 from simrail.rotation import rotation_matrix
 from simrail.seeds import stream
 from simrail.track.laid import LaidTrack
@@ -79,10 +81,7 @@ def sample_rails(
     """
     check_rail_sensor(spec)
     wanted = times.to_numpy(dtype=np.float64)
-    known = motion.index.to_numpy(dtype=np.float64)
-
-    def at_times(*columns: str) -> FloatArray:
-        return np.column_stack([np.interp(wanted, known, motion[column].to_numpy()) for column in columns])
+    at_times = partial(interpolated, motion, wanted)
 
     position, angles = at_times(*POSITION), at_times(*ATTITUDE)
     guess = at_times("position_m")[:, 0]
