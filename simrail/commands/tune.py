@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -107,20 +108,13 @@ def tune(
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
     file = out or Path(f"{read.name}_{method}.toml")
     words = [scenario, "--estimator", estimator, "--method", method]
-    for name, given, usual in (
-        ("--imu", imu, None),
-        ("--box", box, (1e-4, 1e4)),
-        ("--constrain", constrain, "y"),
-        ("--position", position, None),
-        ("--band", band, None),
-        ("--within", within, None),
-        ("--step", step, 0.25),
-        ("--evaluations", evaluations, 480),
-        ("--at-most", at_most, None),
-        ("--seed", seed, None),
-    ):
-        if given != usual:
-            words += [name, *(map(repr, given) if isinstance(given, tuple) else [str(given)])]
+    given = {"imu": imu, "box": box, "constrain": constrain, "position": position, "band": band}
+    given |= {"within": within, "step": step, "evaluations": evaluations, "at_most": at_most, "seed": seed}
+    usual = signature(tune).parameters
+    for name, value in given.items():
+        if value != usual[name].default:
+            parts = map(repr, value) if isinstance(value, tuple) else [str(value)]
+            words += ["--" + name.replace("_", "-"), *parts]
     words += [word for ride in rides or [] for word in ("--ride", ride)]
     words += [word for setting in settings or [] for word in ("--set", setting)]
     words += ["--by-kind"] * by_kind

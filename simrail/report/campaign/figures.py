@@ -178,14 +178,18 @@ def box_figure(
             log_ticks(axis.yaxis)
             if column == 0:
                 axis.set_ylabel("rms roll error, \u00b0")
-        figure.legend(
-            handles=[Patch(color=style.colour, label=style.label) for style in styles],
-            loc="upper left",
-            bbox_to_anchor=(LEFT_IN / WIDTH_IN - 0.01, 1.0),
-            ncols=6,
-            borderaxespad=0.1,
-        )
+        _legend(figure, styles)
         return to_svg(figure, description=what)
+
+
+def _legend(figure: Figure, styles: Sequence[MethodStyle]) -> None:
+    figure.legend(
+        handles=[Patch(color=style.colour, label=style.label) for style in styles],
+        loc="upper left",
+        bbox_to_anchor=(LEFT_IN / WIDTH_IN - 0.01, 1.0),
+        ncols=6,
+        borderaxespad=0.1,
+    )
 
 
 def _draw_boxes(
@@ -268,13 +272,7 @@ def curvature_figure(
             else:
                 axis.set_ylabel("mean roll error, \u00b0")
         drawn = [style for style in styles if any(style.name in item[0].estimates for item in kept)]
-        figure.legend(
-            handles=[Patch(color=style.colour, label=style.label) for style in drawn],
-            loc="upper left",
-            bbox_to_anchor=(LEFT_IN / WIDTH_IN - 0.01, 1.0),
-            ncols=6,
-            borderaxespad=0.1,
-        )
+        _legend(figure, drawn)
         return to_svg(figure, description=what)
 
 
