@@ -156,13 +156,21 @@ class _Loop:
                 waiting[self._submit(crew, task)] = task
             if not waiting:
                 return
-            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            if any(broken(error_of(future)) for future in done):
-                done = set(waiting)  # all that were under way are lost; which one it was, is not known
-                wait(done)
-                crew.renew()
-            for future in done:
-                self._take(waiting.pop(future), future, crew, batch_cells)
+            self._collect(waiting, crew, batch_cells)
+
+    def _collect(self, waiting: dict[Future[Any], _Task], crew: Crew, batch_cells: int | None) -> None:
+        """Wait until something is done, and take it.
+
+        No future that has been taken is held on to from here: a cluster keeps a result for as long as
+        somebody does, and computes it again when the worker dies that has it.
+        """
+        done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+        if any(broken(error_of(future)) for future in done):
+            done = set(waiting)  # all that were under way are lost; which one it was, is not known
+            wait(done)
+            crew.renew()
+        for future in done:
+            self._take(waiting.pop(future), future, crew, batch_cells)
 
     def _rides(self, draws: int | None) -> Iterator[tuple[Cell, ...]]:
         """The cells left of each ride."""

@@ -201,6 +201,7 @@ class _Cluster:
             self.close()
             raise
         self._pool: Executor = self._client.get_executor(pure=False)
+        self._busy: set[str] = set()
 
     def _judge_workers(self) -> None:
         """Refuse a cluster without workers, or one whose workers run another simrail."""
@@ -243,10 +244,17 @@ class _Cluster:
             raise ClusterGone from error
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        # To a worker whose last result is here: one that dies then takes one batch with it, not two.
         try:
-            future: Future[Any] = self._pool.submit(function, *arguments)
-        except (CancelledError, RuntimeError) as error:
+            place = next((each for each in self._client.nthreads() if each not in self._busy), None)
+            future: Future[Any] = self._pool.submit(
+                function, *arguments, workers=place, allow_other_workers=place is not None
+            )
+        except (OSError, CancelledError, RuntimeError) as error:
             raise ClusterGone from error
+        if place is not None:
+            self._busy.add(place)
+            future.add_done_callback(lambda _: self._busy.discard(place))
         return future
 
     def renew(self) -> None:

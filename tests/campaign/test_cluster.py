@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Protocol
 
@@ -21,6 +22,7 @@ import simrail
 from simrail import results
 from simrail.campaign import run_campaign
 from simrail.cli import BAD_INPUT, CELL_FAILED, DONE, call
+from simrail.crew import _Cluster
 from simrail.errors import InputError
 from simrail.scenario.scenario import load_scenario
 from simrail.unfinished import Unfinished
@@ -106,6 +108,28 @@ def test_a_campaign_on_a_cluster_with_a_worker_killed_midway(
     assert_same(whole.scores, found.scores)
     assert found.failures == []
     assert notes.repeated(main=os.getpid()) <= 2  # one batch of the worker that was killed
+
+
+def test_a_worker_gets_no_batch_before_its_last_result_is_here() -> None:
+    asked: list[tuple[str | None, Future[None]]] = []
+
+    class Pool:
+        def submit(self, *arguments: object, workers: str | None, allow_other_workers: bool) -> object:
+            assert allow_other_workers == (workers is not None)  # where that worker dies, others may
+            asked.append((workers, Future()))
+            return asked[-1][1]
+
+    class Client:
+        def nthreads(self) -> dict[str, int]:
+            return {"one": 1, "two": 1}
+
+    crew = object.__new__(_Cluster)
+    crew._client, crew._pool, crew._busy = Client(), Pool(), set()  # type: ignore[assignment]
+    for done in (None, None, 1, None, 2, 0):
+        if done is not None:
+            asked[done][1].set_result(None)
+        crew.submit(print)
+    assert [workers for workers, _ in asked] == ["one", "two", "two", None, "two", "one"]
 
 
 def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_it(

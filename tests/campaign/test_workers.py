@@ -7,16 +7,17 @@ import random
 import signal
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from simrail import campaign
+from simrail import campaign, crew
 from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult, gather
 from simrail.crew import FEW_CELLS, crew_of
@@ -105,6 +106,23 @@ def test_each_ride_is_simulated_once_whoever_runs_it(rides: Path, short: Callabl
     found = run_campaign(short(*AXES), workers=2, batch_cells=1)
     assert [ride["from_cache"] for ride in found.rides] == [False] * 4
     assert len(list(rides.glob("[!.]*"))) == 4
+
+
+def test_a_result_that_was_taken_is_let_go_before_more_is_asked_for(
+    short: Callable[..., Scenario], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cluster computes again what is held and whose worker died."""
+    submit, handed_out, held = crew._Here.submit, [], []
+
+    def noting(self: crew._Here, *arguments: Any) -> Any:
+        held.append(sum(reference() is not None for reference in handed_out))
+        future = submit(self, *arguments)
+        handed_out.append(weakref.ref(future))
+        return future
+
+    monkeypatch.setattr(crew._Here, "submit", noting)
+    run_campaign(short(*AXES), workers=1, batch_cells=1)
+    assert len(held) > 3 and not any(held)
 
 
 @pytest.mark.parametrize("kills", [2])
