@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.kernels.trajectory import WIDTH, mirror
+from estimators.kernels.trajectory import WIDTH
 from estimators.kernels.trajectory_equations import (
     PITCH,
     PITCH_RATE,
@@ -56,36 +56,59 @@ def transpose_predict(lam: FloatArray, dt: float) -> None:
 def information_predict(info: FloatArray, dt: float) -> None:
     """Lam <- F' Lam F in place."""
     half = 0.5 * dt * dt
-    width = info.shape[1]
+    width = info.shape[0] // 12
     for a in range(0, 6, 2):
         for i in range(width):
-            info[a + 1, i] += dt * info[a, i]
+            info[(a + 1) * WIDTH + i] += dt * info[a * WIDTH + i]
     for a in range(6, 12, 3):
         for i in range(width):
-            info[a + 2, i] += dt * info[a + 1, i] + half * info[a, i]
+            info[(a + 2) * WIDTH + i] += dt * info[(a + 1) * WIDTH + i] + half * info[a * WIDTH + i]
         for i in range(width):
-            info[a + 1, i] += dt * info[a, i]
+            info[(a + 1) * WIDTH + i] += dt * info[a * WIDTH + i]
+    for o in range(0, 12 * WIDTH, WIDTH):
+        info[o + 1] += dt * info[o]
+        info[o + 3] += dt * info[o + 2]
+        info[o + 5] += dt * info[o + 4]
+        info[o + 8] += dt * info[o + 7] + half * info[o + 6]
+        info[o + 7] += dt * info[o + 6]
+        info[o + 11] += dt * info[o + 10] + half * info[o + 9]
+        info[o + 10] += dt * info[o + 9]
     for i in range(12):
-        info[i, 1] += dt * info[i, 0]
-        info[i, 3] += dt * info[i, 2]
-        info[i, 5] += dt * info[i, 4]
-        info[i, 8] += dt * info[i, 7] + half * info[i, 6]
-        info[i, 7] += dt * info[i, 6]
-        info[i, 11] += dt * info[i, 10] + half * info[i, 9]
-        info[i, 10] += dt * info[i, 9]
-    mirror(info)
+        for c in range(i + 1, 12):
+            info[c * WIDTH + i] = info[i * WIDTH + c]
+
+
+@njit_borrowed
+def combine(a: FloatArray, start: int, b: FloatArray, out: FloatArray, to: int) -> None:
+    """Row a' B into ``out`` from ``to``, with the twelve numbers of ``a`` from ``start``.
+
+    Written out, with all strides known, so that the compiler keeps the sums in vector registers.
+    """
+    a0, a1, a2, a3 = a[start], a[start + 1], a[start + 2], a[start + 3]
+    a4, a5, a6, a7 = a[start + 4], a[start + 5], a[start + 6], a[start + 7]
+    a8, a9, a10, a11 = a[start + 8], a[start + 9], a[start + 10], a[start + 11]
+    for i in range(WIDTH):
+        out[to + i] = (
+            a0 * b[i]
+            + a1 * b[WIDTH + i]
+            + a2 * b[2 * WIDTH + i]
+            + a3 * b[3 * WIDTH + i]
+            + a4 * b[4 * WIDTH + i]
+            + a5 * b[5 * WIDTH + i]
+            + a6 * b[6 * WIDTH + i]
+            + a7 * b[7 * WIDTH + i]
+            + a8 * b[8 * WIDTH + i]
+            + a9 * b[9 * WIDTH + i]
+            + a10 * b[10 * WIDTH + i]
+            + a11 * b[11 * WIDTH + i]
+        )
 
 
 @njit_borrowed
 def give_back(info: FloatArray, h: FloatArray, gain: FloatArray, inverse: float, v: FloatArray) -> None:
     """Lam <- (I - h K') Lam (I - K h') + h h'/s in place, as Lam - h w' - w h'."""
-    width = info.shape[1]
-    for i in range(width):
-        v[i] = 0.0
-    for c in range(12):
-        k = gain[c]
-        for i in range(width):
-            v[i] += k * info[c, i]
+    width = v.shape[0]
+    combine(gain, 0, info, v, 0)
     square = inverse
     for c in range(12):
         square += gain[c] * v[c]
@@ -94,7 +117,7 @@ def give_back(info: FloatArray, h: FloatArray, gain: FloatArray, inverse: float,
     for r in range(12):
         a, b = h[r], v[r]
         for i in range(width):
-            info[r, i] -= a * v[i] + b * h[i]
+            info[r * WIDTH + i] -= a * v[i] + b * h[i]
 
 
 @njit_borrowed
@@ -102,22 +125,11 @@ def shrink(
     info: FloatArray, p: FloatArray, work: FloatArray, v: FloatArray, packed: FloatArray, k: int
 ) -> None:
     """Row k of ``packed`` becomes P - P Lam P."""
-    width = p.shape[1]
-    for r in range(12):
-        for i in range(width):
-            work[r, i] = 0.0
-        for c in range(12):
-            a = info[r, c]
-            for i in range(width):
-                work[r, i] += a * p[c, i]
+    for o in range(0, 12 * WIDTH, WIDTH):
+        combine(info, o, p, work, o)
     at = 0
     for r in range(12):
-        for i in range(width):
-            v[i] = 0.0
-        for c in range(12):
-            a = p[r, c]
-            for i in range(width):
-                v[i] += a * work[c, i]
+        combine(p, r * WIDTH, work, v, 0)
         for c in range(r, 12):
             packed[k, at] -= v[c]
             at += 1
@@ -129,8 +141,8 @@ def unpack(packed: FloatArray, k: int, p: FloatArray) -> None:
     at = 0
     for i in range(12):
         for c in range(i, 12):
-            p[i, c] = packed[k, at]
-            p[c, i] = packed[k, at]
+            p[i * WIDTH + c] = packed[k, at]
+            p[c * WIDTH + i] = packed[k, at]
             at += 1
 
 
@@ -167,7 +179,7 @@ def trajectory_back(
     """
     lam, v, out = np.zeros(STATES), np.zeros(WIDTH), np.zeros(STATES)
     g, j, rows = np.zeros(6), np.zeros((3, 8)), np.zeros((ROWS, WIDTH))
-    info, p, work = np.zeros((STATES, WIDTH)), np.zeros((STATES, WIDTH)), np.zeros((STATES, WIDTH))
+    info, p, work = np.zeros(STATES * WIDTH), np.zeros(STATES * WIDTH), np.zeros(STATES * WIDTH)
     rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = rows[6, Y] = rows[7, Z] = 1.0
     for k in range(states.shape[0] - 1, -1, -1):
         x = states[k]
