@@ -51,9 +51,10 @@ def run(
     if plan:
         return _plan(scenario, seed, settings or [], many=yes)
 
-    from simrail.progress import ProgressWatcher, print_cell, print_scores
+    from simrail.progress import ProgressWatcher
     from simrail.results import run as run_scenario
     from simrail.results import run_cell
+    from simrail.shown_scores import print_cell, print_scores
 
     starts = {"resume": resume, "fresh": fresh, "retry-failed": retry_failed}
     wanted = [name for name, is_wanted in starts.items() if is_wanted]

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from simrail.bands import Band, band_pass, why_not
 from simrail.example import CellResult
 from simrail.jit import FloatArray
-from simrail.report.geometry_tables import JUDGED, QUANTITIES, bands_of_case, is_zero, mappers
+from simrail.report.geometry_bands import JUDGED, QUANTITIES, bands_of_case
+from simrail.report.geometry_tables import is_zero, mappers
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
 from simrail.report.ride_figures import direction_of

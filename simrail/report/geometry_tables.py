@@ -8,33 +8,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from simrail.bands import BANDS, Band
+from simrail.bands import Band
 from simrail.report.findings import Finding, significant
+from simrail.report.geometry_bands import BAND, JUDGED, QUANTITIES, band_words, bands_of_case
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figure, Figures
 from simrail.report.tables import Cell, Row, Table
 from simrail.score_table import FULL
 from simrail.track_quality import Limits, section_indicators
-
-QUANTITIES = {
-    "vertical_profile": "vertical profile",
-    "cross_level": "cross-level",
-    "alignment": "alignment",
-    "twist": "twist",
-    "gauge": "gauge",
-}
-"""Quantities of rail geometry in the order of the page."""
-
-JUDGED = ("vertical_profile", "cross_level", "alignment")
-BAND = "D1"
-"""Band that sentences and indicators speak of."""
-
-
-def bands_of_case(case: Figures) -> list[str]:
-    """Bands in which a case has rail geometry, ``full`` first; empty without any."""
-    table = case.table
-    rows = table[table["quantity"].astype(str).isin(QUANTITIES) & (table["draws"] > 0)]
-    return [str(name) for name in dict.fromkeys(rows["band"])]
 
 
 def mappers(case: Figures, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
@@ -109,14 +90,6 @@ def _is_unobservable(case: Figures, quantity: str) -> bool:
         (case.table["quantity"].astype(str) == quantity) & (case.table["band"].astype(str) == FULL)
     ]
     return len(rows) > 0 and bool(((rows["draws"] == 0) & (rows["failed"] == 0)).all())
-
-
-def band_words(name: str) -> str:
-    """A band with its wavelengths: ``D1 (3-25 m)``."""
-    if name not in BANDS:
-        return "unfiltered" if name == FULL else name
-    band = BANDS[name]
-    return f"{name} ({band.shortest_m:g}\u2013{band.longest_m:g} m)"
 
 
 def overview_table(all_cases: Sequence[Figures], styles: Sequence[MethodStyle]) -> Table | None:

@@ -108,6 +108,15 @@ def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
     return _shaded(styles)
 
 
+def attitude_methods(styles: Sequence[MethodStyle]) -> list[MethodStyle]:
+    """Methods that are told apart by their attitude: of those without an IMU, the first.
+
+    Rails that lie as designed give the design angles once more.
+    """
+    first = next((style for style in styles if not style.uses_imu), None)
+    return [style for style in styles if style.uses_imu or style is first]
+
+
 def _shaded(styles: dict[str, MethodStyle]) -> dict[str, MethodStyle]:
     """Give shades to methods that share a colour with too many others, from dark to light."""
     sharing: dict[str, list[str]] = {}

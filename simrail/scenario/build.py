@@ -233,11 +233,16 @@ def rail_sensor_of(cell: Cell) -> RailSensorSpec | None:
     return None if part is None else part.spec()
 
 
+def bands_by_name(spec: ScenarioFile) -> dict[str, Band]:
+    """Every wavelength band that a scenario can speak of: the standard's, and its own."""
+    own = spec.geometry.own_bands.items()
+    return {**BANDS, **{name: Band(name, *wavelengths) for name, wavelengths in own}}
+
+
 def bands_of(cell: Cell) -> tuple[Band, ...]:
     """Wavelength bands that the rail geometry of a cell is scored in."""
-    part = cell.spec.geometry
-    own = (Band(name, *wavelengths) for name, wavelengths in part.own_bands.items())
-    return (*(BANDS[name] for name in part.bands), *own)
+    part, known = cell.spec.geometry, bands_by_name(cell.spec)
+    return tuple(known[name] for name in (*part.bands, *part.own_bands))
 
 
 def limits_of(spec: ScenarioFile) -> dict[str, Limits]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from estimators.tuning_file import Tuning
 from simrail.report.claim import Claim
 from simrail.report.findings import significant
-from simrail.report.geometry_tables import QUANTITIES
+from simrail.report.geometry_bands import QUANTITIES
 from simrail.report.paper_001.parts import PARTS, Rows
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import constraint_claim

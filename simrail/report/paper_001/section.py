@@ -15,8 +15,8 @@ from estimators.tuning_file import Tuning
 from simrail.bands import Band
 from simrail.example import CellResult
 from simrail.report.claim import Claim
+from simrail.report.geometry_bands import QUANTITIES
 from simrail.report.geometry_figures import lines_of, rails_figure, stretch_of
-from simrail.report.geometry_tables import QUANTITIES
 from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
 from simrail.report.paper_001.claims import claims, errata_note
