@@ -27,7 +27,7 @@ ATTITUDE = (
     ("pitch", "truth", "curve"),
     ("pitch", "design", "curve"),
 )
-"""Columns of the attitude. Beside rails, those against the design are left out: there the design is no goal."""
+"""Columns of the attitude. Beside rails, those against the design are left out: the design is no goal."""
 
 RAILS = (*JUDGED, "gauge")
 """Columns of the rails."""

@@ -7,10 +7,11 @@ so, and where compensation does not help it says that.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from simrail.report.alike import ALIKE, alike
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
+from simrail.report.sentences import Finding, degrees, interval_verdict, listed, significant
 
 _QUANTITIES = {"roll": "roll", "pitch": "pitch", "yaw_debiased": "yaw without its initial offset"}
 _WINDOWS = {
@@ -21,35 +22,8 @@ _WINDOWS = {
 }
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One sentence.
-
-    Attributes
-    ----------
-    tone : str
-        ``"good"``, ``"bad"`` (a loss, an inconsistency, a failure) or ``"note"``.
-    text : str
-        Plain text.
-    """
-
-    tone: str
-    text: str
-
-
-def degrees(value: float) -> str:
-    """An angle with three significant digits, at most four decimals: ``0.213°``."""
-    return f"{significant(value)}\u00b0"
-
-
-def significant(value: float, *, digits: int = 3) -> str:
-    """A number with some significant digits and no exponent, at most four decimals."""
-    if value == 0.0:
-        return "0"
-    # The exponent of the rounded number: 0.09999 is 0.100, not 0.1000.
-    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
-    decimals = min(max(digits - 1 - exponent, 0), 4)
-    return f"{value:.{decimals}f}" if abs(value) >= 5e-5 else "<0.0001"
+MOST_NAMED = 3
+"""So many methods have a sentence each; of more, sentences tell together."""
 
 
 def findings(
@@ -66,15 +40,33 @@ def findings(
     others : sequence of Figures
         All cases of the scenario: the one with an ideal IMU is looked for among them.
     """
+    groups = alike(case, styles)
+    like = {style.name for _, *rest in groups for style in rest}
+    told = [style for style in styles if style.name not in like]
     return [
-        *_compensation(case, styles),
-        *_design_angles(case, styles),
-        *_general_purpose(case, styles),
-        *_floor(case, styles, others),
-        *_consistency(case, styles),
+        *_alike(groups),
+        *_compensation(case, told),
+        *_design_angles(case, told),
+        *_general_purpose(case, told),
+        *_floor(case, told, others),
+        *_consistency(case, told),
         *_odometry(case),
         *_failures(case),
     ]
+
+
+def _alike(groups: Sequence[Sequence[MethodStyle]]) -> list[Finding]:
+    """Methods that the other sentences do not tell apart."""
+    result = []
+    for group in groups:
+        if len(group) > 1:
+            text = (
+                f"The attitudes of {listed([style.label for style in group])} differ by less than "
+                f"{100.0 * ALIKE:g} %: what is said of {group[0].label} holds of "
+                f"{'both' if len(group) == 2 else 'all of them'}."
+            )
+            result.append(Finding("note", text))
+    return result
 
 
 def _compensation(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
@@ -107,6 +99,7 @@ def _design_angles(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding
         text = "'Design angles only' was not run: whether a filter beats no IMU at all is not known."
         return [Finding("note", text)]
     result, unbeaten, baselines = [], [], []
+    beaten: dict[str, list[str]] = {}
     for style in styles:
         if not style.uses_imu or not case.get(style.name, "roll", "rms").draws:
             continue
@@ -116,20 +109,42 @@ def _design_angles(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding
             if (loss := _loss(case, style, design, quantity, word))
         ]
         if losses and style.baseline:
-            baselines.append(f"{style.label} in {_listed(losses)}")
+            baselines.append(f"{style.label} in {listed(losses)}")
         elif losses:
-            text = f"'Design angles only', which uses no IMU, beats {style.label} in {_listed(losses)}."
-            result.append(Finding("bad", text))
+            beaten[style.label] = losses
         else:
             unbeaten.append(style.label)
+    if len(beaten) > MOST_NAMED:
+        result += _many_beaten(case, [style for style in styles if style.label in beaten], design)
+    else:
+        for label, losses in beaten.items():
+            text = f"'Design angles only', which uses no IMU, beats {label} in {listed(losses)}."
+            result.append(Finding("bad", text))
     if baselines:
         text = f"Of the baselines, 'design angles only' beats {'; '.join(baselines)}."
         result.append(Finding("bad", text))
     if unbeaten:
         text = (
-            f"{_listed(unbeaten)}: nowhere beaten by 'design angles only', neither overall nor in any window."
+            f"'Design angles only', which uses no IMU, nowhere beats {listed(unbeaten)}: neither "
+            "overall nor in any kind of track."
         )
         result.insert(0, Finding("good", text))
+    return result
+
+
+def _many_beaten(case: Figures, styles: Sequence[MethodStyle], design: MethodStyle) -> list[Finding]:
+    """Where the design angles win over many methods: a sentence per quantity, without the sizes."""
+    result = []
+    for quantity, word in _QUANTITIES.items():
+        floor = case.get(design.name, quantity, "rms").value
+        overall = [s.label for s in styles if floor < case.get(s.name, quantity, "rms").value]
+        lost = [s.label for s in styles if _loss(case, s, design, quantity, word)]
+        in_parts = [label for label in lost if label not in overall]
+        parts = [f"over the whole ride {listed(overall)}"] if overall else []
+        parts += [f"in some kind of track {listed(in_parts)}"] if in_parts else []
+        if parts:
+            text = f"In {word} 'design angles only', which uses no IMU, beats {'; '.join(parts)}."
+            result.append(Finding("bad", text))
     return result
 
 
@@ -141,9 +156,9 @@ def _loss(case: Figures, style: MethodStyle, design: MethodStyle, quantity: str,
     floor = {window: case.get(design.name, quantity, "rms", window=window).value for window in own}
     lost = [place for window, place in _WINDOWS.items() if floor[window] < own[window]]
     if not floor["whole"] < own["whole"]:
-        return f"{word} {_listed(lost)}" if lost else ""
+        return f"{word} {listed(lost)}" if lost else ""
     won = [place for window, place in _WINDOWS.items() if own[window] < floor[window]]
-    inside = f", though not {_listed(won)}" if won else ""
+    inside = f", though not {listed(won)}" if won else ""
     return f"{word} ({degrees(floor['whole'])} against {degrees(own['whole'])} rms{inside})"
 
 
@@ -181,32 +196,53 @@ def _floor(case: Figures, styles: Sequence[MethodStyle], others: Sequence[Figure
     if not ideal:
         text = "No ideal IMU was run beside this one: what of the errors is the methods' own is not known."
         return [Finding("note", text)]
-    parts = []
+    sizes = {}
     for style in styles:
         own, least = (c.get(style.name, "roll", "rms").value for c in (case, ideal[0]))
         if not style.baseline and own > 0.0 and least > 0.0:
-            parts.append(f"{style.label} {degrees(least)} instead of {degrees(own)}")
-    text = f"With an ideal IMU the roll error over the whole ride would be: {'; '.join(parts)} rms."
-    return [Finding("note", text)] if parts else []
+            sizes[style.label] = (least, own)
+    if not sizes:
+        return []
+    if len(sizes) > MOST_NAMED:
+        with_ideal, with_own = (
+            f"{degrees(min(values))} to {degrees(max(values))}"
+            for values in zip(*sizes.values(), strict=True)
+        )
+        told = f"{with_ideal} instead of {with_own}, by method,"
+    else:
+        told = "; ".join(
+            f"{label} {degrees(least)} instead of {degrees(own)}" for label, (least, own) in sizes.items()
+        )
+    return [Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {told} rms.")]
 
 
 def _consistency(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
-    result = []
+    shares = {}
     for style in styles:
-        if style.baseline:
-            continue
         covered = {q: case.get(style.name, q, "coverage95") for q in ("roll", "pitch")}
-        parts = [f"the true {q} in {100.0 * c.value:.0f} %" for q, c in covered.items() if c.draws]
-        if parts:
-            known = [c.value for c in covered.values() if c.draws]
-            tone, verdict = "good", "about right"
-            if min(known) < 0.9:
-                tone, verdict = "bad", "too small"
-            elif min(known) > 0.985:
-                tone, verdict = "note", "larger than its errors"
-            text = f"The 95 % interval of {style.label} holds {_listed(parts)} of the samples: "
-            result.append(Finding(tone, f"{text}the standard deviations that it claims are {verdict}."))
+        known = {q: c.value for q, c in covered.items() if c.draws}
+        if known and not style.baseline:
+            shares[style.label] = known
+    if len(shares) > MOST_NAMED:
+        return _many_intervals({label: min(known.values()) for label, known in shares.items()})
+    result = []
+    for label, known in shares.items():
+        parts = [f"the true {quantity} in {100.0 * share:.0f} %" for quantity, share in known.items()]
+        tone, verdict = interval_verdict(min(known.values()))
+        text = f"The 95 % interval of {label} holds {listed(parts)} of the samples: "
+        result.append(Finding(tone, f"{text}the standard deviations that it claims are {verdict}."))
     return result
+
+
+def _many_intervals(shares: dict[str, float]) -> list[Finding]:
+    """The same of many methods: a sentence per verdict, each method with the worse of roll and pitch."""
+    by_verdict: dict[tuple[str, str], list[str]] = {}
+    for label, share in shares.items():
+        by_verdict.setdefault(interval_verdict(share), []).append(f"{label} ({100.0 * share:.0f} %)")
+    return [
+        Finding(tone, f"The 95 % interval of the attitude is {verdict} of {listed(named)}.")
+        for (tone, verdict), named in by_verdict.items()
+    ]
 
 
 def _odometry(case: Figures) -> list[Finding]:
@@ -227,7 +263,7 @@ def _odometry(case: Figures) -> list[Finding]:
             told = ", the true one: an ablation, not something that a train has" if source == "truth" else ""
             text = (
                 f"All methods take position and speed from the odometry '{source}'{told}; "
-                f"its position error is {_listed(sizes)}."
+                f"its position error is {listed(sizes)}."
             )
             result.append(Finding("note", text))
     return result
@@ -237,8 +273,3 @@ def _failures(case: Figures) -> list[Finding]:
     empty = case.table[(case.table["failed"] > 0) & (case.table["window"].astype(str) == "whole")]
     names = [str(name) for name in empty["estimator"].unique()]
     return [Finding("bad", f"{name} has no value for some figures; see 'What failed'.") for name in names]
-
-
-def _listed(words: Sequence[str]) -> str:
-    """a, b and c."""
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

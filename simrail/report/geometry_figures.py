@@ -1,18 +1,17 @@
-"""Figures of rail geometry: true and estimated rails over distance with their 95 % band, and error by "
-"band."""
+"""Figures of rail geometry: true and estimated rails with their 95 % band, and error by band."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.bands import Band, band_pass, why_not
+from simrail.bands import BANDS, Band, band_pass, why_not
 from simrail.example import CellResult
 from simrail.jit import FloatArray
-from simrail.report.geometry_bands import JUDGED, QUANTITIES, bands_of_case
+from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case
 from simrail.report.geometry_tables import is_zero, mappers
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
@@ -22,6 +21,7 @@ from simrail.report.style import (
     TRUTH,
     WIDTH_IN,
     distance_axis,
+    fitting_columns,
     legend_above,
     log_ticks,
     look,
@@ -30,13 +30,38 @@ from simrail.report.style import (
     shade_track,
     to_svg,
 )
+from simrail.score_table import FULL
+
+_MARKS = "osv^PX<>*"
+
+ROOMY = 4
+"""So many bands leave room for their wavelengths below the axis."""
 
 
-def stretch_of(example: CellResult, *, length_m: float) -> tuple[float, float]:
-    """A stretch about the middle of the ride."""
+def stretch_of(example: CellResult, name: str, *, band: Band | None, length_m: float) -> tuple[float, float]:
+    """First and last place of a stretch of some length: in the middle of what there is to draw.
+
+    That is where the ride went and a method says what the rails look like, in a band or unfiltered; the
+    stretch is shorter where there is no more of it.
+    """
     position = example.motion["position_m"]
-    middle = 0.5 * float(position.min() + position.max())
-    return middle - 0.5 * length_m, middle + 0.5 * length_m
+    low, high = float(position.min()), float(position.max())
+    there = []
+    for quantity in JUDGED:
+        place, _, found, _ = lines_of(example, name, quantity, band)
+        there.append(place[np.isfinite(found) & (place >= low) & (place <= high)])
+    places = np.concatenate(there)
+    if len(places):
+        low, high = float(places.min()), float(places.max())
+    middle = 0.5 * (low + high)
+    return max(low, middle - 0.5 * length_m), min(high, middle + 0.5 * length_m)
+
+
+def stretch_words(example: CellResult, stretch: tuple[float, float]) -> str:
+    """A stretch as captions say it: ``120 m in the middle of the ride``."""
+    length = stretch[1] - stretch[0]
+    is_all = length > 0.98 * float(np.ptp(example.motion["position_m"].to_numpy()))
+    return f"all {length:.0f} m of the ride" if is_all else f"{length:.0f} m in the middle of the ride"
 
 
 def lines_of(example: CellResult, name: str, quantity: str, band: Band | None) -> tuple[FloatArray, ...]:
@@ -121,15 +146,23 @@ def rails_figure(
         return to_svg(figure, description=what)
 
 
-def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
-    """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without "
-    "any."""
+def bands_figure(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> str:
+    """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without any.
+
+    Parameters
+    ----------
+    case, styles : Figures, sequence of MethodStyle
+        The case and the scenario's methods.
+    known : mapping of str to Band
+        Bands whose wavelengths are told, if there is room.
+    """
     bands = bands_of_case(case)
     shown = mappers(case, styles)
     if not bands or not shown:
         return ""
     with look():
-        height, gap, left, top, bottom = 3.0, 0.42, 0.62, 0.62, 0.42
+        gap, left, top, bottom = 0.42, 0.62, 0.62, 0.42
+        height = 2.0 + top + bottom
         figure = Figure(figsize=(WIDTH_IN, height))
         wide = (WIDTH_IN - left - 0.15 - 2 * gap) / 3
         step = 0.7 / max(len(shown), 1)
@@ -150,7 +183,7 @@ def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
                     x,
                     value,
                     [np.minimum(sd, 0.7 * value), sd],
-                    fmt="D" if hollow else "osv^"[order % 4],
+                    fmt="D" if hollow else _MARKS[order % len(_MARKS)],
                     ms=5.0,
                     color=style.colour,
                     mfc="white" if hollow else style.colour,
@@ -165,7 +198,8 @@ def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
             axis.grid(axis="x", visible=False)
             axis.grid(axis="y", which="minor", color="#f2f4f7", lw=0.5)
             axis.set_xlim(-0.5, len(bands) - 0.5)
-            axis.set_xticks(range(len(bands)), ["all" if band == "full" else band for band in bands])
+            words = [_tick(band, known if len(bands) <= ROOMY else {}) for band in bands]
+            axis.set_xticks(range(len(bands)), words)
             axis.tick_params(axis="x", length=0)
             axis.set_title(QUANTITIES[quantity], color=INK)
             if i == 0:
@@ -176,7 +210,14 @@ def bands_figure(case: Figures, styles: Sequence[MethodStyle]) -> str:
             labels,
             loc="upper left",
             bbox_to_anchor=(left / WIDTH_IN - 0.01, 1.0),
-            ncols=6,
+            ncols=fitting_columns(labels, WIDTH_IN - left),
             borderaxespad=0.1,
         )
         return to_svg(figure, description="Standard deviation of the error of the rail geometry by band")
+
+
+def _tick(band: str, known: Mapping[str, Band]) -> str:
+    """Name of a band below an axis, and its wavelengths below that."""
+    if band == FULL:
+        return "all"
+    return band_words(band, known).replace(" (", "\n").removesuffix(")")

@@ -1,4 +1,4 @@
-"""Rail geometry of a ride as the page shows it: sentences, figures, and indicators against limits."""
+"""Rail geometry of a ride as the page shows it: figures, and indicators against limits."""
 
 from __future__ import annotations
 
@@ -7,32 +7,31 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from simrail.bands import BANDS, why_not
+from simrail.bands import BANDS, Band, margin_m, why_not
 from simrail.columns import IRREGULARITY
 from simrail.example import CellResult
-from simrail.report.findings import Finding
-from simrail.report.geometry_figures import bands_figure, rails_figure, stretch_of
-from simrail.report.geometry_tables import (
-    BAND,
-    JUDGED,
-    geometry_findings,
-    indicator_table,
-    is_zero,
-)
+from simrail.report.geometry_bands import BAND, JUDGED, band_words, judged_band
+from simrail.report.geometry_figures import bands_figure, rails_figure, stretch_of, stretch_words
+from simrail.report.geometry_tables import indicator_table, is_zero
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
 from simrail.report.tables import Table
 from simrail.track_quality import Limits
 
-LONG_M, SHORT_M = 400.0, 120.0
-"""Stretches that are drawn unfiltered, and in `BAND`."""
+LONG_M = 400.0
+"""Stretch that is drawn unfiltered."""
+
+WAVES = 5.0
+"""So many of the longest waves of a band are drawn of it: 125 m of D1."""
+
+MOST_DRAWN = 3
+"""Methods of one figure of rails; the tables hold all."""
 
 
 @dataclass(frozen=True)
 class GeometryView:
     """Rail geometry of one ride as the template needs it."""
 
-    findings: list[Finding]
     figures: list[tuple[str, Markup]]
     indicators: Table | None
     indicators_text: str
@@ -42,64 +41,67 @@ def geometry_view(
     example: CellResult,
     case: Figures | None,
     styles: Sequence[MethodStyle],
-    others: Sequence[Figures],
+    *,
     limits: Mapping[str, Limits],
-    goals_mm: Mapping[str, float],
+    known: Mapping[str, Band] = BANDS,
 ) -> GeometryView | None:
-    """Make it; None if no method of the ride says what the rails look like."""
-    drawn = with_rails(example, [style for style in styles if not is_zero(style)])
+    """Make it; None if no method of the ride says what the rails look like.
+
+    Parameters
+    ----------
+    example : CellResult
+        The ride.
+    case : Figures, optional
+        Its scores; they say in which band it is judged.
+    styles : sequence of MethodStyle
+        The scenario's methods.
+    limits : mapping of str to Limits
+        Limits of the indicators.
+    known : mapping of str to Band
+        The scenario's bands by name.
+    """
+    drawn = with_rails(example, [style for style in styles if not is_zero(style)])[:MOST_DRAWN]
     if not drawn:
         return None
     first = drawn[0]
-    figures = [
-        (
-            f"Rails over {LONG_M:.0f} m in the middle of the ride, unfiltered: as they lie (broad grey), "
-            f"and as "
-            f"{first.label} and others find them. The tinted band is the 95 % interval of {first.label}. "
-            f"What "
-            "is far longer than a train, an inertial method cannot tell from its own drift.",
-            rails_figure(
-                example,
-                drawn[:2],
-                band=None,
-                limits=stretch_of(example, length_m=LONG_M),
-                with_interval=True,
-                what="Rails over distance, unfiltered",
-            ),
-        )
-    ]
-    if _holds_band(example, first):
-        figures.append(
-            (
-                f"The same over {SHORT_M:.0f} m, filtered to {BAND}. A shift along the track is an error "
-                f"of the "
-                "odometry.",
-                rails_figure(
-                    example,
-                    drawn[:2],
-                    band=BANDS[BAND],
-                    limits=stretch_of(example, length_m=SHORT_M),
-                    with_interval=False,
-                    what=f"Rails over distance in {BAND}",
-                ),
-            )
-        )
-    if case is not None:
-        figures.append(
-            (
-                "Standard deviation of the error by band of wavelengths, on a logarithmic axis; hollow: no "
-                "IMU "
-                "at all, whose error is the rails themselves. Strokes: one standard deviation between draws.",
-                bands_figure(case, styles),
-            )
-        )
-    indicators, text = _indicators(example, first, limits)
-    return GeometryView(
-        geometry_findings(case, styles, others, goals_mm=goals_mm) if case else [],
-        [(caption, Markup(svg)) for caption, svg in figures if svg],
-        indicators,
-        text,
+    stretch = stretch_of(example, first.name, band=None, length_m=LONG_M)
+    text = (
+        f"Rails over {stretch_words(example, stretch)}, unfiltered: as they lie (broad grey), and as "
+        f"{' and '.join(style.label for style in drawn)} say. The tinted band is the 95 % interval of "
+        f"{first.label}. What is far longer than a train, an inertial method cannot tell from its own drift."
     )
+    svg = rails_figure(
+        example, drawn, band=None, limits=stretch, with_interval=True, what="Rails over distance, unfiltered"
+    )
+    figures = [(text, svg)]
+    band = known.get(judged_band(case)) if case is not None else None
+    if band is not None and _holds(example, first, band):
+        length = WAVES * max(band.edges_m(quantity)[1] for quantity in JUDGED)
+        stretch = stretch_of(example, first.name, band=band, length_m=length)
+        words = band_words(band.name, known)
+        text = (
+            f"The same over {stretch_words(example, stretch)}, in {words}: the band that the scores speak "
+            f"of. It ends {margin_m(band.edges_m(JUDGED[0])):g} m from either end of the ride, where its "
+            "filter would have to know the rails beyond. A shift along the track is an error of the odometry."
+        )
+        svg = rails_figure(
+            example,
+            drawn,
+            band=band,
+            limits=stretch,
+            with_interval=False,
+            what=f"Rails over distance in {words}",
+        )
+        figures.append((text, svg))
+    if case is not None:
+        text = (
+            "Standard deviation of the error by band of wavelengths, on a logarithmic axis; hollow: no IMU "
+            "at all, whose error is the rails themselves. Strokes: one standard deviation between draws, if "
+            "there are several."
+        )
+        figures.append((text, bands_figure(case, styles, known=known)))
+    indicators, text = _indicators(example, first, limits)
+    return GeometryView([(caption, Markup(svg)) for caption, svg in figures if svg], indicators, text)
 
 
 def with_rails(example: CellResult, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
@@ -114,18 +116,19 @@ def with_rails(example: CellResult, styles: Sequence[MethodStyle]) -> list[Metho
     return found
 
 
-def _holds_band(example: CellResult, style: MethodStyle) -> bool:
+def _holds(example: CellResult, style: MethodStyle, band: Band) -> bool:
+    """Whether a ride is long enough, and its places near enough to each other, for a band."""
     geometry = example.estimates[style.name].geometry
     assert geometry is not None
     step = float(geometry.index[1] - geometry.index[0])
-    return not any(why_not(BANDS[BAND].edges_m(q), count=len(geometry), step_m=step) for q in JUDGED)
+    return not any(why_not(band.edges_m(q), count=len(geometry), step_m=step) for q in JUDGED)
 
 
 def _indicators(
     example: CellResult, style: MethodStyle, limits: Mapping[str, Limits]
 ) -> tuple[Table | None, str]:
     geometry = example.estimates[style.name].geometry
-    if geometry is None or example.rails is None or not _holds_band(example, style):
+    if geometry is None or example.rails is None or not _holds(example, style, BANDS[BAND]):
         return None, ""
     truth = example.rails.irregularities(geometry.index.to_numpy(dtype="float64"))[list(IRREGULARITY)]
     table = indicator_table(truth.set_index(geometry.index), geometry, limits=limits, band=BANDS[BAND])
@@ -140,8 +143,7 @@ def _indicators(
     )
     text = (
         f"Indicators in {BAND} of the true rails and of those that {style.label} finds, mm: standard "
-        f"deviation "
-        "over 200 m, largest distance from the mean. "
+        f"deviation over 200 m, largest distance from the mean. "
     )
     text += (
         f"Marked: beyond the scenario's limits ({told})."

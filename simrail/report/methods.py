@@ -26,7 +26,20 @@ _COLOURS = {
 _NO_IMU = ("DesignAngles", "ZeroTrack")
 _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
 _MOST_ALIKE = 3
-"""So many methods of one class share its colour, told apart by their strokes; more get shades of it."""
+"""So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
+shades of it, which stay beside those of their twins."""
+_APART = (
+    "#0072B2",
+    "#D55E00",
+    "#56B4E9",
+    "#E69F00",
+    "#CC79A7",
+    "#332288",
+    "#882255",
+    "#7b5e2a",
+    "#999933",
+)
+"""Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 _SPELLED = {
     "sabatini": "Sabatini",
@@ -118,14 +131,19 @@ def attitude_methods(styles: Sequence[MethodStyle]) -> list[MethodStyle]:
 
 
 def _shaded(styles: dict[str, MethodStyle]) -> dict[str, MethodStyle]:
-    """Give shades to methods that share a colour with too many others, from dark to light."""
+    """Tell methods apart that share a colour: by colours that no other has, or by shades."""
     sharing: dict[str, list[str]] = {}
     for style in styles.values():
         if style.uses_imu:
             sharing.setdefault(style.colour, []).append(style.name)
     shaded = dict(styles)
+    free = [colour for colour in _APART if colour not in sharing]
     for colour, names in sharing.items():
-        if len(names) > _MOST_ALIKE:
+        fit = 1 < len(names) <= len(free) + 1 and all(styles[name].compensated is None for name in names)
+        if fit:
+            for name in names[1:]:
+                shaded[name] = replace(styles[name], colour=free.pop(0))
+        elif len(names) > _MOST_ALIKE:
             for place, name in zip(np.linspace(-0.6, 0.6, len(names)), names, strict=True):
                 shaded[name] = replace(styles[name], colour=_mixed(colour, float(place)))
     return shaded

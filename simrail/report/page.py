@@ -7,34 +7,37 @@ from the scores (`simrail.report.findings`); how it looks is in ``page.html.j2``
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
+from simrail.bands import Band
 from simrail.example import CellResult
 from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.campaign.section import campaign_view
 from simrail.report.campaign.tables import write_tables
-from simrail.report.findings import Finding, findings
+from simrail.report.findings import findings
+from simrail.report.geometry_findings import geometry_findings
 from simrail.report.geometry_tables import geometry_table, overview_table
 from simrail.report.geometry_view import GeometryView, geometry_view
-from simrail.report.methods import MethodStyle, method_styles
+from simrail.report.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.paper_000.section import paper_view as beside_briales
 from simrail.report.paper_001.section import paper_view as beside_gonzalez
 from simrail.report.paper_001.tunings import tunings_of
 from simrail.report.pivot import Figures, cases, of_cell
 from simrail.report.provenance import facts, parts
-from simrail.report.ride_figures import direction_of, imu_figure, odometry_figure, speed_figure
+from simrail.report.ride_figures import imu_figure, odometry_figure, speed_figure
+from simrail.report.ride_words import axis_words, ride_facts, ride_title
 from simrail.report.score_figures import curves_figure, rms_figure
+from simrail.report.sentences import Finding
 from simrail.report.tables import Table, consistency_table, error_table, odometry_table
 from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure
-from simrail.scenario.build import goals_mm, limits_of
+from simrail.scenario.build import bands_by_name, goals_mm, limits_of
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.score_table import LEFT_OPEN, NO_SAMPLES, OK
@@ -113,7 +116,14 @@ def write_report(
     campaign = campaign_view(scenario, scores, cells, styles, examples, manifest)
     if campaign is not None:
         write_tables(path.parent / TABLES, campaign.tables)
-    rides = [_ride(example, all_cases, styles, scenario.spec) for example in examples[:MOST_RIDES]]
+    drawn = examples[:MOST_RIDES]
+    rides = [_ride(example, all_cases, styles, scenario.spec) for example in drawn]
+    if len({ride.title for ride in rides}) < len(rides):
+        # One ride may be drawn as two IMUs recorded it.
+        rides = [
+            replace(ride, title=f"{ride.title} \u00b7 {example.recording.mount}")
+            for ride, example in zip(rides, drawn, strict=True)
+        ]
     environment = Environment(
         loader=PackageLoader("simrail.report", "."),
         autoescape=select_autoescape(default=True),
@@ -132,8 +142,9 @@ def write_report(
         tracks=_tracks(examples),
         rides=rides,
         rides_left_out=max(len(examples) - MOST_RIDES, 0),
-        cases=[_case(case, styles) for case in all_cases[:MOST_TABLES]],
-        rails=overview_table(all_cases, styles),
+        ride_count=cells["ride"].nunique(),
+        cases=[_case(case, styles, bands_by_name(scenario.spec)) for case in all_cases[:MOST_TABLES]],
+        rails=overview_table(all_cases, styles, known=bands_by_name(scenario.spec)),
         cases_left_out=max(len(all_cases) - MOST_TABLES, 0),
         odometry=odometry_table(all_cases[:MOST_TABLES]),
         failures=_failures(scores),
@@ -166,9 +177,14 @@ def _ride(
     spec: ScenarioFile,
 ) -> RideView:
     name = example.recording.name
-    drawn = [style for style in styles if style.name in example.estimates]
+    drawn = [style for style in attitude_methods(styles) if style.name in example.estimates]
     case = of_cell(all_cases, example.cell)
-    said = findings(case, styles, others=all_cases) if case else []
+    known = bands_by_name(spec)
+    said: list[Finding] = []
+    if case:
+        # Where rails are scored, they are what the ride was for.
+        said += geometry_findings(case, styles, all_cases, goals_mm=goals_mm(spec), known=known)
+        said += findings(case, attitude_methods(styles), others=all_cases)
     first = [s for s in drawn if not s.baseline] + [s for s in drawn if s.baseline == "general purpose"]
     by_name = {style.name: style for style in drawn}
     comparisons = []
@@ -182,9 +198,9 @@ def _ride(
     nothing = Markup("")
     return RideView(
         key="ride-" + "".join(c if c.isalnum() else "-" for c in f"{name}-{example.cell.get('cell', '')}"),
-        title=_ride_title(example),
-        facts=_ride_facts(example),
-        tiles=tiles(case, styles) if case else [],
+        title=ride_title(example),
+        facts=ride_facts(example),
+        tiles=tiles(case, styles, known=known) if case else [],
         findings=said,
         speed=Markup(speed_figure(example, conditions=spec.rail_condition)),
         imu=Markup(imu_figure(example)),
@@ -194,47 +210,10 @@ def _ride(
         comparisons=comparisons,
         errors=Markup(error_figure(example, drawn)) if drawn else nothing,
         odometry=Markup(odometry_figure(example)),
-        rms=Markup(rms_figure(case, styles)) if case else nothing,
-        curves=Markup(curves_figure(case, styles)) if case else nothing,
-        geometry=geometry_view(example, case, styles, all_cases, limits_of(spec), goals_mm(spec)),
+        rms=Markup(rms_figure(case, attitude_methods(styles))) if case else nothing,
+        curves=Markup(curves_figure(case, attitude_methods(styles))) if case else nothing,
+        geometry=geometry_view(example, case, styles, limits=limits_of(spec), known=known),
     )
-
-
-_UNITS = {"kmh": "km/h", "mps2": "m/s\u00b2", "mps3": "m/s\u00b3", "m": "m", "s": "s", "hz": "Hz"}
-
-
-def axis_words(name: str, value: object) -> str:
-    """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
-    *words, last = name.rpartition(".")[2].split("_")
-    shown = f"{value:g}" if isinstance(value, float) else str(value)
-    if words and last in _UNITS:
-        return f"{' '.join(words)} {shown} {_UNITS[last]}"
-    return f"{' '.join([*words, last])} {shown}"
-
-
-def _ride_title(example: CellResult) -> str:
-    axes = [
-        axis_words(name, value) for name, value in example.cell.items() if "." in name and name != "imu.grade"
-    ]
-    return " \u00b7 ".join([example.recording.name, *axes])
-
-
-def _ride_facts(example: CellResult) -> list[str]:
-    motion, recording = example.motion, example.recording
-    position, speed = motion["position_m"].to_numpy(), np.abs(motion["speed_mps"].to_numpy())
-    moving = speed > 0.01
-    way = "increasing" if direction_of(example) > 0 else "decreasing"
-    mean = 3.6 * float(speed[moving].mean()) if moving.any() else 0.0
-    duration = float(motion.index[-1] - motion.index[0])
-    x, y, z = recording.mount_position_m
-    return [
-        f"{abs(position[-1] - position[0]):.0f} m towards {way} distance, {duration:.0f} s",
-        f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
-        f"IMU {recording.imu_sheet.grade} at {recording.imu_sheet.rate_hz:g} Hz on '{recording.mount_body}', "
-        f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
-        f"position and speed from the odometry '{recording.odometry_source}'"
-        + (" (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""),
-    ]
 
 
 def _tracks(examples: Sequence[CellResult]) -> list[dict[str, Any]]:
@@ -256,7 +235,7 @@ def _tracks(examples: Sequence[CellResult]) -> list[dict[str, Any]]:
     ]
 
 
-def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
+def _case(case: Figures, styles: list[MethodStyle], known: Mapping[str, Band]) -> CaseView:
     labels = case.labels
     title = f"{labels['ride']} \u00b7 IMU {labels['mount']} ({labels['imu']})"
     axes = [f"odometry {labels['odometry']}"]
@@ -274,10 +253,10 @@ def _case(case: Figures, styles: list[MethodStyle]) -> CaseView:
     return CaseView(
         " \u00b7 ".join([title, *axes]),
         said,
-        error_table(case, styles, reference="truth"),
-        error_table(case, styles, reference="design"),
+        error_table(case, attitude_methods(styles), reference="truth"),
+        error_table(case, attitude_methods(styles), reference="design"),
         consistency_table(case, styles),
-        geometry_table(case, styles),
+        geometry_table(case, styles, known=known),
     )
 
 

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
-from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, log_ticks, look, to_svg
+from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, fitting_columns, log_ticks, look, to_svg
 
 _WINDOWS = (("straight", "o", "#8a8f98"), ("transition", "D", "#56B4E9"), ("curve", "s", "#D55E00"))
 _QUANTITIES = (("roll", "roll"), ("pitch", "pitch"), ("yaw_debiased", "yaw, initial offset removed"))
@@ -107,8 +107,13 @@ def curves_figure(figures: Figures, styles: Sequence[MethodStyle]) -> str:
         axis.set_xticks(range(len(windows)), [window.removeprefix("curve:") for window in windows])
         axis.tick_params(axis="x", length=0)
         axis.set_ylabel("rms roll error, \u00b0")
+        columns = fitting_columns([style.label for style in styles], WIDTH_IN - LEFT_IN)
         axis.legend(
-            loc="lower left", bbox_to_anchor=(-0.005, 1.0), ncols=8, borderaxespad=0.15, columnspacing=1.2
+            loc="lower left",
+            bbox_to_anchor=(-0.005, 1.0),
+            ncols=columns,
+            borderaxespad=0.15,
+            columnspacing=1.2,
         )
         return to_svg(figure, description="Root mean square roll error of every method in each curve")
 

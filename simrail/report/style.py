@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from html import escape
 from io import StringIO
+from itertools import pairwise
 from typing import Any
 
 import matplotlib as mpl
@@ -106,7 +107,22 @@ def log_ticks(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def legend_above(axis: Axes, *, columns: int = 8) -> None:
+def fitting_columns(labels: Sequence[str], width_in: float) -> int:
+    """Columns of a legend that fit into a width; a letter is taken for 0.6 of the font's size.
+
+    Matplotlib fills a legend column by column, and a column is as wide as its longest label.
+    """
+    size_in = _RC["legend.fontsize"] / 72.0
+    for columns in range(len(labels), 1, -1):
+        rows, longer = divmod(len(labels), columns)
+        starts = np.cumsum([0] + [rows + (i < longer) for i in range(columns)])
+        longest = [max(map(len, labels[a:b])) for a, b in pairwise(starts)]
+        if size_in * (0.6 * sum(longest) + 4.2 * columns) <= width_in:
+            return columns
+    return 1
+
+
+def legend_above(axis: Axes) -> None:
     """Put the legend of an axis above it, outside of the data; truth and design first."""
     handles, labels = axis.get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda i: {"truth": 0, "design": 1}.get(labels[i], 2))
@@ -115,7 +131,7 @@ def legend_above(axis: Axes, *, columns: int = 8) -> None:
         [labels[i] for i in order],
         loc="lower left",
         bbox_to_anchor=(-0.005, 1.0),
-        ncols=columns,
+        ncols=fitting_columns([labels[i] for i in order], WIDTH_IN - LEFT_IN),
         borderaxespad=0.15,
         columnspacing=1.4,
     )

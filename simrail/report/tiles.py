@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from simrail.report.findings import degrees, significant
-from simrail.report.methods import MethodStyle
+from simrail.bands import BANDS, Band
+from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
+from simrail.report.geometry_tables import baseline_of, is_zero, mappers, sd_of
+from simrail.report.methods import MethodStyle, attitude_methods
 from simrail.report.pivot import Figures
+from simrail.report.sentences import degrees, significant
 
 
 @dataclass(frozen=True)
@@ -19,10 +22,48 @@ class Tile:
     note: str
 
 
-def tiles(case: Figures, styles: Sequence[MethodStyle]) -> list[Tile]:
-    """Roll error in curves of the best method, of its uncompensated twin, of the design angles; odometry."""
-    window = "curve" if case.curves() else "whole"
-    where = "in curves" if window == "curve" else "whole ride"
+def tiles(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> list[Tile]:
+    """Errors of the rails where they are scored, of roll, and of the odometry, beside what no IMU gives.
+
+    Parameters
+    ----------
+    case, styles : Figures, sequence of MethodStyle
+        The case and the scenario's methods.
+    known : mapping of str to Band
+        Bands whose wavelengths are told.
+    """
+    rails = _rails(case, styles, known)
+    roll = _roll(case, attitude_methods(styles))
+    if rails and len(roll) > 1:
+        # Beside rails the attitude is a side matter: one tile of it.
+        *_, design = roll
+        roll = [Tile(roll[0].title, roll[0].value, f"{roll[0].note}; without any IMU {design.value}")]
+    return [*rails, *roll, *_odometry(case)]
+
+
+def _rails(case: Figures, styles: Sequence[MethodStyle], known: Mapping[str, Band]) -> list[Tile]:
+    """Per quantity, the method that errs least in the band that the case is judged in, beside no IMU."""
+    band, floor = judged_band(case), baseline_of(case, styles)
+    result = []
+    for quantity in JUDGED:
+        tested = {
+            s.label: sd_of(case, s, quantity, band=band) for s in mappers(case, styles) if not is_zero(s)
+        }
+        tested = {label: sd for label, sd in tested.items() if sd > 0.0}
+        if not tested:
+            continue
+        best = min(tested, key=lambda label: tested[label])
+        note = f"sd in {band_words(band, known)}, {best}" + (", the best method" if len(tested) > 1 else "")
+        if floor:
+            note += f"; without any IMU {significant(sd_of(case, floor, quantity, band=band))} mm"
+        result.append(Tile(f"{QUANTITIES[quantity]} error", f"{significant(tested[best])} mm", note))
+    return result
+
+
+def _roll(case: Figures, styles: Sequence[MethodStyle]) -> list[Tile]:
+    """Roll error in curves of the best method, of its uncompensated twin, of the design angles."""
+    in_curves = any(case.get(style.name, "roll", "rms", window="curve").draws for style in styles)
+    window, where = ("curve", "in curves") if in_curves else ("whole", "over the whole ride")
 
     def roll(name: str) -> float:
         return case.get(name, "roll", "rms", window=window).value
@@ -31,23 +72,24 @@ def tiles(case: Figures, styles: Sequence[MethodStyle]) -> list[Tile]:
     tested = [style for style in styles if not style.baseline and roll(style.name) > 0.0]
     if tested:
         best = min(tested, key=lambda style: roll(style.name))
-        result.append(
-            Tile(f"roll error {where}", degrees(roll(best.name)), f"rms, {best.label}, the best method")
-        )
+        note = f"rms, {best.label}" + (", the best method" if len(tested) > 1 else "")
+        result.append(Tile(f"roll error {where}", degrees(roll(best.name)), note))
         if roll(best.twin) > 0.0:
             times = f"{roll(best.twin) / roll(best.name):.1f} times as much"
             result.append(Tile("the same, uncompensated", degrees(roll(best.twin)), times))
     for style in styles:
         if not style.uses_imu and roll(style.name) > 0.0:
-            result.append(
-                Tile(
-                    "design angles only", degrees(roll(style.name)), f"rms roll error {where} without any IMU"
-                )
-            )
+            note = f"rms roll error {where} without any IMU"
+            result.append(Tile("design angles only", degrees(roll(style.name)), note))
+    return result
+
+
+def _odometry(case: Figures) -> list[Tile]:
+    """Position error of every odometry that was scored."""
+    result = []
     for name in case.estimators():
         error = case.get(name, "position", "rms")
         if name.startswith("odometry:") and error.draws:
-            result.append(
-                Tile("position error", f"{significant(error.value)} m", f"rms, odometry '{name[9:]}'")
-            )
+            note = f"rms, odometry '{name.removeprefix('odometry:')}'"
+            result.append(Tile("position error", f"{significant(error.value)} m", note))
     return result

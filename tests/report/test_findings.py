@@ -12,9 +12,10 @@ import pytest
 from simrail.columns import ATTITUDE
 from simrail.estimate import Estimate
 from simrail.example import CellResult
-from simrail.report.findings import findings, significant
+from simrail.report.findings import findings
 from simrail.report.methods import method_styles
 from simrail.report.pivot import cases
+from simrail.report.sentences import significant
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario
 
@@ -68,7 +69,7 @@ def test_a_filter_that_is_never_beaten_is_said_to_be_so(
     states = one.motion[list(ATTITUDE)]
     perfect = dict(one.estimates, ekf_compensated=Estimate(states=states, mount="axle"))
     text = said(scenario, *tables(CellResult(one.cell, one.recording, one.motion, perfect)))
-    assert "EKF compensated: nowhere beaten by 'design angles only'" in text
+    assert "'Design angles only', which uses no IMU, nowhere beats EKF compensated: neither" in text
 
 
 def test_coverage_decides_what_is_said_of_the_standard_deviations(

@@ -16,7 +16,7 @@ from simrail.columns import ACCEL, GYRO, IMU
 from simrail.estimate import Estimate
 from simrail.example import CellResult
 from simrail.report import write_report
-from simrail.report.page import axis_words
+from simrail.report.ride_words import axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.score_table import concat_scores, failed_figures, labelled
 

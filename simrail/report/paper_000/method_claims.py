@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from simrail.report.claim import Claim
-from simrail.report.findings import degrees
 from simrail.report.paper_000.claim import (
     FAILS_DEG,
     HELPS_FACTOR,
@@ -22,6 +21,7 @@ from simrail.report.paper_000.claim import (
 from simrail.report.paper_000.printed import QUANTITIES, TABLE_3, TIME_CONSTANTS_S
 from simrail.report.paper_000.rides import GENERAL_PURPOSE, PARTS, Rides, is_fast
 from simrail.report.pivot import Figures
+from simrail.report.sentences import degrees
 
 
 def _asked(

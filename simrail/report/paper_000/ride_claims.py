@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from simrail.report.claim import Claim
-from simrail.report.findings import degrees, significant
 from simrail.report.paper_000.claim import (
     FAILS_BACKWARD_FACTOR,
     REPEATS_FACTOR,
@@ -16,6 +15,7 @@ from simrail.report.paper_000.claim import (
 from simrail.report.paper_000.printed import QUANTITIES, TABLE_3
 from simrail.report.paper_000.rides import PARTS, Rides
 from simrail.report.pivot import Figures
+from simrail.report.sentences import degrees, significant
 
 
 def ride_claims(rides: Rides, *, spread: dict[str, float], wrong_sign_deg: float) -> list[Claim]:

@@ -14,7 +14,6 @@ from markupsafe import Markup
 from simrail.example import CellResult
 from simrail.report.attitude_figures import attitude_figure
 from simrail.report.claim import Claim
-from simrail.report.findings import degrees
 from simrail.report.methods import MethodStyle
 from simrail.report.paper_000.figures import (
     compensation_figure,
@@ -29,6 +28,7 @@ from simrail.report.paper_000.rides import PARTS, Rides, is_fast, rides_of
 from simrail.report.paper_000.terms import terms_table
 from simrail.report.pivot import Figures
 from simrail.report.ride_figures import direction_of
+from simrail.report.sentences import degrees
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.cells import Method
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from estimators.tuning_file import Tuning
 from simrail.report.claim import Claim
-from simrail.report.findings import significant
 from simrail.report.geometry_bands import QUANTITIES
 from simrail.report.paper_001.parts import PARTS, Rows
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import constraint_claim
+from simrail.report.sentences import significant
 
 SAME_FACTOR = 1.5
 """Two tunings are about as accurate if their errors lie within this factor."""
@@ -25,11 +26,19 @@ MATTERS_FACTOR = 1.05
 """Misprints matter if an error is more than so many times as large with them."""
 
 
+class Peak(NamedTuple):
+    """Unfiltered alignment error: largest over the first metres of a ride, and sd over the rest, mm."""
+
+    first_m: float
+    largest_mm: float
+    rest_sd_mm: float
+
+
 def claims(
     rows: Rows,
     *,
     coverage: Sequence[float],
-    peak: tuple[float, float],
+    peak: Peak,
     tuning: Tuning | None = None,
 ) -> list[Claim]:
     """All of them, in the order of the paper.
@@ -40,8 +49,8 @@ def claims(
         The scores.
     coverage : sequence of float
         Share of the track inside the interval of `Rows.main`, %, in the order of `COLUMNS`; empty if unknown.
-    peak : tuple of float
-        Of the unfiltered alignment error of `Rows.main`: largest in the first metres, sd of the rest, mm.
+    peak : Peak
+        The start of the ride beside its rest, of `Rows.main`.
     tuning : Tuning, optional
         That of CML, with what the search knows.
     """
@@ -80,19 +89,19 @@ def _same(key: str, said: str, rows: Rows, parts: Sequence[str]) -> Claim:
     return Claim(key, said, worst <= SAME_FACTOR, found)
 
 
-def _peak(rows: Rows, peak: tuple[float, float]) -> Claim:
+def _peak(rows: Rows, peak: Peak) -> Claim:
     said = (
         "Section 6.1, Fig. A1: the alignment by CML has a spurious peak in the first metres of the ride "
         f"(largest {TABLES['cml'][2].largest:g} mm), which is left open."
     )
-    start, rest = peak
+    start, rest = peak.largest_mm, peak.rest_sd_mm
     if not (start > 0.0 and rest > 0.0):
         return Claim("peak", said, None, "Not run here.")
     holds = start > PEAK_FACTOR * rest
     found = (
-        f"Ours, {PARTS[rows.main]}, unfiltered: at most {significant(start)} mm over the first 20 m, "
-        f"against an "
-        f"sd of {significant(rest)} mm over the rest (holds if more than {PEAK_FACTOR:g} times that)."
+        f"Ours, {PARTS[rows.main]}, unfiltered: at most {significant(start)} mm over the first "
+        f"{peak.first_m:g} m, against an sd of {significant(rest)} mm over the rest (holds if more than "
+        f"{PEAK_FACTOR:g} times that)."
     )
     return Claim("peak", said, holds, found)
 

@@ -16,10 +16,10 @@ from simrail.bands import Band
 from simrail.example import CellResult
 from simrail.report.claim import Claim
 from simrail.report.geometry_bands import QUANTITIES
-from simrail.report.geometry_figures import lines_of, rails_figure, stretch_of
+from simrail.report.geometry_figures import lines_of, rails_figure, stretch_of, stretch_words
 from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
-from simrail.report.paper_001.claims import claims, errata_note
+from simrail.report.paper_001.claims import Peak, claims, errata_note
 from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
@@ -34,11 +34,11 @@ FULL_SIZE = Band("paper", 3.0, 70.0)
 MODEL_M = 200.0
 """Length below which a track is taken for the 1:10 one."""
 
-START_M = 20.0
-"""First metres of a ride."""
+START_M = 2.0
+"""First metres of a ride on a 1:10 track, where the peak of Fig. A1 stands; ten times that at full size."""
 
 DRAWN_M = 300.0
-"""Stretch that is drawn at full size; of the model's, all."""
+"""Stretch that is drawn: of a model's ride, all."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class PaperView:
     """The section as the template needs it."""
 
     where: str
-    size: str
+    is_model: bool
     table: Table
     coverage: Table
     tunings: Table | None
@@ -104,7 +104,7 @@ def paper_view(
     return PaperView(
         where=f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), "
         f"odometry {labels['odometry']}",
-        size="a 1:10 track" if band is SCALED else "full size",
+        is_model=band is SCALED,
         table=_table(rows, looks),
         coverage=_coverage_table(covered, looks),
         tunings=status_table(tuned),
@@ -112,7 +112,7 @@ def paper_view(
         claims=claims(
             rows,
             coverage=covered.get(rows.main, []),
-            peak=_peak(example, drawn) if example and drawn else (np.nan, np.nan),
+            peak=_peak(example, drawn, band) if example and drawn else Peak(np.nan, np.nan, np.nan),
             tuning=tuned.get("cml"),
         ),
         notes=[note for note in (*notes(tuned), errata_note(rows), *_not_run(rows)) if note],
@@ -187,15 +187,16 @@ def _coverage_table(covered: dict[str, list[float]], looks: dict[str, MethodStyl
     return Table([("inside the 95 % interval, %", len(columns))], columns, rows)
 
 
-def _peak(example: CellResult, style: MethodStyle) -> tuple[float, float]:
-    """Largest unfiltered alignment error over the first metres of the ride, and sd of the rest, mm."""
+def _peak(example: CellResult, style: MethodStyle, band: Band) -> Peak:
+    """How the start of a ride errs beside its rest; its first metres are as long as its size asks for."""
     place, true, found, _ = lines_of(example, style.name, "alignment", None)
     error = found - true
     away = np.abs(place - float(example.motion["position_m"].iloc[0]))
-    first = away < START_M
+    first_m = START_M * band.longest_m / SCALED.longest_m
+    first = away < first_m
     if not first.any() or first.all():
-        return float("nan"), float("nan")
-    return float(np.abs(error[first]).max()), float(error[~first].std())
+        return Peak(first_m, float("nan"), float("nan"))
+    return Peak(first_m, float(np.abs(error[first]).max()), float(error[~first].std()))
 
 
 def _not_run(rows: Rows) -> list[str]:
@@ -208,16 +209,19 @@ def _figures(
 ) -> list[tuple[str, Markup]]:
     """Our versions of Figs. A1 and A3."""
     there = {part: style for part, style in looks.items() if part != "zero" and with_rails(example, [style])}
-    limits = stretch_of(example, length_m=DRAWN_M if band is FULL_SIZE else 1e3)
     ride = example.recording.name
     figures: list[tuple[str, Markup]] = []
     first = [there[part] for part in ("cml", "kom", "hand") if part in there]
     if first:
+        limits = stretch_of(example, first[0].name, band=band, length_m=DRAWN_M)
         named = " and ".join(style.label for style in first)
-        text = f"As Fig. A1: rails of ride {ride} as {named} find{'s' * (len(first) == 1)} them, filtered."
+        text = (
+            f"As Fig. A1: rails over {stretch_words(example, limits)} {ride}, filtered, as {named} "
+            f"find{'s' * (len(first) == 1)} them."
+        )
         svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
         figures.append((text, Markup(svg)))
-        text = f"As Fig. A3: the same, filtered, with the 95 % interval of {first[0].label}."
+        text = f"As Fig. A3: the same, with the 95 % interval that {first[0].label} claims unfiltered."
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
         figures.append((text, Markup(svg)))
     return figures
@@ -233,9 +237,10 @@ def _noise_figure(
     # The two are of two recordings: for one figure, the second goes beside the first under its own name.
     added = replace(loud, name="noise added", label=PARTS["cml_noise"], colour=COLOURS["cml_noise"])
     estimates = {quiet.name: example.estimates[quiet.name], added.name: noisy.estimates[loud.name]}
-    limits = stretch_of(example, length_m=DRAWN_M if band is FULL_SIZE else 1e3)
+    limits = stretch_of(example, quiet.name, band=band, length_m=DRAWN_M)
     text = (
-        f"As Fig. A2: rails of ride {example.recording.name} by CML, without and with noise added, filtered."
+        f"As Fig. A2: rails over {stretch_words(example, limits)} {example.recording.name}, filtered, by CML "
+        "without and with noise added."
     )
     both = replace(example, estimates=estimates)
     svg = rails_figure(both, [quiet, added], band=band, limits=limits, with_interval=False, what=text)

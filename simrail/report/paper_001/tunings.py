@@ -12,8 +12,8 @@ from estimators.tuning_file import Tuning
 from estimators.tuning_space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER
 from simrail.errors import InputError
 from simrail.report.claim import Claim
-from simrail.report.findings import significant
 from simrail.report.paper_001.parts import PARTS
+from simrail.report.sentences import significant
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.build_estimator import class_named, construct
 from simrail.scenario.cells import Method
