@@ -11,7 +11,7 @@ from rich.text import Text
 
 from simrail.bands import Band
 from simrail.campaign_result import CampaignResult
-from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
+from simrail.report.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
 from simrail.report.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.pivot import Figures, cases
 from simrail.results import Results
@@ -104,8 +104,8 @@ def _case(
     mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
     if mapping:
         band = judged_band(case)
-        told = f"Rails: sd of the error in {band_words(band, bands)}, mm; {draws}"
-        parts += [Text(told.replace("in unfiltered", "unfiltered")), _rails(console, case, mapping, band)]
+        told = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
+        parts += [Text(told), _rails(console, case, mapping, band)]
         notes += _lost_rails(case, mapping, band)
     attitude = [s for s in attitude_methods(styles) if case.get(s.name, "roll", "rms").draws]
     if attitude:

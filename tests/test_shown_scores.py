@@ -143,7 +143,7 @@ def test_rails_come_first_in_the_scenarios_own_band_where_d1_is_too_long(scenari
     lines = shown(scenario, *scores(bands={"D1": TOO_SHORT, "paper": OK}))
     titles = [line for line in lines if line.startswith(("Rails", "Attitude"))]
     assert titles == [
-        "Rails: sd of the error in paper (0.3\u20137 m), mm; mean of 2 draws",
+        "Rails: sd of the error in wavelengths of 0.3\u20137 m (paper), mm; mean of 2 draws",
         "Attitude: rms error, deg; mean of 2 draws",
     ]
     assert row_of(lines, SHORT, after="Rails") == ["0.120", "0.230", "0.340", "0.450", "3.25"]
@@ -158,7 +158,9 @@ def test_rails_come_first_in_the_scenarios_own_band_where_d1_is_too_long(scenari
 
 def test_rails_are_told_in_d1_where_it_has_figures(scenario: Scenario) -> None:
     lines = shown(scenario, *scores(bands={"D1": OK, "paper": OK}))
-    assert any(line.startswith("Rails: sd of the error in D1 (3\u201325 m), mm") for line in lines)
+    assert any(
+        line.startswith("Rails: sd of the error in wavelengths of 3\u201325 m (D1), mm") for line in lines
+    )
     assert row_of(lines, SHORT, after="Rails")[0] == "1.200"
 
 

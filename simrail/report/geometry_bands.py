@@ -47,3 +47,11 @@ def band_words(name: str, bands: Mapping[str, Band] = BANDS) -> str:
         return "unfiltered" if name == FULL else name
     band = bands[name]
     return f"{name} ({band.shortest_m:g}\u2013{band.longest_m:g} m)"
+
+
+def waves_words(name: str, bands: Mapping[str, Band] = BANDS) -> str:
+    """The same for a sentence: ``in wavelengths of 3-25 m (D1)``."""
+    if name not in bands:
+        return "unfiltered" if name == FULL else f"in the band {name}"
+    band = bands[name]
+    return f"in wavelengths of {band.shortest_m:g}\u2013{band.longest_m:g} m ({name})"

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from simrail.bands import BANDS, Band
-from simrail.report.geometry_bands import BAND, JUDGED, QUANTITIES, band_words, judged_band
+from simrail.report.geometry_bands import BAND, JUDGED, QUANTITIES, judged_band, waves_words
 from simrail.report.geometry_tables import baseline_of, is_zero, main_of, mappers, sd_of
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
 from simrail.report.sentences import Finding, interval_verdict, listed, significant
-from simrail.score_table import FULL
 
 MOST_OTHERS = 2
 """So many other methods are told one by one beside the first; of more, the best and the worst."""
@@ -42,7 +41,8 @@ def geometry_findings(
     floor, main, band = baseline_of(case, styles), main_of(case, styles), judged_band(case)
     if main is None:
         return []
-    where = f"In {band_words(band, known)}" if band != FULL else "Unfiltered"
+    where = waves_words(band, known)
+    where = where[:1].upper() + where[1:]
     result = []
     for quantity in JUDGED:
         own, words = sd_of(case, main, quantity, band=band), QUANTITIES[quantity]
@@ -64,15 +64,15 @@ def geometry_findings(
         for name, words_of in (("odometry", "with the true position"), ("imu", "with an ideal IMU")):
             twin = _twin(case, others, name)
             if twin:
-                parts.append(f"{words_of} {significant(sd_of(twin, main, quantity, band=band))} mm")
+                parts.append(f"{significant(sd_of(twin, main, quantity, band=band))} mm {words_of}")
         both = _twin(case, others, "both")
         if both:
             least = sd_of(both, main, quantity, band=band)
             parts.append(
-                f"with both {significant(least)} mm, which is the vehicle between IMU and rails, and the "
-                f"method"
+                f"{significant(least)} mm with both, which is the vehicle between IMU and rails, and the "
+                "method"
             )
-        text += f". It would be: {'; '.join(parts)}." if parts else "."
+        text += f". It would be {', '.join(parts)}." if parts else "."
         result.append(Finding(tone, text))
     return result + _lost(case, styles, band) + _coverage(case, main)
 

@@ -11,7 +11,7 @@ from simrail.bands import BANDS, Band
 from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case, judged_band
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figure, Figures
-from simrail.report.tables import Cell, Row, Table
+from simrail.report.tables import DECIMALS, Cell, Row, Table
 from simrail.score_table import FULL
 from simrail.track_quality import Limits, section_indicators
 
@@ -93,7 +93,10 @@ def _mark(case: Figures, shown: Sequence[MethodStyle], quantity: str, band: str,
         [case.get(s.name, quantity, "sd", band=band).value for s in shown if is_zero(s) is baseline]
         for baseline in (False, True)
     )
-    is_best = value == min((v for v in tested if np.isfinite(v)), default=np.nan)
+    # As they are shown: what reads the same is as good.
+    is_best = round(value, DECIMALS) == round(
+        min((v for v in tested if np.isfinite(v)), default=np.nan), DECIMALS
+    )
     is_worse = any(value > v for v in floor)
     return " ".join(word for word, holds in (("best", is_best), ("worse", is_worse)) if holds)
 
@@ -175,7 +178,7 @@ def _indicator(line: pd.Series | None, what: str) -> Cell:
     return Cell(f"{1e3 * float(line[what]):.2f}".replace("-", "\u2212"), mark="worse" if beyond else "")
 
 
-def _cell(found: Figure, *, decimals: int = 3, mark: str = "", scale: float = 1.0) -> Cell:
+def _cell(found: Figure, *, decimals: int = DECIMALS, mark: str = "", scale: float = 1.0) -> Cell:
     if found.draws == 0 or not np.isfinite(found.value):
         return Cell("\u2013", mark="none")
     spread = f"{scale * found.sd:.{decimals}f}" if found.sd > 0.0 else ""

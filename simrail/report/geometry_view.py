@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from simrail.bands import BANDS, Band, margin_m, why_not
+from simrail.bands import BANDS, Band, why_not
 from simrail.columns import IRREGULARITY
 from simrail.example import CellResult
-from simrail.report.geometry_bands import BAND, JUDGED, band_words, judged_band
+from simrail.report.geometry_bands import BAND, JUDGED, judged_band, waves_words
 from simrail.report.geometry_figures import bands_figure, rails_figure, stretch_of, stretch_words
 from simrail.report.geometry_tables import indicator_table, is_zero
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
+from simrail.report.sentences import listed
 from simrail.report.tables import Table
 from simrail.track_quality import Limits
 
@@ -63,11 +64,11 @@ def geometry_view(
     drawn = with_rails(example, [style for style in styles if not is_zero(style)])[:MOST_DRAWN]
     if not drawn:
         return None
-    first = drawn[0]
+    first, finds = drawn[0], "finds" if len(drawn) == 1 else "find"
     stretch = stretch_of(example, first.name, band=None, length_m=LONG_M)
     text = (
         f"Rails over {stretch_words(example, stretch)}, unfiltered: as they lie (broad grey), and as "
-        f"{' and '.join(style.label for style in drawn)} say. The tinted band is the 95 % interval of "
+        f"{listed([style.label for style in drawn])} {finds} them. The tinted band is the 95 % interval of "
         f"{first.label}. What is far longer than a train, an inertial method cannot tell from its own drift."
     )
     svg = rails_figure(
@@ -78,11 +79,10 @@ def geometry_view(
     if band is not None and _holds(example, first, band):
         length = WAVES * max(band.edges_m(quantity)[1] for quantity in JUDGED)
         stretch = stretch_of(example, first.name, band=band, length_m=length)
-        words = band_words(band.name, known)
+        words = waves_words(band.name, known)
         text = (
-            f"The same over {stretch_words(example, stretch)}, in {words}: the band that the scores speak "
-            f"of. It ends {margin_m(band.edges_m(JUDGED[0])):g} m from either end of the ride, where its "
-            "filter would have to know the rails beyond. A shift along the track is an error of the odometry."
+            f"The same over {stretch_words(example, stretch)} {words}, which the scores speak of. A shift "
+            "along the track is an error of the odometry."
         )
         svg = rails_figure(
             example,
@@ -90,7 +90,7 @@ def geometry_view(
             band=band,
             limits=stretch,
             with_interval=False,
-            what=f"Rails over distance in {words}",
+            what=f"Rails over distance {words}",
         )
         figures.append((text, svg))
     if case is not None:

@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from simrail.bands import Band
 from simrail.example import CellResult
+from simrail.report.alike import alike
 from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.campaign.section import campaign_view
 from simrail.report.campaign.tables import write_tables
@@ -36,7 +37,7 @@ from simrail.report.score_figures import curves_figure, rms_figure
 from simrail.report.sentences import Finding
 from simrail.report.tables import Table, consistency_table, error_table, odometry_table
 from simrail.report.tiles import Tile, tiles
-from simrail.report.track_figures import plan_figure, profile_figure
+from simrail.report.track_figures import plan_figure, profile_figure, profile_words
 from simrail.scenario.build import bands_by_name, goals_mm, limits_of
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, ScenarioFile
@@ -185,6 +186,14 @@ def _ride(
         # Where rails are scored, they are what the ride was for.
         said += geometry_findings(case, styles, all_cases, goals_mm=goals_mm(spec), known=known)
         said += findings(case, attitude_methods(styles), others=all_cases)
+    if case:
+        # One line for all that lie upon each other.
+        groups = alike(case, drawn)
+        like = {style.name for _, *rest in groups for style in rest}
+        names = {
+            group[0].name: f"{group[0].label} and {len(group) - 1} alike" for group in groups if group[1:]
+        }
+        drawn = [replace(s, label=names.get(s.name, s.label)) for s in drawn if s.name not in like]
     first = [s for s in drawn if not s.baseline] + [s for s in drawn if s.baseline == "general purpose"]
     by_name = {style.name: style for style in drawn}
     comparisons = []
@@ -230,6 +239,7 @@ def _tracks(examples: Sequence[CellResult]) -> list[dict[str, Any]]:
             "length_m": entry["track"].length_m,
             "plan": Markup(plan_figure(entry["track"], stops=entry["stops"])),
             "profile": Markup(profile_figure(entry["track"])),
+            "profile_words": profile_words(entry["track"]),
         }
         for entry in found.values()
     ]

@@ -47,6 +47,9 @@ class Table:
     rows: list[Row]
 
 
+DECIMALS = 3
+"""Of an error in the table, degrees."""
+
 _ERRORS = (
     ("roll", "rms", "straight", "straight"),
     ("roll", "rms", "transition", "transition"),
@@ -83,15 +86,18 @@ def error_table(case: Figures, styles: Sequence[MethodStyle], *, reference: str)
         floor = values.get(design or "", float("nan"))
         mark = {name: "worse" for name, value in tested.items() if reference == "truth" and value > floor}
         if tested:
-            best = min(tested, key=lambda name: tested[name])
-            mark[best] = (mark.get(best, "") + " best").strip()
+            # As they are shown: what reads the same is as good.
+            least = round(min(tested.values()), DECIMALS)
+            for name, value in tested.items():
+                if round(value, DECIMALS) == least:
+                    mark[name] = (mark.get(name, "") + " best").strip()
         marks.append(mark)
     rows = []
     for style in styles:
         cells = []
         for (quantity, metric, window, _), mark in zip(columns, marks, strict=True):
             found = case.get(style.name, quantity, metric, window=window, reference=reference)
-            cells.append(_cell(found, decimals=3, mark=mark.get(style.name, "")))
+            cells.append(_cell(found, decimals=DECIMALS, mark=mark.get(style.name, "")))
         rows.append(Row(style.label, style.baseline, style.colour, cells))
     return Table(_group_spans(columns), [word for *_, word in columns], rows)
 

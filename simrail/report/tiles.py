@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from simrail.bands import BANDS, Band
-from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
+from simrail.report.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
 from simrail.report.geometry_tables import baseline_of, is_zero, mappers, sd_of
 from simrail.report.methods import MethodStyle, attitude_methods
 from simrail.report.pivot import Figures
@@ -53,7 +53,7 @@ def _rails(case: Figures, styles: Sequence[MethodStyle], known: Mapping[str, Ban
         if not tested:
             continue
         best = min(tested, key=lambda label: tested[label])
-        note = f"sd in {band_words(band, known)}, {best}" + (", the best method" if len(tested) > 1 else "")
+        note = f"sd {waves_words(band, known)}: {best}" + (", the best method" if len(tested) > 1 else "")
         if floor:
             note += f"; without any IMU {significant(sd_of(case, floor, quantity, band=band))} mm"
         result.append(Tile(f"{QUANTITIES[quantity]} error", f"{significant(tested[best])} mm", note))

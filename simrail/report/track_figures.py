@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simrail.jit import FloatArray
+from simrail.report.sentences import listed
 from simrail.report.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 
@@ -60,28 +61,57 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
         return to_svg(figure, description=f"Plan of the track {track.name}")
 
 
+FLAT_M = 1e-6
+"""Height, or cant, that changes by less is none."""
+
+
 def profile_figure(track: TrackDesign) -> str:
-    """Height, curvature and cant over distance."""
+    """Curvature over distance, with height above and cant below it where the line has any."""
     with look():
-        s = np.linspace(track.start_m, track.end_m, 1200)
-        frame = track.frame(s)
-        figure, axes = panels([1.35, 1.2, 1.2], top_in=0.12)
-        height = frame.position[:, 2]
-        span = max(float(np.ptp(height)), 1.0)
-        floor = float(height.min()) - 0.1 * span
-        axes[0].fill_between(s, height, floor, color="#e8ebf0", lw=0)
-        axes[0].plot(s, height, color=INK, lw=1.4)
-        axes[0].set_ylim(floor, float(height.min()) + 1.35 * span)
-        axes[0].set_ylabel("height, m")
-        axes[1].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
-        axes[1].set_ylabel("curvature, 1/km")
-        axes[2].plot(s, -1e3 * track.rail_base_m * np.sin(frame.roll_rad), color="#0072B2", lw=1.4)
-        axes[2].set_ylabel("cant, mm")
-        for axis in axes[1:]:
+        s, height, cant = _profile(track)
+        is_level, has_cant = np.ptp(height) < FLAT_M, np.abs(cant).max() > FLAT_M
+        figure, axes = panels([*([] if is_level else [1.35]), 1.2, *([1.2] if has_cant else [])], top_in=0.12)
+        rest = list(axes)
+        if not is_level:
+            axis = rest.pop(0)
+            span = max(float(np.ptp(height)), 1.0)
+            floor = float(height.min()) - 0.1 * span
+            axis.fill_between(s, height, floor, color="#e8ebf0", lw=0)
+            axis.plot(s, height, color=INK, lw=1.4)
+            axis.set_ylim(floor, float(height.min()) + 1.35 * span)
+            axis.set_ylabel("height, m")
+        rest[0].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
+        rest[0].set_ylabel("curvature, 1/km")
+        if has_cant:
+            rest[1].plot(s, 1e3 * cant, color="#0072B2", lw=1.4)
+            rest[1].set_ylabel("cant, mm")
+        for axis in rest:
             axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
         shade_track(axes, track, limits=(track.start_m, track.end_m))
         axes[-1].set_xlabel("distance along the track, m")
         return to_svg(figure, description="Height, curvature and cant of the track over distance")
+
+
+def profile_words(track: TrackDesign) -> str:
+    """Caption of `profile_figure`: what it shows, and what the line has none of."""
+    _, height, cant = _profile(track)
+    shown, none = ["curvature (positive to the left)"], []
+    if np.ptp(height) < FLAT_M:
+        none.append("is level")
+    else:
+        shown.insert(0, "height")
+    if np.abs(cant).max() > FLAT_M:
+        shown.append("cant (positive with the right rail raised, as a left curve needs)")
+    else:
+        none.append("has no cant")
+    return f"Design {listed(shown)} over distance." + (f" The line {listed(none)}." if none else "")
+
+
+def _profile(track: TrackDesign) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Distance, height and cant (positive with the right rail raised), m."""
+    s = np.linspace(track.start_m, track.end_m, 1200)
+    frame = track.frame(s)
+    return s, frame.position[:, 2], -track.rail_base_m * np.sin(frame.roll_rad)
 
 
 def _along_the_page(xy: FloatArray) -> FloatArray:
@@ -104,7 +134,8 @@ def _name_curves(axis: Axes, track: TrackDesign, s: FloatArray, xy: FloatArray) 
             tangent = xy[i + 1] - xy[i - 1]
             outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
             axis.annotate(
-                f"R {abs(element.radius_m):.0f} m\ncant {1e3 * abs(element.cant_m):.0f} mm",
+                f"R {abs(element.radius_m):.0f} m"
+                + (f"\ncant {1e3 * abs(element.cant_m):.0f} mm" if element.cant_m else ""),
                 (float(xy[i, 0]), float(xy[i, 1])),
                 (26.0 * outside[0], 26.0 * outside[1]),
                 textcoords="offset points",

@@ -24,6 +24,7 @@ from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
 from simrail.report.pivot import Figures, of_cell
+from simrail.report.sentences import listed
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.cells import Method
 
@@ -214,7 +215,7 @@ def _figures(
     first = [there[part] for part in ("cml", "kom", "hand") if part in there]
     if first:
         limits = stretch_of(example, first[0].name, band=band, length_m=DRAWN_M)
-        named = " and ".join(style.label for style in first)
+        named = listed([style.label for style in first])
         text = (
             f"As Fig. A1: rails over {stretch_words(example, limits)} {ride}, filtered, as {named} "
             f"find{'s' * (len(first) == 1)} them."
