@@ -140,10 +140,10 @@ def _many_beaten(case: Figures, styles: Sequence[MethodStyle], design: MethodSty
         overall = [s.label for s in styles if floor < case.get(s.name, quantity, "rms").value]
         lost = [s.label for s in styles if _loss(case, s, design, quantity, word)]
         in_parts = [label for label in lost if label not in overall]
-        parts = [f"over the whole ride {listed(overall)}"] if overall else []
-        parts += [f"in some kind of track {listed(in_parts)}"] if in_parts else []
+        parts = [f"{listed(overall)} over the whole ride"] if overall else []
+        parts += [f"{listed(in_parts)} in some kind of track"] if in_parts else []
         if parts:
-            text = f"In {word} 'design angles only', which uses no IMU, beats {'; '.join(parts)}."
+            text = f"In {word}, 'design angles only', which uses no IMU, beats {', and '.join(parts)}."
             result.append(Finding("bad", text))
     return result
 
@@ -208,12 +208,13 @@ def _floor(case: Figures, styles: Sequence[MethodStyle], others: Sequence[Figure
             f"{degrees(min(values))} to {degrees(max(values))}"
             for values in zip(*sizes.values(), strict=True)
         )
-        told = f"{with_ideal} instead of {with_own}, by method,"
+        told = f"{with_ideal} rms, by method, instead of {with_own}."
     else:
         told = "; ".join(
             f"{label} {degrees(least)} instead of {degrees(own)}" for label, (least, own) in sizes.items()
         )
-    return [Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {told} rms.")]
+        told = f"{told} rms."
+    return [Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {told}")]
 
 
 def _consistency(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
@@ -238,9 +239,9 @@ def _many_intervals(shares: dict[str, float]) -> list[Finding]:
     """The same of many methods: a sentence per verdict, each method with the worse of roll and pitch."""
     by_verdict: dict[tuple[str, str], list[str]] = {}
     for label, share in shares.items():
-        by_verdict.setdefault(interval_verdict(share), []).append(f"{label} ({100.0 * share:.0f} %)")
+        by_verdict.setdefault(interval_verdict(share), []).append(f"{label} ({100.0 * share:.0f} % inside)")
     return [
-        Finding(tone, f"The 95 % interval of the attitude is {verdict} of {listed(named)}.")
+        Finding(tone, f"The 95 % interval of roll or pitch is {verdict} with {listed(named)}.")
         for (tone, verdict), named in by_verdict.items()
     ]
 

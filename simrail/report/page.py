@@ -34,7 +34,7 @@ from simrail.report.provenance import facts, parts
 from simrail.report.ride_figures import imu_figure, odometry_figure, speed_figure
 from simrail.report.ride_words import axis_words, ride_facts, ride_title
 from simrail.report.score_figures import curves_figure, rms_figure
-from simrail.report.sentences import Finding
+from simrail.report.sentences import Finding, unbroken
 from simrail.report.tables import Table, consistency_table, error_table, odometry_table
 from simrail.report.tiles import Tile, tiles
 from simrail.report.track_figures import plan_figure, profile_figure, profile_words
@@ -114,7 +114,7 @@ def write_report(
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
     paper = _beside_paper(scenario, all_cases, styles, examples)
-    campaign = campaign_view(scenario, scores, cells, styles, examples, manifest)
+    campaign = campaign_view(scenario, scores, cells, attitude_methods(styles), examples, manifest)
     if campaign is not None:
         write_tables(path.parent / TABLES, campaign.tables)
     drawn = examples[:MOST_RIDES]
@@ -132,6 +132,7 @@ def write_report(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["unbroken"] = unbroken
     text = environment.get_template("page.html.j2").render(
         scenario=scenario,
         manifest=manifest,

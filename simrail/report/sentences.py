@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -42,6 +43,11 @@ def interval_verdict(share: float) -> tuple[str, str]:
     if share < 0.9:
         return "bad", "too small"
     return ("note", "larger than its errors") if share > 0.985 else ("good", "about right")
+
+
+def unbroken(text: str) -> str:
+    """A text whose numbers and units are not parted at the end of a line."""
+    return re.sub(r"(?<=\d) (?=(?:mm|m|s|%)(?![a-z]))", "\u00a0", text)
 
 
 def listed(words: Sequence[str]) -> str:

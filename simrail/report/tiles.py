@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from simrail.bands import BANDS, Band
-from simrail.report.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
+from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
 from simrail.report.geometry_tables import baseline_of, is_zero, mappers, sd_of
 from simrail.report.methods import MethodStyle, attitude_methods
 from simrail.report.pivot import Figures
 from simrail.report.sentences import degrees, significant
+from simrail.score_table import FULL
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ def tiles(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, B
     if rails and len(roll) > 1:
         # Beside rails the attitude is a side matter: one tile of it.
         *_, design = roll
-        roll = [Tile(roll[0].title, roll[0].value, f"{roll[0].note}; without any IMU {design.value}")]
+        roll = [Tile(roll[0].title, roll[0].value, f"{roll[0].note}; no IMU: {design.value}")]
     return [*rails, *roll, *_odometry(case)]
 
 
@@ -53,9 +54,10 @@ def _rails(case: Figures, styles: Sequence[MethodStyle], known: Mapping[str, Ban
         if not tested:
             continue
         best = min(tested, key=lambda label: tested[label])
-        note = f"sd {waves_words(band, known)}: {best}" + (", the best method" if len(tested) > 1 else "")
+        note = f"sd in {band_words(band, known)}" if band != FULL else "sd, unfiltered"
+        note += f"; best: {best}" if len(tested) > 1 else f", {best}"
         if floor:
-            note += f"; without any IMU {significant(sd_of(case, floor, quantity, band=band))} mm"
+            note += f"; no IMU: {significant(sd_of(case, floor, quantity, band=band))} mm"
         result.append(Tile(f"{QUANTITIES[quantity]} error", f"{significant(tested[best])} mm", note))
     return result
 

@@ -1,0 +1,410 @@
+"""A short ride on a 1:10 track on the page: rails first, in the band that it can show, over what there is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.bands import BANDS, Band, margin_m
+from simrail.campaign import run_campaign
+from simrail.estimate import Estimate
+from simrail.example import CellResult
+from simrail.report import write_report
+from simrail.report.alike import alike
+from simrail.report.findings import findings
+from simrail.report.geometry_bands import JUDGED, band_words, judged_band, waves_words
+from simrail.report.geometry_figures import rails_figure, stretch_of, stretch_words
+from simrail.report.geometry_findings import geometry_findings
+from simrail.report.geometry_tables import geometry_table, overview_table
+from simrail.report.geometry_view import geometry_view
+from simrail.report.methods import MethodStyle, attitude_methods, method_styles
+from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
+from simrail.report.pivot import Figure, Figures, cases
+from simrail.report.sentences import unbroken
+from simrail.report.style import fitting_columns
+from simrail.report.tiles import tiles
+from simrail.report.track_figures import profile_figure, profile_words
+from simrail.results import describe
+from simrail.scenario.build import bands_by_name
+from simrail.scenario.cells import methods
+from simrail.scenario.scenario import Scenario, read_scenario
+from simrail.track.design import Curve, Straight, TrackDesign, Transition
+
+TEXT = """
+title = "Rails of a model"
+paper = "gonzalez_2023"
+seed = 3
+track = "scale_track"
+vehicle = "scale_vehicle"
+engine = "kinematic"
+odometry = "truth"
+[irregularity]
+spectrum = "erri_b176_high"
+wavelengths_m = [0.6, 7.0]
+fade_m = 3.0
+scale = 2.0
+[[ride]]
+name = "out"
+start_m = 1.0
+end_m = 89.0
+speed_kmh = 3.6
+rest_s = 5.0
+[[imu]]
+name = "body"
+grade = ["lord_3dm_gx4_25", "ideal"]
+body = "body"
+position_m = [0.0, 0.0, 0.05]
+[rail_sensor]
+[geometry]
+bands = ["D1"]
+own_bands = { paper = [0.3, 7.0] }
+twist_base_m = 0.3
+[[estimator]]
+name = "smoother"
+method = "TrajectorySmoother"
+[estimator.options]
+geometry_step_m = 0.05
+[[estimator]]
+name = "camera_free"
+method = "TrajectorySmoother"
+[estimator.options]
+geometry_step_m = 0.05
+rail_sensor = false
+[[estimator]]
+name = "design_angles"
+method = "DesignAngles"
+[[estimator]]
+name = "zero_track"
+method = "ZeroTrack"
+[estimator.options]
+step_m = 0.05
+"""
+START_M, END_M = 1.0, 89.0
+
+
+class Ran:
+    """A scenario that was run, and what the page is made of."""
+
+    def __init__(self, scenario: Scenario, result: Any, page: str) -> None:
+        self.scenario, self.page = scenario, page
+        self.cases = cases(result.scores, result.cells)
+        self.styles = list(method_styles(methods(scenario)).values())
+        self.example: CellResult = result.examples[0]
+        self.known = bands_by_name(scenario.spec)
+        self.examples = result.examples
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("cache")
+        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
+        scenario = read_scenario(TEXT, name="model")
+        result = run_campaign(scenario, workers=1)
+        path = tmp_path_factory.mktemp("page") / "report.html"
+        write_report(
+            path,
+            scenario=scenario,
+            scores=result.scores,
+            cells=result.cells,
+            examples=result.examples,
+            manifest=describe(scenario, result),
+        )
+        return Ran(scenario, result, path.read_text(encoding="utf-8"))
+
+
+# ---- the band that counts ----------------------------------------------------------------------
+
+
+def planted(*bands: str) -> Figures:
+    """A case with figures in some bands."""
+    table = pd.DataFrame({"quantity": "alignment", "band": ["full", *bands], "draws": 2})
+    return Figures({}, table, {})
+
+
+@pytest.mark.parametrize(
+    ("bands", "judged"),
+    [
+        (("D1", "paper"), "D1"),
+        (("D0", "paper"), "paper"),
+        (("D0", "D2"), "D0"),
+        (("paper",), "paper"),
+        ((), "full"),
+    ],
+)
+def test_one_rule_says_which_band_counts(bands: tuple[str, ...], judged: str) -> None:
+    assert judged_band(planted(*bands)) == judged
+
+
+def test_bands_are_told_with_their_wavelengths() -> None:
+    own = {**BANDS, "paper": Band("paper", 0.3, 7.0)}
+    assert band_words("paper", own) == "paper (0.3\u20137 m)" and band_words("paper") == "paper"
+    assert waves_words("paper", own) == "in wavelengths of 0.3\u20137 m (paper)"
+    assert band_words("full") == waves_words("full") == "unfiltered"
+
+
+# ---- figures -----------------------------------------------------------------------------------
+
+
+def places_of(svg: str) -> list[float]:
+    """Labels of the x axis, which is the only one with numbers of this kind on a track of 90 m."""
+    told = re.findall(r"<text[^>]*>(\u2212?\d+)</text>", svg.replace("\n", ""))
+    return [float(text.replace("\u2212", "-")) for text in told]
+
+
+@pytest.mark.parametrize("length_m", [20.0, 400.0, 1e3])
+def test_a_stretch_is_within_the_ride_and_within_what_is_drawn(ran: Ran, length_m: float) -> None:
+    low, high = stretch_of(ran.example, "smoother", band=None, length_m=length_m)
+    assert START_M - 1e-9 <= low < high <= END_M + 1e-9
+    assert high - low == pytest.approx(min(length_m, END_M - START_M), abs=0.2)
+    assert 0.5 * (low + high) == pytest.approx(45.0, abs=0.2)
+    low, high = stretch_of(ran.example, "smoother", band=SCALED, length_m=length_m)
+    margin = margin_m(SCALED.edges_m("alignment"))
+    assert START_M + margin - 1e-9 <= low and high <= END_M - margin + 1e-9
+    assert high - low == pytest.approx(min(length_m, END_M - START_M - 2.0 * margin), abs=0.2)
+
+
+def test_an_estimate_of_the_first_metres_only_is_drawn_there(ran: Ran) -> None:
+    estimate = ran.example.estimates["smoother"]
+    assert estimate.geometry is not None
+    short = replace(estimate, geometry=estimate.geometry[estimate.geometry.index < 21.0])
+    low, high = stretch_of(replace(ran.example, estimates={"a": short}), "a", band=None, length_m=10.0)
+    assert low == pytest.approx(6.0, abs=0.2) and high == pytest.approx(16.0, abs=0.2)
+
+
+def test_captions_say_how_long_a_stretch_is(ran: Ran) -> None:
+    assert stretch_words(ran.example, (1.0, 89.0)) == "all 88 m of the ride"
+    assert stretch_words(ran.example, (20.0, 55.0)) == "35 m in the middle of the ride"
+
+
+def test_no_figure_of_rails_leaves_the_track(ran: Ran) -> None:
+    view = geometry_view(ran.example, ran.cases[0], ran.styles, limits={}, known=ran.known)
+    assert view is not None and len(view.figures) == 3
+    captions = [caption for caption, _ in view.figures]
+    assert "all 88 m of the ride, unfiltered" in captions[0]
+    assert "35 m in the middle of the ride in wavelengths of 0.3\u20137 m (paper)" in captions[1]
+    paper = paper_view(ran.cases, methods(ran.scenario), ran.styles, ran.examples)
+    assert isinstance(paper, PaperView) and len(paper.figures) == 2
+    for _, svg in [*view.figures[:2], *paper.figures]:
+        places = places_of(str(svg))
+        assert max(places) > 30.0
+        assert min(places) > -20.0 and max(places) < 90.0
+    assert "60 m in the middle of the ride out" in paper.figures[0][0]
+    assert "0.3\u20137 m" in str(view.figures[2][1]), "the panels of the bands tell wavelengths"
+
+
+def test_a_stretch_that_is_too_long_would_be_seen(ran: Ran) -> None:
+    """The check above can fail: a figure over more than the track has labels beyond it."""
+    svg = rails_figure(
+        ran.example, ran.styles[:1], band=None, limits=(-450.0, 550.0), with_interval=False, what="x"
+    )
+    assert max(places_of(svg)) > 90.0
+
+
+def test_a_level_line_without_cant_has_no_panels_of_them() -> None:
+    bare = TrackDesign(
+        "bare", 0.0, (Straight(50.0), Transition(20.0), Curve(50.0, 300.0, 0.0)), "made up", synthetic=True
+    )
+    assert profile_figure(bare).count("height, m") == profile_figure(bare).count("cant, mm") == 0
+    assert profile_words(bare) == (
+        "Design curvature (positive to the left) over distance. The line is level and has no cant."
+    )
+    canted = replace(bare, elements=(Straight(50.0), Transition(20.0), Curve(50.0, 300.0, 0.07)))
+    assert profile_figure(canted).count("cant, mm") == 1 and "height" not in profile_figure(canted)[200:]
+    assert profile_words(canted).endswith("over distance. The line is level.")
+
+
+@pytest.mark.parametrize("count", [1, 3, 11, 30])
+def test_a_legend_fits_its_width(count: int) -> None:
+    labels = [f"smoother of kind {i}" for i in range(count)]
+    columns = fitting_columns(labels, 10.0)
+    assert 1 <= columns <= count
+    size_in = 8.8 / 72.0
+    assert columns == 1 or columns * size_in * (0.6 * 17 + 4.2) <= 10.0
+    assert fitting_columns(["a", "b"], 10.0) == 2 and fitting_columns(["a" * 200, "b"], 10.0) == 1
+
+
+# ---- tiles, tables and sentences ---------------------------------------------------------------
+
+
+def test_tiles_tell_rails_first_and_nothing_twice(ran: Ran) -> None:
+    case = ran.cases[0]
+    told = tiles(case, ran.styles, known=ran.known)
+    assert [tile.title for tile in told] == [
+        "vertical profile error",
+        "cross-level error",
+        "alignment error",
+        "roll error in curves",
+        "position error",
+    ]
+    for quantity, tile in zip(JUDGED, told, strict=False):
+        sds = [case.get(name, quantity, "sd", band="paper").value for name in ("smoother", "camera_free")]
+        assert float(tile.value.split()[0]) == pytest.approx(min(sds), rel=6e-3, abs=6e-5)
+        zero = case.get("zero_track", quantity, "sd", band="paper").value
+        assert "paper (0.3\u20137 m)" in tile.note
+        assert float(tile.note.rpartition("no IMU: ")[2].split()[0]) == pytest.approx(zero, rel=6e-3)
+    assert len({(tile.title, tile.value) for tile in told}) == len(told)
+
+
+def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
+    assert [s.name for s in attitude_methods(ran.styles)] == ["smoother", "camera_free", "design_angles"]
+    only_zero = [s for s in ran.styles if s.name != "design_angles"]
+    assert [s.name for s in attitude_methods(only_zero)][-1] == "zero_track"
+    attitude = ran.page[ran.page.index("Against the truth") : ran.page.index("Rails. In bold")]
+    assert "design angles" in attitude and "zero track" not in attitude
+
+
+def test_methods_are_told_apart_by_their_colours(ran: Ran) -> None:
+    assert len({style.colour for style in ran.styles if style.uses_imu}) == 2
+
+
+def test_tables_are_of_the_band_that_counts(ran: Ran) -> None:
+    table = geometry_table(ran.cases[0], ran.styles, known=ran.known)
+    assert table is not None
+    assert table.columns == ["unfiltered", "paper (0.3\u20137 m)", "unfiltered", "paper", "interval, %"]
+    by_label = {row.label: row for row in table.rows}
+    most = ran.cases[0].get("smoother", "alignment", "max", band="paper").value
+    assert by_label["alignment: smoother"].cells[3].text == f"{most:.2f}"
+    assert by_label["gauge: camera free"].cells[0].text == "not observable"
+    assert "gauge: zero track" not in by_label and by_label["gauge: smoother"].cells[1].mark == "best"
+    overview = overview_table(ran.cases, ran.styles, known=ran.known)
+    assert overview is not None and all("paper (0.3\u20137 m)" in row.label for row in overview.rows)
+    found = ran.cases[0].get("smoother", "alignment", "sd", band="paper").value
+    assert overview.rows[0].cells[4].text == f"{found:.3f}"
+
+
+def test_sentences_are_of_the_band_that_counts_and_of_every_method(ran: Ran) -> None:
+    said = geometry_findings(ran.cases[0], ran.styles, ran.cases, known=ran.known)
+    first = said[0].text
+    assert first.startswith(
+        "In wavelengths of 0.3\u20137 m (paper), the vertical profile of smoother is off by"
+    )
+    free = ran.cases[0].get("camera_free", "vertical_profile", "sd", band="paper").value
+    assert float(first.partition("that of camera free by ")[2].split()[0]) == pytest.approx(free, rel=6e-3)
+    assert sum("95 % interval" in one.text for one in said) == 1
+    goals = geometry_findings(
+        ran.cases[0], ran.styles, ran.cases, goals_mm={"vertical_profile": 1e-6}, known=ran.known
+    )
+    assert not any("Asked were" in one.text for one in goals), "what is asked is asked of D1"
+
+
+def test_a_goal_is_asked_of_d1_alone() -> None:
+    found = {
+        ("ours", "alignment", band, "truth", "whole", "sd"): Figure(0.4, 0.0, 2) for band in ("D1", "paper")
+    }
+    found["ours", "vertical_profile", "full", "truth", "whole", "sd"] = Figure(0.4, 0.0, 2)
+    one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
+    labels = {"imu": "ideal", "odometry": "truth"}
+    for bands, is_asked in ((("D1", "paper"), True), (("paper",), False)):
+        case = Figures(labels, planted(*bands).table, found)
+        said = geometry_findings(case, [one], [], goals_mm={"alignment": 0.3})
+        assert any("Asked were 0.3 mm: missed by 0.100 mm" in f.text for f in said) is is_asked
+
+
+def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran) -> None:
+    said = re.findall(r'<li class="(?:good|bad|note)">(.*?)</li>', ran.page)
+    assert len(said) == len(set(said))
+    ride = ran.page[ran.page.index('id="ride-out') :]
+    order = [
+        ride.index(words)
+        for words in (
+            "vertical profile error",
+            "What the scores say",
+            "the vertical profile of smoother is off by",
+            "The attitudes of smoother and camera free differ by less than 1\u00a0%",
+            "What the rails look like",
+            "Attitude, by kind of track",
+            "Attitude over distance",
+        )
+    ]
+    assert order == sorted(order)
+    assert "smoother and 1 alike" in ride and "400 m" not in ran.page
+    assert "The track here is 1:10 as well." in ran.page
+    assert "1 ride, 2 IMUs" in ran.page
+    assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
+
+
+def test_methods_are_alike_only_if_every_figure_is(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    one = example()
+    states = one.estimates["ekf_compensated"].states
+    styles = list(method_styles(methods(scenario)).values())
+    styles = [*styles, *(replace(styles[0], name=name, label=name, twin="") for name in ("b", "c", "d"))]
+    for factor, groups in ((1.005, [["ekf_compensated", "b"], ["c"], ["d"]]), (1.02, [["ekf_compensated"]])):
+        error = np.deg2rad(0.1) * (factor - 1.0)
+        other = {
+            "b": states.assign(roll_rad=states["roll_rad"] + error),
+            "c": states.assign(yaw_rad=states["yaw_rad"] + 0.1 * np.sin(states.index.to_numpy())),
+            "d": states.assign(roll_sd_rad=1e-6),
+        }
+        estimates = one.estimates | {k: Estimate(states=v, mount="axle") for k, v in other.items()}
+        case = cases(*tables(replace(one, estimates=estimates)))[0]
+        found = [[style.name for style in group] for group in alike(case, styles)]
+        assert found[: len(groups)] == groups
+        text = "\n".join(finding.text for finding in findings(case, styles))
+        assert ("what is said of EKF compensated holds of both" in text) is (factor < 1.01)
+        assert ("beats b in" in text or "beats over" in text) is False or factor > 1.01
+
+
+def test_many_methods_are_told_together(
+    scenario: Scenario,
+    example: Callable[..., CellResult],
+    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+) -> None:
+    one = example()
+    style = method_styles(methods(scenario))["ekf_compensated"]
+    design = method_styles(methods(scenario))["design_angles"]
+    names = ["m1", "m2", "m3", "m4"]
+    estimates = {"design_angles": one.estimates["design_angles"]}
+    for k, name in enumerate(names):
+        states = one.estimates["ekf_compensated"].states
+        size = np.deg2rad(0.1 * (k + 1))
+        states = states.assign(
+            roll_rad=one.motion["roll_rad"] + size, roll_sd_rad=np.deg2rad(0.04 if k else 0.1)
+        )
+        estimates[name] = Estimate(states=states, mount="axle")
+    case = cases(*tables(replace(one, estimates=estimates)))[0]
+    styles = [*(replace(style, name=name, label=name, twin="") for name in names), design]
+    text = "\n".join(finding.text for finding in findings(case, styles))
+    # The design angles are off by 0.25 deg in roll, and exact in pitch.
+    assert "In roll, 'design angles only', which uses no IMU, beats m3 and m4 over the whole ride" in text
+    assert "In pitch, 'design angles only', which uses no IMU, beats m1, m2, m3 and m4 over" in text
+    assert "is too small with m2 (0 % inside), m3 (0 % inside) and m4 (0 % inside)." in text
+    assert "is larger than its errors with m1 (100 % inside)." in text
+    assert text.count("95 % interval") == 2
+
+
+def test_numbers_and_units_stay_together() -> None:
+    assert unbroken("off by 0.4 mm in 95 % of 3 methods") == "off by 0.4\u00a0mm in 95\u00a0% of 3 methods"
+
+
+# ---- the peak ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("band", "first_m"), [(SCALED, 2.0), (FULL_SIZE, 20.0)])
+def test_the_first_metres_grow_with_the_track(ran: Ran, band: Band, first_m: float) -> None:
+    """A peak counts if it stands within a share of the ride's start, the same at either size."""
+    estimate, style = ran.example.estimates["smoother"], ran.styles[0]
+    assert estimate.geometry is not None and ran.example.rails is not None
+    place = estimate.geometry.index.to_numpy()
+    true = ran.example.rails.irregularities(place)["alignment_m"].to_numpy()
+    for at, counts in ((0.9 * first_m, True), (1.1 * first_m, False)):
+        wrong = true + 1e-3 * (np.abs(place - START_M - at) < 0.06)
+        geometry = estimate.geometry.assign(alignment_m=wrong)
+        changed = replace(ran.example, estimates={"smoother": replace(estimate, geometry=geometry)})
+        peak = _peak(changed, style, band)
+        assert peak.first_m == pytest.approx(first_m)
+        assert (peak.largest_mm > 0.5) is counts and (peak.rest_sd_mm > 1e-3) is not counts
+
+
+def test_the_claim_names_the_first_metres_of_the_model(ran: Ran) -> None:
+    assert "over the first 2 m, against an sd of" in ran.page
