@@ -54,7 +54,6 @@ def geometry_findings(
             zero = sd_of(case, floor, quantity, band=band)
             tone = "good" if own < zero else "bad"
             text += f"; that of no IMU at all by {significant(zero)} mm"
-        text += _beside(case, styles, quantity, band=band)
         goal = (goals_mm or {}).get(quantity) if band == BAND else None
         if goal is not None:
             tone = "bad" if own > goal else tone
@@ -73,6 +72,7 @@ def geometry_findings(
                 "method"
             )
         text += f". It would be {', '.join(parts)}." if parts else "."
+        text += _beside(case, styles, quantity, band=band)
         result.append(Finding(tone, text))
     return result + _lost(case, styles, band) + _coverage(case, main)
 
@@ -82,12 +82,16 @@ def _beside(case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band
     _, *rest = [style for style in mappers(case, styles) if not is_zero(style)]
     sds = {style.label: sd_of(case, style, quantity, band=band) for style in rest}
     sds = {label: sd for label, sd in sds.items() if sd > 0.0}
+    if not sds:
+        return ""
     if len(sds) <= MOST_OTHERS:
-        return "".join(f"; that of {label} by {significant(sd)} mm" for label, sd in sds.items())
+        first, *more = [(label, f"by {significant(sd)} mm") for label, sd in sds.items()]
+        told = [f"That of {first[0]} is off {first[1]}", *(f"that of {label} {by}" for label, by in more)]
+        return f" {listed(told)}."
     best, worst = (choose(sds, key=lambda label: sds[label]) for choose in (min, max))
     return (
-        f"; of the {len(sds)} other methods, that of {best} the least, by {significant(sds[best])} mm, "
-        f"and that of {worst} the most, by {significant(sds[worst])} mm"
+        f" Of the {len(sds)} other methods, that of {best} is off the least, by {significant(sds[best])} mm, "
+        f"and that of {worst} the most, by {significant(sds[worst])} mm."
     )
 
 

@@ -89,7 +89,7 @@ def profile_figure(track: TrackDesign) -> str:
             axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
         shade_track(axes, track, limits=(track.start_m, track.end_m))
         axes[-1].set_xlabel("distance along the track, m")
-        return to_svg(figure, description="Height, curvature and cant of the track over distance")
+        return to_svg(figure, description=profile_words(track))
 
 
 def profile_words(track: TrackDesign) -> str:
