@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from simrail.bands import BANDS, Band
 from simrail.report.pivot import Figures
@@ -39,6 +39,12 @@ def judged_band(case: Figures) -> str:
     there = [name for name in bands_of_case(case) if name != FULL]
     own = [name for name in there if name not in BANDS]
     return BAND if BAND in there else next(iter([*own, *there]), FULL)
+
+
+def band_of_all(all_cases: Sequence[Figures]) -> str:
+    """Band that most cases are judged in: of those with rail geometry."""
+    found = [judged_band(case) for case in all_cases if bands_of_case(case)]
+    return max(dict.fromkeys(found), key=found.count, default=FULL)
 
 
 def band_words(name: str, bands: Mapping[str, Band] = BANDS) -> str:

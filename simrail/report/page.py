@@ -22,6 +22,7 @@ from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.campaign.section import campaign_view
 from simrail.report.campaign.tables import write_tables
 from simrail.report.findings import findings
+from simrail.report.geometry_bands import band_of_all
 from simrail.report.geometry_findings import geometry_findings
 from simrail.report.geometry_tables import geometry_table, overview_table
 from simrail.report.geometry_view import GeometryView, geometry_view
@@ -114,7 +115,7 @@ def write_report(
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
     paper = _beside_paper(scenario, all_cases, styles, examples)
-    campaign = campaign_view(scenario, scores, cells, attitude_methods(styles), examples, manifest)
+    campaign = campaign_view(scenario, scores, cells, styles, examples, manifest, band=band_of_all(all_cases))
     if campaign is not None:
         write_tables(path.parent / TABLES, campaign.tables)
     drawn = examples[:MOST_RIDES]

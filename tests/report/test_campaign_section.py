@@ -12,9 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from simrail.bands import BANDS
 from simrail.example import CellResult
-from simrail.report.campaign.axes import campaign_axes, draws_of, is_campaign
-from simrail.report.campaign.figures import box_figure, curvature_figure, heat_figure, side_of
+from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
+from simrail.report.campaign.figures import _in_two, box_figure, curvature_figure
+from simrail.report.campaign.heat import _short, heat_figure, side_of
+from simrail.report.campaign.rails import rails_figures
 from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
 from simrail.report.methods import MethodStyle, method_styles
 from simrail.report.page import TABLES, write_report
@@ -219,6 +222,53 @@ def test_heat_maps_show_the_means(
                 at = (rows["imu"] == grade) & (rows["speed_kmh"] == speed) & (rows["direction"] == way)
                 assert f">{rows.loc[at, 'value'].mean():.2f}</text>" in svg
     assert "20 \u2192" in svg and "70 \u2190" in svg
+
+
+def test_an_axis_that_follows_from_another_has_no_map(small: tuple[pd.DataFrame, pd.DataFrame]) -> None:
+    """Each place has its own grade here, and two places share one."""
+    _, cells = small
+    place = cells["imu"].map({"ideal": "a", "tactical": "b", "industrial": "c", "consumer": "d"})
+    coarse = cells["imu"].map({"ideal": "x", "tactical": "x", "industrial": "y", "consumer": "z"})
+    cells = cells.assign(**{"mount": place, "imu": coarse, "imu.grade": coarse})
+    axes = campaign_axes(cells)
+    assert [a.column for a in axes] == ["speed_kmh", "direction", "imu", "irregularity.scale", "mount"]
+    assert [a.column for a in finest(axes, cells)] == [
+        "speed_kmh",
+        "direction",
+        "irregularity.scale",
+        "mount",
+    ]
+
+
+def test_rails_are_mapped_in_the_band_that_counts(
+    small: tuple[pd.DataFrame, pd.DataFrame], styles: list[MethodStyle]
+) -> None:
+    scores, cells = small
+    axes = campaign_axes(cells)
+    assert rails_figures(scores, cells, axes, styles, band="D1", known=BANDS) == []
+    rows = scores[(scores["quantity"] == "roll") & (scores["metric"] == "rms")]
+    rows = rows[(rows["window"] == "whole") & (rows["estimator"] == styles[0].name)]
+    parts = [scores]
+    for band, factor in (("full", 3.0), ("D1", 1.0)):
+        for quantity in ("vertical_profile", "cross_level", "alignment"):
+            own = {"quantity": quantity, "metric": "sd", "band": band, "unit": "mm"}
+            parts.append(rows.assign(value=factor * rows["value"], **own))
+    scores = as_score_table(pd.concat([part.astype({"quantity": str}) for part in parts]))
+    made = rails_figures(scores, cells, axes, styles, band="D1", known=BANDS)
+    captions = [caption for caption, _ in made]
+    assert ["speed and direction" in captions[0], "IMU" in captions[1]] == [True, True]
+    assert len(made) == 3 and all("in wavelengths of 3\u201325 m (D1)" in caption for caption in captions)
+    plain = roll(small)
+    for speed in SPEEDS:
+        at = (plain["speed_kmh"] == speed) & (plain["direction"] == "forward")
+        mean = plain.loc[at & (plain["estimator"] == styles[0].name), "value"].mean()
+        assert made[0][1].count(f">{_short(mean)}</text>") >= 3
+    assert styles[1].label not in made[0][1], "a method that says nothing of rails has no row"
+
+
+def test_long_names_are_told_in_two_lines() -> None:
+    assert _in_two("lord_3dm_gx4_25_noise_added") == "lord_3dm_gx4_\n25_noise_added"
+    assert _in_two("axle_ideal") == "axle_ideal" and _in_two("a" * 30) == "a" * 30
 
 
 def test_boxes_and_curvature_are_drawn(

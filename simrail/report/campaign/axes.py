@@ -65,6 +65,15 @@ def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     return [_axis(cells, name) for name in kept]
 
 
+def finest(axes: Sequence[CampaignAxis], cells: pd.DataFrame) -> list[CampaignAxis]:
+    """Axes that do not follow from another one, as the grade follows from the place if each has its own."""
+    return [
+        axis
+        for axis in axes
+        if not any(other is not axis and _follows(cells, axis.column, other.column) for other in axes)
+    ]
+
+
 def draws_of(
     scores: pd.DataFrame,
     cells: pd.DataFrame,
@@ -73,13 +82,14 @@ def draws_of(
     quantity: str = "roll",
     metric: str = "rms",
     window: str = "whole",
+    band: str = FULL,
 ) -> pd.DataFrame:
     """One row per cell and method that has the figure: value, axes, draws.
 
     ``window`` may be ``curve:*``: every single curve, one row each.
     """
     chosen = (scores["quantity"] == quantity) & (scores["metric"] == metric)
-    chosen &= (scores["reference"] == "truth") & (scores["band"] == FULL) & scores["value"].notna()
+    chosen &= (scores["reference"] == "truth") & (scores["band"] == band) & scores["value"].notna()
     if window == EVERY_CURVE:
         curves = [name for name in scores["window"].cat.categories if name.startswith(CURVE_PREFIX)]
         chosen &= scores["window"].isin(curves)
@@ -100,6 +110,11 @@ def cluster_of(draws: pd.DataFrame) -> pd.Series:
 def _says_the_same(cells: pd.DataFrame, one: str, other: str) -> bool:
     pairs = cells[[one, other]].drop_duplicates()
     return len(pairs) == pairs[one].nunique(dropna=False) == pairs[other].nunique(dropna=False)
+
+
+def _follows(cells: pd.DataFrame, one: str, other: str) -> bool:
+    """Whether the value of `other` says that of `one`."""
+    return len(cells[[one, other]].drop_duplicates()) == cells[other].nunique(dropna=False)
 
 
 def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:

@@ -1,15 +1,12 @@
-"""Figures over the axes of a campaign: heat maps, box plots, and the error against curvature."""
+"""Figures over the axes of a campaign: box plots, and the error against curvature."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -18,133 +15,10 @@ from simrail.jit import FloatArray
 from simrail.report.attitude_figures import angle_error
 from simrail.report.campaign.axes import CampaignAxis
 from simrail.report.methods import MethodStyle
-from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, log_ticks, look, to_svg
+from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, fitting_columns, log_ticks, look, to_svg
 
-HEAT = LinearSegmentedColormap.from_list(
-    "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64
-)
-"""One hue, from light to dark: more error is darker, in print as well."""
-
-CELL_IN = (0.46, 0.27)
-"""Least width and height of a cell of a heat map: its number must be read."""
-
-
-@dataclass(frozen=True)
-class Side:
-    """Columns or rows of a heat map: groups of draws, with their words."""
-
-    title: str
-    keys: list[tuple[object, ...]]
-    words: list[str]
-    columns: list[str]
-
-
-def side_of(*axes: CampaignAxis) -> Side:
-    """One axis, or two of which the second runs faster: speeds, each in both directions."""
-    first, *rest = axes
-    if not rest:
-        return Side(first.title, [(value,) for value in first.values], list(first.words), [first.column])
-    (second,) = rest
-    arrows = {"forward": "\u2192", "backward": "\u2190", "standing": "\u2013"}
-    pairs = [(i, j) for i in range(len(first.values)) for j in range(len(second.values))]
-    name, comma, unit = first.title.partition(",")
-    return Side(
-        f"{name} and {second.title}{comma}{unit}",
-        [(first.values[i], second.values[j]) for i, j in pairs],
-        [f"{first.words[i]} {arrows.get(second.words[j], second.words[j])}" for i, j in pairs],
-        [first.column, second.column],
-    )
-
-
-def heat_figure(
-    draws: pd.DataFrame, styles: Sequence[MethodStyle], across: Side, down: Side, *, what: str
-) -> str:
-    """Mean figure of each method over two sides, on one logarithmic scale of colour; "" if there is none."""
-    tables = [(style, _means(draws[draws["estimator"] == style.name], across, down)) for style in styles]
-    tables = [(style, table) for style, table in tables if np.isfinite(table).any()]
-    shown = np.array([table for _, table in tables])
-    positive = shown[np.isfinite(shown) & (shown > 0.0)]
-    if len(positive) == 0:
-        return ""
-    low, high = float(positive.min()), float(positive.max())
-    norm = LogNorm(low, max(high, 1.05 * low))
-    left = 0.35 + 0.075 * max(len(word) for word in down.words)
-    wide = max(CELL_IN[0], 0.075 * max(len(word) for word in across.words)) * len(across.words)
-    tall = CELL_IN[1] * len(down.words)
-    gap, top, bottom, right = 0.22, 0.34, 0.52, 0.85
-    room = WIDTH_IN - left - right
-    per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
-    rows = -(-len(tables) // per_row)
-    per_row = -(-len(tables) // rows)
-    wide = min((room - gap * (per_row - 1)) / per_row, 1.8 * wide)
-    height = rows * (tall + top) + bottom
-    with look():
-        figure = Figure(figsize=(WIDTH_IN, height))
-        for number, (style, table) in enumerate(tables):
-            row, column = divmod(number, per_row)
-            box = (
-                (left + column * (wide + gap)) / WIDTH_IN,
-                (height - (row + 1) * (tall + top)) / height,
-                wide / WIDTH_IN,
-                tall / height,
-            )
-            axis = figure.add_axes(box)
-            _draw_heat(axis, table, norm)
-            axis.set_title(style.label, color=MUTED if style.baseline else INK, pad=4.0)
-            axis.set_yticks(range(len(down.words)), down.words if column == 0 else [])
-            last = row == rows - 1 or number + per_row >= len(tables)
-            axis.set_xticks(range(len(across.words)), across.words if last else [])
-            if last:
-                axis.set_xlabel(across.title)
-            if column == 0:
-                axis.set_ylabel(down.title.partition(",")[0])
-        _colour_bar(figure, norm, left + per_row * (wide + gap), bottom, height, min(tall, 1.6))
-        return to_svg(figure, description=what)
-
-
-def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
-    """Mean over the draws of each cell of the map (rows, columns)."""
-    means = draws.groupby([*down.columns, *across.columns], observed=True)["value"].mean()
-    found = {key if isinstance(key, tuple) else (key,): value for key, value in means.items()}
-    return np.array([[found.get((*y, *x), np.nan) for x in across.keys] for y in down.keys], dtype=np.float64)
-
-
-def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
-    rows, columns = table.shape
-    edges = np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5
-    axis.pcolormesh(
-        *edges, np.ma.masked_invalid(table), cmap=HEAT, norm=norm, edgecolors="white", linewidth=1.2
-    )
-    axis.set_ylim(rows - 0.5, -0.5)
-    axis.grid(visible=False)
-    axis.tick_params(length=0)
-    for spine in axis.spines.values():
-        spine.set_visible(False)
-    for (i, j), value in np.ndenumerate(table):
-        if not np.isfinite(value):
-            axis.text(j, i, "\u2013", ha="center", va="center", color=MUTED, fontsize=8.0)
-            continue
-        dark = float(norm(max(value, norm.vmin or value))) > 0.5
-        axis.text(j, i, _short(value), ha="center", va="center", fontsize=8.0, color="white" if dark else INK)
-
-
-def _short(value: float) -> str:
-    """A number in two or three digits."""
-    decimals = 3 if value < 0.0995 else 2 if value < 9.95 else 1
-    return f"{value:.{decimals}f}"
-
-
-def _colour_bar(
-    figure: Figure, norm: LogNorm, left: float, bottom: float, height: float, tall: float
-) -> None:
-    box = (left / WIDTH_IN, (height - 0.34 - tall) / height, 0.11 / WIDTH_IN, tall / height)
-    axis = figure.add_axes(box)
-    bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
-    bar.outline.set_visible(False)
-    log_ticks(axis.yaxis)
-    axis.grid(visible=False)
-    axis.minorticks_off()
-    axis.set_title("\u00b0", fontsize=8.5, pad=5.0)
+LONG_WORD = 16
+"""Longer names of values are told in two lines, so that neighbours do not touch."""
 
 
 def box_figure(
@@ -187,7 +61,7 @@ def _legend(figure: Figure, styles: Sequence[MethodStyle]) -> None:
         handles=[Patch(color=style.colour, label=style.label) for style in styles],
         loc="upper left",
         bbox_to_anchor=(LEFT_IN / WIDTH_IN - 0.01, 1.0),
-        ncols=6,
+        ncols=fitting_columns([style.label for style in styles], WIDTH_IN - LEFT_IN),
         borderaxespad=0.1,
     )
 
@@ -211,7 +85,7 @@ def _draw_boxes(
             # A box without height is seen as a bar.
             axis.plot(ends, [middle, middle], color=style.colour, lw=3.6, solid_capstyle="butt", zorder=2)
             axis.plot(ends, [middle, middle], color="white", lw=1.3, solid_capstyle="butt", zorder=4)
-    axis.set_xticks(range(len(along.words)), along.words)
+    axis.set_xticks(range(len(along.words)), [_in_two(word) for word in along.words])
     axis.set_xlim(-0.5, len(along.values) - 0.5)
     axis.tick_params(axis="x", length=0)
     axis.grid(axis="x", visible=False)
@@ -219,6 +93,15 @@ def _draw_boxes(
     for place in range(1, len(along.values)):
         axis.axvline(place - 0.5, color="#d0d5dd", lw=0.7)
     axis.set_xlabel(along.title)
+
+
+def _in_two(word: str) -> str:
+    """A long name in two lines, parted at the underscore that is nearest to its middle."""
+    places = [i for i, letter in enumerate(word) if letter == "_"]
+    if len(word) <= LONG_WORD or not places:
+        return word
+    at = min(places, key=lambda i: abs(i - len(word) // 2)) + 1
+    return f"{word[:at]}\n{word[at:]}"
 
 
 def curvature_figure(

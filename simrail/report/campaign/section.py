@@ -10,13 +10,16 @@ import pandas as pd
 from markupsafe import Markup
 
 from simrail.example import CellResult
-from simrail.report.campaign.axes import CampaignAxis, campaign_axes, draws_of, is_campaign
-from simrail.report.campaign.figures import Side, box_figure, curvature_figure, heat_figure, side_of
+from simrail.report.campaign.axes import CampaignAxis, campaign_axes, draws_of, finest, is_campaign
+from simrail.report.campaign.figures import box_figure, curvature_figure
+from simrail.report.campaign.heat import Side, heat_figure, side_of
+from simrail.report.campaign.rails import rails_figures
 from simrail.report.campaign.tables import CampaignTables, campaign_tables
-from simrail.report.methods import MethodStyle, readable
+from simrail.report.methods import MethodStyle, attitude_methods, readable
 from simrail.report.tables import Cell, Row, Table
+from simrail.scenario.build import bands_by_name
 from simrail.scenario.scenario import Scenario
-from simrail.score_table import CURVE_PREFIX, EVERY_CURVE
+from simrail.score_table import CURVE_PREFIX, EVERY_CURVE, FULL
 
 MOST_METHODS = 8
 """Methods that are drawn: those under test first."""
@@ -28,6 +31,7 @@ class CampaignView:
 
     axes: list[tuple[str, str]]
     cells: int
+    rails: list[tuple[str, Markup]]
     methods: Table
     pairs: Table
     consistency: Table
@@ -43,19 +47,30 @@ def campaign_view(
     styles: Sequence[MethodStyle],
     examples: Sequence[CellResult],
     manifest: Mapping[str, object],
+    *,
+    band: str = FULL,
 ) -> CampaignView | None:
-    """Make the section; None for a scenario without lists, or whose methods say nothing of roll."""
+    """Make the section; None for a scenario without lists, or whose methods say nothing of roll.
+
+    Rails, where a method says what they look like, come first, in a band.
+    """
     axes = campaign_axes(cells) if is_campaign(scenario) else []
     if not axes or not (scores["quantity"] == "roll").any():
         return None
     command = str(manifest.get("command", f"simrail run {scenario.name}"))
-    tables = campaign_tables(scores, cells, axes, styles, command=command)
+    tables = campaign_tables(scores, cells, axes, attitude_methods(styles), command=command)
     if tables.methods.empty:
         return None
     label = {style.name: style for style in styles}
     return CampaignView(
         axes=[(axis.title, ", ".join(axis.words)) for axis in axes],
         cells=len(cells),
+        rails=[
+            (caption, Markup(svg))
+            for caption, svg in rails_figures(
+                scores, cells, axes, styles, band=band, known=bands_by_name(scenario.spec)
+            )
+        ],
         methods=_methods_table(tables.methods, label),
         pairs=_pairs_table(tables.pairs, label),
         consistency=_consistency_table(tables.consistency, label),
@@ -68,7 +83,7 @@ def campaign_view(
             )
             for row in tables.worst.to_dict("records")
         ],
-        figures=_figures(scores, cells, axes, styles, examples),
+        figures=_figures(scores, cells, axes, attitude_methods(styles), examples),
         tables=tables,
     )
 
@@ -82,12 +97,14 @@ def _figures(
 ) -> list[tuple[str, Markup]]:
     shown = sorted(styles, key=lambda style: bool(style.baseline))[:MOST_METHODS]
     roll = draws_of(scores, cells, axes)
-    by_column = {axis.column: axis for axis in axes}
+    # A map over two axes of which one follows from the other would be empty but for a line of cells.
+    fine = finest(axes, cells)
+    by_column = {axis.column: axis for axis in fine}
     speed, direction = by_column.get("speed_kmh"), by_column.get("direction")
     found: list[tuple[str, str]] = []
     curves = draws_of(scores, cells, axes, window=EVERY_CURVE)
     down = _curve_side(curves, examples)
-    across = side_of(speed) if speed else side_of(axes[0])
+    across = side_of(speed or fine[0])
     if len(down.keys) > 1:
         found.append(
             (
@@ -99,7 +116,7 @@ def _figures(
         )
     if speed and direction:
         across = side_of(speed, direction)
-    for axis in axes:
+    for axis in fine:
         if axis.column in across.columns:
             continue
         found.append(

@@ -1,0 +1,171 @@
+"""Heat maps over the axes of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.figure import Figure
+
+from simrail.jit import FloatArray
+from simrail.report.campaign.axes import CampaignAxis
+from simrail.report.methods import MethodStyle
+from simrail.report.style import INK, MUTED, WIDTH_IN, log_ticks, look, to_svg
+
+HEAT = LinearSegmentedColormap.from_list(
+    "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64
+)
+"""One hue, from light to dark: more error is darker, in print as well."""
+
+CELL_IN = (0.46, 0.27)
+"""Least width and height of a cell of a heat map: its number must be read."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """Columns or rows of a heat map: groups of draws, with their words."""
+
+    title: str
+    keys: list[tuple[object, ...]]
+    words: list[str]
+    columns: list[str]
+
+
+def side_of(*axes: CampaignAxis) -> Side:
+    """One axis, or two of which the second runs faster: speeds, each in both directions."""
+    first, *rest = axes
+    if not rest:
+        return Side(first.title, [(value,) for value in first.values], list(first.words), [first.column])
+    (second,) = rest
+    arrows = {"forward": "\u2192", "backward": "\u2190", "standing": "\u2013"}
+    pairs = [(i, j) for i in range(len(first.values)) for j in range(len(second.values))]
+    name, comma, unit = first.title.partition(",")
+    return Side(
+        f"{name} and {second.title}{comma}{unit}",
+        [(first.values[i], second.values[j]) for i, j in pairs],
+        [f"{first.words[i]} {arrows.get(second.words[j], second.words[j])}" for i, j in pairs],
+        [first.column, second.column],
+    )
+
+
+def heat_figure(
+    draws: pd.DataFrame, styles: Sequence[MethodStyle], across: Side, down: Side, *, what: str
+) -> str:
+    """Mean figure, in degrees, of each method over two sides; "" if there is none."""
+    parts = {style.label: draws[draws["estimator"] == style.name] for style in styles}
+    muted = {style.label for style in styles if style.baseline}
+    return heat_maps(parts, across, down, unit="\u00b0", what=what, muted=muted)
+
+
+def heat_maps(
+    draws: Mapping[str, pd.DataFrame],
+    across: Side,
+    down: Side,
+    *,
+    unit: str,
+    what: str,
+    muted: Collection[str] = (),
+) -> str:
+    """Mean figure over two sides, a map per title, on one logarithmic scale of colour; "" if there is none.
+
+    Parameters
+    ----------
+    draws : mapping of str to pandas.DataFrame
+        By title of a map, what it is the mean of.
+    across, down : Side
+        Its columns and rows.
+    unit : str
+        Unit of the figures.
+    what : str
+        Description for those who cannot see it.
+    muted : collection of str
+        Titles that stand back: those of baselines.
+    """
+    tables = [(title, _means(part, across, down)) for title, part in draws.items()]
+    tables = [(title, table) for title, table in tables if np.isfinite(table).any()]
+    shown = np.array([table for _, table in tables])
+    positive = shown[np.isfinite(shown) & (shown > 0.0)]
+    if len(positive) == 0:
+        return ""
+    low, high = float(positive.min()), float(positive.max())
+    norm = LogNorm(low, max(high, 1.05 * low))
+    left = 0.35 + 0.075 * max(len(word) for word in down.words)
+    wide = max(CELL_IN[0], 0.075 * max(len(word) for word in across.words)) * len(across.words)
+    tall = CELL_IN[1] * len(down.words)
+    gap, top, bottom, right = 0.22, 0.34, 0.52, 0.85
+    room = WIDTH_IN - left - right
+    per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
+    rows = -(-len(tables) // per_row)
+    per_row = -(-len(tables) // rows)
+    wide = min((room - gap * (per_row - 1)) / per_row, 1.8 * wide)
+    height = rows * (tall + top) + bottom
+    with look():
+        figure = Figure(figsize=(WIDTH_IN, height))
+        for number, (title, table) in enumerate(tables):
+            row, column = divmod(number, per_row)
+            box = (
+                (left + column * (wide + gap)) / WIDTH_IN,
+                (height - (row + 1) * (tall + top)) / height,
+                wide / WIDTH_IN,
+                tall / height,
+            )
+            axis = figure.add_axes(box)
+            _draw_heat(axis, table, norm)
+            axis.set_title(title, color=MUTED if title in muted else INK, pad=4.0)
+            axis.set_yticks(range(len(down.words)), down.words if column == 0 else [])
+            last = row == rows - 1 or number + per_row >= len(tables)
+            axis.set_xticks(range(len(across.words)), across.words if last else [])
+            if last:
+                axis.set_xlabel(across.title)
+            if column == 0:
+                axis.set_ylabel(down.title.partition(",")[0])
+        _colour_bar(figure, norm, unit, left + per_row * (wide + gap), height, min(tall, 1.6))
+        return to_svg(figure, description=what)
+
+
+def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
+    """Mean over the draws of each cell of the map (rows, columns)."""
+    means = draws.groupby([*down.columns, *across.columns], observed=True)["value"].mean()
+    found = {key if isinstance(key, tuple) else (key,): value for key, value in means.items()}
+    return np.array([[found.get((*y, *x), np.nan) for x in across.keys] for y in down.keys], dtype=np.float64)
+
+
+def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
+    rows, columns = table.shape
+    edges = np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5
+    axis.pcolormesh(
+        *edges, np.ma.masked_invalid(table), cmap=HEAT, norm=norm, edgecolors="white", linewidth=1.2
+    )
+    axis.set_ylim(rows - 0.5, -0.5)
+    axis.grid(visible=False)
+    axis.tick_params(length=0)
+    for spine in axis.spines.values():
+        spine.set_visible(False)
+    for (i, j), value in np.ndenumerate(table):
+        if not np.isfinite(value):
+            axis.text(j, i, "\u2013", ha="center", va="center", color=MUTED, fontsize=8.0)
+            continue
+        dark = float(norm(max(value, norm.vmin or value))) > 0.5
+        axis.text(j, i, _short(value), ha="center", va="center", fontsize=8.0, color="white" if dark else INK)
+
+
+def _short(value: float) -> str:
+    """A number in two or three digits."""
+    decimals = 3 if value < 0.0995 else 2 if value < 9.95 else 1
+    return f"{value:.{decimals}f}"
+
+
+def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, height: float, tall: float) -> None:
+    box = (left / WIDTH_IN, (height - 0.34 - tall) / height, 0.11 / WIDTH_IN, tall / height)
+    axis = figure.add_axes(box)
+    bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
+    bar.outline.set_visible(False)
+    log_ticks(axis.yaxis)
+    axis.grid(visible=False)
+    axis.minorticks_off()
+    axis.set_title(unit, fontsize=8.5, pad=5.0)
