@@ -1,4 +1,4 @@
-"""Results set beside other results: read back, shown as rows of their own, or refused before anything runs."""
+"""Results beside other results: read back, shown as rows of their own, or refused before anything runs."""
 
 from __future__ import annotations
 
