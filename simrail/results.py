@@ -26,8 +26,9 @@ from simrail.campaign import run_campaign
 from simrail.campaign_result import CampaignResult
 from simrail.drafts import draft_of
 from simrail.errors import InputError
+from simrail.former import FormerResults, read_results
 from simrail.job import prepare
-from simrail.report.page import write_report
+from simrail.report.page import SETS_BESIDE, write_report
 from simrail.retry import keep_good
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.unfinished import LOG, Start, unfinished_of
@@ -67,6 +68,7 @@ def run(
     workers: int | None = None,
     cluster: str | None = None,
     start: Start = "auto",
+    beside: str | Path | None = None,
     watcher: Watcher | None = None,
     many: bool = False,
 ) -> Results:
@@ -87,6 +89,9 @@ def run(
     start : {"auto", "resume", "fresh", "retry-failed"}, optional
         Whether to go on with an unfinished run of the same plan: if there is one, in any case, or not; or
         to run the failed cells of finished results again.
+    beside : str or Path, optional
+        Folder of other results that the page sets beside these, of the same publication
+        (`simrail.report.page.SETS_BESIDE`).
     watcher : Watcher, optional
         Is told of the progress.
     many : bool
@@ -101,7 +106,7 @@ def run(
     ------
     InputError
         If the scenario cannot be run, or the folder is not one of results; nothing has been written. Or if
-        there is nothing to resume, or to retry.
+        there is nothing to resume, or to retry, or nothing that could stand beside.
     OSError
         If a disk is full, or the cluster has gone; what is done is kept, and gone on with by the next run.
     """
@@ -112,6 +117,7 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
+    other = _former(Path(beside), scenario) if beside is not None else None
     job = prepare(scenario, many=many)
     with unfinished_of(folder, job.key, start=start) as kept:
         if start == "retry-failed":
@@ -119,8 +125,12 @@ def run(
         campaign = run_campaign(job, workers=workers, cluster=cluster, kept=kept, watcher=watcher)
         manifest = describe(scenario, campaign)
         manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": job.key}
+        if other is not None:
+            said = ("scenario", "scenario_hash", "seed", "started_utc", "git_revision")
+            manifest["beside"] = {name: other.manifest.get(name) for name in said}
+            manifest["command"] += f" --beside results/{other.manifest['scenario']}"
         with draft_of(folder) as draft:
-            _write(draft, scenario, campaign, manifest, begun=begun)
+            _write(draft, scenario, campaign, manifest, begun=begun, beside=other)
             shutil.copyfile(kept.folder / LOG, draft / LOG)
         kept.remove()
     return Results(folder, scenario, campaign, manifest)
@@ -170,8 +180,30 @@ def run_cell(
     return campaign
 
 
+def _former(folder: Path, scenario: Scenario) -> FormerResults:
+    """Results to stand beside those of a scenario; of the same publication, or the page has no place."""
+    remedy = "run that scenario first, and name the folder of its results"
+    former = read_results(folder, field="--beside", remedy=remedy)
+    paper, other = scenario.spec.paper, former.scenario().spec.paper
+    if paper not in SETS_BESIDE or other != paper:
+        raise InputError(
+            f"the page of {scenario.name} has no place for results of {former.manifest['scenario']}",
+            field="--beside",
+            value=str(folder),
+            limit=f"two scenarios with the same paper, one of {', '.join(SETS_BESIDE)}",
+            remedy="run it without --beside; each page stands for itself",
+        )
+    return former
+
+
 def _write(
-    draft: Path, scenario: Scenario, campaign: CampaignResult, manifest: dict[str, Any], *, begun: float
+    draft: Path,
+    scenario: Scenario,
+    campaign: CampaignResult,
+    manifest: dict[str, Any],
+    *,
+    begun: float,
+    beside: FormerResults | None = None,
 ) -> None:
     """Write the results of a campaign into a folder."""
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
@@ -185,6 +217,7 @@ def _write(
         cells=campaign.cells,
         examples=campaign.examples,
         manifest=manifest,
+        beside=beside,
     )
     ended = time.perf_counter()
     manifest["wall_s"] |= {"report": ended - drawing, "total": ended - begun}

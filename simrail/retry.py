@@ -6,13 +6,11 @@ gone on with: a table whose rows come from different code belongs to none.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-
-import pandas as pd
 
 from simrail.batch import BatchResult
 from simrail.errors import InputError
+from simrail.former import read_results
 from simrail.job import Job
 from simrail.ledger import STAGES
 from simrail.scenario.cells import cells
@@ -40,11 +38,8 @@ def keep_good(results: Path, job: Job, kept: Unfinished) -> None:
     def refuse(problem: str, remedy: str) -> InputError:
         return InputError(problem, field="--retry-failed", value=str(results), remedy=remedy)
 
-    try:
-        manifest = json.loads((results / "manifest.json").read_text(encoding="utf-8"))
-        scores = pd.read_parquet(results / "scores.parquet")
-    except (OSError, ValueError) as error:
-        raise refuse("there are no finished results there", "run it without --retry-failed") from error
+    former = read_results(results, field="--retry-failed", remedy="run it without --retry-failed")
+    manifest, scores = former.manifest, former.scores
     if manifest.get("key") != job.key:
         raise refuse(
             "the results there are of another plan, or were made by other code",

@@ -52,6 +52,7 @@ def tune_scenario(
     estimator: str,
     method: str,
     rides: Sequence[str] = (),
+    draws: int = 1,
     imu: str | None = None,
     space: SearchSpace | None = None,
     by_kind: bool = False,
@@ -68,7 +69,7 @@ def tune_scenario(
     Parameters
     ----------
     scenario : Scenario
-        As read. Of each ride the first draw is used, and the first value of every list.
+        As read. Of every list the first value is used.
     out : Path
         File of the tuning. A former tuning is replaced when the new one is there. What has been found before
         lies beside it, and an interrupted search with the same arguments goes on from there.
@@ -80,6 +81,9 @@ def tune_scenario(
         ``"cml"`` or ``"kom"``.
     rides : sequence of str
         Names of the rides to fit on, together; all of them if none is named.
+    draws : int
+        How many draws of each ride to fit on, of different tracks as long as there are such. One ride alone
+        has too few waves, and one set of sensor biases, to know thirteen parameters by its rails.
     imu : str, optional
         Name of the IMU; the first if not given.
     space : SearchSpace, optional
@@ -101,7 +105,8 @@ def tune_scenario(
     Raises
     ------
     InputError
-        If the scenario cannot be run, or has no such ride, IMU or smoother; if the file is no tuning.
+        If the scenario cannot be run, or has no such ride, IMU, smoother or number of draws; if the file is
+        no tuning.
     KeyboardInterrupt
         If interrupted; the search can be gone on with.
     """
@@ -119,7 +124,7 @@ def tune_scenario(
     scenario = alone(scenario, estimator)
     parts = Parts(scenario)
     smoother = smoother_of(scenario, parts, estimator)
-    chosen = chosen_cells(scenario, rides, imu)
+    chosen = chosen_cells(scenario, rides, imu, draws=draws)
     wanted = None if band is None else _band(chosen[0], band)
     recordings, references = [], []
     with interruptible() as check:
@@ -218,8 +223,8 @@ def smoother_of(scenario: Scenario, parts: Parts, estimator: str) -> TrajectoryS
     return smoother
 
 
-def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None) -> list[Cell]:
-    """First cell of each ride that is wanted, in the scenario's order."""
+def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, draws: int = 1) -> list[Cell]:
+    """First cells of each ride that is wanted, in the scenario's order, those of new tracks first."""
     spec = scenario.spec
     for field, wanted, known in (
         ("--ride", list(rides), [part.name for part in spec.ride]),
@@ -236,11 +241,25 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None) -> l
                 )
     names = set(rides) or {part.name for part in spec.ride}
     mount = spec.imu[0].name if imu is None else imu
-    found: dict[str, Cell] = {}
+    found: dict[str, list[Cell]] = {}
     for cell in cells(scenario):
         if cell.ride.name in names and cell.imu.name == mount:
-            found.setdefault(cell.ride.name, cell)
-    return list(found.values())
+            of_ride = found.setdefault(cell.ride.name, [])
+            if not of_ride or cell.case == of_ride[0].case:
+                of_ride.append(cell)
+    least = min(len(of_ride) for of_ride in found.values())
+    if not 1 <= draws <= least:
+        raise InputError(
+            "the scenario does not draw so often",
+            file=scenario.file,
+            field="--draws",
+            value=draws,
+            limit=f"1 to {least}",
+            remedy="for more, --set monte_carlo.track_draws=N",
+        )
+    for of_ride in found.values():
+        of_ride.sort(key=lambda cell: (cell.sample, cell.sensor_draw, cell.track_draw))
+    return [cell for of_ride in found.values() for cell in of_ride[:draws]]
 
 
 def reference_of(
@@ -271,6 +290,11 @@ def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:
     return (
         f"{scenario.name}: {cell.ride.name}, {cell.imu.name} on {cell.imu.body}, "
         f"{Path(cell.imu.grade).stem}, odometry {recording.odometry_source}, {len(recording.imu)} samples"
+        + (
+            f", draw {cell.sensor_draw} on track {cell.track_draw}"
+            if cell.track_draw or cell.sensor_draw
+            else ""
+        )
     )
 
 

@@ -46,6 +46,10 @@ def method(name: str, kind: str = "TrajectorySmoother", **options: object) -> Me
     return Method(name, "default", EstimatorPart(name=name, method=kind, options=options), 0)
 
 
+SEARCHED = ["cml", "kom", "kom_start", "kom_end", "cml_noise", "kom_rides", "cml_held"]
+"""Parts that a searched tuning plays, in the order of the table."""
+
+
 @pytest.mark.parametrize(
     ("one", "part"),
     [
@@ -59,6 +63,7 @@ def method(name: str, kind: str = "TrajectorySmoother", **options: object) -> Me
         (method("a_kom", tuning="a.toml"), "kom"),
         (method("a_kom_start", tuning="a.toml"), "kom_start"),
         (method("a_kom_end", tuning="a.toml"), "kom_end"),
+        (method("a_kom_rides", tuning="a.toml"), "kom_rides"),
         (method("a_cml", tuning="a.toml", smoothed=False), ""),
         (method("a_cml"), "hand"),
         (method("x", tuning="tunings/scale_by_hand.toml"), "hand"),
@@ -97,27 +102,40 @@ def test_on_the_scale_track_the_paper_is_set_beside_the_smoother_that_sees_the_r
     assert parts == {
         "hand": "smoother",
         "blind": "smoother_camera_free",
+        **{part: f"smoother_{part}" for part in SEARCHED},
         "": "design_angles",
         "zero": "zero_track",
     }
 
 
-def test_its_tunings_are_what_their_names_say() -> None:
+@pytest.mark.parametrize(
+    ("name", "searched", "start", "end"),
+    [
+        ("metro_geometry", [p for p in SEARCHED if p != "kom_rides"], "20.0 1050.0", "1050.0 1520.0"),
+        ("scale_track", SEARCHED, "0.8 45.0", "45.0 65.0"),
+    ],
+)
+def test_their_tunings_are_what_their_names_say(name: str, searched: list[str], start: str, end: str) -> None:
     """Where each search looked, what it was judged by and on which signals: read from the files."""
-    scenario = load_scenario("metro_geometry")
+    scenario = load_scenario(name)
     ran = methods(scenario)
     found = by_part({part_of(m): m.name for m in ran}, tunings_of(ran, scenario.folder))
-    assert list(found) == ["cml", "kom", "kom_start", "kom_end", "cml_noise", "cml_held"]
+    assert list(found) == searched
     searches = {part: tuning.search for part, tuning in found.items()}
     for part, search in searches.items():
         assert search is not None and search.finished
         assert search.method == part.split("_")[0]
-        assert search.command.startswith("simrail tune metro_geometry ")
-        assert ("axle_noise" in search.fitted_on[0]) == (part == "cml_noise")
-        paper = part in ("cml", "cml_noise")
-        assert (search.space == SearchSpace()) == paper
-    assert "--within 20.0 1050.0" in searches["kom_start"].command  # type: ignore[union-attr]
-    assert "--within 1050.0 1520.0" in searches["kom_end"].command  # type: ignore[union-attr]
+        assert search.command.startswith(f"simrail tune {name} ")
+        assert ("_noise on" in search.fitted_on[0]) == (part == "cml_noise")
+        # The box is the paper's for its own CML, and at its own size for its KOM as well.
+        assert (search.space == SearchSpace()) == (
+            part in ("cml", "cml_noise")
+            or (name == "scale_track" and part in ("kom", "kom_start", "kom_end"))
+        )
+        assert len(search.fitted_on) == (4 if part == "kom_rides" else 1)
+        assert ("--band paper" in search.command) == (part == "kom_rides")
+    assert f"--within {start}" in searches["kom_start"].command  # type: ignore[union-attr]
+    assert f"--within {end}" in searches["kom_end"].command  # type: ignore[union-attr]
 
 
 def test_added_noise_is_ten_times_that_of_the_sheet_and_nothing_else() -> None:

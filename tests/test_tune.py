@@ -11,6 +11,7 @@ from simrail.cli import BAD_INPUT, DONE, INTERRUPTED, call
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import load_scenario
+from simrail.tune import chosen_cells
 from simrail.watcher import Watcher
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -98,6 +99,24 @@ def test_known_output(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert tuning.hyperparameters.lateral_position_m2 == 3e-3
 
 
+def test_fits_on_several_draws_of_new_tracks_first(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All of them count: the objective is that of the recordings together, and the file names each."""
+    monkeypatch.setattr("estimators.tuning_search.ROUNDS", 0)
+    words = [*WORDS, "--method", "cml", "--set", "monte_carlo.track_draws=2"]
+    spec = load_scenario("mine.toml", overrides=["monte_carlo.track_draws=2"])
+    drawn = [(c.track_draw, c.sensor_draw) for c in chosen_cells(spec, [], None, draws=3)]
+    assert drawn == [(0, 0), (1, 0), (0, 1)]
+    assert call([*words, "--draws", "2"]) == DONE
+    both = Tuning.from_file(place / "mine_cml.toml").search
+    assert both is not None and "--draws 2" in both.command
+    assert len(both.fitted_on) == 2 and both.fitted_on[1].endswith(", draw 0 on track 1")
+    assert call(words) == DONE
+    one = Tuning.from_file(place / "mine_cml.toml").search
+    assert one is not None and one.fitted_on == both.fitted_on[:1] and one.objective != both.objective
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
@@ -105,6 +124,8 @@ def test_known_output(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--estimator", "smother"], ["--estimator", "'smother'", "smoother"]),
         (["--estimator", "design_angles"], ["--estimator", "design_angles", "TrajectorySmoother"]),
         (["--ride", "home"], ["--ride", "'home'", "one of out"]),
+        (["--draws", "0"], ["--draws", "0", "1 to 2"]),
+        (["--draws", "3"], ["--draws", "3", "1 to 2", "track_draws"]),
         (["--imu", "roof"], ["--imu", "'roof'", "one of axle"]),
         (["--out", "tuned.txt"], ["--out", "tuned.txt", ".toml"]),
         (["--out", "nowhere/tuned.toml"], ["--out", "no such folder"]),

@@ -38,6 +38,14 @@ def run(
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the failed cells of finished results again.")
     ] = False,
+    beside: Annotated[
+        Path | None,
+        typer.Option(
+            "--beside",
+            metavar="DIR",
+            help="Results that the page sets beside these, e.g. full size and 1:10.",
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     plan: Annotated[
@@ -58,7 +66,7 @@ def run(
 
     starts = {"resume": resume, "fresh": fresh, "retry-failed": retry_failed}
     wanted = [name for name, is_wanted in starts.items() if is_wanted]
-    if len(wanted) > 1 or (cell is not None and (wanted or cluster or workers)):
+    if len(wanted) > 1 or (cell is not None and (wanted or cluster or workers or beside)):
         raise InputError(
             "these options do not go together",
             field=" ".join([*(f"--{name}" for name in wanted), *(["--cell"] if cell is not None else [])]),
@@ -77,6 +85,7 @@ def run(
                 workers=workers,
                 cluster=cluster,
                 start=cast("Any", wanted[0] if wanted else "auto"),
+                beside=beside,
                 watcher=watcher,
                 many=yes,
             )

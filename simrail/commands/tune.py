@@ -41,6 +41,9 @@ def tune(
         list[str] | None,
         typer.Option("--ride", metavar="NAME", help="Ride to fit on; all if none is named. Repeatable."),
     ] = None,
+    draws: Annotated[
+        int, typer.Option("--draws", metavar="N", help="Draws of each ride to fit on, new tracks first.")
+    ] = 1,
     imu: Annotated[
         str | None, typer.Option("--imu", metavar="NAME", help="IMU of the scenario; the first if not given.")
     ] = None,
@@ -108,7 +111,14 @@ def tune(
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
     file = out or Path(f"{read.name}_{method}.toml")
     words = [scenario, "--estimator", estimator, "--method", method]
-    given = {"imu": imu, "box": box, "constrain": constrain, "position": position, "band": band}
+    given = {
+        "draws": draws,
+        "imu": imu,
+        "box": box,
+        "constrain": constrain,
+        "position": position,
+        "band": band,
+    }
     given |= {"within": within, "step": step, "evaluations": evaluations, "at_most": at_most, "seed": seed}
     usual = signature(tune).parameters
     for name, value in given.items():
@@ -130,6 +140,7 @@ def tune(
                 estimator=estimator,
                 method=method,
                 rides=rides or [],
+                draws=draws,
                 imu=imu,
                 space=space,
                 by_kind=by_kind,

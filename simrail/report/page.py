@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from simrail.bands import Band
 from simrail.example import CellResult
+from simrail.former import FormerResults
 from simrail.report.alike import alike
 from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.campaign.section import campaign_view
@@ -49,6 +50,9 @@ MOST_RIDES = 6
 
 TABLES = "tables"
 """Folder beside the page for the tables of a campaign, as CSV and LaTeX."""
+
+SETS_BESIDE = ("gonzalez_2023",)
+"""Publications whose section can hold the results of a second scenario as well."""
 
 MOST_TABLES = 24
 """Cases whose table is on the page; ``scores.csv`` holds all."""
@@ -94,6 +98,7 @@ def write_report(
     cells: pd.DataFrame,
     examples: Sequence[CellResult],
     manifest: Mapping[str, Any],
+    beside: FormerResults | None = None,
 ) -> None:
     """Write the report of a campaign; where it has axes, its tables into the folder `TABLES` beside it.
 
@@ -111,10 +116,12 @@ def write_report(
         Rides to draw, first draw of each.
     manifest : mapping
         What the campaign noted of itself: command, versions, times; plain values.
+    beside : FormerResults, optional
+        Results of another scenario of the same publication, one of `SETS_BESIDE`.
     """
     all_cases = cases(scores, cells)
     styles = list(method_styles(methods(scenario)).values())
-    paper = _beside_paper(scenario, all_cases, styles, examples)
+    paper = _beside_paper(scenario, all_cases, styles, examples, beside)
     campaign = campaign_view(scenario, scores, cells, styles, examples, manifest, band=band_of_all(all_cases))
     if campaign is not None:
         write_tables(path.parent / TABLES, campaign.tables)
@@ -162,6 +169,7 @@ def _beside_paper(
     all_cases: list[Figures],
     styles: Sequence[MethodStyle],
     examples: Sequence[CellResult],
+    former: FormerResults | None,
 ) -> Any:
     """The section that sets a scenario beside a publication; None if it names none."""
     ran = methods(scenario)
@@ -169,7 +177,7 @@ def _beside_paper(
         return beside_briales(all_cases, ran, styles, examples)
     if scenario.spec.paper == "gonzalez_2023":
         tunings = tunings_of(ran, scenario.folder)
-        return beside_gonzalez(all_cases, ran, styles, examples, tunings=tunings)
+        return beside_gonzalez(all_cases, ran, styles, examples, tunings=tunings, former=former)
     return None
 
 

@@ -18,6 +18,7 @@ PARTS: dict[str, str] = {
     "kom_start": "KOM on part 1",
     "kom_end": "KOM on part 2",
     "cml_noise": "CML, noise added",
+    "kom_rides": "KOM on several rides",
     "cml_held": "CML, virtual positions held",
     "hand": "set by hand",
     "blind": "by hand, no sight of the rails",
@@ -59,7 +60,7 @@ def part_of(method: Method) -> str:
     if "cml" in words:
         return "cml_noise" if NOISE in words else "cml_held" if "held" in words else "cml"
     if "kom" in words:
-        return "kom_start" if "start" in words else "kom_end" if "end" in words else "kom"
+        return next((f"kom_{word}" for word in ("start", "end", "rides") if word in words), "kom")
     return ""
 
 

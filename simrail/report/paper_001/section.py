@@ -14,11 +14,13 @@ from markupsafe import Markup
 from estimators.tuning_file import Tuning
 from simrail.bands import Band
 from simrail.example import CellResult
+from simrail.former import FormerResults
 from simrail.report.claim import Claim
 from simrail.report.geometry_bands import QUANTITIES
 from simrail.report.geometry_figures import lines_of, rails_figure, stretch_of, stretch_words
 from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
+from simrail.report.paper_001.beside import FULL, MODEL, OtherSize, other_size, where
 from simrail.report.paper_001.claims import Peak, claims, errata_note
 from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
@@ -47,7 +49,9 @@ class PaperView:
     """The section as the template needs it."""
 
     where: str
+    size: str
     is_model: bool
+    other: OtherSize | None
     table: Table
     coverage: Table
     tunings: Table | None
@@ -66,6 +70,7 @@ def paper_view(
     examples: Sequence[CellResult],
     *,
     tunings: Mapping[str, Tuning] | None = None,
+    former: FormerResults | None = None,
 ) -> PaperView | None:
     """Make the section; None if no case has rail geometry.
 
@@ -79,6 +84,8 @@ def paper_view(
         First draw of each ride, and of an IMU with noise added.
     tunings : mapping of str to Tuning, optional
         Tunings by the method that names them.
+    former : FormerResults, optional
+        Results of the other size, whose rows stand beside ours.
     """
     rows = rows_of(all_cases, methods, band=SCALED.name)
     if rows is None:
@@ -100,13 +107,15 @@ def paper_view(
         for part in ("cml", "cml_held", "kom", "hand", "printed")
         if example and part in looks and with_rails(example, [looks[part]])
     }
-    labels = rows.case.labels
+    size = MODEL if band is SCALED else FULL
+    other = other_size(former, band=SCALED.name) if former is not None else None
     tuned = by_part(rows.names, tunings or {})
     return PaperView(
-        where=f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), "
-        f"odometry {labels['odometry']}",
-        is_model=band is SCALED,
-        table=_table(rows, looks),
+        where=where(rows),
+        size=size,
+        is_model=size == MODEL,
+        other=other,
+        table=_table(rows, looks, size, other),
         coverage=_coverage_table(covered, looks),
         tunings=status_table(tuned),
         commands=commands(tuned),
@@ -131,8 +140,9 @@ def _band_of(example: CellResult | None) -> Band:
     return SCALED if length < MODEL_M else FULL_SIZE
 
 
-def _table(rows: Rows, looks: dict[str, MethodStyle]) -> Table:
-    """Tables 1 and 2: what is printed, and ours below it."""
+def _table(rows: Rows, looks: dict[str, MethodStyle], size: str, other: OtherSize | None) -> Table:
+    """Tables 1 and 2: what is printed, ours below it, and ours of the other size below that."""
+    ours = f"ours, {size}" if other is not None else "ours"
     result = []
     for part, label in PARTS.items():
         style = looks.get(rows.played_by(part))
@@ -142,18 +152,25 @@ def _table(rows: Rows, looks: dict[str, MethodStyle]) -> Table:
                 Cell(f"{value:.3f}".replace("-", "\u2212")) for printed in TABLES[part] for value in printed
             ]
             result.append(Row(f"{label}: printed", "", "", cells))
-        cells = [
-            _number(rows, part, quantity, metric, filtered=filtered)
-            for quantity, filtered in COLUMNS
-            for metric in ("mean", "sd", "max")
-        ]
         if rows.has(part):
-            result.append(Row(f"{label}: ours" if part in TABLES else label, "", colour, cells))
+            named = part in TABLES or other is not None
+            result.append(Row(f"{label}: {ours}" if named else label, "", colour, _numbers(rows, part)))
+        if other is not None and other.rows.has(part):
+            colour = colour or COLOURS.get(part, "")
+            result.append(Row(f"{label}: ours, {other.size}", "", colour, _numbers(other.rows, part)))
     groups = [
         (f"{QUANTITIES[quantity]}, {'filtered' if filtered else 'unfiltered'}", 3)
         for quantity, filtered in COLUMNS
     ]
     return Table(groups, ["\u03bc", "\u03c3", "max"] * len(COLUMNS), result)
+
+
+def _numbers(rows: Rows, part: str) -> list[Cell]:
+    return [
+        _number(rows, part, quantity, metric, filtered=filtered)
+        for quantity, filtered in COLUMNS
+        for metric in ("mean", "sd", "max")
+    ]
 
 
 def _number(rows: Rows, part: str, quantity: str, metric: str, *, filtered: bool) -> Cell:

@@ -1,0 +1,143 @@
+"""Results beside other results: read back, shown as rows of their own, or refused before anything runs."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from simrail.cli import BAD_INPUT, DONE, call
+
+TEXT = """
+title = "Rails of a short line"
+paper = "gonzalez_2023"
+seed = 3
+track = "condequinto_olivar"
+vehicle = "metro_irw_bogie"
+engine = "kinematic"
+odometry = "truth"
+[irregularity]
+spectrum = "erri_b176_low"
+[[ride]]
+name = "go"
+start_m = 10.0
+end_m = 460.0
+speed_kmh = 70.0
+rest_s = 5.0
+[[imu]]
+name = "axle"
+grade = "lord_3dm_gx4_25"
+body = "front"
+position_m = [0.0, 0.0, 0.6]
+[geometry]
+own_bands = { paper = [3.0, 70.0] }
+[[estimator]]
+name = "smoother"
+method = "TrajectorySmoother"
+[[estimator]]
+name = "zero_track"
+method = "ZeroTrack"
+"""
+
+# The same rails in another band: which size a run is of, its band tells.
+MODEL = TEXT.replace("[3.0, 70.0]", "[1.0, 7.0]").replace('"go"', '"out"').replace("seed = 3", "seed = 4")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the results of both sizes, the first beside the second."""
+    here = tmp_path_factory.mktemp("beside")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(here)
+        patch.setattr("simrail.ride_cache.cache_folder", lambda: here / "cache")
+        (here / "full.toml").write_text(TEXT)
+        (here / "model.toml").write_text(MODEL)
+        assert call(["run", "model.toml", "--workers", "1"]) == DONE
+        assert call(["run", "full.toml", "--workers", "1", "--beside", "results/model"]) == DONE
+    return here
+
+
+def rows_of_page(page: str) -> dict[str, list[str]]:
+    """Cells of each row of the section's first table, by the row's label."""
+    table = page.partition('id="paper"')[2].partition("</table>")[0]
+    rows = re.findall(r"<tr.*?</tr>", table, flags=re.S)
+    found = [
+        [re.sub(r"<[^>]*>", "", cell).strip() for cell in re.findall(r"<t[hd].*?</t[hd]>", row, flags=re.S)]
+        for row in rows
+    ]
+    return {row[0]: row[1:] for row in found if row}
+
+
+def test_rows_of_both_sizes_stand_on_one_page(ran: Path) -> None:
+    """Those of the other are the ones on its own page, and not those of this one."""
+    both = rows_of_page((ran / "results/full/report.html").read_text(encoding="utf-8"))
+    alone = rows_of_page((ran / "results/model/report.html").read_text(encoding="utf-8"))
+    assert both["set by hand: ours, 1:10"] == alone["set by hand"]
+    assert both["set by hand: ours, full size"] != alone["set by hand"]
+    assert both["no IMU: ours, 1:10"] == alone["no IMU"]
+    assert "set by hand" not in both and not any("ours" in label for label in alone)
+
+
+def test_the_page_and_the_manifest_say_what_stands_beside(ran: Path) -> None:
+    page = (ran / "results/full/report.html").read_text(encoding="utf-8")
+    assert "with 1:10 beside it" in page and "results of model of 20" in page and "ride out" in page
+    own, other = (
+        json.loads((ran / f"results/{name}/manifest.json").read_text()) for name in ("full", "model")
+    )
+    assert own["beside"]["scenario_hash"] == other["scenario_hash"] != own["scenario_hash"]
+    assert own["command"].endswith(" --beside results/model") and "beside" not in other
+
+
+@pytest.fixture
+def here(ran: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copytree(ran / "results" / "model", tmp_path / "model")
+    (tmp_path / "full.toml").write_text(TEXT)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _is_refused(beside: str, words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["run", "full.toml", "--beside", beside]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert all(word in said for word in ["--beside", *words]), said
+    assert not Path("results").exists() and "Traceback" not in said
+
+
+def test_no_results_are_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _is_refused("nowhere", ["nowhere", "no finished results"], capsys)
+    (here / "model" / "scores.parquet").write_text("no table")
+    _is_refused("model", ["no finished results", "run that scenario first"], capsys)
+
+
+@pytest.mark.parametrize("key", ["scenario", "scenario_text", "settings", "seed"])
+def test_a_manifest_that_lacks_something_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], key: str
+) -> None:
+    file = here / "model" / "manifest.json"
+    manifest = json.loads(file.read_text())
+    del manifest[key]
+    file.write_text(json.dumps(manifest))
+    _is_refused("model", [f"does not say {key}"], capsys)
+
+
+def test_another_publication_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = here / "model" / "manifest.json"
+    manifest = json.loads(file.read_text())
+    manifest["scenario_text"] = MODEL.replace("gonzalez_2023", "briales_2021")
+    file.write_text(json.dumps(manifest))
+    _is_refused("model", ["no place for results of model", "gonzalez_2023"], capsys)
+
+
+def test_a_scenario_that_is_not_read_any_more_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = here / "model" / "manifest.json"
+    manifest = json.loads(file.read_text())
+    manifest["scenario_text"] = MODEL.replace("seed = 4", "seed = 4\nsede = 5")
+    file.write_text(json.dumps(manifest))
+    assert call(["run", "full.toml", "--beside", "model"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "manifest.json" in said and "sede" in said and not Path("results").exists()
