@@ -106,7 +106,7 @@ def _lost(case: Figures, styles: Sequence[MethodStyle], band: str) -> list[Findi
         worse = [style.label for style in rest if sd_of(case, style, quantity, band=band) > least]
         if worse:
             lost.append(f"{listed(worse)} in {QUANTITIES[quantity]}")
-    return [Finding("bad", f"No IMU at all also beats {'; '.join(lost)}.")] if lost else []
+    return [Finding("bad", f"No IMU at all beats {'; '.join(lost)}.")] if lost else []
 
 
 def _coverage(case: Figures, main: MethodStyle) -> list[Finding]:

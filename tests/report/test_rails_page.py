@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from simrail.bands import BANDS, Band, margin_m
 from simrail.campaign import run_campaign
@@ -27,7 +28,7 @@ from simrail.report.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.pivot import Figure, Figures, cases
 from simrail.report.sentences import unbroken
-from simrail.report.style import fitting_columns
+from simrail.report.style import fitting_columns, legend_above, look, panels
 from simrail.report.tiles import tiles
 from simrail.report.track_figures import profile_figure, profile_words
 from simrail.results import describe
@@ -232,6 +233,19 @@ def test_a_legend_fits_its_width(count: int) -> None:
     size_in = 8.8 / 72.0
     assert columns == 1 or columns * size_in * (0.6 * 17 + 4.2) <= 10.0
     assert fitting_columns(["a", "b"], 10.0) == 2 and fitting_columns(["a" * 200, "b"], 10.0) == 1
+
+
+def test_a_drawn_legend_ends_within_the_figure() -> None:
+    with look():
+        figure, (axis,) = panels([1.0])
+        for i in range(12):
+            axis.plot([0.0, 1.0], [0.0, i], label=f"smoother of the kind {i}")
+        legend_above(axis)
+        FigureCanvasAgg(figure).draw()
+        drawn = axis.get_legend()
+        assert drawn is not None
+        assert drawn.get_window_extent().x1 <= figure.bbox.x1
+        assert drawn.get_window_extent().width > 0.6 * figure.bbox.width, "no narrower than it must be"
 
 
 # ---- tiles, tables and sentences ---------------------------------------------------------------

@@ -239,7 +239,7 @@ def _figures(
         )
         svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
         figures.append((text, Markup(svg)))
-        text = f"As Fig. A3: the same, with the 95 % interval that {first[0].label} claims unfiltered."
+        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, unfiltered."
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
         figures.append((text, Markup(svg)))
     return figures
