@@ -22,7 +22,7 @@ from estimators.trajectory_draws import FELT, geometry_draws, state_errors
 from estimators.trajectory_model import Model, measured, packed_process, process_noise, transition
 from estimators.trajectory_noise import Hyperparameters
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend
-from simrail.bands import BANDS, Band, band_pass, margin_m, sd_of_draws
+from simrail.bands import BANDS, band_pass, margin_m, sd_of_draws
 from simrail.columns import (
     ACCEL,
     ATTITUDE,
@@ -212,7 +212,7 @@ def test_what_the_estimator_keeps_is_roll_and_place() -> None:
 # Through the rails and into a band, on rides that the model itself made.
 
 LINE = TrackDesign("straight", 0.0, (Straight(400.0),))
-SPEED, RIDE, BAND = 15.0, 3001, Band("short", 1.0, 5.0)
+SPEED, RIDE, EDGES = 15.0, 3001, (1.0, 5.0)
 TRUE = Hyperparameters(
     1e-6, 1e-6, 1e-6, 1e-2, 1e-2, 3e-6, 3e-6, 3e-6, 1e-3, 1e-3, 1e-3, 1e6, 1e6
 )  # fmt: skip
@@ -229,7 +229,7 @@ def empty(name: str, *, sd_m: float = 0.0) -> Recording:
     odometry["position_m"], odometry["speed_mps"] = 10.0 + SPEED * time, SPEED
     odometry["position_sd_m"] = sd_m
     imu = pd.DataFrame(0.0, index=time, columns=[*GYRO, *ACCEL])
-    return Recording(name, imu, SHEET, "axle", "front", (0.0, 0.0, 0.6), LINE, None, None, 10.0, odometry)
+    return Recording(name, imu, SHEET, "axle", "front", (0.0, 0.0, 0.6), LINE, None, None, 10.0, odometry, "model")
 
 
 def made(name: str, noise: Hyperparameters = TRUE) -> tuple[Recording, Estimate]:
@@ -254,7 +254,7 @@ RIDES = 24
 
 @lru_cache
 def shares(scale: float) -> tuple[np.ndarray, int]:
-    """Share of places inside the interval in `BAND`, of alignment, profile and cross-level, and how many.
+    """Share of places inside the interval in the band of `EDGES`, of alignment, profile and cross-level, and how many.
 
     Places a longest wave apart, where an error of the band has forgotten itself.
     """
@@ -265,13 +265,12 @@ def shares(scale: float) -> tuple[np.ndarray, int]:
         estimate = SMOOTHER.estimate(recording)
         true, found = track_geometry(truth, recording), estimate.geometry
         assert found is not None and estimate.geometry_draws is not None
-        error = (found - true)[list(IRREGULARITY[:3])].to_numpy().T
-        error = band_pass(error, (1.0, 5.0), step_m=0.25)
-        draws = np.moveaxis(estimate.geometry_draws[:, :, :3], 2, 1)
-        sd = np.array([sd_of_draws(draws_of) for draws_of in np.moveaxis(band_pass(draws, (1.0, 5.0), step_m=0.25), 1, 0)])
-        crop = round(margin_m((1.0, 5.0)) / 0.25)
-        at = np.arange(crop, error.shape[1] - crop, 20)
-        inside += (np.abs(error) <= 1.96 * sd)[:, at].sum(axis=1)
+        crop = round(margin_m(EDGES) / 0.25)
+        at = np.arange(crop, len(found) - crop, 20)
+        for i, name in enumerate(IRREGULARITY[:3]):
+            error = band_pass((found - true)[name].to_numpy(), EDGES, step_m=0.25)
+            sd = sd_of_draws(band_pass(estimate.geometry_draws[:, :, i], EDGES, step_m=0.25))
+            inside[i] += np.count_nonzero(np.abs(error[at]) <= 1.96 * sd[at])
         count += len(at)
     return inside, count
 
@@ -306,7 +305,7 @@ def sight(recording: Recording, *, sd_m: float = 0.0, noise_m: float = 0.0) -> t
     place = recording.odometry["position_m"].to_numpy()
     n = len(place)
     wave = 1e-3 * np.sin(2.0 * np.pi * place / 12.0)
-    seen = np.column_stack([wave + 0.7, -0.6 + 0.5 * wave, wave - 0.7, -0.6 - 0.5 * wave])
+    seen = np.column_stack([wave + 0.7, -0.6 + 0.5 * wave, 0.3 * wave - 0.7, -0.6 - 0.2 * wave])
     recording = replace(
         recording,
         rail_displacement=pd.DataFrame(seen, index=recording.imu.index),
