@@ -12,7 +12,7 @@ What is drawn is what `estimators.track_geometry` has in its standard deviations
 * the odometry's error of position: one normal number per draw times its sd at each place, as if it were of
   one cause.
 
-A draw is the truth minus the estimate: added to the estimate it is one of the rails that the recording allows.
+A draw is the truth minus the estimate: added to the estimate it is rails that the recording allows.
 """
 
 from __future__ import annotations

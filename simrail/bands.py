@@ -194,9 +194,9 @@ def twist(cross_level: FloatArray, *, base_m: float, step_m: float) -> FloatArra
 def sd_of_draws(draws: FloatArray) -> FloatArray:
     """Standard deviation of an error of which m draws are known, for an interval of 1.96 of it.
 
-    The mean square of m normal draws about zero, and the error itself over its root, are Student's t with m
-    degrees of freedom: +-t_m of the root holds 95 % of the errors, more than +-1.96 of it. The root is therefore
-    made larger by t_m/1.96: 6 % for 20 draws.
+    A normal error over the root mean square of m draws like it is Student's t with m degrees of freedom:
+    +-t_m of the root holds 95 % of the errors, +-1.96 of it fewer. The root is therefore made larger by
+    t_m/1.96: 6 % for 20 draws.
 
     Parameters
     ----------

@@ -4,8 +4,8 @@ An error is estimate minus truth at the same s. The filters of `simrail.bands` a
 band is the error, filtered; over their margins, where they would need to know the rails beyond the ends of
 the ride, nothing counts. Consistency (nees, coverage95) of the unfiltered irregularities is by the estimate's
 standard deviations. In a band, and of twist, the sd depends on how the errors hang together along the track,
-which these do not say: coverage95 is told where the estimate has draws of its error (`geometry_draws`), filtered
-as the error is. nees is not: with the sd of m draws its mean is not 1.
+which these do not say: coverage95 is told where the estimate has draws of its error (`geometry_draws`), which
+are filtered as the error is. nees is not: with the sd of m draws its mean is not 1.
 
 Windows are those of the track (whole, straight, transition, curve and each curve): a place has no speed.
 """

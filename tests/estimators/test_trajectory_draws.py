@@ -60,7 +60,23 @@ def left() -> Left:
     """A steady curve with cant, whose second half is noisier; the signals are no matter."""
     turn, cant, speed = 0.05, -0.02, 15.0
     v, h = cant * turn, turn
-    row = [cant, 0.0, 0.0, 0.0, speed * h, -speed * v, 0.0, -h * h, v * h, 0.0, v * h, -v * v, 0.0, 2 * v, 2 * h]
+    row = [
+        cant,
+        0.0,
+        0.0,
+        0.0,
+        speed * h,
+        -speed * v,
+        0.0,
+        -h * h,
+        v * h,
+        0.0,
+        v * h,
+        -v * v,
+        0.0,
+        2 * v,
+        2 * h,
+    ]
     track = np.tile(row, (SAMPLES, 1))
     track[:, 2] = turn * STEP * np.arange(SAMPLES)
     start = np.zeros(STATES)
@@ -76,9 +92,7 @@ def left() -> Left:
     states, covariance = np.empty((SAMPLES, STATES)), np.empty((SAMPLES, PACKED))
     gains, scaled = np.empty((SAMPLES, ROWS, STATES)), np.empty((SAMPLES, ROWS, 2))
     none = np.empty((0, STATES)), np.empty((0, PACKED))
-    trajectory_filter(
-        *model, states, covariance, gains, scaled, *none, np.empty((0, 7)), np.empty(0)
-    )
+    trajectory_filter(*model, states, covariance, gains, scaled, *none, np.empty((0, 7)), np.empty(0))
     return Left(model, gains, scaled, states, covariance)
 
 
@@ -190,7 +204,9 @@ def test_covariances_are_those_of_the_smoother() -> None:
         assert np.abs(ratio - 1.0).max() < 4.5 * np.sqrt(2.0 / MANY)
 
 
-@pytest.mark.parametrize("forgotten", [slice(0, STATES), slice(STATES, None)], ids=["process", "measurements"])
+@pytest.mark.parametrize(
+    "forgotten", [slice(0, STATES), slice(STATES, None)], ids=["process", "measurements"]
+)
 def test_a_noise_that_is_forgotten_would_be_seen(forgotten: slice) -> None:
     rng, squares = stream(4, "normals"), 0.0
     p = dense().covariance[30]
@@ -218,7 +234,12 @@ TRUE = Hyperparameters(
 )  # fmt: skip
 SHEET = ImuSheet("model", 250.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SMOOTHER = TrajectorySmoother(
-    hyperparameters=TRUE, second_order=False, rest_bias=False, draws=20, start_sd_rad=1e-3, start_yaw_sd_rad=1e-3
+    hyperparameters=TRUE,
+    second_order=False,
+    rest_bias=False,
+    draws=20,
+    start_sd_rad=1e-3,
+    start_yaw_sd_rad=1e-3,
 )
 
 
@@ -229,7 +250,9 @@ def empty(name: str, *, sd_m: float = 0.0) -> Recording:
     odometry["position_m"], odometry["speed_mps"] = 10.0 + SPEED * time, SPEED
     odometry["position_sd_m"] = sd_m
     imu = pd.DataFrame(0.0, index=time, columns=[*GYRO, *ACCEL])
-    return Recording(name, imu, SHEET, "axle", "front", (0.0, 0.0, 0.6), LINE, None, None, 10.0, odometry, "model")
+    return Recording(
+        name, imu, SHEET, "axle", "front", (0.0, 0.0, 0.6), LINE, None, None, 10.0, odometry, "model"
+    )
 
 
 def made(name: str, noise: Hyperparameters = TRUE) -> tuple[Recording, Estimate]:
@@ -340,7 +363,10 @@ def test_each_term_has_the_unfiltered_sd_that_the_geometry_tells(term: str) -> N
     np.testing.assert_allclose(ratio[judged], 1.0, atol=allowed)
     if term == "bias":  # a constant has no waves: it is gone in a band
         edges = BANDS["D1"].edges_m("cross_level")
-        assert np.nanmax(np.abs(band_pass(draws[0, :, 2], edges, step_m=0.25))) < 1e-2 * np.abs(draws[0, :, 2]).max()
+        assert (
+            np.nanmax(np.abs(band_pass(draws[0, :, 2], edges, step_m=0.25)))
+            < 1e-2 * np.abs(draws[0, :, 2]).max()
+        )
 
 
 def test_draws_change_nothing_else_and_are_the_same_bits_again(line_recording: Callable) -> None:
