@@ -277,7 +277,7 @@ RIDES = 24
 
 @lru_cache
 def shares(scale: float) -> tuple[np.ndarray, int]:
-    """Share of places inside the interval in the band of `EDGES`, of alignment, profile and cross-level, and how many.
+    """How many places are inside the interval in the band of `EDGES`, by irregularity, and out of how many.
 
     Places a longest wave apart, where an error of the band has forgotten itself.
     """
@@ -356,7 +356,7 @@ def test_each_term_has_the_unfiltered_sd_that_the_geometry_tells(term: str) -> N
         told = np.full((len(told), 4), 2e-3 / np.sqrt(3.0)) * [0.6, 0.0, 1.4, 0.0]
         assert np.ptp(draws[:, inner, 2], axis=1).max() < 1e-2 * np.abs(draws[:, inner, 2]).max()
     drawn_sd = np.sqrt(np.square(draws[:, inner]).mean(axis=0))
-    # Displacement and bias are one number per draw: their mean square is known to sqrt(2/m), 7 % of an sd 3.5.
+    # Displacement and bias are one number per draw: their mean square is known to sqrt(2/m) only.
     ratio = np.sqrt(np.square(drawn_sd).mean(axis=0) / np.maximum(np.square(told).mean(axis=0), 1e-20))
     judged = [0, 2] if term == "bias" else [0, 1, 2, 3]
     allowed = 0.02 if term == "rail_sensor" else 3.5 / np.sqrt(2.0 * many)
