@@ -47,12 +47,13 @@ def add_product(e: FloatArray, packed: FloatArray, lam: FloatArray, k: int) -> N
     """Row k of ``e`` (n, 12) += P lam, with P row k of ``packed`` (n, 78)."""
     at = 0
     for i in range(12):
-        e[k, i] += packed[k, at] * lam[i]
+        row = packed[k, at] * lam[i]
         at += 1
         for c in range(i + 1, 12):
-            e[k, i] += packed[k, at] * lam[c]
+            row += packed[k, at] * lam[c]
             e[k, c] += packed[k, at] * lam[i]
             at += 1
+        e[k, i] += row
 
 
 @njit
