@@ -56,7 +56,7 @@ class Left(NamedTuple):
 
 
 @lru_cache
-def left() -> Left:
+def left(*, printed: bool = False) -> Left:
     """A steady curve with cant, whose second half is noisier; the signals are no matter."""
     turn, cant, speed = 0.05, -0.02, 15.0
     v, h = cant * turn, turn
@@ -86,7 +86,7 @@ def left() -> Left:
     signals = np.array([measured(start, term, GRAVITY)[0][:6] for term in track])
     signals += 0.05 * stream(1, "signals").standard_normal(signals.shape)
     model = Model(
-        signals, track, np.empty((0, 3)), kinds, packed_process([ONE, OTHER], STEP), noise,
+        signals, track, np.full((SAMPLES if printed else 0, 3), 0.3), kinds, packed_process([ONE, OTHER], STEP), noise,
         np.array([0.0, 0.6]), start, START_SD**2, STEP, GRAVITY,
     )  # fmt: skip
     states, covariance = np.empty((SAMPLES, STATES)), np.empty((SAMPLES, PACKED))
@@ -119,12 +119,13 @@ class Dense(NamedTuple):
 
 
 @lru_cache
-def dense() -> Dense:
-    model, _, _, states, _ = left()
+def dense(*, printed: bool = False) -> Dense:
+    model, _, _, states, _ = left(printed=printed)
     f = transition(STEP)
     both = [block_diag(*process_noise(values, STEP)) for values in (ONE, OTHER)]
     q = [both[kind] for kind in model.kinds]
-    j = [measured(x, term, GRAVITY)[1] for x, term in zip(states, model.track, strict=True)]
+    slips = model.slips if printed else [None] * SAMPLES
+    j = [measured(x, *at)[1] for x, *at in zip(states, model.track, [GRAVITY] * SAMPLES, slips, strict=True)]
     predicted, filtered, gains = [], [], []
     p = np.diag(START_SD**2)
     for k in range(SAMPLES):
@@ -143,9 +144,9 @@ def dense() -> Dense:
     return Dense(f, q, j, gains, back, np.array(smoothed))
 
 
-def drawn(normals: np.ndarray) -> np.ndarray:
+def drawn(normals: np.ndarray, *, printed: bool = False) -> np.ndarray:
     """A draw (n, 12) by the kernel."""
-    model, gains, scaled, states, covariance = left()
+    model, gains, scaled, states, covariance = left(printed=printed)
     root = np.array([np.linalg.cholesky(block_diag(*process_noise(v, STEP))) for v in (ONE, OTHER)])
     errors = np.empty((SAMPLES, STATES))
     trajectory_error(
@@ -155,9 +156,10 @@ def drawn(normals: np.ndarray) -> np.ndarray:
     return errors
 
 
-def test_a_draw_is_a_simulated_truth_less_what_a_dense_smoother_makes_of_it() -> None:
+@pytest.mark.parametrize("printed", [False, True], ids=["corrected", "printed"])
+def test_a_draw_is_a_simulated_truth_less_what_a_dense_smoother_makes_of_it(printed: bool) -> None:
     """Mean corrections as they stand in the book: simulate states and measurements, smooth, subtract."""
-    model, twin = left().model, dense()
+    model, twin = left(printed=printed).model, dense(printed=printed)
     normals = stream(2, "normals").standard_normal((SAMPLES, STATES + ROWS))
     truth, z = np.empty((SAMPLES, STATES)), np.empty((SAMPLES, ROWS))
     for k in range(SAMPLES):
@@ -165,7 +167,9 @@ def test_a_draw_is_a_simulated_truth_less_what_a_dense_smoother_makes_of_it() ->
         truth[k] = twin.f @ truth[k - 1] + moved if k else START_SD * normals[0, :STATES]
         z[k] = twin.j[k] @ truth[k] + np.sqrt(model.noise[model.kinds[k]]) * normals[k, STATES:]
     sd = np.sqrt(np.diagonal(twin.covariance, axis1=1, axis2=2))
-    np.testing.assert_allclose(drawn(normals) / sd, (truth - twin.smooth(z)) / sd, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        drawn(normals, printed=printed) / sd, (truth - twin.smooth(z)) / sd, rtol=0, atol=1e-6
+    )
 
 
 MANY, JUDGED = 4000, (0, 1, 29, 30, 31, 58, 59)
@@ -361,6 +365,11 @@ def test_each_term_has_the_unfiltered_sd_that_the_geometry_tells(term: str) -> N
     judged = [0, 2] if term == "bias" else [0, 1, 2, 3]
     allowed = 0.02 if term == "rail_sensor" else 3.5 / np.sqrt(2.0 * many)
     np.testing.assert_allclose(ratio[judged], 1.0, atol=allowed)
+    if term == "position":  # the wave of 12 m, moved as a whole, less itself: again a wave of 12 m
+        phase = 2.0 * np.pi * geometry.index.to_numpy()[inner] / 12.0
+        waves = np.column_stack([np.sin(phase), np.cos(phase)])
+        beside = draws[0, inner] - waves @ np.linalg.lstsq(waves, draws[0, inner], rcond=None)[0]
+        assert (np.abs(beside).max(axis=0) < 1e-2 * np.abs(draws[0, inner]).max(axis=0)).all()
     if term == "bias":  # a constant has no waves: it is gone in a band
         edges = BANDS["D1"].edges_m("cross_level")
         assert (

@@ -242,7 +242,9 @@ def _figures(
         text = f"As Fig. A1: rails of ride {ride} as {named} find{'s' * (len(first) == 1)} them, filtered."
         svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
         figures.append((text, Markup(svg)))
-        text = f"As Fig. A3: the same, filtered, with the 95 % interval of {first[0].label}."
+        drawn = example.estimates[first[0].name].geometry_draws is not None
+        how = ", which follows from draws of its error" if drawn else ""
+        text = f"As Fig. A3: the same, filtered, with the 95 % interval of {first[0].label}{how}."
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
         figures.append((text, Markup(svg)))
     return figures
