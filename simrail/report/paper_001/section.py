@@ -107,6 +107,7 @@ def paper_view(
         for part in ("cml", "cml_held", "kom", "hand", "printed")
         if example and part in looks and with_rails(example, [looks[part]])
     }
+    by_draws = {part: coverage_of(example, looks[part], band, by_draws=True) for part in covered if example}
     size = MODEL if band is SCALED else FULL
     other = other_size(former, band=SCALED.name) if former is not None else None
     tuned = by_part(rows.names, tunings or {})
@@ -116,7 +117,7 @@ def paper_view(
         is_model=size == MODEL,
         other=other,
         table=_table(rows, looks, size, other),
-        coverage=_coverage_table(covered, looks),
+        coverage=_coverage_table(covered, by_draws, looks),
         tunings=status_table(tuned),
         commands=commands(tuned),
         claims=claims(
@@ -180,14 +181,17 @@ def _number(rows: Rows, part: str, quantity: str, metric: str, *, filtered: bool
     return Cell(f"{found.value:.3f}".replace("-", "\u2212"))
 
 
-def coverage_of(example: CellResult, style: MethodStyle, band: Band) -> list[float]:
+def coverage_of(
+    example: CellResult, style: MethodStyle, band: Band, *, by_draws: bool = False
+) -> list[float]:
     """Share of the track inside a method's 95 % interval, %, in the order of `COLUMNS`; [] without sds.
 
-    As in the paper, the interval about filtered rails is that of the unfiltered ones.
+    As in the paper, the interval about filtered rails is that of the unfiltered ones; by draws, their own.
     """
     shares = []
     for quantity, filtered in COLUMNS:
-        _, true, found, sd = lines_of(example, style.name, quantity, band if filtered else None)
+        cut = band if filtered else None
+        _, true, found, sd = lines_of(example, style.name, quantity, cut, by_draws=by_draws)
         known = np.isfinite(found) & np.isfinite(sd)
         if not known.any():
             return []
@@ -195,12 +199,18 @@ def coverage_of(example: CellResult, style: MethodStyle, band: Band) -> list[flo
     return shares
 
 
-def _coverage_table(covered: dict[str, list[float]], looks: dict[str, MethodStyle]) -> Table:
+def _coverage_table(
+    covered: dict[str, list[float]], by_draws: dict[str, list[float]], looks: dict[str, MethodStyle]
+) -> Table:
     rows = [Row("CML: printed", "", "", [Cell(f"{value:g}") for value in COVERAGE])]
     for part, values in covered.items():
         if values:
             cells = [Cell(f"{value:.0f}") for value in values]
             rows.append(Row(PARTS[part], "", looks[part].colour, cells))
+        if by_draws.get(part):
+            cells = [Cell(f"{value:.0f}") for value in by_draws[part]]
+            label = f"{PARTS[part]}: interval of the filtered rails, by draws"
+            rows.append(Row(label, "", looks[part].colour, cells))
     columns = [f"{QUANTITIES[q]}, {'filtered' if f else 'unfiltered'}" for q, f in COLUMNS]
     return Table([("inside the 95 % interval, %", len(columns))], columns, rows)
 
@@ -239,7 +249,9 @@ def _figures(
         )
         svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
         figures.append((text, Markup(svg)))
-        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, unfiltered."
+        drawn = example.estimates[first[0].name].geometry_draws is not None
+        how = "which follows from draws of its error" if drawn else "that of unfiltered rails"
+        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}."
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
         figures.append((text, Markup(svg)))
     return figures
