@@ -22,6 +22,7 @@ from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
 from simrail.report.paper_001.beside import FULL, MODEL, OtherSize, other_size, where
 from simrail.report.paper_001.claims import Peak, claims, errata_note
+from simrail.report.paper_001.own_ride import FILTERED, own_ride_note, searched_on
 from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
@@ -29,6 +30,7 @@ from simrail.report.pivot import Figures, of_cell
 from simrail.report.sentences import listed
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.cells import Method
+from simrail.scenario.scenario import Scenario
 
 SCALED = Band("paper", 0.3, 7.0)
 FULL_SIZE = Band("paper", 3.0, 70.0)
@@ -70,6 +72,7 @@ def paper_view(
     examples: Sequence[CellResult],
     *,
     tunings: Mapping[str, Tuning] | None = None,
+    scenario: Scenario | None = None,
     former: FormerResults | None = None,
 ) -> PaperView | None:
     """Make the section; None if no case has rail geometry.
@@ -84,6 +87,8 @@ def paper_view(
         First draw of each ride, and of an IMU with noise added.
     tunings : mapping of str to Tuning, optional
         Tunings by the method that names them.
+    scenario : Scenario, optional
+        What was run: tells which tunings were searched on the ride that is drawn.
     former : FormerResults, optional
         Results of the other size, whose rows stand beside ours.
     """
@@ -111,6 +116,11 @@ def paper_view(
     size = MODEL if band is SCALED else FULL
     other = other_size(former, band=SCALED.name) if former is not None else None
     tuned = by_part(rows.names, tunings or {})
+    own = {
+        part: _filtered_sds(example, looks[part], band)
+        for part, tuning in tuned.items()
+        if example and scenario and part in looks and searched_on(tuning, scenario, example.cell)
+    }
     return PaperView(
         where=where(rows),
         size=size,
@@ -126,12 +136,28 @@ def paper_view(
             peak=_peak(example, drawn, band) if example and drawn else Peak(np.nan, np.nan, np.nan),
             tuning=tuned.get("cml"),
         ),
-        notes=[note for note in (*notes(tuned), errata_note(rows), *_not_run(rows)) if note],
+        notes=[
+            note
+            for note in (*notes(tuned), own_ride_note(rows, own), errata_note(rows), *_not_run(rows))
+            if note
+        ],
         figures=[
             *(_figures(rows, looks, example, band) if example else []),
             *(_noise_figure(rows, looks, example, noisy, band) if example and noisy else []),
         ],
     )
+
+
+def _filtered_sds(example: CellResult, style: MethodStyle, band: Band) -> list[float]:
+    """Sd of the filtered error on one ride, mm, in the order of `FILTERED`; NaN where there is none."""
+    sds = []
+    for quantity in FILTERED:
+        if not with_rails(example, [style]):
+            return [float("nan")] * len(FILTERED)
+        _, true, found, _ = lines_of(example, style.name, quantity, band)
+        error = (found - true)[np.isfinite(found)]
+        sds.append(float(error.std()) if len(error) else float("nan"))
+    return sds
 
 
 def _band_of(example: CellResult | None) -> Band:
