@@ -128,10 +128,12 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
         If another process holds it, or there is nothing to resume.
     """
     _drop_abandoned(results)
+    made = [above for above in (results.parent, *results.parent.parents) if not above.exists()]
     folder = results.parent / f".{results.name}.unfinished-{key[:16]}"
-    kept = Unfinished(folder)
-    try:
-        with _locked(folder):
+    with _locked(folder):
+        # Only now: what lies there may be another process's, at work.
+        kept = Unfinished(folder)
+        try:
             if start == "resume" and kept.is_empty:
                 raise InputError(
                     "there is no unfinished run of this plan",
@@ -143,14 +145,18 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
             if start in ("fresh", "retry-failed"):
                 kept.clear()
             yield kept
-    finally:
-        if kept.is_empty:
-            kept.remove()
+        finally:
+            if kept.is_empty:
+                kept.remove()
+            with suppress(OSError):  # those that were made for it, if nothing has come into them
+                for above in made:
+                    above.rmdir()
 
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold a folder for this process; the lock goes with the process, however it ends."""
+    """Hold a folder, made if it is not there, for this process; the lock goes with the process."""
+    folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("a") as stream:
         if sys.platform != "win32":
             import fcntl

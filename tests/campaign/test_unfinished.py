@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pandas as pd
@@ -21,7 +22,7 @@ from simrail.cli import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.errors import InputError
 from simrail.job import prepare
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.unfinished import Unfinished, unfinished_of
+from simrail.unfinished import Start, Unfinished, unfinished_of
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 
@@ -225,6 +226,28 @@ def test_two_processes_do_not_run_one_plan_into_one_folder(tmp_path: Path) -> No
         with unfinished_of(tmp_path / "results", "another"):
             pass
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_that_is_refused_leaves_the_other_one_alone(tmp_path: Path) -> None:
+    """Before the other has a batch, and while it writes one."""
+    with unfinished_of(tmp_path / "results", "key") as kept:
+        draft = kept.folder / ".000000000-ab.parquet.1.draft"
+        draft.touch()
+        with pytest.raises(InputError), unfinished_of(tmp_path / "results", "key", start="fresh"):
+            pass
+        assert draft.exists()
+        kept.log("at work")
+
+
+@pytest.mark.parametrize("start", ["resume", "auto"])
+def test_folders_that_nothing_came_into_go_again(tmp_path: Path, start: Start) -> None:
+    with suppress(InputError), unfinished_of(tmp_path / "a" / "b" / "results", "key", start=start):
+        pass
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "a").mkdir()
+    with suppress(InputError), unfinished_of(tmp_path / "a" / "results", "key", start=start):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 def test_runs_that_nobody_goes_on_with_are_dropped_after_a_month(tmp_path: Path) -> None:
