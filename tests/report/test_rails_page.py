@@ -17,7 +17,7 @@ from simrail.campaign import run_campaign
 from simrail.estimate import Estimate
 from simrail.example import CellResult
 from simrail.report import write_report
-from simrail.report.alike import alike
+from simrail.report.alike import alike, one_of_each
 from simrail.report.findings import findings
 from simrail.report.geometry_bands import JUDGED, band_words, judged_band, waves_words
 from simrail.report.geometry_figures import rails_figure, stretch_of, stretch_words
@@ -25,6 +25,8 @@ from simrail.report.geometry_findings import geometry_findings
 from simrail.report.geometry_tables import geometry_table, overview_table
 from simrail.report.geometry_view import geometry_view
 from simrail.report.methods import MethodStyle, attitude_methods, method_styles
+from simrail.report.page import _ride
+from simrail.report.paper_001.parts import COLOURS
 from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.pivot import Figure, Figures, cases
 from simrail.report.sentences import unbroken
@@ -348,6 +350,30 @@ def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran
     assert "The track here is 1:10 as well." in ran.page
     assert "1 ride, 2 IMUs" in ran.page
     assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
+
+
+def test_one_line_stands_for_all_that_are_alike(ran: Ran) -> None:
+    labels = [style.label for style in one_of_each(ran.cases[0], ran.styles)]
+    assert labels == ["smoother and 1 alike", "design angles", "zero track"]
+
+
+def test_beside_rails_few_attitudes_are_drawn_and_the_rest_counted(
+    ran: Ran, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def drawn() -> tuple[int, bool]:
+        view = _ride(ran.example, ran.cases, ran.styles, ran.scenario.spec)
+        return view.left_out, "smoother and 1 alike" in str(view.attitude)
+
+    assert drawn() == (0, True)
+    monkeypatch.setattr("simrail.report.page.MOST_DRAWN", 0)
+    assert drawn() == (1, False)
+
+
+def test_only_what_is_drawn_beside_the_paper_has_a_colour_in_its_table(ran: Ran) -> None:
+    paper = paper_view(ran.cases, methods(ran.scenario), ran.styles, ran.examples)
+    assert isinstance(paper, PaperView)
+    colours = {row.label: row.colour for row in paper.table.rows if "printed" not in row.label}
+    assert colours["set by hand"] == COLOURS["hand"] and colours["no IMU"] == ""
 
 
 def test_methods_are_alike_only_if_every_figure_is(
