@@ -86,11 +86,45 @@ def track_geometry(
     InputError
         If the states lack a column or a number, or the step is not positive.
     """
+    return geometry_of(sight_of(estimate, recording), step_m=step_m)
+
+
+class Sight(NamedTuple):
+    """Rails at each of n samples, before they are brought over space.
+
+    Attributes
+    ----------
+    place, place_sd : ndarray (n,)
+        Position along the track and its standard deviation, 0 where that is not known, m.
+    arms : ndarray (n, 2, 3)
+        From the IMU to left and right rail, track axes, m.
+    rails : ndarray (n, 2, 2)
+        Deviation of left and right rail from the design, along y and z, m.
+    use : ndarray of bool (n,)
+        Which samples are used (`trusted`).
+    noise_sd : float
+        Of the rail sensor, m; 0 without one.
+    gauge_known : bool
+        Whether there is a rail sensor.
+    covariance : ndarray (n, 3, 3), optional
+        Of roll, lateral and vertical position.
+    """
+
+    place: FloatArray
+    place_sd: FloatArray
+    arms: FloatArray
+    rails: FloatArray
+    use: np.ndarray
+    noise_sd: float
+    gauge_known: bool
+    covariance: FloatArray | None
+
+
+def sight_of(estimate: Estimate, recording: Recording) -> Sight:
+    """Where the rails are by an estimate; see `track_geometry`."""
     states = estimate.states
     require(states, (*ATTITUDE, *RELATIVE_POSITION), what="states")
     sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
-    if not 0.0 < step_m < np.inf:
-        raise InputError("is out of range", field="step_m", value=step_m, limit="> 0 m")
     known = states if "position_m" in states.columns else recording.odometry
     if len(known) != len(states):
         raise InputError("states are not at the recording's times", field="states", value=len(states))
@@ -109,22 +143,26 @@ def track_geometry(
     use, noise_sd = np.ones(len(place), dtype=bool), 0.0
     if sheet is not None:
         use, noise_sd = trusted(seen[:, :, 1:].reshape(-1, 4), sheet.noise_m), sheet.noise_m
-    covariance = _covariance(estimate)
-    variance = None
-    if covariance is not None:
-        place_sd = (
-            known["position_sd_m"].to_numpy(dtype=np.float64) if "position_sd_m" in known else 0.0 * place
-        )
-        variance = np.column_stack([_variance(arms, covariance), place_sd**2])[use]
-    found = over_space(place[use], irregularities(rails)[use], step_m=step_m, variance=variance)
+    place_sd = known["position_sd_m"].to_numpy(dtype=np.float64) if "position_sd_m" in known else 0.0 * place
+    return Sight(place, place_sd, arms, rails, use, noise_sd, sheet is not None, _covariance(estimate))
+
+
+def geometry_of(sight: Sight, *, step_m: float) -> pd.DataFrame:
+    """The rails over space; see `track_geometry`."""
+    if not 0.0 < step_m < np.inf:
+        raise InputError("is out of range", field="step_m", value=step_m, limit="> 0 m")
+    use, variance = sight.use, None
+    if sight.covariance is not None:
+        variance = np.column_stack([_variance(sight.arms, sight.covariance), sight.place_sd**2])[use]
+    found = over_space(sight.place[use], irregularities(sight.rails)[use], step_m=step_m, variance=variance)
     columns = dict(zip(IRREGULARITY, found.values.T, strict=True))
     if found.variance is not None:
         # Of mean and difference of two rails with equal, independent noise.
-        white = found.noise_gain[:, None] * noise_sd**2 * np.array([0.5, 0.5, 2.0, 2.0])
+        white = found.noise_gain[:, None] * sight.noise_sd**2 * np.array([0.5, 0.5, 2.0, 2.0])
         moved = displaced(found.position_m, found.values, np.sqrt(found.variance[:, 4]))
         sds = np.sqrt(found.variance[:, :4] + white + moved)
         columns |= dict(zip(IRREGULARITY_SD, sds.T, strict=True))
-    if sheet is None:
+    if not sight.gauge_known:
         for name in [column for column in columns if column.startswith("gauge")]:
             columns[name] = np.full(len(found.position_m), np.nan)
     return pd.DataFrame(columns, index=pd.Index(found.position_m, name="position_m"))
@@ -176,12 +214,20 @@ def _covariance(estimate: Estimate) -> FloatArray | None:
 
 
 def _variance(arms: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Variance (n, 4) of the irregularities: a turn by d about X moves a rail by d (-arm_z, arm_y)."""
-    n = len(arms)
-    moved = irregularities(np.stack([-arms[:, :, 2], arms[:, :, 1]], axis=-1))
-    slope = np.zeros((n, 4, 3))
-    slope[:, :, 0], slope[:, 0, 1], slope[:, 1, 2] = moved, 1.0, 1.0
+    """Variance (n, 4) of the irregularities."""
+    slope = slopes(arms)
     return np.einsum("nij,njk,nik->ni", slope, covariance, slope)
+
+
+def slopes(arms: FloatArray) -> FloatArray:
+    """How the irregularities depend on roll, y and z, (n, 4, 3).
+
+    A turn by d about X moves a rail by d (-arm_z, arm_y).
+    """
+    slope = np.zeros((len(arms), 4, 3))
+    slope[:, :, 0] = irregularities(np.stack([-arms[:, :, 2], arms[:, :, 1]], axis=-1))
+    slope[:, 0, 1] = slope[:, 1, 2] = 1.0
+    return slope
 
 
 def displaced(position: FloatArray, lines: FloatArray, sd: FloatArray) -> FloatArray:

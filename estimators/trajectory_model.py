@@ -61,12 +61,15 @@ class Found(NamedTuple):
         Measured minus predicted rates and forces, and their normalised innovation squared.
     log_likelihood : float
         Of all measurements, the virtual ones among them.
+    errors : ndarray (m, n, 3), optional
+        Draws of truth minus smoothed roll, y and z (`estimators.trajectory_draws`).
     """
 
     states: FloatArray
     covariance: FloatArray
     innovations: FloatArray
     log_likelihood: float
+    errors: FloatArray | None = None
 
 
 def transition(step_s: float) -> FloatArray:
@@ -92,7 +95,7 @@ def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray
 
 
 def packed_process(parameters: Sequence[Hyperparameters], step_s: float) -> FloatArray:
-    """Upper triangles of the blocks of Q, row by row: (c, 18) for c sets of hyper-parameters."""
+    """Upper triangles of the blocks of Q, row by row: (c, 21) for c sets of hyper-parameters."""
     return np.array(
         [
             np.concatenate([q[np.triu_indices(len(q))] for q in process_noise(values, step_s)])
@@ -162,7 +165,7 @@ def model_of(
         track=track_terms(recording, frame, printed=printed),
         slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
         kinds=kinds_of(recording),
-        process=np.empty((0, 18)),
+        process=np.empty((0, 21)),
         noise=np.empty((0, 8)),
         virtual=np.array([lateral, height]),
         start=start,
@@ -271,14 +274,19 @@ def measured(
     return value, j
 
 
-def filterpy_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> Found:
-    """The same estimate by filterpy: block update in Joseph's form, and the Rauch-Tung-Striebel smoother."""
+def filterpy_backend(
+    model: Model, *, smoothed: bool, with_covariance: bool, streams: Sequence[np.random.Generator] = ()
+) -> Found:
+    """The same estimate by filterpy: block update in Joseph's form, and the Rauch-Tung-Striebel smoother.
+
+    It makes no draws, and is given no streams.
+    """
     n = len(model.signals)
     f = transition(model.step_s)
     upper = np.triu_indices(STATES)
     ekf = ExtendedKalmanFilter(dim_x=STATES, dim_z=8)
     ekf.x, ekf.P, ekf.F = model.start.copy(), np.diag(model.start_variance), f
-    noises = [(_dense_process(q), np.diag(r)) for q, r in zip(model.process, model.noise, strict=True)]
+    noises = [(dense_process(q), np.diag(r)) for q, r in zip(model.process, model.noise, strict=True)]
     states, covariances = np.empty((n, STATES)), np.empty((n, STATES, STATES))
     innovations, likelihood = np.empty((n, 7)), 0.0
     for k in range(n):
@@ -302,7 +310,7 @@ def filterpy_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> 
     return Found(states, packed, innovations, float(likelihood))
 
 
-def _dense_process(process: FloatArray) -> FloatArray:
+def dense_process(process: FloatArray) -> FloatArray:
     """Q (12, 12) of the upper triangles of its blocks."""
     blocks, at = [], 0
     for size in (2, 2, 2, 3, 3):

@@ -21,6 +21,7 @@ The model stands in `estimators.trajectory_model`, the noise in `estimators.traj
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,7 +30,8 @@ import pandas as pd
 from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_back import trajectory_back
 from estimators.kernels.trajectory_equations import ROWS, STATES
-from estimators.track_geometry import track_geometry
+from estimators.track_geometry import geometry_of, sight_of
+from estimators.trajectory_draws import geometry_draws, state_errors, stream_of
 from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
 from estimators.trajectory_noise import Hyperparameters
 from estimators.tuning_file import Tuning
@@ -97,6 +99,10 @@ class TrajectorySmoother:
         made after the ride, also of the filter's states, which are causal.
     rail_sensor : bool
         False makes the geometry without a rail sensor, though the recording has one: to show what it gives.
+    draws : int
+        How often to draw what the rails may be from the posterior (`estimators.trajectory_draws`): their
+        standard deviation in a band of wavelengths follows from that alone. 0 for none; only smoothed, with
+        the compiled backend and a geometry.
     start_sd_rad, start_yaw_sd_rad : float
         Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
     """
@@ -114,6 +120,7 @@ class TrajectorySmoother:
     sensor_bias: bool = True
     geometry_step_m: float = 0.25
     rail_sensor: bool = True
+    draws: int = 0
     start_sd_rad: float = math.radians(1.0)
     start_yaw_sd_rad: float = math.radians(0.3)
 
@@ -152,6 +159,15 @@ class TrajectorySmoother:
                 value=self.geometry_step_m,
                 limit="0 (none) or more, m",
             )
+        if isinstance(self.draws, bool) or not isinstance(self.draws, int) or self.draws < 0:
+            raise InputError("is no number of draws", field="draws", value=self.draws, limit="0 or more")
+        if self.draws and not (self.smoothed and self.backend == "compiled" and self.geometry_step_m):
+            raise InputError(
+                "cannot be",
+                field="draws",
+                value=self.draws,
+                limit="0 unless smoothed, with the compiled backend and a geometry",
+            )
         given = self.hyperparameters != Hyperparameters() or self.curve_hyperparameters is not None
         if self.tuning is not None and given:
             raise InputError("a file and values cannot both be given", field="tuning")
@@ -170,14 +186,24 @@ class TrajectorySmoother:
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate attitude and place in the track frame at every IMU sample, and the rails below."""
-        estimate = self._trajectory(recording)
+        estimate, errors = self._trajectory(recording)
         if not self.geometry_step_m:
             return estimate
         if not self.rail_sensor:
             recording = replace(recording, rail_displacement=None, rail_sensor_sheet=None)
-        return replace(estimate, geometry=track_geometry(estimate, recording, step_m=self.geometry_step_m))
+        sight, step = sight_of(estimate, recording), self.geometry_step_m
+        geometry, drawn = geometry_of(sight, step_m=step), None
+        if errors is not None:
+            tilt = self._tilt(recording)
+            drawn = geometry_draws(sight, geometry, errors, recording, tilt_rad=tilt, step_m=step)
+        return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
-    def _trajectory(self, recording: Recording) -> Estimate:
+    def _tilt(self, recording: Recording) -> float:
+        """Bound of the roll or pitch that the accelerometer's turn-on bias is taken for, rad."""
+        bias = recording.imu_sheet.accel_turn_on_bias_mps2 if self.sensor_bias else 0.0
+        return bias / recording.gravity_mps2
+
+    def _trajectory(self, recording: Recording) -> tuple[Estimate, FloatArray | None]:
         """Without the geometry; the trace is let go before that is made, since it is large."""
         found = self.trace(recording)
         index = recording.imu.index
@@ -186,18 +212,17 @@ class TrajectorySmoother:
         covariance = None
         if self.with_covariance:
             covariance = block(found.covariance, OUTPUT)
-            if self.sensor_bias:
-                tilt = recording.imu_sheet.accel_turn_on_bias_mps2 / recording.gravity_mps2
-                covariance[:, [0, 1], [0, 1]] += tilt**2 / 3.0  # uniform within that bound
+            covariance[:, [0, 1], [0, 1]] += self._tilt(recording) ** 2 / 3.0  # uniform within that bound
             columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
             names += [*ATTITUDE_SD, *RELATIVE_POSITION_SD]
-        return Estimate(
+        estimate = Estimate(
             states=pd.DataFrame(np.hstack(columns), index=index, columns=names),
             mount=recording.mount,
             innovations=pd.DataFrame(found.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
             covariance=covariance,
             covariance_of=(*ATTITUDE, *RELATIVE_POSITION) if self.with_covariance else (),
         )
+        return estimate, found.errors
 
     def trace(self, recording: Recording) -> Found:
         """All twelve states with their covariances, the innovations, and the log-likelihood."""
@@ -206,7 +231,8 @@ class TrajectorySmoother:
             model = self.model(recording, around=around)
             around = run(model, smoothed=True, with_covariance=False).states
         model = self.model(recording, around=around)
-        return run(model, smoothed=self.smoothed, with_covariance=self.with_covariance)
+        streams = [stream_of(recording, draw, "trajectory") for draw in range(self.draws)]
+        return run(model, smoothed=self.smoothed, with_covariance=self.with_covariance, streams=streams)
 
     def log_likelihood(self, recording: Recording) -> float:
         """Log-likelihood of the recording by prediction-error decomposition."""
@@ -244,8 +270,10 @@ def log_likelihood(model: Model) -> float:
     return trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), np.empty(0))
 
 
-def compiled_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> Found:
-    """Filter and smoother by the kernels."""
+def compiled_backend(
+    model: Model, *, smoothed: bool, with_covariance: bool, streams: Sequence[np.random.Generator] = ()
+) -> Found:
+    """Filter and smoother by the kernels; one draw of the smoother's error for each of the streams."""
     n = len(model.signals)
     none = np.empty((0, STATES)), np.empty((0, PACKED))
     kept = np.empty((n, STATES)), np.empty((n, PACKED))
@@ -254,11 +282,14 @@ def compiled_backend(model: Model, *, smoothed: bool, with_covariance: bool) -> 
     innovations = np.empty((n, 7))
     before, after = (kept, none) if smoothed else (none, kept)
     likelihood = trajectory_filter(*model, *before, *updates, *after, innovations, np.empty(0))
+    errors = None
     if smoothed:
+        if streams:
+            errors = state_errors(model, *updates, *kept, streams)
         trajectory_back(
             model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance
         )
-    return Found(kept[0], kept[1] if with_covariance else none[1], innovations, likelihood)
+    return Found(kept[0], kept[1] if with_covariance else none[1], innovations, likelihood, errors)
 
 
 BACKENDS = {"compiled": compiled_backend, "filterpy": filterpy_backend}

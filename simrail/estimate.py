@@ -41,6 +41,10 @@ class Estimate:
         Rail irregularities over a uniform ``position_m``, columns `simrail.columns.IRREGULARITY`, with
         `IRREGULARITY_SD` where the method has them. A column that is NaN throughout is one that the method
         cannot observe; any other is finite.
+    geometry_draws : ndarray (m, places, 4), optional
+        m independent draws of true minus estimated irregularities, of equal probability, m: columns
+        `simrail.columns.IRREGULARITY` over the places of `geometry`, NaN where that is. What is linear in
+        the rails, such as a band of wavelengths, has the standard deviation of its draws.
     """
 
     states: pd.DataFrame
@@ -49,6 +53,7 @@ class Estimate:
     covariance: FloatArray | None = None
     covariance_of: tuple[str, ...] = ()
     geometry: pd.DataFrame | None = None
+    geometry_draws: FloatArray | None = None
 
 
 SENSORS = ("encoder", "magnetometer", "rail_sensor")

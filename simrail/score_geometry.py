@@ -2,8 +2,10 @@
 
 An error is estimate minus truth at the same s. The filters of `simrail.bands` are linear, so the error in a
 band is the error, filtered; over their margins, where they would need to know the rails beyond the ends of
-the ride, nothing counts. Consistency (nees, coverage95) is told of the unfiltered irregularities only: how
-their errors hang together along the track, which their sd in a band depends on, is not known.
+the ride, nothing counts. Consistency (nees, coverage95) of the unfiltered irregularities is by the estimate's
+standard deviations. In a band, and of twist, the sd depends on how the errors hang together along the track,
+which these do not say: coverage95 is told where the estimate has draws of its error (`geometry_draws`), which
+are filtered as the error is. nees is not: with the sd of m draws its mean is not 1.
 
 Windows are those of the track (whole, straight, transition, curve and each curve): a place has no speed.
 """
@@ -16,7 +18,7 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
-from simrail.bands import BANDS, Band, band_pass, twist, why_not
+from simrail.bands import BANDS, Band, band_pass, sd_of_draws, twist, why_not
 from simrail.columns import IRREGULARITY, require
 from simrail.errors import InputError
 from simrail.estimate import Estimate
@@ -55,7 +57,7 @@ def score_geometry(
     Parameters
     ----------
     estimate : Estimate
-        Its `geometry`, and nothing else, is scored.
+        Its `geometry`, by its `geometry_draws` if it has some, and nothing else, is scored.
     rails : LaidTrack
         The rails that the ride was run on.
     recording : Recording
@@ -91,11 +93,22 @@ def score_geometry(
     keep = [name for name in kept_metrics(metrics) if name not in _NO_PLACE_METRICS]
     for band in bands:
         band.check()
+    draws = estimate.geometry_draws
+    if draws is None:
+        draws = np.empty((0, len(geometry), len(IRREGULARITY)))
+    if draws.shape[1:] != (len(geometry), len(IRREGULARITY)):
+        raise InputError(
+            "are not over the places of the geometry",
+            field="geometry_draws",
+            value=draws.shape,
+            limit=f"(draws, {len(geometry)}, {len(IRREGULARITY)})",
+        )
     rows: list[Row] = []
-    for series, counts in _series(geometry, rails.irregularities(position), step, bands, twist_base_m):
+    for series, counts in _series(geometry, rails.irregularities(position), draws, step, bands, twist_base_m):
         told = list(chosen)[:1] if series.reason else chosen  # a reason is told once
         inside = {name: chosen[name][counts[chosen[name]]] for name in told}
-        rows += figures(series, inside, keep)
+        own = series.band == "full" and series.quantity != "twist"  # the estimate's own sd
+        rows += figures(series, inside, keep if own else [name for name in keep if name != "nees"])
     return table_of(rows, bands=[band.name for band in bands])
 
 
@@ -113,46 +126,57 @@ def _step_of(position: FloatArray) -> float:
 def _series(
     geometry: pd.DataFrame,
     truth: pd.DataFrame,
+    draws: FloatArray,
     step_m: float,
     bands: Sequence[Band],
     twist_base_m: float,
 ) -> Iterator[tuple[Series, np.ndarray]]:
-    """Errors of every quantity and band, mm, and which places (n,) count."""
+    """Errors of every quantity and band, mm, and which places (n,) count.
+
+    The error and its draws (m, n, 4) go the same way: as lines (1 + m, n), the error first.
+    """
     n = len(geometry)
     everywhere = np.ones(n, dtype=bool)
-    for name in IRREGULARITY:
+    for at, name in enumerate(IRREGULARITY):
         quantity = name.removesuffix("_m")
-        error = 1e3 * (geometry[name].to_numpy(dtype=np.float64) - truth[name].to_numpy())
+        error = geometry[name].to_numpy(dtype=np.float64) - truth[name].to_numpy()
+        lines = 1e3 * np.vstack([error, draws[:, :, at]])
         unknown = UNOBSERVABLE if n and np.isnan(error).all() else ""
         sd_name = f"{quantity}_sd_m"
         sd = 1e3 * geometry[sd_name].to_numpy(dtype=np.float64) if sd_name in geometry else None
-        yield Series(quantity, "truth", error, sd, unknown), everywhere
-        in_bands = [(band.name, *_filtered(error, band, quantity, step_m)) for band in bands if not unknown]
+        yield Series(quantity, "truth", lines[0], sd, unknown), everywhere
+        in_bands = [(band.name, *_filtered(lines, band, quantity, step_m)) for band in bands if not unknown]
         for band_name, filtered, reason in in_bands:
-            yield Series(quantity, "truth", filtered, None, reason, band_name), _counts(filtered, reason)
+            yield _of_lines(quantity, filtered, reason, band_name)
         if quantity != "cross_level":
             continue
-        for band_name, levels, reason in [("full", error, unknown), *in_bands]:
+        for band_name, levels, reason in [("full", lines, unknown), *in_bands]:
             turned, why = _twisted(levels, twist_base_m, step_m, reason)
-            yield Series("twist", "truth", turned, None, why, band_name), _counts(turned, why)
+            yield _of_lines("twist", turned, why, band_name)
 
 
-def _filtered(error: FloatArray, band: Band, quantity: str, step_m: float) -> tuple[FloatArray, str]:
-    """Error in a band, and the reason if it has none."""
+def _of_lines(quantity: str, lines: FloatArray, reason: str, band: str) -> tuple[Series, np.ndarray]:
+    """Series of an error with the sd that its draws have, and which places (n,) count."""
+    sd = sd_of_draws(lines[1:]) if len(lines) > 1 else None
+    return Series(quantity, "truth", lines[0], sd, reason, band), _counts(lines[0], reason)
+
+
+def _filtered(lines: FloatArray, band: Band, quantity: str, step_m: float) -> tuple[FloatArray, str]:
+    """Lines (m, n) in a band, and the reason if they have none."""
     edges = band.edges_m(quantity)
-    reason = why_not(edges, count=len(error), step_m=step_m)
-    if reason or not np.isfinite(error).all():
-        return error, reason
-    return band_pass(error, edges, step_m=step_m), ""
+    reason = why_not(edges, count=lines.shape[1], step_m=step_m)
+    if reason or not np.isfinite(lines[0]).all():
+        return lines, reason
+    return band_pass(lines, edges, step_m=step_m), ""
 
 
-def _twisted(levels: FloatArray, base_m: float, step_m: float, reason: str) -> tuple[FloatArray, str]:
-    if reason or len(levels) == 0:
-        return levels, reason
+def _twisted(lines: FloatArray, base_m: float, step_m: float, reason: str) -> tuple[FloatArray, str]:
+    if reason or lines.shape[1] == 0:
+        return lines, reason
     try:
-        return twist(levels, base_m=base_m, step_m=step_m), ""
+        return twist(lines, base_m=base_m, step_m=step_m), ""
     except InputError:
-        return levels, NO_TWIST
+        return lines, NO_TWIST
 
 
 def _counts(values: FloatArray, reason: str) -> np.ndarray:

@@ -117,7 +117,7 @@ def sees_no_future(estimator: Estimator, recording: Recording) -> None:
         return
     whole = estimator.estimate(recording)
     for n in prefix_lengths(recording):
-        part = replace(estimator.estimate(prefix(recording, n)), geometry=None)
+        part = replace(estimator.estimate(prefix(recording, n)), geometry=None, geometry_draws=None)
         require_same(first_samples(whole, n), part, when=f"cut after {n} of {len(recording.imu)} samples")
 
 
@@ -157,6 +157,8 @@ def require_well_formed(estimate: Estimate, recording: Recording) -> None:
         _require_covariance(estimate, len(index))
     if estimate.geometry is not None:
         _require_geometry(estimate.geometry)
+    if estimate.geometry_draws is not None:
+        _require_draws(estimate)
 
 
 def _require_geometry(geometry: pd.DataFrame) -> None:
@@ -170,6 +172,16 @@ def _require_geometry(geometry: pd.DataFrame) -> None:
     for name in geometry:
         known = np.isfinite(geometry[name].to_numpy(dtype=np.float64))
         assert known.all() or not known.any(), f"geometry is not finite in {name}, here and there"
+
+
+def _require_draws(estimate: Estimate) -> None:
+    geometry, draws = estimate.geometry, estimate.geometry_draws
+    assert geometry is not None and draws is not None, "geometry_draws are there without a geometry"
+    assert draws.ndim == 3 and draws.shape[1:] == (len(geometry), len(IRREGULARITY)), (
+        f"geometry_draws have the shape {draws.shape}, not (draws, {len(geometry)}, {len(IRREGULARITY)})"
+    )
+    known = geometry[list(IRREGULARITY)].notna().to_numpy()
+    assert (np.isfinite(draws) == known).all(), "geometry_draws are not finite where the geometry is"
 
 
 def _require_covariance(estimate: Estimate, n: int) -> None:
@@ -200,9 +212,11 @@ def require_same(one: Estimate, other: Estimate, *, when: str) -> None:
         assert list(a) == list(b) and a.index.equals(b.index), f"{when}: {what} has another shape"
         for name in a:
             _require_bits(a[name].to_numpy(), b[name].to_numpy(), what=f"{when}: {name}")
-    assert (one.covariance is None) == (other.covariance is None), f"{when}: covariance is there once"
-    if one.covariance is not None and other.covariance is not None:
-        _require_bits(one.covariance, other.covariance, what=f"{when}: covariance")
+    for what in ("covariance", "geometry_draws"):
+        a, b = getattr(one, what), getattr(other, what)
+        assert (a is None) == (b is None), f"{when}: {what} is there once and once not"
+        if a is not None:
+            _require_bits(a, b, what=f"{when}: {what}")
 
 
 def _require_bits(a: np.ndarray, b: np.ndarray, *, what: str) -> None:
@@ -249,6 +263,7 @@ def first_samples(estimate: Estimate, n: int) -> Estimate:
         innovations=None if estimate.innovations is None else estimate.innovations.iloc[:n],
         covariance=None if estimate.covariance is None else estimate.covariance[:n],
         geometry=None,
+        geometry_draws=None,
     )
 
 

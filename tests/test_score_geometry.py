@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import stdtr, stdtrit
 
 from estimators.track_geometry import track_geometry
 from simrail import bands as band_module
@@ -119,6 +120,35 @@ def test_consistency_is_that_of_the_unfiltered_irregularities():
     assert figure(table, "cross_level", "coverage95") == pytest.approx(0.95, abs=0.015)
     told = table[table["metric"].isin(["nees", "coverage95"])]
     assert set(zip(told["quantity"], told["band"], strict=True)) == {("cross_level", "full")}
+
+
+def rough(rng, count):
+    """Errors (count, places), m: white, so that a band has a share of their variance and twist twice it."""
+    return 1e-3 * rng.standard_normal((count, len(S)))
+
+
+def test_coverage_in_a_band_and_of_twist_is_by_draws_of_the_error():
+    """Of draws as large as the error 95 % lie inside, within what 1000 m hold; of others Student's share."""
+    rng = np.random.default_rng(4)
+    error = rough(rng, 1)[0]
+    found = estimate({"cross_level_m": error}, cross_level_sd_m=1e-3)
+    for scale in (1.0, 0.5, 2.0):
+        share = 2.0 * stdtr(60, scale * stdtrit(60, 0.975)) - 1.0
+        # D0 over 980 m has some 1500 degrees of freedom; their squares, of which it is a matter, count half.
+        spread = 4.0 * np.sqrt(share * (1.0 - share) / 700.0) + 1e-3
+        draws = np.zeros((60, len(S), 4))
+        draws[:, :, 2] = scale * rough(rng, 60)
+        table = score_geometry(replace(found, geometry_draws=draws), LAID, RECORDING, windows=["whole"])
+        assert figure(table, "cross_level", "coverage95", band="D0") == pytest.approx(share, abs=spread)
+        for band in ("full", "D0"):
+            assert figure(table, "twist", "coverage95", band=band) == pytest.approx(share, abs=spread)
+        told = table[table["metric"] == "nees"]  # the mean square of a Student's t is no 1
+        assert set(zip(told["quantity"], told["band"], strict=True)) == {("cross_level", "full")}
+        # Unfiltered, the estimate's own standard deviation counts.
+        assert figure(table, "cross_level", "coverage95") == pytest.approx(0.95, abs=0.015)
+    for shape in ((60, len(S) - 1, 4), (60, len(S), 3)):
+        with pytest.raises(InputError, match="geometry_draws"):
+            score_geometry(replace(found, geometry_draws=np.zeros(shape)), LAID, RECORDING)
 
 
 def test_what_is_left_open_is_told_once_and_is_no_failure():

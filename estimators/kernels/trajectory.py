@@ -58,7 +58,7 @@ def mirror(p: FloatArray) -> None:
 
 @njit_borrowed
 def predict(x: FloatArray, p: FloatArray, q: FloatArray, kind: int, dt: float) -> None:
-    """x <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is row ``kind`` of ``q`` (c, 18)."""
+    """x <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is row ``kind`` of ``q`` (c, 21)."""
     half = 0.5 * dt * dt
     width = p.shape[1]
     for a in range(0, 6, 2):
@@ -151,7 +151,7 @@ def trajectory_filter(
         See `misprint`; of no rows for the corrected equations.
     kinds : ndarray of int (n,)
         Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
-    process : ndarray (c, 18)
+    process : ndarray (c, 21)
         Upper triangles of the five blocks of Q, row by row.
     noise : ndarray (c, 8)
         Variances U of the measurements.

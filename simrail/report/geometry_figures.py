@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.bands import BANDS, Band, band_pass, why_not
+from simrail.bands import BANDS, Band, band_pass, sd_of_draws, why_not
+from simrail.columns import IRREGULARITY
 from simrail.example import CellResult
 from simrail.jit import FloatArray
 from simrail.report.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case
@@ -64,10 +65,13 @@ def stretch_words(example: CellResult, stretch: tuple[float, float]) -> str:
     return f"all {length:.0f} m of the ride" if is_all else f"{length:.0f} m in the middle of the ride"
 
 
-def lines_of(example: CellResult, name: str, quantity: str, band: Band | None) -> tuple[FloatArray, ...]:
+def lines_of(
+    example: CellResult, name: str, quantity: str, band: Band | None, *, by_draws: bool = False
+) -> tuple[FloatArray, ...]:
     """Places, true rails, estimated rails and their sd (NaN if unknown), mm; in a band or unfiltered.
 
-    The sd is always that of the unfiltered rails, as the paper has it.
+    The sd in a band is that of the unfiltered rails, as paper 001 has it, or by draws that of the filtered
+    ones.
     """
     geometry = example.estimates[name].geometry
     assert geometry is not None and example.rails is not None
@@ -83,6 +87,12 @@ def lines_of(example: CellResult, name: str, quantity: str, band: Band | None) -
         if why_not(edges, count=len(place), step_m=step):
             nothing = np.full(len(place), np.nan)
             return place, nothing, nothing, nothing
+        draws = example.estimates[name].geometry_draws
+        if by_draws:
+            sd = np.full(len(place), np.nan)
+            if draws is not None:
+                drawn = 1e3 * draws[:, :, IRREGULARITY.index(column)]
+                sd = sd_of_draws(band_pass(drawn, edges, step_m=step))
         true, found = (band_pass(line, edges, step_m=step) for line in (true, found))
     return place, true, found, sd
 
@@ -109,7 +119,7 @@ def rails_figure(
     limits : tuple of float
         First and last place, m.
     with_interval : bool
-        Whether to draw the interval.
+        Whether to draw the interval: by draws where the method has them.
     what : str
         Description for those who cannot see it.
     """
@@ -118,7 +128,8 @@ def rails_figure(
         for axis, quantity in zip(axes, JUDGED, strict=True):
             reach = [0.0]
             for order, style in enumerate(styles):
-                place, true, found, sd = lines_of(example, style.name, quantity, band)
+                drawn = example.estimates[style.name].geometry_draws is not None
+                place, true, found, sd = lines_of(example, style.name, quantity, band, by_draws=drawn)
                 at = (place >= limits[0]) & (place <= limits[1]) & np.isfinite(found)
                 if order == 0:
                     axis.plot(place[at], true[at], color=TRUTH, lw=2.6, label="truth", zorder=2)

@@ -178,7 +178,9 @@ def _beside_paper(
         return beside_briales(all_cases, ran, styles, examples)
     if scenario.spec.paper == "gonzalez_2023":
         tunings = tunings_of(ran, scenario.folder)
-        return beside_gonzalez(all_cases, ran, styles, examples, tunings=tunings, former=former)
+        return beside_gonzalez(
+            all_cases, ran, styles, examples, tunings=tunings, scenario=scenario, former=former
+        )
     return None
 
 

@@ -52,6 +52,7 @@ class EncoderPart(Part):
     pulses_per_revolution: Listed[Annotated[int, Field(ge=1, le=1_000_000)]] = 1024
     rate_hz: Listed[Annotated[float, Field(gt=0.0, le=1000.0)]] = 250.0
     radius_error_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.0
+    rolling_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.004
     radius_error: Listed[Annotated[float, Field(ge=-0.2, le=0.2)]] | None = None
     quadrature: Listed[bool] = False
     edge_pattern_sd: Listed[Fraction] = 0.0

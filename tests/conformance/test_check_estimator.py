@@ -82,7 +82,7 @@ BACKWARDS = {
     "gda": AttitudeGda(),
     "vqf": Vqf(),
     "imufusion": Imufusion(),
-    "trajectory": TrajectorySmoother(),
+    "trajectory": TrajectorySmoother(draws=2),
     "trajectory_filter": TrajectorySmoother(smoothed=False),
 }
 

@@ -22,6 +22,7 @@ from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
 from simrail.report.paper_001.beside import FULL, MODEL, OtherSize, other_size, where
 from simrail.report.paper_001.claims import Peak, claims, errata_note
+from simrail.report.paper_001.own_ride import FILTERED, own_ride_note, searched_on
 from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
@@ -29,6 +30,7 @@ from simrail.report.pivot import Figures, of_cell
 from simrail.report.sentences import listed
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.cells import Method
+from simrail.scenario.scenario import Scenario
 
 SCALED = Band("paper", 0.3, 7.0)
 FULL_SIZE = Band("paper", 3.0, 70.0)
@@ -70,6 +72,7 @@ def paper_view(
     examples: Sequence[CellResult],
     *,
     tunings: Mapping[str, Tuning] | None = None,
+    scenario: Scenario | None = None,
     former: FormerResults | None = None,
 ) -> PaperView | None:
     """Make the section; None if no case has rail geometry.
@@ -84,6 +87,8 @@ def paper_view(
         First draw of each ride, and of an IMU with noise added.
     tunings : mapping of str to Tuning, optional
         Tunings by the method that names them.
+    scenario : Scenario, optional
+        What was run: tells which tunings were searched on the ride that is drawn.
     former : FormerResults, optional
         Results of the other size, whose rows stand beside ours.
     """
@@ -107,16 +112,22 @@ def paper_view(
         for part in ("cml", "cml_held", "kom", "hand", "printed")
         if example and part in looks and with_rails(example, [looks[part]])
     }
+    by_draws = {part: coverage_of(example, looks[part], band, by_draws=True) for part in covered if example}
     size = MODEL if band is SCALED else FULL
     other = other_size(former, band=SCALED.name) if former is not None else None
     tuned = by_part(rows.names, tunings or {})
+    own = {
+        part: _filtered_sds(example, looks[part], band)
+        for part, tuning in tuned.items()
+        if example and scenario and part in looks and searched_on(tuning, scenario, example.cell)
+    }
     return PaperView(
         where=where(rows),
         size=size,
         is_model=size == MODEL,
         other=other,
         table=_table(rows, looks, size, other),
-        coverage=_coverage_table(covered, looks),
+        coverage=_coverage_table(covered, by_draws, looks),
         tunings=status_table(tuned),
         commands=commands(tuned),
         claims=claims(
@@ -125,12 +136,28 @@ def paper_view(
             peak=_peak(example, drawn, band) if example and drawn else Peak(np.nan, np.nan, np.nan),
             tuning=tuned.get("cml"),
         ),
-        notes=[note for note in (*notes(tuned), errata_note(rows), *_not_run(rows)) if note],
+        notes=[
+            note
+            for note in (*notes(tuned), own_ride_note(rows, own), errata_note(rows), *_not_run(rows))
+            if note
+        ],
         figures=[
             *(_figures(rows, looks, example, band) if example else []),
             *(_noise_figure(rows, looks, example, noisy, band) if example and noisy else []),
         ],
     )
+
+
+def _filtered_sds(example: CellResult, style: MethodStyle, band: Band) -> list[float]:
+    """Sd of the filtered error on one ride, mm, in the order of `FILTERED`; NaN where there is none."""
+    sds = []
+    for quantity in FILTERED:
+        if not with_rails(example, [style]):
+            return [float("nan")] * len(FILTERED)
+        _, true, found, _ = lines_of(example, style.name, quantity, band)
+        error = (found - true)[np.isfinite(found)]
+        sds.append(float(error.std()) if len(error) else float("nan"))
+    return sds
 
 
 def _band_of(example: CellResult | None) -> Band:
@@ -180,14 +207,17 @@ def _number(rows: Rows, part: str, quantity: str, metric: str, *, filtered: bool
     return Cell(f"{found.value:.3f}".replace("-", "\u2212"))
 
 
-def coverage_of(example: CellResult, style: MethodStyle, band: Band) -> list[float]:
+def coverage_of(
+    example: CellResult, style: MethodStyle, band: Band, *, by_draws: bool = False
+) -> list[float]:
     """Share of the track inside a method's 95 % interval, %, in the order of `COLUMNS`; [] without sds.
 
-    As in the paper, the interval about filtered rails is that of the unfiltered ones.
+    As in the paper, the interval about filtered rails is that of the unfiltered ones; by draws, their own.
     """
     shares = []
     for quantity, filtered in COLUMNS:
-        _, true, found, sd = lines_of(example, style.name, quantity, band if filtered else None)
+        cut = band if filtered else None
+        _, true, found, sd = lines_of(example, style.name, quantity, cut, by_draws=by_draws)
         known = np.isfinite(found) & np.isfinite(sd)
         if not known.any():
             return []
@@ -195,12 +225,18 @@ def coverage_of(example: CellResult, style: MethodStyle, band: Band) -> list[flo
     return shares
 
 
-def _coverage_table(covered: dict[str, list[float]], looks: dict[str, MethodStyle]) -> Table:
+def _coverage_table(
+    covered: dict[str, list[float]], by_draws: dict[str, list[float]], looks: dict[str, MethodStyle]
+) -> Table:
     rows = [Row("CML: printed", "", "", [Cell(f"{value:g}") for value in COVERAGE])]
     for part, values in covered.items():
         if values:
             cells = [Cell(f"{value:.0f}") for value in values]
             rows.append(Row(PARTS[part], "", looks[part].colour, cells))
+        if by_draws.get(part):
+            cells = [Cell(f"{value:.0f}") for value in by_draws[part]]
+            label = f"{PARTS[part]}: interval of the filtered rails, by draws"
+            rows.append(Row(label, "", looks[part].colour, cells))
     columns = [f"{QUANTITIES[q]}, {'filtered' if f else 'unfiltered'}" for q, f in COLUMNS]
     return Table([("inside the 95 % interval, %", len(columns))], columns, rows)
 
@@ -239,7 +275,9 @@ def _figures(
         )
         svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
         figures.append((text, Markup(svg)))
-        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, unfiltered."
+        drawn = example.estimates[first[0].name].geometry_draws is not None
+        how = "which follows from draws of its error" if drawn else "that of unfiltered rails"
+        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}."
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
         figures.append((text, Markup(svg)))
     return figures

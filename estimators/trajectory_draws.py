@@ -1,0 +1,137 @@
+"""Draws of the trajectory smoother's error, and of the rails' that follow from it.
+
+A standard deviation at each place does not say how the error hangs together along the track, so nothing
+follows from it for a band of wavelengths. Draws of the whole error do: each is filtered as the rails are, and
+their root mean square in a band is the standard deviation there (`simrail.bands.sd_of_draws`).
+
+What is drawn is what `estimators.track_geometry` has in its standard deviations, each as it hangs together:
+
+* the smoother's error: from the joint posterior of all samples (`estimators.kernels.trajectory_draws`);
+* the accelerometer's turn-on bias, taken for roll: one number per draw, uniform;
+* the rail sensor's noise: white;
+* the odometry's error of position: one normal number per draw times its sd at each place, as if it were of
+  one cause.
+
+A draw is the truth minus the estimate: added to the estimate it is rails that the recording allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
+
+from estimators.kernels.trajectory_draws import trajectory_error
+from estimators.kernels.trajectory_equations import ROLL, ROWS, STATES, Y, Z
+from estimators.track_geometry import Sight, over_space, slopes
+from estimators.trajectory_model import Model, dense_process
+from simrail.columns import IRREGULARITY
+from simrail.jit import FloatArray
+from simrail.recording import Recording
+from simrail.seeds import stream
+
+FELT = (ROLL, Y, Z)
+"""States that the rails depend on to first order."""
+
+ROOT = 0
+"""Of the streams: an estimator has no seed of its own, and the same recording gives the same draws."""
+
+
+def stream_of(recording: Recording, draw: int, term: str) -> np.random.Generator:
+    """Random numbers of one term of one draw; those of another ride or IMU are others."""
+    return stream(ROOT, "rail draws", recording.name, recording.mount, draw, term)
+
+
+def state_errors(
+    model: Model,
+    gains: FloatArray,
+    scaled: FloatArray,
+    states: FloatArray,
+    covariance: FloatArray,
+    streams: Sequence[np.random.Generator],
+) -> FloatArray:
+    """Draws of the smoothing error of the states `FELT`.
+
+    Parameters
+    ----------
+    model : Model
+        What the filter had.
+    gains, scaled, states, covariance : ndarray
+        What it left behind, before the way back replaces it; shapes as in
+        `estimators.kernels.trajectory_draws.trajectory_error`.
+    streams : sequence of numpy.random.Generator
+        One for each of m draws.
+
+    Returns
+    -------
+    ndarray (m, n, 3)
+        rad and m.
+    """
+    n = len(states)
+    root = np.array([np.linalg.cholesky(dense_process(q)) for q in model.process])
+    start_sd, noise_sd = np.sqrt(model.start_variance), np.sqrt(model.noise)
+    steady = (model.track, model.slips, model.kinds, root, noise_sd, start_sd, model.step_s, model.gravity)
+    found, errors, innovations = np.empty((len(streams), n, 3)), np.empty((n, STATES)), np.empty((n, ROWS))
+    for draw, rng in enumerate(streams):
+        normals = rng.standard_normal((n, STATES + ROWS))
+        trajectory_error(*steady, gains, scaled, states, covariance, normals, innovations, errors)
+        found[draw] = errors[:, FELT]
+    return found
+
+
+def geometry_draws(
+    sight: Sight,
+    geometry: pd.DataFrame,
+    errors: FloatArray,
+    recording: Recording,
+    *,
+    tilt_rad: float,
+    step_m: float,
+) -> FloatArray:
+    """Draws of true minus estimated irregularities.
+
+    Parameters
+    ----------
+    sight : Sight
+        Of the estimate (`estimators.track_geometry.sight_of`).
+    geometry : pandas.DataFrame
+        The estimated rails.
+    errors : ndarray (m, n, 3)
+        Draws of the error of the states `FELT` (`state_errors`).
+    recording : Recording
+        Names the draws.
+    tilt_rad : float
+        Bound of the roll that the accelerometer's turn-on bias is taken for; 0 for none.
+    step_m : float
+        As in `estimators.track_geometry.track_geometry`.
+
+    Returns
+    -------
+    ndarray (m, places, 4)
+        `simrail.columns.IRREGULARITY` over the places of ``geometry``, m; NaN where that is.
+    """
+    slope, place = slopes(sight.arms)[sight.use], sight.place[sight.use]
+    variance = np.square(sight.place_sd[sight.use])[:, None]
+    lines = geometry[list(IRREGULARITY)].to_numpy(dtype=np.float64)
+    unknown = np.isnan(lines)
+    white = sight.noise_sd * np.sqrt([0.5, 0.5, 2.0, 2.0])  # of mean and difference of two rails
+    drawn = np.empty((len(errors), *lines.shape))
+    for draw, error in enumerate(errors):
+        states = error[sight.use]
+        states[:, 0] += stream_of(recording, draw, "accel_bias").uniform(-tilt_rad, tilt_rad)
+        # Not by BLAS, whose sums depend on how many threads it has.
+        rails = np.einsum("nij,nj->ni", slope, states)
+        if sight.noise_sd > 0.0:
+            rails += white * stream_of(recording, draw, "rail_sensor").standard_normal(rails.shape)
+        found = over_space(place, rails, step_m=step_m, variance=variance)
+        drawn[draw] = found.values
+        if len(found.position_m) and found.variance is not None and found.variance.any():
+            at = found.position_m
+            sd = np.sqrt(found.variance[:, 0])
+            moved = at + stream_of(recording, draw, "position").standard_normal() * sd
+            known = np.where(unknown, 0.0, lines)
+            drawn[draw] += CubicSpline(at, known)(np.clip(moved, at[0], at[-1])) - known
+        drawn[draw][unknown] = np.nan
+    return drawn
