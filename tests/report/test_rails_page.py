@@ -316,6 +316,18 @@ def test_sentences_are_of_the_band_that_counts_and_of_every_method(ran: Ran) -> 
     assert not any("Asked were" in one.text for one in goals), "what is asked is asked of D1"
 
 
+def test_intervals_are_told_of_the_band_that_counts_where_there_are_any() -> None:
+    one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
+    found = {("ours", "vertical_profile", "full", "truth", "whole", "sd"): Figure(0.4, 0.0, 2)}
+    found["ours", "alignment", "full", "truth", "whole", "coverage95"] = Figure(0.5, 0.0, 2)
+    case = Figures({"imu": "ideal", "odometry": "truth"}, planted("D1").table, found)
+    text = "The 95 % interval of ours, of the unfiltered rails, holds the true alignment in 50 %: too small."
+    assert text in [said.text for said in geometry_findings(case, [one], [])]
+    found["ours", "alignment", "D1", "truth", "whole", "coverage95"] = Figure(0.95, 0.0, 2)
+    text = "in wavelengths of 3\u201325 m (D1), holds the true alignment in 95 %: about right."
+    assert any(said.text.endswith(text) for said in geometry_findings(case, [one], []))
+
+
 def test_a_goal_is_asked_of_d1_alone() -> None:
     found = {
         ("ours", "alignment", band, "truth", "whole", "sd"): Figure(0.4, 0.0, 2) for band in ("D1", "paper")
