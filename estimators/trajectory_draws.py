@@ -7,7 +7,7 @@ their root mean square in a band is the standard deviation there (`simrail.bands
 What is drawn is what `estimators.track_geometry` has in its standard deviations, each as it hangs together:
 
 * the smoother's error: from the joint posterior of all samples (`estimators.kernels.trajectory_draws`);
-* the accelerometer's turn-on bias, taken for roll: one number per draw, uniform;
+* the accelerometer's turn-on bias, taken for roll, and that of the package: one number each, uniform;
 * the rail sensor's noise: white;
 * the odometry's error of position: one normal number per draw times its sd at each place, as if it were of
   one cause.
@@ -87,7 +87,7 @@ def geometry_draws(
     errors: FloatArray,
     recording: Recording,
     *,
-    tilt_rad: float,
+    tilts_rad: Sequence[float],
     step_m: float,
 ) -> FloatArray:
     """Draws of true minus estimated irregularities.
@@ -102,8 +102,8 @@ def geometry_draws(
         Draws of the error of the states `FELT` (`state_errors`).
     recording : Recording
         Names the draws.
-    tilt_rad : float
-        Bound of the roll that the accelerometer's turn-on bias is taken for; 0 for none.
+    tilts_rad : sequence of float
+        Bounds of the roll that each thing that is constant over the ride is taken for.
     step_m : float
         As in `estimators.track_geometry.track_geometry`.
 
@@ -120,7 +120,8 @@ def geometry_draws(
     drawn = np.empty((len(errors), *lines.shape))
     for draw, error in enumerate(errors):
         states = error[sight.use]
-        states[:, 0] += stream_of(recording, draw, "accel_bias").uniform(-tilt_rad, tilt_rad)
+        shares = stream_of(recording, draw, "tilt").uniform(-1.0, 1.0, len(tilts_rad))
+        states[:, 0] += sum(share * bound for share, bound in zip(shares, tilts_rad, strict=True))
         # Not by BLAS, whose sums depend on how many threads it has.
         rails = np.einsum("nij,nj->ni", slope, states)
         if sight.noise_sd > 0.0:

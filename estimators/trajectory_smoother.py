@@ -7,9 +7,10 @@ smoother, and the first alone is to be had as a causal filter. It works at stand
 speed enters the measurements only, with its sign. What the rails look like then follows from the trajectory
 (`estimators.track_geometry`).
 
-The model has no sensor bias. An offset of the accelerometer is wholly taken for roll and pitch, so its sd
-by the data sheet is added to theirs afterwards (`sensor_bias`). What one of the gyro does to yaw is not in
-the standard deviations. Place is another matter: the virtual measurements hold it.
+The model has no sensor bias. An offset of the accelerometer is wholly taken for roll and pitch, and so is the
+turn of the device in its package: their sds by the data sheet are added afterwards (`sensor_bias`). What an
+offset of the gyro does to yaw is not in the standard deviations. Place is another matter: the virtual
+measurements hold it.
 
 What the model lacks is balanced from both sides within a ride, and from one side only at its two ends. A gyro
 bias that no rest has told, a start attitude that is believed too firmly, or virtual positions that are too
@@ -92,8 +93,8 @@ class TrajectorySmoother:
     with_covariance : bool
         False leaves out covariances and standard deviations, which take more than half of the time.
     sensor_bias : bool
-        Add what the turn-on bias of the data sheet does to roll and pitch to their variances. False leaves
-        the paper's, of a model in which sensors have none.
+        Add what the accelerometer's turn-on bias and the misalignment of the package, by the data sheet, do
+        to roll and pitch to their variances. False leaves the paper's, of a model in which sensors have none.
     geometry_step_m : float
         Distance of the places of the rail geometry; 0 leaves the geometry out. It lies over the track and is
         made after the ride, also of the filter's states, which are causal.
@@ -194,14 +195,16 @@ class TrajectorySmoother:
         sight, step = sight_of(estimate, recording), self.geometry_step_m
         geometry, drawn = geometry_of(sight, step_m=step), None
         if errors is not None:
-            tilt = self._tilt(recording)
-            drawn = geometry_draws(sight, geometry, errors, recording, tilt_rad=tilt, step_m=step)
+            tilts = self._tilts(recording)
+            drawn = geometry_draws(sight, geometry, errors, recording, tilts_rad=tilts, step_m=step)
         return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
-    def _tilt(self, recording: Recording) -> float:
-        """Bound of the roll or pitch that the accelerometer's turn-on bias is taken for, rad."""
-        bias = recording.imu_sheet.accel_turn_on_bias_mps2 if self.sensor_bias else 0.0
-        return bias / recording.gravity_mps2
+    def _tilts(self, recording: Recording) -> tuple[float, ...]:
+        """Bounds of the roll or pitch that the accelerometer's turn-on bias and the package cause, rad."""
+        sheet = recording.imu_sheet
+        if not self.sensor_bias:
+            return ()
+        return sheet.accel_turn_on_bias_mps2 / recording.gravity_mps2, sheet.package_misalignment_rad
 
     def _trajectory(self, recording: Recording) -> tuple[Estimate, FloatArray | None]:
         """Without the geometry; the trace is let go before that is made, since it is large."""
@@ -212,7 +215,8 @@ class TrajectorySmoother:
         covariance = None
         if self.with_covariance:
             covariance = block(found.covariance, OUTPUT)
-            covariance[:, [0, 1], [0, 1]] += self._tilt(recording) ** 2 / 3.0  # uniform within that bound
+            # Uniform within their bounds.
+            covariance[:, [0, 1], [0, 1]] += sum(bound**2 for bound in self._tilts(recording)) / 3.0
             columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
             names += [*ATTITUDE_SD, *RELATIVE_POSITION_SD]
         estimate = Estimate(

@@ -27,7 +27,7 @@ from simrail.columns import GYRO
 from simrail.estimate import Estimate, Estimator
 from simrail.recording import Recording
 from simrail.ride import simulate
-from simrail.scenario.build import Parts
+from simrail.scenario.build import Parts, mount_of
 from simrail.scenario.cells import cells
 from simrail.scenario.files import shipped
 from simrail.scenario.scenario import load_scenario
@@ -56,7 +56,8 @@ def ride(own_cache: None) -> tuple[Rides, LaidTrack]:
     def record(*more: str) -> list[Recording]:
         scenario = load_scenario("scale_track", overrides=[*settings, *more])
         parts = Parts(scenario)
-        return [record_cell(cell, simulate(parts.ride(cell)), parts) for cell in cells(scenario)]
+        chosen = [cell for cell in cells(scenario) if mount_of(cell).name == "body"]
+        return [record_cell(cell, simulate(parts.ride(cell)), parts) for cell in chosen]
 
     scenario = load_scenario("scale_track", overrides=settings)
     rails = Parts(scenario).rails(next(iter(cells(scenario))))

@@ -4,7 +4,7 @@ The simulation smoother of Durbin and Koopman (2002), in their form of mean corr
 linearisation. Its gains are at hand, so that a draw is two recursions of twelve numbers, without covariance.
 Random numbers come from outside.
 
-Not here: the geometry of the rails that follows from a draw (`estimators.geometry_draws`).
+Not here: the geometry of the rails that follows from a draw (`estimators.trajectory_draws`).
 """
 
 from __future__ import annotations

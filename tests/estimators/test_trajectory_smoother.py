@@ -21,10 +21,19 @@ from estimators.trajectory_noise import Hyperparameters
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend, log_likelihood
 from estimators.tuning_file import Tuning
 from simrail.bands import BANDS, band_pass
-from simrail.columns import ATTITUDE, ATTITUDE_SD, IRREGULARITY, RELATIVE_POSITION, RELATIVE_POSITION_SD
+from simrail.columns import (
+    ACCEL,
+    ATTITUDE,
+    ATTITUDE_SD,
+    GYRO,
+    IRREGULARITY,
+    RELATIVE_POSITION,
+    RELATIVE_POSITION_SD,
+)
 from simrail.errors import InputError
 from simrail.recording import Recording
 from simrail.report.estimate_figures import innovation_figure
+from simrail.rotation import rotation_matrix
 from simrail.scenario.build_estimator import construct
 from simrail.score_geometry import score_geometry
 from simrail.seeds import stream
@@ -253,6 +262,23 @@ def test_an_offset_of_the_accelerometer_is_taken_for_tilt_and_told(line_recordin
     tilt = bound / math.sqrt(3.0) / 9.81
     np.testing.assert_allclose(np.abs(middle[["roll_rad", "pitch_rad"]]), tilt, rtol=0.1)
     assert np.abs(middle[list(RELATIVE_POSITION)]).mean().max() < 1e-3
+
+
+def test_a_turn_of_the_package_is_taken_for_tilt_and_told(line_recording: Callable) -> None:
+    """A device that is turned about X and Y, gyro and accelerometer alike, rolls and pitches as much."""
+    recording = part(line_recording(70.0, 1, 0), 6000, 6000)
+    bound = 4e-3
+    turned = replace(recording, imu_sheet=replace(recording.imu_sheet, package_misalignment_rad=bound))
+    smoother = TrajectorySmoother(geometry_step_m=0.0)
+    before, told = smoother.estimate(recording).states, smoother.estimate(turned).states
+    sds = ["roll_sd_rad", "pitch_sd_rad"]
+    added = np.square(told[sds]) - np.square(before[sds])
+    np.testing.assert_allclose(added, bound**2 / 3.0, rtol=1e-9)
+    imu = recording.imu.copy()
+    for kind in (GYRO, ACCEL):  # what the device senses is the body's, turned back by its own turn
+        imu[list(kind)] = imu[list(kind)].to_numpy() @ rotation_matrix(np.array([[bound, bound, 0.0]]))[0]
+    moved = (smoother.estimate(replace(recording, imu=imu)).states - before).iloc[2500:-2500]
+    np.testing.assert_allclose(moved[["roll_rad", "pitch_rad"]], bound, rtol=0.1)
 
 
 def test_the_rails_follow_from_the_trajectory(line_recording: Callable) -> None:
