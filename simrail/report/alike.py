@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,6 +36,15 @@ def alike(case: Figures, styles: Sequence[MethodStyle]) -> list[list[MethodStyle
         else:
             groups.append([style])
     return groups
+
+
+def one_of_each(case: Figures, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
+    """Methods without those that lie upon an earlier one in a figure, which says how many they are."""
+    like, labels = set(), {}
+    for first, *rest in alike(case, styles):
+        like |= {style.name for style in rest}
+        labels[first.name] = f"{first.label} and {len(rest)} alike" if rest else first.label
+    return [replace(s, label=labels.get(s.name, s.label)) for s in styles if s.name not in like]
 
 
 def _figures(case: Figures, style: MethodStyle) -> FloatArray:

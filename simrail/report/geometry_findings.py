@@ -10,6 +10,7 @@ from simrail.report.geometry_tables import baseline_of, is_zero, main_of, mapper
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
 from simrail.report.sentences import Finding, interval_verdict, listed, significant
+from simrail.score_table import FULL
 
 MOST_OTHERS = 2
 """So many other methods are told one by one beside the first; of more, the best and the worst."""
@@ -74,7 +75,7 @@ def geometry_findings(
         text += f". It would be {', '.join(parts)}." if parts else "."
         text += _beside(case, styles, quantity, band=band)
         result.append(Finding(tone, text))
-    return result + _lost(case, styles, band) + _coverage(case, main)
+    return result + _lost(case, styles, band) + _coverage(case, main, band, known)
 
 
 def _beside(case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band: str) -> str:
@@ -109,11 +110,16 @@ def _lost(case: Figures, styles: Sequence[MethodStyle], band: str) -> list[Findi
     return [Finding("bad", f"No IMU at all beats {'; '.join(lost)}.")] if lost else []
 
 
-def _coverage(case: Figures, main: MethodStyle) -> list[Finding]:
-    """What the 95 % intervals of the first method hold, in one sentence as bad as the worst of them."""
+def _coverage(case: Figures, main: MethodStyle, band: str, known: Mapping[str, Band]) -> list[Finding]:
+    """What the 95 % intervals of the first method hold, in one sentence as bad as the worst of them.
+
+    Those of the band that counts where the method has them, else those of the unfiltered rails.
+    """
     told, tones = [], []
+    if not any(case.get(main.name, quantity, "coverage95", band=band).draws for quantity in JUDGED):
+        band = FULL
     for quantity in JUDGED:
-        covered = case.get(main.name, quantity, "coverage95")
+        covered = case.get(main.name, quantity, "coverage95", band=band)
         if not covered.draws:
             continue
         tone, verdict = interval_verdict(covered.value)
@@ -122,7 +128,8 @@ def _coverage(case: Figures, main: MethodStyle) -> list[Finding]:
     if not told:
         return []
     worst = next(tone for tone in ("bad", "note", "good") if tone in tones)
-    text = f"The 95 % interval of {main.label}, of the unfiltered rails, holds {'; '.join(told)}."
+    where = "of the unfiltered rails" if band == FULL else waves_words(band, known)
+    text = f"The 95 % interval of {main.label}, {where}, holds {'; '.join(told)}."
     return [Finding(worst, text)]
 
 

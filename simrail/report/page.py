@@ -18,7 +18,7 @@ from markupsafe import Markup
 from simrail.bands import Band
 from simrail.example import CellResult
 from simrail.former import FormerResults
-from simrail.report.alike import alike
+from simrail.report.alike import one_of_each
 from simrail.report.attitude_figures import attitude_figure, error_figure
 from simrail.report.campaign.section import campaign_view
 from simrail.report.campaign.tables import write_tables
@@ -26,7 +26,7 @@ from simrail.report.findings import findings
 from simrail.report.geometry_bands import band_of_all
 from simrail.report.geometry_findings import geometry_findings
 from simrail.report.geometry_tables import geometry_table, overview_table
-from simrail.report.geometry_view import GeometryView, geometry_view
+from simrail.report.geometry_view import MOST_DRAWN, GeometryView, geometry_view
 from simrail.report.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.paper_000.section import paper_view as beside_briales
 from simrail.report.paper_001.section import paper_view as beside_gonzalez
@@ -76,6 +76,7 @@ class RideView:
     rms: Markup
     curves: Markup
     geometry: GeometryView | None
+    left_out: int
 
 
 @dataclass(frozen=True)
@@ -198,14 +199,10 @@ def _ride(
         # Where rails are scored, they are what the ride was for.
         said += geometry_findings(case, styles, all_cases, goals_mm=goals_mm(spec), known=known)
         said += findings(case, attitude_methods(styles), others=all_cases)
-    if case:
-        # One line for all that lie upon each other.
-        groups = alike(case, drawn)
-        like = {style.name for _, *rest in groups for style in rest}
-        names = {
-            group[0].name: f"{group[0].label} and {len(group) - 1} alike" for group in groups if group[1:]
-        }
-        drawn = [replace(s, label=names.get(s.name, s.label)) for s in drawn if s.name not in like]
+    geometry = geometry_view(example, case, styles, limits=limits_of(spec), known=known)
+    drawn = one_of_each(case, drawn) if case else drawn
+    left_out = [s.name for s in drawn if not s.baseline][MOST_DRAWN:] if geometry else []
+    drawn = [style for style in drawn if style.name not in left_out]
     first = [s for s in drawn if not s.baseline] + [s for s in drawn if s.baseline == "general purpose"]
     by_name = {style.name: style for style in drawn}
     comparisons = []
@@ -233,7 +230,8 @@ def _ride(
         odometry=Markup(odometry_figure(example)),
         rms=Markup(rms_figure(case, attitude_methods(styles))) if case else nothing,
         curves=Markup(curves_figure(case, attitude_methods(styles))) if case else nothing,
-        geometry=geometry_view(example, case, styles, limits=limits_of(spec), known=known),
+        geometry=geometry,
+        left_out=len(left_out),
     )
 
 

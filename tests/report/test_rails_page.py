@@ -17,7 +17,7 @@ from simrail.campaign import run_campaign
 from simrail.estimate import Estimate
 from simrail.example import CellResult
 from simrail.report import write_report
-from simrail.report.alike import alike
+from simrail.report.alike import alike, one_of_each
 from simrail.report.findings import findings
 from simrail.report.geometry_bands import JUDGED, band_words, judged_band, waves_words
 from simrail.report.geometry_figures import rails_figure, stretch_of, stretch_words
@@ -25,6 +25,8 @@ from simrail.report.geometry_findings import geometry_findings
 from simrail.report.geometry_tables import geometry_table, overview_table
 from simrail.report.geometry_view import geometry_view
 from simrail.report.methods import MethodStyle, attitude_methods, method_styles
+from simrail.report.page import _ride
+from simrail.report.paper_001.parts import COLOURS
 from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.pivot import Figure, Figures, cases
 from simrail.report.sentences import unbroken
@@ -314,6 +316,18 @@ def test_sentences_are_of_the_band_that_counts_and_of_every_method(ran: Ran) -> 
     assert not any("Asked were" in one.text for one in goals), "what is asked is asked of D1"
 
 
+def test_intervals_are_told_of_the_band_that_counts_where_there_are_any() -> None:
+    one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
+    found = {("ours", "vertical_profile", "full", "truth", "whole", "sd"): Figure(0.4, 0.0, 2)}
+    found["ours", "alignment", "full", "truth", "whole", "coverage95"] = Figure(0.5, 0.0, 2)
+    case = Figures({"imu": "ideal", "odometry": "truth"}, planted("D1").table, found)
+    text = "The 95 % interval of ours, of the unfiltered rails, holds the true alignment in 50 %: too small."
+    assert text in [said.text for said in geometry_findings(case, [one], [])]
+    found["ours", "alignment", "D1", "truth", "whole", "coverage95"] = Figure(0.95, 0.0, 2)
+    text = "in wavelengths of 3\u201325 m (D1), holds the true alignment in 95 %: about right."
+    assert any(said.text.endswith(text) for said in geometry_findings(case, [one], []))
+
+
 def test_a_goal_is_asked_of_d1_alone() -> None:
     found = {
         ("ours", "alignment", band, "truth", "whole", "sd"): Figure(0.4, 0.0, 2) for band in ("D1", "paper")
@@ -348,6 +362,30 @@ def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran
     assert "The track here is 1:10 as well." in ran.page
     assert "1 ride, 2 IMUs" in ran.page
     assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
+
+
+def test_one_line_stands_for_all_that_are_alike(ran: Ran) -> None:
+    labels = [style.label for style in one_of_each(ran.cases[0], ran.styles)]
+    assert labels == ["smoother and 1 alike", "design angles", "zero track"]
+
+
+def test_beside_rails_few_attitudes_are_drawn_and_the_rest_counted(
+    ran: Ran, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def drawn() -> tuple[int, bool]:
+        view = _ride(ran.example, ran.cases, ran.styles, ran.scenario.spec)
+        return view.left_out, "smoother and 1 alike" in str(view.attitude)
+
+    assert drawn() == (0, True)
+    monkeypatch.setattr("simrail.report.page.MOST_DRAWN", 0)
+    assert drawn() == (1, False)
+
+
+def test_only_what_is_drawn_beside_the_paper_has_a_colour_in_its_table(ran: Ran) -> None:
+    paper = paper_view(ran.cases, methods(ran.scenario), ran.styles, ran.examples)
+    assert isinstance(paper, PaperView)
+    colours = {row.label: row.colour for row in paper.table.rows if "printed" not in row.label}
+    assert colours["set by hand"] == COLOURS["hand"] and colours["no IMU"] == ""
 
 
 def test_methods_are_alike_only_if_every_figure_is(

@@ -99,7 +99,7 @@ def paper_view(
     example = example or next((e for e in examples if e.rails is not None), None)
     noisy = next((e for e in examples if rows.noisy and of_cell(list(all_cases), e.cell) is rows.noisy), None)
     looks = {
-        part: replace(style, colour=COLOURS.get(part, style.colour), stroke="-")
+        part: replace(style, colour=COLOURS.get(part, ""), stroke="-")
         for part, name in rows.names.items()
         for style in styles
         if style.name == name
