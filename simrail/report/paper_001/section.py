@@ -1,4 +1,4 @@
-"""The section itself: tables, claims, notes and figures, gathered for the template.
+"""The section itself: its tables, and claims, notes and figures gathered for the template.
 
 Everything of ours is looked up in the scores, or computed from the first draw of the ride that is drawn.
 """
@@ -17,17 +17,17 @@ from simrail.example import CellResult
 from simrail.former import FormerResults
 from simrail.report.claim import Claim
 from simrail.report.geometry_bands import QUANTITIES
-from simrail.report.geometry_figures import lines_of, rails_figure, stretch_of, stretch_words
+from simrail.report.geometry_figures import lines_of
 from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
 from simrail.report.paper_001.beside import FULL, MODEL, OtherSize, other_size, where
 from simrail.report.paper_001.claims import Peak, claims, errata_note
+from simrail.report.paper_001.figures import noise_figure, tuning_figures
 from simrail.report.paper_001.own_ride import FILTERED, own_ride_note, searched_on
 from simrail.report.paper_001.parts import COLOURS, PARTS, Rows, rows_of
 from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.tunings import by_part, commands, notes, status_table
 from simrail.report.pivot import Figures, of_cell
-from simrail.report.sentences import listed
 from simrail.report.tables import Cell, Row, Table
 from simrail.scenario.cells import Method
 from simrail.scenario.scenario import Scenario
@@ -41,9 +41,6 @@ MODEL_M = 200.0
 
 START_M = 2.0
 """First metres of a ride on a 1:10 track, where the peak of Fig. A1 stands; ten times that at full size."""
-
-DRAWN_M = 300.0
-"""Stretch that is drawn: of a model's ride, all."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +139,8 @@ def paper_view(
             if note
         ],
         figures=[
-            *(_figures(rows, looks, example, band) if example else []),
-            *(_noise_figure(rows, looks, example, noisy, band) if example and noisy else []),
+            *(tuning_figures(looks, example, band) if example else []),
+            *(noise_figure(rows, looks, example, noisy, band) if example and noisy else []),
         ],
     )
 
@@ -256,48 +253,3 @@ def _peak(example: CellResult, style: MethodStyle, band: Band) -> Peak:
 def _not_run(rows: Rows) -> list[str]:
     missing = [PARTS[part] for part in TABLES if not rows.has(part)]
     return [f"Not run in this scenario: {', '.join(missing)}."] if missing else []
-
-
-def _figures(
-    rows: Rows, looks: dict[str, MethodStyle], example: CellResult, band: Band
-) -> list[tuple[str, Markup]]:
-    """Our versions of Figs. A1 and A3."""
-    there = {part: style for part, style in looks.items() if part != "zero" and with_rails(example, [style])}
-    ride = example.recording.name
-    figures: list[tuple[str, Markup]] = []
-    first = [there[part] for part in ("cml", "kom", "hand") if part in there]
-    if first:
-        limits = stretch_of(example, first[0].name, band=band, length_m=DRAWN_M)
-        named = listed([style.label for style in first])
-        text = (
-            f"As Fig. A1: rails over {stretch_words(example, limits)} {ride}, filtered, as {named} "
-            f"find{'s' * (len(first) == 1)} them."
-        )
-        svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
-        figures.append((text, Markup(svg)))
-        drawn = example.estimates[first[0].name].geometry_draws is not None
-        how = "which follows from draws of its error" if drawn else "that of unfiltered rails"
-        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}."
-        svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
-        figures.append((text, Markup(svg)))
-    return figures
-
-
-def _noise_figure(
-    rows: Rows, looks: dict[str, MethodStyle], example: CellResult, noisy: CellResult, band: Band
-) -> list[tuple[str, Markup]]:
-    """Our version of Fig. A2: CML without and with noise added to the IMU; [] where one is missing."""
-    quiet, loud = looks.get("cml"), looks.get(rows.played_by("cml_noise"))
-    if quiet is None or loud is None or not (with_rails(example, [quiet]) and with_rails(noisy, [loud])):
-        return []
-    # The two are of two recordings: for one figure, the second goes beside the first under its own name.
-    added = replace(loud, name="noise added", label=PARTS["cml_noise"], colour=COLOURS["cml_noise"])
-    estimates = {quiet.name: example.estimates[quiet.name], added.name: noisy.estimates[loud.name]}
-    limits = stretch_of(example, quiet.name, band=band, length_m=DRAWN_M)
-    text = (
-        f"As Fig. A2: rails over {stretch_words(example, limits)} {example.recording.name}, filtered, by CML "
-        "without and with noise added."
-    )
-    both = replace(example, estimates=estimates)
-    svg = rails_figure(both, [quiet, added], band=band, limits=limits, with_interval=False, what=text)
-    return [(text, Markup(svg))]
