@@ -11,6 +11,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
@@ -139,6 +140,9 @@ class _Processes:
     def _new(self) -> Any:
         from joblib.externals.loky import ProcessPoolExecutor
 
+        # A process that has grown by some 300 MB, as long rides make it, is ended between two batches and
+        # another takes its place: nothing is lost, and nobody needs to do anything about it.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         return ProcessPoolExecutor(
             max_workers=self._workers,
             env={"SIMRAIL_RIDES": str(ride_cache.folder().absolute()), "NUMBA_NUM_THREADS": "1"},

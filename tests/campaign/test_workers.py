@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
+import sys
 import threading
 import time
 import weakref
@@ -223,3 +225,17 @@ def test_a_result_is_the_same_from_kept_batches_alone(
     job, kept = prepare(short(*AXES)), Unfinished(tmp_path / "kept")
     run_campaign(job, kept=kept, batch_cells=5)
     assert_same(alone.scores, gather(job, kept).scores)
+
+
+def test_a_worker_that_is_replaced_is_no_news() -> None:
+    """loky tells of it in a warning, with a path and advice that do not concern the user."""
+    program = (
+        "import warnings\n"
+        "from simrail.crew import crew_of\n"
+        "with crew_of(2, None, cells=9) as crew:\n"
+        "    assert crew.submit(abs, -3).result() == 3\n"
+        "    warnings.warn('A worker stopped while some jobs were given to the executor.', UserWarning)\n"
+        "    warnings.warn('something else', UserWarning)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stderr
+    assert "something else" in said and "A worker stopped" not in said
