@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from estimators.tuning_file import Tuning
@@ -37,13 +38,13 @@ def test_the_own_ride_is_told_by_the_command(scenario: Scenario) -> None:
     assert not searched_on(shipped_tuning("scale_by_hand"), scenario, FIRST)
 
 
-def rows(sds: dict[str, float], *, draws: int = 20) -> Rows:
+def rows(sds: dict[str, float], *, draws: int = 20, tracks: int = 4) -> Rows:
     found = {
         (part, quantity, "paper", "truth", "whole", "sd"): Figure(sd, 0.1, draws)
         for part, sd in sds.items()
         for quantity in ("cross_level", "alignment", "vertical_profile")
     }
-    case = Figures({}, None, found)  # type: ignore[arg-type]
+    case = Figures({}, pd.DataFrame({"track_draws": [tracks]}), found)
     return Rows(case, None, {part: part for part in sds}, "paper")
 
 
@@ -51,9 +52,11 @@ def test_what_is_said_follows_the_larger_ratio() -> None:
     said = own_ride_note(rows({"kom": 2.0, "cml": 0.5}), {"kom": [2.0, 0.4, 1.0], "cml": [0.5, 0.5, 0.4]})
     assert "KOM, alignment 0.400 there and 2.00 mm on the mean" in said
     assert "CML, vertical profile 0.400 there and 0.500 mm" in said
-    assert "mean of 20 draws" in said and "up to 5.0 times as large" in said
+    assert "mean of 20 draws over 4 lays" in said and "up to 5.0 times as large" in said
     said = own_ride_note(rows({"cml": 0.5}), {"cml": [0.5, 0.5, 0.4]})
     assert "None was fitted" in said and "more than 1.2 times" in said
+    said = own_ride_note(rows({"kom": 2.0}, draws=2, tracks=1), {"kom": [2.0, 0.4, 1.0]})
+    assert "2 draws over 1 lay of" in said and "same rails" in said and "fitted to its" not in said
 
 
 def test_nothing_is_said_of_one_draw_or_of_what_was_not_run() -> None:

@@ -39,6 +39,8 @@ def searched_on(tuning: Tuning, scenario: Scenario, cell: Mapping[str, object]) 
 def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:
     """How a tuning does on the ride that it was searched on, and on all draws; "" if none was.
 
+    A verdict takes rides over other rails: with the same ones, only the sensors' errors are others.
+
     Parameters
     ----------
     rows : Rows
@@ -60,12 +62,21 @@ def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:
         )
     if not told:
         return ""
-    verdict = (
+    tracks = int(rows.case.table["track_draws"].max())
+    if tracks < 2:
+        verdict = "All are over the same rails, so what was fitted to these does not show"
+    else:
+        verdict = _verdict(worst)
+    return (
+        f"Sd of the filtered error on the ride that was searched on, and on the mean of {draws} draws over "
+        f"{tracks} lay{'s' * (tracks > 1)} of the rails, of the quantity that differs most: "
+        f"{'; '.join(told)}. {verdict}."
+    )
+
+
+def _verdict(worst: float) -> str:
+    return (
         f"A search over one ride fits that ride: elsewhere an error is up to {worst:.1f} times as large"
         if worst > OVERFITTED_FACTOR
         else f"None was fitted to its ride alone: elsewhere no error is more than {worst:.1f} times as large"
-    )
-    return (
-        f"Sd of the filtered error on the ride that was searched on, and on the mean of {draws} draws, of "
-        f"the quantity that differs most: {'; '.join(told)}. {verdict}."
     )
