@@ -4,7 +4,8 @@ A strange estimator in a person's own file is run here for the first time: what 
 not raised.
 
 An option may be a file: where the class declares a type that has `from_file(path)`, the scenario gives a
-path, seen from its own folder first. Nothing is estimated here.
+path, seen from its own folder first, then from here, then among what is shipped: a copy of a shipped scenario
+finds its files wherever it lies. Nothing is estimated here.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from simrail.errors import InputError
 from simrail.estimate import SENSORS, Estimator, estimator_class
 from simrail.own_files import load_own
 from simrail.scenario.cells import Method
-from simrail.scenario.files import blame
+from simrail.scenario.files import blame, shipped_folder
 from simrail.scenario.scenario import Scenario
 
 
@@ -88,14 +89,23 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
     return own
 
 
-def _existing(name: str, folder: Path | None) -> Path:
-    """A file by its path, seen from a folder (that of the scenario), or from here."""
-    for candidate in (*([folder / name] if folder else []), Path(name)):
+def _existing(name: str, folder: Path | None, *, also: Path | None = None) -> Path:
+    """A file by its path, seen from a folder (that of the scenario), from here, or from one more folder."""
+    for candidate in (*([folder / name] if folder else []), Path(name), *([also / name] if also else [])):
         if candidate.is_file():
             return candidate
+    near = difflib.get_close_matches(name, _relative(also), n=1) if also else []
     raise InputError(
-        "no such file", value=name, remedy="mend the path; it is seen from the scenario's folder"
+        "no such file",
+        value=name,
+        remedy="mend the path; it is seen from the scenario's folder"
+        + (f" (shipped: {near[0]})" if near else ""),
     )
+
+
+def _relative(folder: Path) -> list[str]:
+    """TOML files in the folders of a folder, as a scenario names them."""
+    return [path.relative_to(folder).as_posix() for path in sorted(folder.glob("*/*.toml"))]
 
 
 def option_files(estimator: Estimator) -> dict[str, str]:
@@ -149,7 +159,7 @@ def _option(kind: Any, name: str, value: Any, folder: Path | None) -> Any:
         if not isinstance(value, str):
             raise InputError("has the wrong type", field=name, value=value, limit="the path of a file")
         with blame(None, name):
-            return of_file.from_file(_existing(value, folder))
+            return of_file.from_file(_existing(value, folder, also=shipped_folder()))
     if isinstance(value, list):
         value = tuple(tuple(item) if isinstance(item, list) else item for item in value)
     try:

@@ -39,9 +39,14 @@ class Part(BaseModel):
 _Part = TypeVar("_Part", bound=Part)
 
 
+def shipped_folder() -> Path:
+    """Where the shipped scenarios lie, and their parts in folders beside them."""
+    return Path(str(files("scenarios")))
+
+
 def shipped(kind: str) -> dict[str, Path]:
     """Shipped files of a kind (``scenario``, ``track``, ``vehicle``, ``imu``), by name."""
-    folder = Path(str(files("scenarios"))) / FOLDERS[kind]
+    folder = shipped_folder() / FOLDERS[kind]
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
@@ -78,7 +83,7 @@ def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
 
 def label(path: Path) -> str:
     """Name a file in messages and results: no more of the machine's folders than its reader needs."""
-    for root, prefix in ((Path(str(files("scenarios"))), "scenarios"), (Path.cwd(), "")):
+    for root, prefix in ((shipped_folder(), "scenarios"), (Path.cwd(), "")):
         if path.resolve().is_relative_to(root.resolve()):
             return (Path(prefix) / path.resolve().relative_to(root.resolve())).as_posix()
     return str(path)

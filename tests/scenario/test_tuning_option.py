@@ -44,6 +44,32 @@ def test_found_beside_the_scenario(scenario: Scenario) -> None:
     assert made.noise == (MINE.hyperparameters,)  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize("name", ["metro_geometry", "scale_track"])
+def test_a_copy_of_a_shipped_scenario_finds_what_is_shipped(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    copy = tmp_path / f"{name}.toml"
+    copy.write_bytes(shipped("scenario")[name].read_bytes())
+    assert judge_scenario(load_scenario(copy)).estimators == judge_scenario(load_scenario(name)).estimators
+
+
+def test_what_lies_beside_the_scenario_goes_before_what_is_shipped(scenario: Scenario) -> None:
+    assert scenario.folder is not None
+    MINE.write(scenario.folder / "tunings" / "scale_track_cml.toml")
+    setting = "estimator.smoother.options.tuning=tunings/scale_track_cml.toml"
+    made = judge_scenario(load_scenario(scenario.folder / "mine.toml", overrides=[setting])).estimators
+    assert made["smoother"].tuning == MINE  # type: ignore[attr-defined]
+
+
+def test_a_shipped_tuning_that_is_misspelt_is_guessed(scenario: Scenario) -> None:
+    assert scenario.folder is not None
+    setting = "estimator.smoother.options.tuning=tunings/scale_track_clm.toml"
+    wrong = load_scenario(scenario.folder / "mine.toml", overrides=[setting])
+    with pytest.raises(InputError, match=r"shipped: tunings/scale_track_cml\.toml"):
+        judge_scenario(wrong)
+
+
 def test_its_content_is_in_the_hash(scenario: Scenario) -> None:
     assert scenario.folder is not None
     file = scenario.folder / "tunings" / "mine.toml"
