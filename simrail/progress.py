@@ -70,7 +70,8 @@ class ProgressWatcher(Watcher):
     def ride_ends(self) -> None:
         """See `Watcher`."""
         if self._ride is not None:
-            self._progress.update(self._ride, total=1.0, completed=1.0, note="running its cells")
+            note = "running its cells" if self._cells is not None else "simulated"
+            self._progress.update(self._ride, total=1.0, completed=1.0, note=note)
 
     def cells_begin(self, done: int, count: int) -> None:
         """See `Watcher`."""

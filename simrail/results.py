@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shlex
 import shutil
 import subprocess
 import time
@@ -30,6 +31,7 @@ from simrail.former import FormerResults, read_results
 from simrail.job import prepare
 from simrail.report.page import SETS_BESIDE, write_report
 from simrail.retry import keep_good
+from simrail.scenario.files import label
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.unfinished import LOG, Start, unfinished_of
 from simrail.watcher import Watcher
@@ -128,7 +130,8 @@ def run(
         if other is not None:
             said = ("scenario", "scenario_hash", "seed", "started_utc", "git_revision")
             manifest["beside"] = {name: other.manifest.get(name) for name in said}
-            manifest["command"] += f" --beside results/{other.manifest['scenario']}"
+            assert beside is not None
+            manifest["command"] += f" --beside {shlex.quote(label(Path(beside)))}"
         with draft_of(folder) as draft:
             _write(draft, scenario, campaign, manifest, begun=begun, beside=other)
             shutil.copyfile(kept.folder / LOG, draft / LOG)
@@ -237,7 +240,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
         "scenario_hash": campaign.plan.content_hash,
         "seed": spec.seed,
         "settings": list(scenario.overrides),
-        "command": f"simrail run {scenario.name}{settings}",
+        "command": f"simrail run {shlex.quote(scenario.called)}{settings}",
         "engine": sorted({str(ride["engine"]) for ride in campaign.rides}),
         "earth": "at rest" if spec.earth is None else spec.earth.model_dump(mode="json", warnings=False),
         "temperature": spec.temperature and spec.temperature.model_dump(mode="json", warnings=False),

@@ -247,8 +247,10 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
             of_ride = found.setdefault(cell.ride.name, [])
             if not of_ride or cell.case == of_ride[0].case:
                 of_ride.append(cell)
+    if draws < 1:
+        raise InputError("is out of range", field="--draws", value=draws, limit=">= 1")
     least = min(len(of_ride) for of_ride in found.values())
-    if not 1 <= draws <= least:
+    if draws > least:
         raise InputError(
             "the scenario does not draw so often",
             file=scenario.file,

@@ -324,6 +324,20 @@ def case(change: Change | None = None, **labels: str) -> Figures:
 STYLES = [style("ours"), style("zero", baseline="no IMU")]
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_twist_that_is_left_open_for_its_base_is_not_called_unobservable(known: bool) -> None:
+    left = ("twist",) if known else ("twist", "cross_level")
+    whole = case()
+    found = {key: figure for key, figure in whole.found.items() if key[1] not in left}
+    rows = [*whole.table.to_dict("records"), {"quantity": "twist", "band": "full", "draws": 0, "failed": 0}]
+    table = geometry_table(replace(whole, found=found, table=pd.DataFrame(rows)), STYLES)
+    assert table is not None
+    (twist,) = (row for row in table.rows if row.label.startswith("twist"))
+    assert ("no multiple of the geometry's step" in twist.label) is known
+    assert ("no sensor sees the rails" in twist.label) is not known
+    assert twist.cells[0].text == ("not computed" if known else "not observable")
+
+
 def test_the_table_sets_every_method_beside_no_imu_and_says_what_is_not_observable() -> None:
     table = geometry_table(case({("ours", "alignment", "D1"): 4.0}), STYLES)
     assert table is not None

@@ -117,6 +117,20 @@ def test_fits_on_several_draws_of_new_tracks_first(
     assert one is not None and one.fitted_on == both.fitted_on[:1] and one.objective != both.objective
 
 
+def test_what_a_search_left_and_what_it_was_not_allowed_is_told(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No fall of the objective stands there as if it were a least; names are whole in 80 columns."""
+    monkeypatch.setattr("estimators.tuning_search.ROUNDS", 0)
+    assert call([*WORDS[:-2], "--method", "cml", "--evaluations", "0", "--at-most", "1"]) == DONE
+    said = capsys.readouterr().out
+    left = " ".join(said.partition("not at the least: ")[2].split()).partition(" would be better")[0]
+    assert "lateral_m2ps5" in left or "vertical_m2ps5" in left, said
+    assert "Costs: by how much" in said and "\u2026" not in said
+    for name in ("lateral_position_m2", "vertical_position_m2"):
+        assert name in said.partition("Costs: ")[0]
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
@@ -124,7 +138,8 @@ def test_fits_on_several_draws_of_new_tracks_first(
         (["--estimator", "smother"], ["--estimator", "'smother'", "smoother"]),
         (["--estimator", "design_angles"], ["--estimator", "design_angles", "TrajectorySmoother"]),
         (["--ride", "home"], ["--ride", "'home'", "one of out"]),
-        (["--draws", "0"], ["--draws", "0", "1 to 2"]),
+        (["--draws", "0"], ["--draws: is out of range; found 0", ">= 1"]),
+        (["--draws", "-1"], ["--draws: is out of range; found -1", ">= 1"]),
         (["--draws", "3"], ["--draws", "3", "1 to 2", "track_draws"]),
         (["--imu", "roof"], ["--imu", "'roof'", "one of axle"]),
         (["--out", "tuned.txt"], ["--out", "tuned.txt", ".toml"]),

@@ -12,6 +12,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from estimators.tuning_identify import Identification
+    from estimators.tuning_space import SearchSpace
     from simrail.tune import Tuned
 
 
@@ -165,17 +167,54 @@ def _show(console: Console, done: Tuned) -> None:
     from rich import box as boxes
     from rich.table import Table
 
+    from estimators.tuning_identify import TOLERANCE
+
     search = done.tuning.search
     assert search is not None
+    lower: list[str] = []
     for (name, known), reached in zip(done.identified.items(), search.objective, strict=True):
-        table = Table(box=boxes.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-        columns = (name, "value, SI", "", "a tenth\nof it costs", "tenfold\ncosts", "known to\ndecades")
+        table = Table(box=boxes.SIMPLE_HEAD, padding=0, show_edge=False)
+        columns = (name, "value,\nSI", "", "a tenth\ncosts", "tenfold\ncosts", "known to\ndecades")
         for number, column in enumerate(columns):
-            table.add_column(column, justify="left" if number in (0, 2) else "right")
+            table.add_column(
+                column, justify="left" if number in (0, 2) else "right", no_wrap=number in (0, 2)
+            )
         for parameter, row in known.table.iterrows():
             span = "" if math.isnan(row["span_decades"]) else f"{row['span_decades']:.2g}"
-            costs = (f"{row['tenth']:.3g}", f"{row['tenfold']:.3g}")
+            costs = []
+            for column, factor in (("tenth", 0.1), ("tenfold", 10.0)):
+                allowed = _is_allowed(known, str(parameter), factor, search.space)
+                costs.append(f"{row[column]:.3g}" if allowed else f"({row[column]:.3g})")
+                if allowed and row[column] < -TOLERANCE:
+                    lower.append(str(parameter))
             table.add_row(str(parameter), f"{row['value']:.4g}", row["status"], *costs, span)
         console.print(f"{search.unit}: {reached:.6f}", highlight=False)
         console.print(table)
+    console.print(
+        "Costs: by how much the figure above rises if this one is a tenth or ten times as large and the others "
+        "stay; in brackets where box, constraint or --position forbid it. Known to: how many powers of ten it "
+        f"can go, the others following, until the figure has changed by {TOLERANCE:g}; beyond one it is flat, "
+        "and these rides say nothing of it. At an edge: box or constraint ended the search there.",
+        highlight=False,
+    )
+    if lower:
+        console.print(
+            f"not at the least: a tenth of or ten times {', '.join(dict.fromkeys(lower))} would be better; "
+            "let it search longer (--evaluations, --at-most)",
+            highlight=False,
+        )
     print(f"{search.evaluations} evaluations; wrote {done.file}")
+
+
+def _is_allowed(known: Identification, parameter: str, factor: float, space: SearchSpace) -> bool:
+    """Whether a search may make a parameter so many times as large, the others being as they are."""
+    from estimators.trajectory_noise import Hyperparameters
+    from simrail.errors import InputError
+
+    values = known.table["value"].copy()
+    values[parameter] *= factor
+    try:
+        space.check(Hyperparameters.from_vector(values.to_numpy()))
+    except InputError:
+        return False
+    return True

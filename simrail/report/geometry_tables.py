@@ -61,13 +61,20 @@ def geometry_table(
     for quantity, words in QUANTITIES.items():
         if not any(case.get(s.name, quantity, "sd").draws for s in shown):
             if _is_unobservable(case, quantity):
-                rows.append(Row(f"{words}: no sensor sees the rails", "", "", _open(len(bands) + 3)))
+                is_base = _is_base(case, quantity, shown)
+                why = (
+                    "its base is no multiple of the geometry's step"
+                    if is_base
+                    else "no sensor sees the rails"
+                )
+                rows.append(Row(f"{words}: {why}", "", "", _open(len(bands) + 3, is_base=is_base)))
             continue
         for style in shown:
             if not case.get(style.name, quantity, "sd").draws:
                 # What a method under test leaves open is told; of rails as designed it goes without saying.
                 if not is_zero(style) and _is_unobservable(case, quantity, style.name):
-                    rows.append(Row(f"{words}: {style.label}", "", style.colour, _open(len(bands) + 3)))
+                    left = _open(len(bands) + 3, is_base=_is_base(case, quantity, [style]))
+                    rows.append(Row(f"{words}: {style.label}", "", style.colour, left))
                 continue
             cells = []
             for band in bands:
@@ -101,9 +108,17 @@ def _mark(case: Figures, shown: Sequence[MethodStyle], quantity: str, band: str,
     return " ".join(word for word, holds in (("best", is_best), ("worse", is_worse)) if holds)
 
 
-def _open(columns: int) -> list[Cell]:
+def _is_base(case: Figures, quantity: str, styles: Sequence[MethodStyle]) -> bool:
+    """Whether twist is left open for its base: it follows from the cross-level, and that is known."""
+    return quantity == "twist" and any(case.get(s.name, "cross_level", "sd").draws for s in styles)
+
+
+def _open(columns: int, *, is_base: bool) -> list[Cell]:
     """Cells of a quantity that is left open."""
-    return [Cell("not observable", mark="none"), *[Cell("\u2013", mark="none")] * (columns - 1)]
+    return [
+        Cell("not computed" if is_base else "not observable", mark="none"),
+        *[Cell("\u2013", mark="none")] * (columns - 1),
+    ]
 
 
 def _is_unobservable(case: Figures, quantity: str, name: str = "") -> bool:

@@ -8,6 +8,7 @@ returns a `Plan` that says what will be run, with warnings. Each ride is judged 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from simrail.errors import InputError
@@ -82,7 +83,9 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
     for sample in range(1, sample_count(scenario.spec)):
         parts.estimators(sample)
     judge_stop_rule(scenario, estimators)
-    warnings: dict[str, None] = dict.fromkeys(_judge_samples(scenario))
+    warnings: dict[str, None] = dict.fromkeys(
+        [*_judge_samples(scenario), *_judge_twist(scenario, estimators)]
+    )
     simulated = 0.0
     judged_rides: set[tuple[str, ...]] = set()
     judged_sensors: set[tuple[str, ...]] = set()
@@ -127,6 +130,19 @@ def _judge_score(scenario: Scenario) -> None:
                     value=word,
                     limit="one of " + ", ".join(known),
                 )
+
+
+def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> list[str]:
+    """Warn of a base of the twist that is no whole number of an estimator's steps: it then has no twist."""
+    if scenario.spec.geometry is None:
+        return []
+    base = scenario.spec.geometry.twist_base_m
+    steps = {name: getattr(made, "geometry_step_m", 0.0) for name, made in estimators.items()}
+    return [
+        f"geometry.twist_base_m = {base:g} m is no multiple of geometry_step_m = {step:g} m of {name}: no twist"
+        for name, step in steps.items()
+        if isinstance(step, int | float) and 0.0 < step and abs(round(base / step) * step / base - 1.0) > 1e-6
+    ]
 
 
 def _judge_samples(scenario: Scenario) -> list[str]:

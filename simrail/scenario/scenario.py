@@ -19,7 +19,7 @@ from pydantic import Field, field_validator
 from simrail.line_odometry import OdometryName
 from simrail.scenario.axes import Axis, Listed, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
-from simrail.scenario.files import Part, blame, find, judge, label, parse_toml, read_text
+from simrail.scenario.files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
 from simrail.scenario.overrides import override
 from simrail.scenario.parts import (
     EarthPart,
@@ -124,6 +124,11 @@ class Scenario:
     def title(self) -> str:
         """Title of the scenario."""
         return self.spec.title
+
+    @property
+    def called(self) -> str:
+        """What a command calls it: a shipped one by its name, a person's own by its file."""
+        return self.name if self.folder in (None, shipped_folder()) else self.file
 
 
 def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:

@@ -88,7 +88,8 @@ def test_the_page_and_the_manifest_say_what_stands_beside(ran: Path) -> None:
         json.loads((ran / f"results/{name}/manifest.json").read_text()) for name in ("full", "model")
     )
     assert own["beside"]["scenario_hash"] == other["scenario_hash"] != own["scenario_hash"]
-    assert own["command"].endswith(" --beside results/model") and "beside" not in other
+    assert own["command"] == "simrail run full.toml --beside results/model", "a file of one's own by its path"
+    assert "beside" not in other
 
 
 @pytest.fixture

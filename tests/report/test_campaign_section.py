@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -349,9 +351,15 @@ def test_tables_are_written_as_csv_and_latex(tables: CampaignTables, tmp_path: P
         assert not re.search(r"(?<!\\)_", text)  # an underscore by itself is an error in LaTeX
 
 
-def page_of(made_up: Scenario, scores: pd.DataFrame, cells: pd.DataFrame, folder: Path) -> str:
+def page_of(
+    made_up: Scenario,
+    scores: pd.DataFrame,
+    cells: pd.DataFrame,
+    folder: Path,
+    manifest: Mapping[str, Any] = MANIFEST,
+) -> str:
     path = folder / "report.html"
-    write_report(path, scenario=made_up, scores=scores, cells=cells, examples=[], manifest=MANIFEST)
+    write_report(path, scenario=made_up, scores=scores, cells=cells, examples=[], manifest=manifest)
     return path.read_text(encoding="utf-8")
 
 
@@ -372,6 +380,25 @@ def test_the_page_has_the_section_and_its_tables(
         assert words in page, words
     assert {path.suffix for path in (tmp_path / TABLES).iterdir()} == {".csv", ".tex"}
     assert "nan" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL).lower().split()
+
+
+def test_a_cell_is_made_again_without_what_stands_beside(
+    made_up: Scenario, small: tuple[pd.DataFrame, pd.DataFrame], tmp_path: Path
+) -> None:
+    """`simrail run` refuses both together."""
+    manifest = {**MANIFEST, "command": "simrail run made_up.toml --beside results/other"}
+    page = page_of(made_up, *small, tmp_path, manifest)
+    assert "<code>simrail run made_up.toml --cell " in page and "--beside results/other --cell" not in page
+    assert "<pre>simrail run made_up.toml --beside results/other</pre>" in page
+
+
+def test_intervals_say_whether_they_are_over_tracks(made_up: Scenario, tmp_path: Path) -> None:
+    for tracks, words in ((2, "from resampled tracks"), (1, "with one track only")):
+        page = page_of(made_up, *campaign(tracks=tracks, sensors=3), tmp_path)
+        assert [word in page for word in ("from resampled tracks", "with one track only")] == [
+            words == "from resampled tracks",
+            words == "with one track only",
+        ]
 
 
 def test_methods_that_fail_leave_the_rest_standing(

@@ -70,6 +70,16 @@ def test_a_shipped_tuning_that_is_misspelt_is_guessed(scenario: Scenario) -> Non
         judge_scenario(wrong)
 
 
+@pytest.mark.parametrize(("base_m", "is_told"), [(3.0, False), (0.75, False), (3.1, True), (0.1, True)])
+def test_a_base_of_the_twist_that_gives_none_is_told(
+    scenario: Scenario, base_m: float, is_told: bool
+) -> None:
+    assert scenario.folder is not None
+    settings = ['geometry.bands=["D1"]', f"geometry.twist_base_m={base_m}"]
+    warnings = judge_scenario(load_scenario(scenario.folder / "mine.toml", overrides=settings)).warnings
+    assert any("no multiple of geometry_step_m = 0.25 m of smoother" in one for one in warnings) is is_told
+
+
 def test_its_content_is_in_the_hash(scenario: Scenario) -> None:
     assert scenario.folder is not None
     file = scenario.folder / "tunings" / "mine.toml"

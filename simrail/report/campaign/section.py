@@ -31,6 +31,7 @@ class CampaignView:
 
     axes: list[tuple[str, str]]
     cells: int
+    tracks: int
     rails: list[tuple[str, Markup]]
     methods: Table
     pairs: Table
@@ -57,7 +58,8 @@ def campaign_view(
     axes = campaign_axes(cells) if is_campaign(scenario) else []
     if not axes or not (scores["quantity"] == "roll").any():
         return None
-    command = str(manifest.get("command", f"simrail run {scenario.name}"))
+    # What stands beside a run has no part in one of its cells.
+    command = str(manifest.get("command", f"simrail run {scenario.called}")).partition(" --beside ")[0]
     tables = campaign_tables(scores, cells, axes, attitude_methods(styles), command=command)
     if tables.methods.empty:
         return None
@@ -65,6 +67,7 @@ def campaign_view(
     return CampaignView(
         axes=[(axis.title, ", ".join(axis.words)) for axis in axes],
         cells=len(cells),
+        tracks=int(tables.methods["tracks"].max()),
         rails=[
             (caption, Markup(svg))
             for caption, svg in rails_figures(

@@ -33,7 +33,7 @@ COLOURS: dict[str, str] = {
     "kom": "#D55E00",
     "kom_start": "#E69F00",
     "kom_end": "#CC79A7",
-    "cml_noise": "#D55E00",
+    "cml_noise": "#000000",
     "cml_held": "#56B4E9",
     "hand": "#009E73",
 }

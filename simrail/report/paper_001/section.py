@@ -201,7 +201,7 @@ def _number(rows: Rows, part: str, quantity: str, metric: str, *, filtered: bool
     found = rows.get(part, quantity, metric, filtered=filtered)
     if not found.draws or not np.isfinite(found.value):
         return Cell("\u2013", mark="none")
-    return Cell(f"{found.value:.3f}".replace("-", "\u2212"))
+    return Cell(f"{round(found.value, 3) + 0.0:.3f}".replace("-", "\u2212"))  # no -0.000
 
 
 def coverage_of(
