@@ -6,6 +6,7 @@ a known output are those that were laid: a measured reference without error.
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from estimators.tuning_file import Tuning
 from estimators.tuning_identify import Identification, identify
 from estimators.tuning_objectives import KINDS, objective_of
 from estimators.tuning_space import SearchSpace
-from simrail.bands import Band
+from simrail.bands import SAMPLES_PER_WAVE, Band
 from simrail.cell import record_cell
 from simrail.errors import InputError
 from simrail.interrupts import interruptible
@@ -125,7 +126,7 @@ def tune_scenario(
     parts = Parts(scenario)
     smoother = smoother_of(scenario, parts, estimator)
     chosen = chosen_cells(scenario, rides, imu, draws=draws)
-    wanted = None if band is None else _band(chosen[0], band)
+    wanted = None if band is None else _band(chosen[0], band, step_m=step_m)
     recordings, references = [], []
     with interruptible() as check:
         for number, cell in enumerate(chosen, start=1):
@@ -281,10 +282,15 @@ def reference_of(
     return parts.rails(cell).irregularities(place)
 
 
-def _band(cell: Cell, name: str) -> Band:
+def _band(cell: Cell, name: str, *, step_m: float) -> Band:
     known = {band.name: band for band in bands_of(cell)}
     if name not in known:
         raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(known))
+    coarsest = known[name].shortest_m / SAMPLES_PER_WAVE
+    if step_m > coarsest:
+        raise InputError(
+            f"is too coarse for the band {name}", field="--step", value=step_m, limit=f"<= {coarsest:g} m"
+        )
     return known[name]
 
 
@@ -308,6 +314,10 @@ def _judge_file(out: Path) -> None:
         )
     if not out.absolute().parent.is_dir():
         raise InputError("no such folder", field="--out", value=str(out), remedy="make the folder first")
+    if not os.access(out.absolute().parent, os.W_OK):
+        raise InputError(
+            "the folder cannot be written", field="--out", value=str(out), remedy="choose another"
+        )
     if out.exists():
         try:
             Tuning.from_file(out)

@@ -117,6 +117,15 @@ def test_fits_on_several_draws_of_new_tracks_first(
     assert one is not None and one.fitted_on == both.fitted_on[:1] and one.objective != both.objective
 
 
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_runs(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("simrail.tune.os.access", lambda *_: False)
+    assert call([*WORDS, "--method", "cml", "--out", "tuned.toml"]) == BAD_INPUT
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "--out: the folder cannot be written; found 'tuned.toml'" in said
+
+
 def test_what_a_search_left_and_what_it_was_not_allowed_is_told(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -155,6 +164,7 @@ def test_what_a_search_left_and_what_it_was_not_allowed_is_told(
         (["--method", "kom", "--band", "D3"], ["band", "D3"]),
         (["--method", "kom", "--within", "50", "20"], ["--within", "[50.0, 20.0]", "smaller first"]),
         (["--method", "kom", "--within", "500", "520"], ["reference", "none of the places"]),
+        (["--method", "kom", "--band", "D1", "--step", "2"], ["--step", "2.0", "D1", "<= 1.2 m"]),
         (["--evaluations", "-1"], ["--evaluations", "-1", ">= 0"]),
         (["--set", "ride.out.speed_kmh=-3"], ["ride[0].speed_kmh"]),
         (["--set", "estimator.smoother.options.smothed=0"], ["estimator[3].options.smothed", "smoothed?"]),

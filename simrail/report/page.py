@@ -142,6 +142,7 @@ def write_report(
         lstrip_blocks=True,
     )
     environment.filters["unbroken"] = unbroken
+    geometry = scenario.spec.geometry
     text = environment.get_template("page.html.j2").render(
         scenario=scenario,
         manifest=manifest,
@@ -156,6 +157,7 @@ def write_report(
         ride_count=cells["ride"].nunique(),
         cases=[_case(case, styles, bands_by_name(scenario.spec)) for case in all_cases[:MOST_TABLES]],
         rails=overview_table(all_cases, styles, known=bands_by_name(scenario.spec)),
+        bands=[bands_by_name(scenario.spec)[name] for name in (*geometry.bands, *geometry.own_bands)],
         cases_left_out=max(len(all_cases) - MOST_TABLES, 0),
         odometry=odometry_table(all_cases[:MOST_TABLES]),
         failures=_failures(scores),

@@ -134,14 +134,13 @@ def _judge_score(scenario: Scenario) -> None:
 
 def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> list[str]:
     """Warn of a base of the twist that is no whole number of an estimator's steps: it then has no twist."""
-    if scenario.spec.geometry is None:
-        return []
     base = scenario.spec.geometry.twist_base_m
     steps = {name: getattr(made, "geometry_step_m", 0.0) for name, made in estimators.items()}
     return [
-        f"geometry.twist_base_m = {base:g} m is no multiple of geometry_step_m = {step:g} m of {name}: no twist"
+        f"geometry.twist_base_m = {base:g} m is no multiple of geometry_step_m = {step:g} m of {name}: "
+        "its twist is not computed"
         for name, step in steps.items()
-        if isinstance(step, int | float) and 0.0 < step and abs(round(base / step) * step / base - 1.0) > 1e-6
+        if isinstance(step, int | float) and step > 0.0 and abs(round(base / step) * step / base - 1.0) > 1e-6
     ]
 
 

@@ -225,6 +225,8 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
             else None
         )
         remedy = "write it in quotes" if kind == "string_type" else remedy
+        if kind == "tuple_type" and isinstance(value, str) and any(letter.isalpha() for letter in value):
+            limit, remedy = "an array", f'write it in brackets: ["{value}"]'
         if isinstance(value, list) and kind not in ("tuple_type", "list_type"):
             remedy = "give one value, not a list"
     elif kind == "literal_error":
@@ -234,6 +236,9 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
             str(value), expected.replace("'", "").replace(" or ", ", ").split(", "), n=1
         )
         remedy = f"did you mean {near[0]}?" if near else None
+    elif kind == "string_pattern_mismatch":
+        problem, limit = "is no name", f"what matches {context.get('pattern')}"
+        field = field.removesuffix(".[key]")
     elif kind in {"too_short", "too_long"}:
         problem, limit = "has the wrong number of items", first["msg"].split(" after ")[0]
     more = len(faults) - 1

@@ -70,6 +70,8 @@ def _set(place: Any, steps: list[str | int], value: Any, key: str) -> None:
             targets, rest = [place[step]], rest
         else:
             named = [item for item in place if isinstance(item, dict) and item.get("name") == step]
+            if not named and rest:
+                _judge_name(place, step, key)
             if named:
                 targets = named
             else:
@@ -94,3 +96,19 @@ def _set(place: Any, steps: list[str | int], value: Any, key: str) -> None:
             )
         place[step] = {}
     _set(place[step], rest, value, key)
+
+
+def _judge_name(place: list[Any], step: str, key: str) -> None:
+    """Refuse a step that is no key of any table of an array, and nearly the name of one."""
+    tables = [item for item in place if isinstance(item, dict)]
+    names = [str(item["name"]) for item in tables if "name" in item]
+    near = difflib.get_close_matches(step, names, n=1, cutoff=0.75)
+    if near and not any(step in item for item in tables):
+        raise InputError(
+            "nothing is called so",
+            file="--set",
+            field=key,
+            value=step,
+            limit="one of " + ", ".join(names),
+            remedy=f"did you mean {near[0]}?",
+        )

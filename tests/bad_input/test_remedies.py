@@ -30,6 +30,12 @@ def refusal(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
         ('name = "out"', 'name = ["out", "back"]', "give one value, not a list"),
         ('name = "out"', "name = 3", "write it in quotes"),
         ("position_m = [0.0, 0.0, 0.6]", "position_m = 0.6", "an array"),
+        ("seed = 1", 'seed = 1\ngeometry = { bands = "D1" }', 'write it in brackets: ["D1"]'),
+        (
+            "seed = 1",
+            'seed = 1\ngeometry = { own_bands = { "a b" = [3.0, 9.0] } }',
+            "is no name; found 'a b'",
+        ),
     ],
 )
 def test_the_remedy_fits(
@@ -53,3 +59,13 @@ def test_a_magnetic_heading_needs_a_magnetometer(tmp_path: Path, capsys: pytest.
     capsys.readouterr()
     (tmp_path / "mine.toml").write_text(nine.replace("magnetometer = true", "magnetometer = false"))
     assert call(["check", str(tmp_path / "mine.toml")]) == 0
+
+
+def test_a_setting_of_a_name_that_is_misspelt_is_guessed(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["check", "quick_kinematic", "--set"]
+    assert call([*words, "estimator.ekf_compensate.options.compensated=false"]) == 2
+    assert "nothing is called so; found 'ekf_compensate'" in (said := capsys.readouterr().err)
+    assert "did you mean ekf_compensated?" in said
+    assert call([*words, "estimator.ekf_compensated.options.compensated=false"]) == 0
+    assert call([*words, "imu.calibration.temperature_c=20"]) == 2
+    assert "nothing is called so" not in capsys.readouterr().err, "a key that no name is near"

@@ -364,6 +364,19 @@ def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran
     assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
 
 
+def test_the_words_of_the_page_are_told_once_with_the_bands_of_the_scenario(ran: Ran) -> None:
+    words = ran.page.partition('<h2 id="words">')[2].partition("<h2 ")[0]
+    told = re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", words)
+    assert len({name for name, _ in told}) == len(told)
+    by_name = dict(told)
+    base = ran.scenario.spec.geometry.twist_base_m
+    assert f"over a base of {base:g} m" in by_name["twist"]
+    assert by_name["paper"].startswith("Wavelengths of 0.3 to 7 m; a band of this scenario")
+    standard = [name for name in ("D0", "D1", "D2", "D3") if name in by_name]
+    assert standard == [*ran.scenario.spec.geometry.bands]
+    assert all("EN 13848-1" in by_name[name] for name in standard)
+
+
 def test_one_line_stands_for_all_that_are_alike(ran: Ran) -> None:
     labels = [style.label for style in one_of_each(ran.cases[0], ran.styles)]
     assert labels == ["smoother and 1 alike", "design angles", "zero track"]
