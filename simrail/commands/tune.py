@@ -193,8 +193,9 @@ def _show(console: Console, done: Tuned) -> None:
     console.print(
         "Costs: by how much the figure above rises if this one is a tenth or ten times as large and the "
         "others stay; in brackets where box, constraint or --position forbid it. Known to: how many powers "
-        f"of ten it can go, the others following, until the figure has changed by {TOLERANCE:g}; beyond one "
-        "it is flat, and these rides say nothing of it. At an edge: box or constraint ended the search there.",
+        f"of ten it can go, the others following, until the figure has changed by {TOLERANCE:g}; beyond "
+        "one it is flat, and these rides say nothing of it. At an edge: box or constraint ended the search "
+        "there.",
         highlight=False,
     )
     if lower:
