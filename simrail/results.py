@@ -119,6 +119,14 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
+    if beside is not None and Path(beside).resolve() == folder.resolve():
+        raise InputError(
+            "is the folder of these results themselves",
+            field="--beside",
+            value=str(beside),
+            limit="results of another scenario",
+            remedy="name another folder, or write into another with --out",
+        )
     other = _former(Path(beside), scenario) if beside is not None else None
     job = prepare(scenario, many=many)
     with unfinished_of(folder, job.key, start=start) as kept:

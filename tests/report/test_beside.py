@@ -113,6 +113,13 @@ def test_no_results_are_refused(here: Path, capsys: pytest.CaptureFixture[str]) 
     _is_refused("model", ["no finished results", "run that scenario first"], capsys)
 
 
+def test_results_are_not_set_beside_themselves(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (here / "model" / "report.html").read_bytes()
+    assert call(["run", "full.toml", "--out", "model", "--beside", "../" + here.name + "/model"]) == BAD_INPUT
+    assert "--beside: is the folder of these results themselves" in capsys.readouterr().err
+    assert (here / "model" / "report.html").read_bytes() == before
+
+
 @pytest.mark.parametrize("key", ["scenario", "scenario_text", "settings", "seed"])
 def test_a_manifest_that_lacks_something_is_refused(
     here: Path, capsys: pytest.CaptureFixture[str], key: str
