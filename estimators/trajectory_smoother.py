@@ -62,6 +62,10 @@ MOST_PASSES = 5
 """Each pass takes the error of the angles squared: two are enough, three change nothing."""
 
 
+MOST_DRAWS = 1000
+"""An interval by so many is 0.1 % wider than by any more; all of them are held at once."""
+
+
 @dataclass(frozen=True)
 class TrajectorySmoother:
     """Extended Kalman smoother of paper 001, section 3 and appendix 1.
@@ -160,8 +164,11 @@ class TrajectorySmoother:
                 value=self.geometry_step_m,
                 limit="0 (none) or more, m",
             )
-        if isinstance(self.draws, bool) or not isinstance(self.draws, int) or self.draws < 0:
-            raise InputError("is no number of draws", field="draws", value=self.draws, limit="0 or more")
+        is_whole = isinstance(self.draws, int) and not isinstance(self.draws, bool)
+        if not is_whole or not 0 <= self.draws <= MOST_DRAWS:
+            raise InputError(
+                "is no number of draws", field="draws", value=self.draws, limit=f"0 to {MOST_DRAWS}"
+            )
         if self.draws and not (self.smoothed and self.backend == "compiled" and self.geometry_step_m):
             raise InputError(
                 "cannot be",

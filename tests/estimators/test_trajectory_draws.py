@@ -18,7 +18,7 @@ from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_draws import trajectory_error
 from estimators.kernels.trajectory_equations import ROWS, STATES
 from estimators.track_geometry import Sight, sight_of, track_geometry
-from estimators.trajectory_draws import FELT, geometry_draws, state_errors
+from estimators.trajectory_draws import FELT, geometry_draws, state_errors, stream_of
 from estimators.trajectory_model import Model, measured, packed_process, process_noise, transition
 from estimators.trajectory_noise import Hyperparameters
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend
@@ -396,12 +396,36 @@ def test_draws_change_nothing_else_and_are_the_same_bits_again(line_recording: C
     assert not np.array_equal(again[0, :, :3], again[1, :, :3])
 
 
+def test_draws_of_other_recordings_are_independent() -> None:
+    """Another draw of the sensors or of the track has other draws of the error; the same one, the same.
+
+    What two machines differ by is no other recording. Coverage that is a mean over draws of the sensors has
+    errors of its intervals that differ from one to the next, or a mean would not lessen them.
+    """
+    one = empty("ride")
+    rng = stream(8, "noise")
+    one.imu.loc[:] = 1e-4 * rng.standard_normal(one.imu.shape)
+    other = replace(one, imu=one.imu + 1e-4 * rng.standard_normal(one.imu.shape))
+    elsewhere = replace(one, imu=one.imu * (1.0 + 1e-9))
+    errors, others, again = (
+        state_errors(*left(), [stream_of(recording, draw, "trajectory") for draw in range(40)])
+        for recording in (one, other, elsewhere)
+    )
+    assert np.array_equal(errors, again) and not np.array_equal(errors, others)
+    # Roll at the middle of each of 40 draws: a correlation of independent numbers is below 4/sqrt(40).
+    middle = SAMPLES // 2
+    assert abs(np.corrcoef(errors[:, middle, 0], others[:, middle, 0])[0, 1]) < 4.0 / np.sqrt(40.0)
+    shares = [stream_of(recording, 0, "tilt").uniform() for recording in (one, other)]
+    assert shares[0] != shares[1]
+
+
 @pytest.mark.parametrize(
     "options",
     [
         {"draws": -1},
         {"draws": 2.5},
         {"draws": True},
+        {"draws": 1001},
         {"draws": 2, "smoothed": False},
         {"draws": 2, "backend": "filterpy"},
         {"draws": 2, "geometry_step_m": 0.0},
