@@ -466,3 +466,15 @@ def test_the_first_metres_grow_with_the_track(ran: Ran, band: Band, first_m: flo
 
 def test_the_claim_names_the_first_metres_of_the_model(ran: Ran) -> None:
     assert "over the first 2 m, against an sd of" in ran.page
+
+
+def test_a_twin_without_figures_is_left_out(ran: Ran) -> None:
+    """The method may have failed with the ideal IMU alone; the page is drawn, and says nothing of it."""
+    real = replace(ran.cases[0], labels={**ran.cases[0].labels, "odometry": "encoder"})
+    ideal = replace(ran.cases[1], labels={**ran.cases[1].labels, "odometry": "encoder"})
+    assert ideal.labels["imu"] == "ideal" != real.labels["imu"]
+    told = geometry_findings(real, ran.styles, [real, ideal], known=ran.known)
+    assert any("mm with an ideal IMU" in finding.text for finding in told)
+    lost = Figures(ideal.labels, ideal.table, {})
+    told = geometry_findings(real, ran.styles, [real, lost], known=ran.known)
+    assert told and not any("with an ideal IMU" in finding.text for finding in told)
