@@ -112,6 +112,23 @@ def test_no_results_are_refused(here: Path, capsys: pytest.CaptureFixture[str]) 
     _is_refused("model", ["no finished results", "run that scenario first"], capsys)
 
 
+def test_what_would_be_replaced_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (here / "model" / "report.html").read_bytes()
+    assert call(["run", "full.toml", "--beside", "model", "--out", "../" + here.name + "/model"]) == BAD_INPUT
+    assert "--beside" in capsys.readouterr().err
+    assert (here / "model" / "report.html").read_bytes() == before and not Path("results").exists()
+
+
+def test_results_of_one_size_are_told_apart_by_their_names(here: Path) -> None:
+    """The size and the band of figures and coverage are those of the scenario's own band, as in the table."""
+    (here / "again.toml").write_text(MODEL)
+    assert call(["run", "again.toml", "--workers", "1", "--beside", "model"]) == DONE
+    page = Path("results/again/report.html").read_text(encoding="utf-8")
+    rows = rows_of_page(page)
+    assert rows["set by hand: ours, 1:10"] == rows["set by hand: ours, 1:10, model"]
+    assert "The track here is 1:10" in page and "with 1:10, model beside it" in page
+
+
 @pytest.mark.parametrize("key", ["scenario", "scenario_text", "settings", "seed"])
 def test_a_manifest_that_lacks_something_is_refused(
     here: Path, capsys: pytest.CaptureFixture[str], key: str
