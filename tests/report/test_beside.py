@@ -7,6 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from simrail.cli import BAD_INPUT, DONE, call
@@ -138,6 +139,15 @@ def test_a_manifest_that_lacks_something_is_refused(
     del manifest[key]
     file.write_text(json.dumps(manifest))
     _is_refused("model", [f"does not say {key}"], capsys)
+
+
+@pytest.mark.parametrize(("table", "column"), [("scores", "band"), ("cells", "case")])
+def test_tables_of_an_older_simrail_are_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], table: str, column: str
+) -> None:
+    file = here / "model" / f"{table}.parquet"
+    pd.read_parquet(file).drop(columns=column).to_parquet(file, index=False)
+    _is_refused("model", [f"does not say {column}"], capsys)
 
 
 def test_another_publication_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
