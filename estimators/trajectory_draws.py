@@ -25,7 +25,8 @@ from scipy.interpolate import CubicSpline
 
 from estimators.kernels.trajectory_draws import trajectory_error
 from estimators.kernels.trajectory_equations import ROLL, ROWS, STATES, Y, Z
-from estimators.track_geometry import Sight, over_space, slopes
+from estimators.over_space import over_space
+from estimators.track_geometry import Sight, slopes
 from estimators.trajectory_model import Model, dense_process
 from simrail.columns import IRREGULARITY
 from simrail.jit import FloatArray

@@ -33,8 +33,9 @@ from estimators.kernels.trajectory_back import trajectory_back
 from estimators.kernels.trajectory_equations import ROWS, STATES
 from estimators.track_geometry import geometry_of, sight_of
 from estimators.trajectory_draws import geometry_draws, state_errors, stream_of
-from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
+from estimators.trajectory_model import Found, Model, model_of
 from estimators.trajectory_noise import Hyperparameters
+from estimators.trajectory_reference import filterpy_backend
 from estimators.tuning_file import Tuning
 from simrail.columns import (
     ATTITUDE,
