@@ -66,10 +66,12 @@ def run(
 
     starts = {"resume": resume, "fresh": fresh, "retry-failed": retry_failed}
     wanted = [name for name, is_wanted in starts.items() if is_wanted]
-    if len(wanted) > 1 or (cell is not None and (wanted or cluster or workers or beside)):
+    others = {"cluster": cluster, "workers": workers, "beside": beside}
+    named = [] if cell is None else ["cell", *(name for name, given in others.items() if given)]
+    if len(wanted) > 1 or len(named) > 1 or (wanted and named):
         raise InputError(
             "these options do not go together",
-            field=" ".join([*(f"--{name}" for name in wanted), *(["--cell"] if cell is not None else [])]),
+            field=" ".join(f"--{name}" for name in [*wanted, *named]),
             remedy="choose one of them; --cell runs in this process",
         )
     console = Console()
