@@ -29,7 +29,7 @@ from simrail.report.page import _ride
 from simrail.report.paper_001.parts import COLOURS
 from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.pivot import Figure, Figures, cases
-from simrail.report.sentences import unbroken
+from simrail.report.sentences import significant, unbroken
 from simrail.report.style import fitting_columns, legend_above, look, panels
 from simrail.report.tiles import tiles
 from simrail.report.track_figures import profile_figure, profile_words
@@ -478,3 +478,20 @@ def test_a_twin_without_figures_is_left_out(ran: Ran) -> None:
     lost = Figures(ideal.labels, ideal.table, {})
     told = geometry_findings(real, ran.styles, [real, lost], known=ran.known)
     assert told and not any("with an ideal IMU" in finding.text for finding in told)
+
+
+def test_of_many_others_the_best_and_the_worst_are_told(ran: Ran) -> None:
+    """The method under test three times over, with errors of one, four and two times its own."""
+    case, first = ran.cases[0], ran.styles[0]
+    found, styles = dict(case.found), [first]
+    for name, factor in (("like", 1.0), ("bad", 4.0), ("poor", 2.0)):
+        styles.append(replace(first, name=name, label=name))
+        for key, figure in case.found.items():
+            if key[0] == first.name:
+                found[(name, *key[1:])] = figure._replace(value=factor * figure.value)
+    told = geometry_findings(replace(case, found=found), styles, [], known=ran.known)
+    own = case.get(first.name, JUDGED[0], "sd", band="paper").value
+    assert (
+        f"Of the 3 other methods, that of like is off the least, by {significant(own)} mm, "
+        f"and that of bad the most, by {significant(4.0 * own)} mm."
+    ) in told[0].text
