@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from simrail.cli import BAD_INPUT, DONE, call
+from simrail.former import read_results
 
 TEXT = """
 title = "Rails of a short line"
@@ -148,6 +149,14 @@ def test_tables_of_an_older_simrail_are_refused(
     file = here / "model" / f"{table}.parquet"
     pd.read_parquet(file).drop(columns=column).to_parquet(file, index=False)
     _is_refused("model", [f"does not say {column}"], capsys)
+
+
+def test_former_results_are_read_with_what_was_set(here: Path) -> None:
+    file = here / "model" / "manifest.json"
+    said = json.loads(file.read_text()) | {"seed": 77, "settings": ["ride.out.end_m=300.0"]}
+    file.write_text(json.dumps(said))
+    spec = read_results(here / "model", field="x", remedy="y").scenario().spec
+    assert spec.seed == 77 and spec.ride[0].end_m == 300.0
 
 
 def test_another_publication_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

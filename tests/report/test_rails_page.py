@@ -29,7 +29,7 @@ from simrail.report.page import _ride
 from simrail.report.paper_001.parts import COLOURS
 from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.pivot import Figure, Figures, cases
-from simrail.report.sentences import significant, unbroken
+from simrail.report.sentences import degrees, significant, unbroken
 from simrail.report.style import fitting_columns, legend_above, look, panels
 from simrail.report.tiles import tiles
 from simrail.report.track_figures import profile_figure, profile_words
@@ -270,6 +270,11 @@ def test_tiles_tell_rails_first_and_nothing_twice(ran: Ran) -> None:
         assert "paper (0.3\u20137 m)" in tile.note
         assert float(tile.note.rpartition("no IMU: ")[2].split()[0]) == pytest.approx(zero, rel=6e-3)
     assert len({(tile.title, tile.value) for tile in told}) == len(told)
+    design = case.get("design_angles", "roll", "rms", window="curve").value
+    assert told[3].note.endswith(f"; no IMU: {degrees(design)}")
+    # Without such a method nothing stands for it, least of all the method's uncompensated twin.
+    alone = [replace(ran.styles[0], twin="camera_free")]
+    assert "no IMU" not in tiles(case, alone, known=ran.known)[3].note
 
 
 def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
@@ -475,9 +480,28 @@ def test_a_twin_without_figures_is_left_out(ran: Ran) -> None:
     assert ideal.labels["imu"] == "ideal" != real.labels["imu"]
     told = geometry_findings(real, ran.styles, [real, ideal], known=ran.known)
     assert any("mm with an ideal IMU" in finding.text for finding in told)
+    elsewhere = replace(ideal, labels={**ideal.labels, "ride": "another"})
+    told = geometry_findings(real, ran.styles, [real, elsewhere], known=ran.known)
+    assert told and not any("with an ideal IMU" in finding.text for finding in told)
     lost = Figures(ideal.labels, ideal.table, {})
     told = geometry_findings(real, ran.styles, [real, lost], known=ran.known)
     assert told and not any("with an ideal IMU" in finding.text for finding in told)
+
+
+def test_a_drawn_interval_in_a_band_is_by_draws_where_there_are_some(ran: Ran) -> None:
+    """Draws of metres reach far beyond the rails, whose unfiltered interval is of millimetres."""
+    estimate = ran.example.estimates["smoother"]
+    assert estimate.geometry is not None
+    shape = (20, len(estimate.geometry), 4)
+    drawn = replace(estimate, geometry_draws=np.random.default_rng(1).standard_normal(shape))
+    reach = []
+    for one in (estimate, drawn):
+        example = replace(ran.example, estimates={"smoother": one})
+        svg = rails_figure(
+            example, ran.styles[:1], band=SCALED, limits=(30.0, 50.0), with_interval=True, what="x"
+        )
+        reach.append(max(places_of(svg)))
+    assert reach[0] < 90.0 and reach[1] > 200.0
 
 
 def test_of_many_others_the_best_and_the_worst_are_told(ran: Ran) -> None:
