@@ -519,3 +519,15 @@ def test_of_many_others_the_best_and_the_worst_are_told(ran: Ran) -> None:
         f"Of the 3 other methods, that of like is off the least, by {significant(own)} mm, "
         f"and that of bad the most, by {significant(4.0 * own)} mm."
     ) in told[0].text
+
+
+@pytest.mark.parametrize(("factor", "tone"), [(1e-3, "good"), (1e3, "bad")])
+def test_a_method_that_loses_to_no_imu_is_told_in_red(ran: Ran, factor: float, tone: str) -> None:
+    case = ran.cases[0]
+    found = {
+        key: one._replace(value=factor * one.value) if key[0] == "smoother" else one
+        for key, one in case.found.items()
+    }
+    told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
+    of_smoother = [finding for finding in told if "of smoother is off by" in finding.text]
+    assert len(of_smoother) == len(JUDGED) and {finding.tone for finding in of_smoother} == {tone}
