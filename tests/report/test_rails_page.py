@@ -531,3 +531,14 @@ def test_a_method_that_loses_to_no_imu_is_told_in_red(ran: Ran, factor: float, t
     told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
     of_smoother = [finding for finding in told if "of smoother is off by" in finding.text]
     assert len(of_smoother) == len(JUDGED) and {finding.tone for finding in of_smoother} == {tone}
+
+
+@pytest.mark.parametrize(("factor", "loses"), [(1e-3, False), (1e3, True)])
+def test_another_method_that_loses_to_no_imu_is_named(ran: Ran, factor: float, loses: bool) -> None:
+    case = ran.cases[0]
+    found = {
+        key: one._replace(value=factor * one.value) if key[0] == "camera_free" else one
+        for key, one in case.found.items()
+    }
+    told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
+    assert any(finding.text.startswith("No IMU at all beats camera free") for finding in told) is loses
