@@ -25,7 +25,8 @@ from scipy.interpolate import CubicSpline
 
 from estimators.kernels.trajectory_draws import trajectory_error
 from estimators.kernels.trajectory_equations import ROLL, ROWS, STATES, Y, Z
-from estimators.track_geometry import Sight, over_space, slopes
+from estimators.over_space import over_space
+from estimators.track_geometry import Sight, slopes
 from estimators.trajectory_model import Model, dense_process
 from simrail.columns import IRREGULARITY
 from simrail.jit import FloatArray
@@ -39,9 +40,20 @@ ROOT = 0
 """Of the streams: an estimator has no seed of its own, and the same recording gives the same draws."""
 
 
+NAMED_BY = 1e-6
+"""Unit of the IMU's first sample in the name of a stream, rad/s and m/s2: far below any IMU's noise, and far
+above what two machines differ by."""
+
+
 def stream_of(recording: Recording, draw: int, term: str) -> np.random.Generator:
-    """Random numbers of one term of one draw; those of another ride or IMU are others."""
-    return stream(ROOT, "rail draws", recording.name, recording.mount, draw, term)
+    """Random numbers of one term of one draw; those of another recording are others, all methods share them.
+
+    If all draws of the sensors and of the track shared them, the error of a standard deviation by few draws
+    would be the same in each, and no mean over these would lessen it. A recording is known by its ride, its
+    IMU and the noise of its first sample; an ideal IMU at the same start has none, and shares them.
+    """
+    first = np.rint(recording.imu.to_numpy(dtype=np.float64)[:1] / NAMED_BY).astype(np.int64).ravel()
+    return stream(ROOT, "rail draws", recording.name, recording.mount, *first.tolist(), draw, term)
 
 
 def state_errors(

@@ -33,8 +33,9 @@ from estimators.kernels.trajectory_back import trajectory_back
 from estimators.kernels.trajectory_equations import ROWS, STATES
 from estimators.track_geometry import geometry_of, sight_of
 from estimators.trajectory_draws import geometry_draws, state_errors, stream_of
-from estimators.trajectory_model import Found, Model, filterpy_backend, model_of
+from estimators.trajectory_model import Found, Model, model_of
 from estimators.trajectory_noise import Hyperparameters
+from estimators.trajectory_reference import filterpy_backend
 from estimators.tuning_file import Tuning
 from simrail.columns import (
     ATTITUDE,
@@ -60,6 +61,10 @@ START_PLACE_SD = (0.01, 0.02, 0.2)
 
 MOST_PASSES = 5
 """Each pass takes the error of the angles squared: two are enough, three change nothing."""
+
+
+MOST_DRAWS = 1000
+"""An interval by so many is 0.1 % wider than by any more; all of them are held at once."""
 
 
 @dataclass(frozen=True)
@@ -160,8 +165,11 @@ class TrajectorySmoother:
                 value=self.geometry_step_m,
                 limit="0 (none) or more, m",
             )
-        if isinstance(self.draws, bool) or not isinstance(self.draws, int) or self.draws < 0:
-            raise InputError("is no number of draws", field="draws", value=self.draws, limit="0 or more")
+        is_whole = isinstance(self.draws, int) and not isinstance(self.draws, bool)
+        if not is_whole or not 0 <= self.draws <= MOST_DRAWS:
+            raise InputError(
+                "is no number of draws", field="draws", value=self.draws, limit=f"0 to {MOST_DRAWS}"
+            )
         if self.draws and not (self.smoothed and self.backend == "compiled" and self.geometry_step_m):
             raise InputError(
                 "cannot be",

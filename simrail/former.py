@@ -15,6 +15,7 @@ import pandas as pd
 
 from simrail.errors import InputError
 from simrail.scenario.scenario import Scenario, read_scenario
+from simrail.score_table import SCORE_COLUMNS
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def read_results(folder: Path, *, field: str, remedy: str) -> FormerResults:
     Raises
     ------
     InputError
-        If one of the files is missing or cannot be read.
+        If one of the files is missing, cannot be read, or lacks what today's simrail writes into it.
     """
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -71,9 +72,13 @@ def read_results(folder: Path, *, field: str, remedy: str) -> FormerResults:
     except (OSError, ValueError) as error:
         problem = "there are no finished results there"
         raise InputError(problem, field=field, value=str(folder), remedy=remedy) from error
-    missing = [key for key in ("scenario", "settings", "seed", "scenario_text") if key not in manifest]
-    if missing:
-        raise InputError(
-            f"its manifest does not say {missing[0]}", field=field, value=str(folder), remedy=remedy
-        )
+    for what, there, wanted in (
+        ("manifest", manifest, ("scenario", "settings", "seed", "scenario_text")),
+        ("score table", scores, SCORE_COLUMNS),
+        ("table of cells", cells, ("cell", "case")),
+    ):
+        missing = [name for name in wanted if name not in there]
+        if missing:
+            problem = f"its {what} does not say {missing[0]}"
+            raise InputError(problem, field=field, value=str(folder), remedy=remedy)
     return FormerResults(folder, manifest, scores, cells)

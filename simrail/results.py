@@ -119,15 +119,7 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
-    if beside is not None and Path(beside).resolve() == folder.resolve():
-        raise InputError(
-            "is the folder of these results themselves",
-            field="--beside",
-            value=str(beside),
-            limit="results of another scenario",
-            remedy="name another folder, or write into another with --out",
-        )
-    other = _former(Path(beside), scenario) if beside is not None else None
+    other = _former(Path(beside), scenario, folder) if beside is not None else None
     job = prepare(scenario, many=many)
     with unfinished_of(folder, job.key, start=start) as kept:
         if start == "retry-failed":
@@ -191,9 +183,16 @@ def run_cell(
     return campaign
 
 
-def _former(folder: Path, scenario: Scenario) -> FormerResults:
+def _former(folder: Path, scenario: Scenario, out: Path) -> FormerResults:
     """Results to stand beside those of a scenario; of the same publication, or the page has no place."""
     remedy = "run that scenario first, and name the folder of its results"
+    if folder.resolve() == out.resolve():
+        raise InputError(
+            "these results would be replaced by those that they are to stand beside",
+            field="--beside",
+            value=str(folder),
+            remedy=f"{remedy}, or choose another folder with --out",
+        )
     former = read_results(folder, field="--beside", remedy=remedy)
     paper, other = scenario.spec.paper, former.scenario().spec.paper
     if paper not in SETS_BESIDE or other != paper:

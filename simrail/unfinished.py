@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 import shutil
 import sys
 import time
@@ -157,12 +158,16 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
 def _locked(folder: Path) -> Iterator[None]:
     """Hold a folder, made if it is not there, for this process; the lock goes with the process."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".lock").open("a") as stream:
+    file = folder / ".lock"
+    with file.open("a") as stream:
         if sys.platform != "win32":
             import fcntl
 
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # One that has just ended took its folder with it, and this would be a lock that nobody sees.
+                if not os.path.samestat(os.fstat(stream.fileno()), file.stat()):
+                    raise FileNotFoundError(file)
             except OSError as error:
                 raise InputError(
                     "this plan is being run by another process, into the same folder",

@@ -18,6 +18,7 @@ from simrail.columns import IRREGULARITY
 from simrail.example import CellResult
 from simrail.report import write_report
 from simrail.report.claim import Claim
+from simrail.report.geometry_bands import QUANTITIES
 from simrail.report.geometry_findings import geometry_findings
 from simrail.report.geometry_tables import geometry_table, indicator_table, overview_table
 from simrail.report.methods import MethodStyle, method_styles
@@ -27,11 +28,13 @@ from simrail.report.paper_001.printed import COLUMNS, COVERAGE, TABLES
 from simrail.report.paper_001.section import FULL_SIZE, PaperView, coverage_of, paper_view
 from simrail.report.paper_001.tunings import by_part, notes, status_table, tunings_of
 from simrail.report.pivot import Figure, Figures, cases
+from simrail.report.sentences import significant
 from simrail.results import describe
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.imu_file import load_grade
 from simrail.scenario.parts import EstimatorPart
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
+from simrail.seeds import stream
 from simrail.track_quality import Limits
 
 
@@ -541,3 +544,61 @@ def test_the_section_holds_printed_and_own_rows(ran: tuple[Scenario, object, Pat
     )
     without = [replace(c, found={}) for c in all_cases]
     assert paper_view(without, methods(scenario), styles, []) is None
+
+
+@pytest.mark.parametrize(("size_m", "held"), [(1e-9, "0"), (1.0, "100")])
+def test_the_interval_by_draws_is_of_the_filtered_rails_alone(
+    ran: tuple[Scenario, object, Path], size_m: float, held: str
+) -> None:
+    """Draws that are tiny, or huge, hold nothing or all of the filtered rails; others stay as they are."""
+    scenario, result, _ = ran
+    example: CellResult = result.examples[0]  # type: ignore[attr-defined]
+    estimate = example.estimates["smoother"]
+    assert estimate.geometry is not None
+    shape = (20, len(estimate.geometry), len(IRREGULARITY))
+    drawn = replace(estimate, geometry_draws=size_m * stream(1, "draws").standard_normal(shape))
+    all_cases = cases(result.scores, result.cells)  # type: ignore[attr-defined]
+    view = paper_view(
+        all_cases,
+        methods(scenario),
+        list(method_styles(methods(scenario)).values()),
+        [replace(example, estimates={**example.estimates, "smoother": drawn})],
+    )
+    assert isinstance(view, PaperView)
+    rows = {row.label: [cell.text for cell in row.cells] for row in view.coverage.rows}
+    own, by_draws = rows["set by hand"], rows["set by hand: interval of the filtered rails, by draws"]
+    for (_, filtered), one, other in zip(COLUMNS, own, by_draws, strict=True):
+        assert other == (held if filtered else one)
+    assert len(rows) == 1 + 1 + len(["hand", "cml", "printed"])  # what has no draws has no row of them
+
+
+def test_the_own_ride_is_told_by_the_scores_of_that_ride(ran: tuple[Scenario, object, Path]) -> None:
+    """One draw was run, so the scores are of the own ride; twice of them are planted as the mean of two."""
+    scenario, result, _ = ran
+    found = tuned()
+    assert found.search is not None
+    search = replace(found.search, seed=3, fitted_on=("short: go, axle on front, made up",))
+    (case, *others) = cases(result.scores, result.cells)  # type: ignore[attr-defined]
+    doubled = replace(
+        case,
+        found={
+            key: Figure(2.0 * one.value, 0.1, 2) if key[0] == "smoother_cml" else one
+            for key, one in case.found.items()
+        },
+    )
+    view = paper_view(
+        [doubled, *others],
+        methods(scenario),
+        list(method_styles(methods(scenario)).values()),
+        result.examples,  # type: ignore[attr-defined]
+        tunings={"smoother_cml": replace(found, search=search)},
+        scenario=scenario,
+    )
+    assert isinstance(view, PaperView)
+    (note,) = [text for text in view.notes if "ride that was searched on" in text]
+    sds = {
+        f"CML, {words} {significant(sd)} there and {significant(2.0 * sd)} mm on the mean"
+        for quantity, words in QUANTITIES.items()
+        if (sd := case.get("smoother_cml", quantity, "sd", band="paper").value) > 0.0
+    }
+    assert any(text in note for text in sds), (note, sds)

@@ -67,13 +67,12 @@ def run(
     starts = {"resume": resume, "fresh": fresh, "retry-failed": retry_failed}
     wanted = [name for name, is_wanted in starts.items() if is_wanted]
     others = {"cluster": cluster, "workers": workers, "beside": beside}
-    alone_only = [name for name, value in others.items() if value is not None and cell is not None]
-    if len(wanted) > 1 or (cell is not None and (wanted or alone_only)):
-        named = [*wanted, *alone_only, *(["cell"] if cell is not None else [])]
+    named = [] if cell is None else ["cell", *(name for name, given in others.items() if given)]
+    if len(wanted) > 1 or len(named) > 1 or (wanted and named):
         raise InputError(
             "these options do not go together",
-            field=" ".join(f"--{name}" for name in named),
-            remedy="choose one of them; --cell runs in this process, and makes no page",
+            field=" ".join(f"--{name}" for name in [*wanted, *named]),
+            remedy="choose one of them; --cell runs in this process",
         )
     console = Console()
     with ProgressWatcher(Console(stderr=True)) as watcher:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from simrail.bands import BANDS, Band
 from simrail.report.geometry_bands import BAND, JUDGED, QUANTITIES, judged_band, waves_words
 from simrail.report.geometry_tables import baseline_of, is_zero, main_of, mappers, sd_of
@@ -63,11 +65,12 @@ def geometry_findings(
         parts = []
         for name, words_of in (("odometry", "with the true position"), ("imu", "with an ideal IMU")):
             twin = _twin(case, others, name)
-            if twin:
-                parts.append(f"{significant(sd_of(twin, main, quantity, band=band))} mm {words_of}")
+            least = sd_of(twin, main, quantity, band=band) if twin else np.nan
+            if least > 0.0:
+                parts.append(f"{significant(least)} mm {words_of}")
         both = _twin(case, others, "both")
-        if both:
-            least = sd_of(both, main, quantity, band=band)
+        least = sd_of(both, main, quantity, band=band) if both else np.nan
+        if least > 0.0:
             parts.append(
                 f"{significant(least)} mm with both, which is the vehicle between IMU and rails, and the "
                 "method"

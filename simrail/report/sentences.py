@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +30,9 @@ def degrees(value: float) -> str:
 
 
 def significant(value: float, *, digits: int = 3) -> str:
-    """A number with some significant digits and no exponent, at most four decimals."""
+    """A number with some significant digits and no exponent, at most four decimals; a dash for none."""
+    if not math.isfinite(value):
+        return "\u2013"
     if value == 0.0:
         return "0"
     # The exponent of the rounded number: 0.09999 is 0.100, not 0.1000.

@@ -13,6 +13,9 @@ from simrail.report.pivot import Figures
 from simrail.report.sentences import degrees, significant
 from simrail.score_table import FULL
 
+WITHOUT_IMU = "design angles only"
+"""Title of the roll error of a method that uses no IMU."""
+
 
 @dataclass(frozen=True)
 class Tile:
@@ -37,8 +40,9 @@ def tiles(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, B
     roll = _roll(case, attitude_methods(styles))
     if rails and len(roll) > 1:
         # Beside rails the attitude is a side matter: one tile of it.
-        *_, design = roll
-        roll = [Tile(roll[0].title, roll[0].value, f"{roll[0].note}; no IMU: {design.value}")]
+        first, *rest = roll
+        without = [f"; no IMU: {tile.value}" for tile in rest if tile.title == WITHOUT_IMU]
+        roll = [Tile(first.title, first.value, first.note + "".join(without[:1]))]
     return [*rails, *roll, *_odometry(case)]
 
 
@@ -82,7 +86,7 @@ def _roll(case: Figures, styles: Sequence[MethodStyle]) -> list[Tile]:
     for style in styles:
         if not style.uses_imu and roll(style.name) > 0.0:
             note = f"rms roll error {where} without any IMU"
-            result.append(Tile("design angles only", degrees(roll(style.name)), note))
+            result.append(Tile(WITHOUT_IMU, degrees(roll(style.name)), note))
     return result
 
 

@@ -26,7 +26,8 @@ from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_back import trajectory_back
 from estimators.kernels.trajectory_equations import ROWS, STATES
 from estimators.rest_bias import rest_bias, step_rates
-from estimators.trajectory_model import Model, filterpy_backend
+from estimators.trajectory_model import Model
+from estimators.trajectory_reference import filterpy_backend
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend, log_likelihood
 from simrail.measure import measure
 from simrail.profile import SpeedProfile

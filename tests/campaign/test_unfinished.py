@@ -239,6 +239,22 @@ def test_a_process_that_is_refused_leaves_the_other_one_alone(tmp_path: Path) ->
         kept.log("at work")
 
 
+def test_a_lock_on_a_folder_that_has_gone_holds_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one that held it ended between our opening of the lock and our taking it: a third may be there."""
+    fcntl = pytest.importorskip("fcntl")
+    real = fcntl.flock
+
+    def late(stream: object, how: int) -> None:
+        shutil.rmtree(next(tmp_path.glob(".results.unfinished-*")))
+        real(stream, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(InputError, match="another process"), unfinished_of(tmp_path / "results", "key"):
+        pytest.fail("it was let in")
+
+
 @pytest.mark.parametrize("start", ["resume", "auto"])
 def test_folders_that_nothing_came_into_go_again(tmp_path: Path, start: Start) -> None:
     with suppress(InputError), unfinished_of(tmp_path / "a" / "b" / "results", "key", start=start):

@@ -289,6 +289,40 @@ def test_geometry_may_leave_a_quantity_open_but_not_in_places() -> None:
             require_well_formed(Rails(fault).estimate(ride()), ride())
 
 
+@dataclass(frozen=True)
+class Draws(Rails):
+    """Draws what the rails may be."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        rails = Rails().estimate(recording)
+        assert rails.geometry is not None
+        rng = np.random.default_rng(None if self.fault == "seed" else 1)
+        draws = 1e-3 * rng.standard_normal((3, len(rails.geometry), 4))
+        if self.fault != "gauge":
+            draws[:, :, 3] = np.nan
+        if self.fault == "hole":
+            draws[1, 2, 0] = np.nan
+        if self.fault == "places":
+            draws = draws[:, 1:]
+        return replace(
+            rails, geometry=None if self.fault == "alone" else rails.geometry, geometry_draws=draws
+        )
+
+
+def test_draws_are_of_the_geometry_and_the_same_bits_again() -> None:
+    check_estimator(Draws(), ride())
+    for fault, words in (
+        ("hole", "not finite where the geometry is"),
+        ("gauge", "not finite where the geometry is"),
+        ("places", "have the shape"),
+        ("alone", "without a geometry"),
+    ):
+        with pytest.raises(AssertionError, match=words):
+            require_well_formed(Draws(fault).estimate(ride()), ride())
+    with pytest.raises(AssertionError, match="geometry_draws"):
+        check_estimator(Draws("seed"), ride())
+
+
 class UnsaidCausal(Sound):
     """Does not say whether it is causal."""
 

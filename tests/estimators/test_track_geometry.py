@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimators.track_geometry import over_space, track_geometry, trusted
+from estimators.over_space import over_space
+from estimators.track_geometry import track_geometry, trusted
 from simrail.bands import BANDS, band_pass
 from simrail.columns import (
     ATTITUDE,

@@ -16,8 +16,9 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from estimators.kernels.trajectory_equations import STATES
-from estimators.trajectory_model import Model, measured, packed_process, process_noise, transition
+from estimators.trajectory_model import Model, packed_process, process_noise, transition
 from estimators.trajectory_noise import Hyperparameters
+from estimators.trajectory_reference import measured
 from estimators.trajectory_smoother import compiled_backend
 from simrail.seeds import stream
 

@@ -17,10 +17,11 @@ from scipy.stats import binom, chi2
 from estimators.kernels.trajectory import PACKED, trajectory_filter
 from estimators.kernels.trajectory_draws import trajectory_error
 from estimators.kernels.trajectory_equations import ROWS, STATES
-from estimators.track_geometry import Sight, sight_of, track_geometry
-from estimators.trajectory_draws import FELT, geometry_draws, state_errors
-from estimators.trajectory_model import Model, measured, packed_process, process_noise, transition
+from estimators.track_geometry import Sight, geometry_of, sight_of, track_geometry
+from estimators.trajectory_draws import FELT, geometry_draws, state_errors, stream_of
+from estimators.trajectory_model import Model, packed_process, process_noise, transition
 from estimators.trajectory_noise import Hyperparameters
+from estimators.trajectory_reference import measured
 from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend
 from simrail.bands import BANDS, band_pass, margin_m, sd_of_draws
 from simrail.columns import (
@@ -378,6 +379,37 @@ def test_each_term_has_the_unfiltered_sd_that_the_geometry_tells(term: str) -> N
         )
 
 
+@pytest.mark.parametrize("unused", [slice(0, 0), slice(0, 1100), slice(900, 2000)])
+def test_errors_go_to_the_places_where_they_are(unused: slice) -> None:
+    """Roll, y and z that err by waves of their own: what each does to the rails by hand, used samples or not.
+
+    With the rails 0.6 m below the IMU and 0.7 m beside it, and left side up for a positive roll.
+    """
+    recording = empty("places")
+    seen, _ = sight(recording)
+    use = np.ones(RIDE, dtype=bool)
+    use[unused] = False
+    seen = seen._replace(use=use)
+    place = recording.odometry["position_m"].to_numpy()
+
+    def waves(at: np.ndarray) -> np.ndarray:
+        return np.sin(2.0 * np.pi * at[:, None] / [20.0, 15.0, 12.0]) * [1e-3, 2e-3, 3e-3]
+
+    geometry = geometry_of(seen, step_m=0.25)
+    errors = waves(place)[None]
+    (found,) = geometry_draws(seen, geometry, errors, recording, tilts_rad=(), step_m=0.25)
+    at = geometry.index.to_numpy()
+    roll, y, z = waves(at).T
+    there = np.ones(len(at), dtype=bool)  # a gap of 66 m is bridged by a spline, and its ends are no places
+    there[:20] = there[-20:] = False
+    if unused.start:
+        low, high = place[unused][[0, -1]]
+        there &= (at < low - 5.0) | (at > high + 5.0)
+    assert np.count_nonzero(there) > 300
+    for column, true in enumerate((y + 0.6 * roll, z, 1.4 * roll)):
+        np.testing.assert_allclose(found[there, column], true[there], atol=0.01 * np.abs(true).max())
+
+
 def test_draws_change_nothing_else_and_are_the_same_bits_again(line_recording: Callable) -> None:
     whole = line_recording(70.0, 1, 0)
     rows = slice(6000, 9000)
@@ -396,12 +428,36 @@ def test_draws_change_nothing_else_and_are_the_same_bits_again(line_recording: C
     assert not np.array_equal(again[0, :, :3], again[1, :, :3])
 
 
+def test_draws_of_other_recordings_are_independent() -> None:
+    """Another draw of the sensors or of the track has other draws of the error; the same one, the same.
+
+    What two machines differ by is no other recording. Coverage that is a mean over draws of the sensors has
+    errors of its intervals that differ from one to the next, or a mean would not lessen them.
+    """
+    one = empty("ride")
+    rng = stream(8, "noise")
+    one.imu.loc[:] = 1e-4 * rng.standard_normal(one.imu.shape)
+    other = replace(one, imu=one.imu + 1e-4 * rng.standard_normal(one.imu.shape))
+    elsewhere = replace(one, imu=one.imu * (1.0 + 1e-9))
+    errors, others, again = (
+        state_errors(*left(), [stream_of(recording, draw, "trajectory") for draw in range(40)])
+        for recording in (one, other, elsewhere)
+    )
+    assert np.array_equal(errors, again) and not np.array_equal(errors, others)
+    # Roll at the middle of each of 40 draws: a correlation of independent numbers is below 4/sqrt(40).
+    middle = SAMPLES // 2
+    assert abs(np.corrcoef(errors[:, middle, 0], others[:, middle, 0])[0, 1]) < 4.0 / np.sqrt(40.0)
+    shares = [stream_of(recording, 0, "tilt").uniform() for recording in (one, other)]
+    assert shares[0] != shares[1]
+
+
 @pytest.mark.parametrize(
     "options",
     [
         {"draws": -1},
         {"draws": 2.5},
         {"draws": True},
+        {"draws": 1001},
         {"draws": 2, "smoothed": False},
         {"draws": 2, "backend": "filterpy"},
         {"draws": 2, "geometry_step_m": 0.0},

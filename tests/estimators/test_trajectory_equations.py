@@ -18,7 +18,7 @@ import sympy as sp
 from estimators.kernels.trajectory_back import jacobian_rows
 from estimators.kernels.trajectory_equations import TERMS, measured, misprint
 from estimators.trajectory_model import beyond_first_order, jacobian_slips, track_terms
-from estimators.trajectory_model import measured as measured_by_vectors
+from estimators.trajectory_reference import measured as measured_by_vectors
 
 t, s, g, small = sp.symbols("t s g small", real=True)
 STATE = sp.symbols("roll roll_rate pitch pitch_rate yaw yaw_rate y yd ydd z zd zdd", real=True)

@@ -19,8 +19,9 @@ from scipy.stats import chi2
 
 import estimators.tuning_objectives
 from estimators.kernels.trajectory_equations import STATES, TERMS
-from estimators.trajectory_model import Model, kinds_of, measured, packed_process, process_noise, transition
+from estimators.trajectory_model import Model, kinds_of, packed_process, process_noise, transition
 from estimators.trajectory_noise import Hyperparameters
+from estimators.trajectory_reference import measured
 from estimators.trajectory_smoother import TrajectorySmoother
 from estimators.tuning import tune
 from estimators.tuning_file import Tuning

@@ -7,9 +7,11 @@ import re
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from simrail.cli import BAD_INPUT, DONE, call
+from simrail.former import read_results
 
 TEXT = """
 title = "Rails of a short line"
@@ -113,11 +115,21 @@ def test_no_results_are_refused(here: Path, capsys: pytest.CaptureFixture[str]) 
     _is_refused("model", ["no finished results", "run that scenario first"], capsys)
 
 
-def test_results_are_not_set_beside_themselves(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_would_be_replaced_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = (here / "model" / "report.html").read_bytes()
-    assert call(["run", "full.toml", "--out", "model", "--beside", "../" + here.name + "/model"]) == BAD_INPUT
-    assert "--beside: is the folder of these results themselves" in capsys.readouterr().err
-    assert (here / "model" / "report.html").read_bytes() == before
+    assert call(["run", "full.toml", "--beside", "model", "--out", "../" + here.name + "/model"]) == BAD_INPUT
+    assert "--beside" in capsys.readouterr().err
+    assert (here / "model" / "report.html").read_bytes() == before and not Path("results").exists()
+
+
+def test_results_of_one_size_are_told_apart_by_their_names(here: Path) -> None:
+    """The size and the band of figures and coverage are those of the scenario's own band, as in the table."""
+    (here / "again.toml").write_text(MODEL)
+    assert call(["run", "again.toml", "--workers", "1", "--beside", "model"]) == DONE
+    page = Path("results/again/report.html").read_text(encoding="utf-8")
+    rows = rows_of_page(page)
+    assert rows["set by hand: ours, 1:10"] == rows["set by hand: ours, 1:10, model"]
+    assert "The track here is 1:10" in page and "with 1:10, model beside it" in page
 
 
 @pytest.mark.parametrize("key", ["scenario", "scenario_text", "settings", "seed"])
@@ -129,6 +141,23 @@ def test_a_manifest_that_lacks_something_is_refused(
     del manifest[key]
     file.write_text(json.dumps(manifest))
     _is_refused("model", [f"does not say {key}"], capsys)
+
+
+@pytest.mark.parametrize(("table", "column"), [("scores", "band"), ("cells", "case")])
+def test_tables_of_an_older_simrail_are_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], table: str, column: str
+) -> None:
+    file = here / "model" / f"{table}.parquet"
+    pd.read_parquet(file).drop(columns=column).to_parquet(file, index=False)
+    _is_refused("model", [f"does not say {column}"], capsys)
+
+
+def test_former_results_are_read_with_what_was_set(here: Path) -> None:
+    file = here / "model" / "manifest.json"
+    said = json.loads(file.read_text()) | {"seed": 77, "settings": ["ride.out.end_m=300.0"]}
+    file.write_text(json.dumps(said))
+    spec = read_results(here / "model", field="x", remedy="y").scenario().spec
+    assert spec.seed == 77 and spec.ride[0].end_m == 300.0
 
 
 def test_another_publication_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -131,6 +131,8 @@ def test_roles_follow_from_the_scenario_not_from_names(scenario: Scenario) -> No
         (0.00012, "0.0001"),
         (0.0999999, "0.100"),
         (1e-9, "<0.0001"),
+        (np.nan, "\u2013"),
+        (np.inf, "\u2013"),
     ],
 )
 def test_numbers_have_three_significant_digits(value: float, text: str) -> None:

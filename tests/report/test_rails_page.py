@@ -29,7 +29,7 @@ from simrail.report.page import _ride
 from simrail.report.paper_001.parts import COLOURS
 from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.pivot import Figure, Figures, cases
-from simrail.report.sentences import unbroken
+from simrail.report.sentences import degrees, significant, unbroken
 from simrail.report.style import fitting_columns, legend_above, look, panels
 from simrail.report.tiles import tiles
 from simrail.report.track_figures import profile_figure, profile_words
@@ -270,6 +270,11 @@ def test_tiles_tell_rails_first_and_nothing_twice(ran: Ran) -> None:
         assert "paper (0.3\u20137 m)" in tile.note
         assert float(tile.note.rpartition("no IMU: ")[2].split()[0]) == pytest.approx(zero, rel=6e-3)
     assert len({(tile.title, tile.value) for tile in told}) == len(told)
+    design = case.get("design_angles", "roll", "rms", window="curve").value
+    assert told[3].note.endswith(f"; no IMU: {degrees(design)}")
+    # Without such a method nothing stands for it, least of all the method's uncompensated twin.
+    alone = [replace(ran.styles[0], twin="camera_free")]
+    assert "no IMU" not in tiles(case, alone, known=ran.known)[3].note
 
 
 def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
@@ -479,3 +484,74 @@ def test_the_first_metres_grow_with_the_track(ran: Ran, band: Band, first_m: flo
 
 def test_the_claim_names_the_first_metres_of_the_model(ran: Ran) -> None:
     assert "over the first 2 m, against an sd of" in ran.page
+
+
+def test_a_twin_without_figures_is_left_out(ran: Ran) -> None:
+    """The method may have failed with the ideal IMU alone; the page is drawn, and says nothing of it."""
+    real = replace(ran.cases[0], labels={**ran.cases[0].labels, "odometry": "encoder"})
+    ideal = replace(ran.cases[1], labels={**ran.cases[1].labels, "odometry": "encoder"})
+    assert ideal.labels["imu"] == "ideal" != real.labels["imu"]
+    told = geometry_findings(real, ran.styles, [real, ideal], known=ran.known)
+    assert any("mm with an ideal IMU" in finding.text for finding in told)
+    elsewhere = replace(ideal, labels={**ideal.labels, "ride": "another"})
+    told = geometry_findings(real, ran.styles, [real, elsewhere], known=ran.known)
+    assert told and not any("with an ideal IMU" in finding.text for finding in told)
+    lost = Figures(ideal.labels, ideal.table, {})
+    told = geometry_findings(real, ran.styles, [real, lost], known=ran.known)
+    assert told and not any("with an ideal IMU" in finding.text for finding in told)
+
+
+def test_a_drawn_interval_in_a_band_is_by_draws_where_there_are_some(ran: Ran) -> None:
+    """Draws of metres reach far beyond the rails, whose unfiltered interval is of millimetres."""
+    estimate = ran.example.estimates["smoother"]
+    assert estimate.geometry is not None
+    shape = (20, len(estimate.geometry), 4)
+    drawn = replace(estimate, geometry_draws=np.random.default_rng(1).standard_normal(shape))
+    reach = []
+    for one in (estimate, drawn):
+        example = replace(ran.example, estimates={"smoother": one})
+        svg = rails_figure(
+            example, ran.styles[:1], band=SCALED, limits=(30.0, 50.0), with_interval=True, what="x"
+        )
+        reach.append(max(places_of(svg)))
+    assert reach[0] < 90.0 and reach[1] > 200.0
+
+
+def test_of_many_others_the_best_and_the_worst_are_told(ran: Ran) -> None:
+    """The method under test three times over, with errors of one, four and two times its own."""
+    case, first = ran.cases[0], ran.styles[0]
+    found, styles = dict(case.found), [first]
+    for name, factor in (("like", 1.0), ("bad", 4.0), ("poor", 2.0)):
+        styles.append(replace(first, name=name, label=name))
+        for key, figure in case.found.items():
+            if key[0] == first.name:
+                found[(name, *key[1:])] = figure._replace(value=factor * figure.value)
+    told = geometry_findings(replace(case, found=found), styles, [], known=ran.known)
+    own = case.get(first.name, JUDGED[0], "sd", band="paper").value
+    assert (
+        f"Of the 3 other methods, that of like is off the least, by {significant(own)} mm, "
+        f"and that of bad the most, by {significant(4.0 * own)} mm."
+    ) in told[0].text
+
+
+@pytest.mark.parametrize(("factor", "tone"), [(1e-3, "good"), (1e3, "bad")])
+def test_a_method_that_loses_to_no_imu_is_told_in_red(ran: Ran, factor: float, tone: str) -> None:
+    case = ran.cases[0]
+    found = {
+        key: one._replace(value=factor * one.value) if key[0] == "smoother" else one
+        for key, one in case.found.items()
+    }
+    told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
+    of_smoother = [finding for finding in told if "of smoother is off by" in finding.text]
+    assert len(of_smoother) == len(JUDGED) and {finding.tone for finding in of_smoother} == {tone}
+
+
+@pytest.mark.parametrize(("factor", "loses"), [(1e-3, False), (1e3, True)])
+def test_another_method_that_loses_to_no_imu_is_named(ran: Ran, factor: float, loses: bool) -> None:
+    case = ran.cases[0]
+    found = {
+        key: one._replace(value=factor * one.value) if key[0] == "camera_free" else one
+        for key, one in case.found.items()
+    }
+    told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
+    assert any(finding.text.startswith("No IMU at all beats camera free") for finding in told) is loses

@@ -27,7 +27,7 @@ class OtherSize:
     name, started, where : str
         Its scenario, its date, and which of its cases is looked at.
     size : str
-        `MODEL` or `FULL`.
+        `MODEL` or `FULL`, with what tells it from ours if that is of the same size.
     rows : Rows
         Its figures.
     """
@@ -46,9 +46,13 @@ def other_size(former: FormerResults, *, band: str) -> OtherSize | None:
     if rows is None:
         return None
     _, longest_m = scenario.spec.geometry.own_bands.get(band, (0.0, np.inf))
-    size = MODEL if longest_m < LONGEST_OF_MODEL_M else FULL
     started = str(former.manifest.get("started_utc", "an unknown day"))[:10]
-    return OtherSize(scenario.name, started, where(rows), size, rows)
+    return OtherSize(scenario.name, started, where(rows), size_of(longest_m), rows)
+
+
+def size_of(longest_m: float) -> str:
+    """`MODEL` or `FULL`, by the longest wave of the scenario's own band."""
+    return MODEL if longest_m < LONGEST_OF_MODEL_M else FULL
 
 
 def where(rows: Rows) -> str:

@@ -76,7 +76,9 @@ def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:
 
 def _verdict(worst: float) -> str:
     return (
-        f"A search over one ride fits that ride: elsewhere an error is up to {worst:.1f} times as large"
+        f"A search over one ride fits that ride: over all, itself among them, an error is up to {worst:.1f} "
+        "times as large"
         if worst > OVERFITTED_FACTOR
-        else f"None was fitted to its ride alone: elsewhere no error is more than {worst:.1f} times as large"
+        else "None was fitted to its ride alone: over all, itself among them, no error is more than "
+        f"{worst:.1f} times as large"
     )

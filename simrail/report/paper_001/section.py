@@ -20,7 +20,7 @@ from simrail.report.geometry_bands import QUANTITIES
 from simrail.report.geometry_figures import lines_of
 from simrail.report.geometry_view import with_rails
 from simrail.report.methods import MethodStyle
-from simrail.report.paper_001.beside import FULL, MODEL, OtherSize, other_size, where
+from simrail.report.paper_001.beside import MODEL, OtherSize, other_size, size_of, where
 from simrail.report.paper_001.claims import Peak, claims, errata_note
 from simrail.report.paper_001.figures import noise_figure, tuning_figures
 from simrail.report.paper_001.own_ride import FILTERED, own_ride_note, searched_on
@@ -101,7 +101,7 @@ def paper_view(
         for style in styles
         if style.name == name
     }
-    band = _band_of(example)
+    band = _band_of(scenario, example)
     main = looks.get(rows.main)
     drawn = main if example and main and with_rails(example, [main]) else None
     covered: dict[str, list[float]] = {
@@ -110,8 +110,10 @@ def paper_view(
         if example and part in looks and with_rails(example, [looks[part]])
     }
     by_draws = {part: coverage_of(example, looks[part], band, by_draws=True) for part in covered if example}
-    size = MODEL if band is SCALED else FULL
+    size = size_of(band.longest_m)
     other = other_size(former, band=SCALED.name) if former is not None else None
+    if other is not None and other.size == size:  # of one size: then the name tells rows apart
+        other = replace(other, size=f"{size}, {other.name}")
     tuned = by_part(rows.names, tunings or {})
     own = {
         part: _filtered_sds(example, looks[part], band)
@@ -157,7 +159,11 @@ def _filtered_sds(example: CellResult, style: MethodStyle, band: Band) -> list[f
     return sds
 
 
-def _band_of(example: CellResult | None) -> Band:
+def _band_of(scenario: Scenario | None, example: CellResult | None) -> Band:
+    """Band that the scores are of; where the scenario is not known, the paper's for the track's length."""
+    own = scenario.spec.geometry.own_bands.get(SCALED.name) if scenario is not None else None
+    if own is not None:
+        return Band(SCALED.name, *own)
     if example is None:
         return FULL_SIZE
     length = example.recording.track.length_m
