@@ -52,7 +52,7 @@ def stream_of(recording: Recording, draw: int, term: str) -> np.random.Generator
     would be the same in each, and no mean over these would lessen it. A recording is known by its ride, its
     IMU and the noise of its first sample; an ideal IMU at the same start has none, and shares them.
     """
-    first = np.rint(recording.imu.to_numpy(dtype=np.float64)[:1] / NAMED_BY).astype(np.int64).ravel()
+    first = np.rint(recording.imu.iloc[:1].to_numpy(dtype=np.float64) / NAMED_BY).astype(np.int64).ravel()
     return stream(ROOT, "rail draws", recording.name, recording.mount, *first.tolist(), draw, term)
 
 
@@ -126,10 +126,16 @@ def geometry_draws(
     """
     slope, place = slopes(sight.arms)[sight.use], sight.place[sight.use]
     variance = np.square(sight.place_sd[sight.use])[:, None]
+    at = geometry.index.to_numpy(dtype=np.float64)
     lines = geometry[list(IRREGULARITY)].to_numpy(dtype=np.float64)
     unknown = np.isnan(lines)
     white = sight.noise_sd * np.sqrt([0.5, 0.5, 2.0, 2.0])  # of mean and difference of two rails
-    drawn = np.empty((len(errors), *lines.shape))
+    drawn, known = np.empty((len(errors), *lines.shape)), np.where(unknown, 0.0, lines)
+    moves = len(at) > 0 and bool(variance.any())
+    if moves:
+        spread = over_space(place, variance, step_m=step_m, variance=variance).variance
+        assert spread is not None
+        along, sd = CubicSpline(at, known), np.sqrt(spread[:, 0])
     for draw, error in enumerate(errors):
         states = error[sight.use]
         shares = stream_of(recording, draw, "tilt").uniform(-1.0, 1.0, len(tilts_rad))
@@ -138,13 +144,9 @@ def geometry_draws(
         rails = np.einsum("nij,nj->ni", slope, states)
         if sight.noise_sd > 0.0:
             rails += white * stream_of(recording, draw, "rail_sensor").standard_normal(rails.shape)
-        found = over_space(place, rails, step_m=step_m, variance=variance)
-        drawn[draw] = found.values
-        if len(found.position_m) and found.variance is not None and found.variance.any():
-            at = found.position_m
-            sd = np.sqrt(found.variance[:, 0])
+        drawn[draw] = over_space(place, rails, step_m=step_m).values
+        if moves:
             moved = at + stream_of(recording, draw, "position").standard_normal() * sd
-            known = np.where(unknown, 0.0, lines)
-            drawn[draw] += CubicSpline(at, known)(np.clip(moved, at[0], at[-1])) - known
+            drawn[draw] += along(np.clip(moved, at[0], at[-1])) - known
         drawn[draw][unknown] = np.nan
     return drawn

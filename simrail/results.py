@@ -130,8 +130,7 @@ def run(
         if other is not None:
             said = ("scenario", "scenario_hash", "seed", "started_utc", "git_revision")
             manifest["beside"] = {name: other.manifest.get(name) for name in said}
-            assert beside is not None
-            manifest["command"] += f" --beside {shlex.quote(label(Path(beside)))}"
+            manifest["command"] += f" --beside {shlex.quote(label(other.folder))}"
         with draft_of(folder) as draft:
             _write(draft, scenario, campaign, manifest, begun=begun, beside=other)
             shutil.copyfile(kept.folder / LOG, draft / LOG)

@@ -12,6 +12,7 @@ from rich.text import Text
 from simrail.bands import Band
 from simrail.campaign_result import CampaignResult
 from simrail.report.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
+from simrail.report.geometry_tables import baseline_of, behind_baseline
 from simrail.report.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.pivot import Figures, cases
 from simrail.results import Results
@@ -178,14 +179,9 @@ def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, li
 
 def _lost_rails(case: Figures, styles: list[MethodStyle], band: str) -> list[str]:
     """What rails that lie as designed know better than a method, by quantity."""
-    floor = next((style for style in styles if not style.uses_imu), None)
-    lost = []
-    for quantity in RAILS if floor else ():
-        assert floor is not None
-        least = case.get(floor.name, quantity, "sd", band=band).value
-        worse = [
-            s.name for s in styles if s.uses_imu and case.get(s.name, quantity, "sd", band=band).value > least
-        ]
+    floor, lost = baseline_of(case, styles), []
+    for quantity in RAILS:
+        worse = [style.name for style in behind_baseline(case, styles, quantity, band=band)]
         if worse:
             lost.append(f"in {QUANTITIES[quantity]} than {', '.join(worse)}")
     return [f"{floor.name}, which uses no IMU, errs less {' and '.join(lost)}"] if floor and lost else []

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.kernels.trajectory import WIDTH
+from estimators.kernels.trajectory import WIDTH, mirror
 from estimators.kernels.trajectory_equations import (
     PITCH,
     PITCH_RATE,
@@ -42,6 +42,30 @@ def jacobian_rows(x: FloatArray, j: FloatArray, rows: FloatArray) -> None:
 
 
 @njit_borrowed
+def still_rows(rows: FloatArray) -> None:
+    """What is always one in the rows (8, 16) of the Jacobian, which are zero before."""
+    rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = rows[6, Y] = rows[7, Z] = 1.0
+
+
+@njit_borrowed
+def linearise(
+    x: FloatArray,
+    track: FloatArray,
+    slips: FloatArray,
+    k: int,
+    gravity: float,
+    g: FloatArray,
+    j: FloatArray,
+    rows: FloatArray,
+) -> None:
+    """Rows (8, 16) of the Jacobian in state x at sample k, as the filter had them; ``g`` and ``j``: work."""
+    measured(x, track, k, gravity, g, j)
+    if slips.shape[0] > 0:
+        misprint(x, track, slips, k, j)
+    jacobian_rows(x, j, rows)
+
+
+@njit_borrowed
 def transpose_predict(lam: FloatArray, dt: float) -> None:
     """lam <- F' lam in place."""
     half = 0.5 * dt * dt
@@ -56,26 +80,24 @@ def transpose_predict(lam: FloatArray, dt: float) -> None:
 def information_predict(info: FloatArray, dt: float) -> None:
     """Lam <- F' Lam F in place."""
     half = 0.5 * dt * dt
-    width = info.shape[0] // 12
+    width = info.shape[1]
     for a in range(0, 6, 2):
         for i in range(width):
-            info[(a + 1) * WIDTH + i] += dt * info[a * WIDTH + i]
+            info[a + 1, i] += dt * info[a, i]
     for a in range(6, 12, 3):
         for i in range(width):
-            info[(a + 2) * WIDTH + i] += dt * info[(a + 1) * WIDTH + i] + half * info[a * WIDTH + i]
+            info[a + 2, i] += dt * info[a + 1, i] + half * info[a, i]
         for i in range(width):
-            info[(a + 1) * WIDTH + i] += dt * info[a * WIDTH + i]
-    for o in range(0, 12 * WIDTH, WIDTH):
-        info[o + 1] += dt * info[o]
-        info[o + 3] += dt * info[o + 2]
-        info[o + 5] += dt * info[o + 4]
-        info[o + 8] += dt * info[o + 7] + half * info[o + 6]
-        info[o + 7] += dt * info[o + 6]
-        info[o + 11] += dt * info[o + 10] + half * info[o + 9]
-        info[o + 10] += dt * info[o + 9]
+            info[a + 1, i] += dt * info[a, i]
     for i in range(12):
-        for c in range(i + 1, 12):
-            info[c * WIDTH + i] = info[i * WIDTH + c]
+        info[i, 1] += dt * info[i, 0]
+        info[i, 3] += dt * info[i, 2]
+        info[i, 5] += dt * info[i, 4]
+        info[i, 8] += dt * info[i, 7] + half * info[i, 6]
+        info[i, 7] += dt * info[i, 6]
+        info[i, 11] += dt * info[i, 10] + half * info[i, 9]
+        info[i, 10] += dt * info[i, 9]
+    mirror(info)
 
 
 @njit_borrowed
@@ -180,13 +202,11 @@ def trajectory_back(
     lam, v, out = np.zeros(STATES), np.zeros(WIDTH), np.zeros(STATES)
     g, j, rows = np.zeros(6), np.zeros((3, 8)), np.zeros((ROWS, WIDTH))
     info, p, work = np.zeros(STATES * WIDTH), np.zeros(STATES * WIDTH), np.zeros(STATES * WIDTH)
-    rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = rows[6, Y] = rows[7, Z] = 1.0
+    square = info.reshape((STATES, WIDTH))
+    still_rows(rows)
     for k in range(states.shape[0] - 1, -1, -1):
         x = states[k]
-        measured(x, track, k, gravity, g, j)
-        if slips.shape[0] > 0:
-            misprint(x, track, slips, k, j)
-        jacobian_rows(x, j, rows)
+        linearise(x, track, slips, k, gravity, g, j, rows)
         for m in range(ROWS - 1, -1, -1):
             dot = scaled[k, m, 0]
             for i in range(STATES):
@@ -207,7 +227,7 @@ def trajectory_back(
         if with_covariance:
             unpack(covariance, k, p)
             shrink(info, p, work, v, covariance, k)
-            information_predict(info, step_s)
+            information_predict(square, step_s)
         for i in range(STATES):
             states[k, i] -= out[i]
         transpose_predict(lam, step_s)

@@ -12,18 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from estimators.kernels.trajectory import WIDTH
-from estimators.kernels.trajectory_back import jacobian_rows, transpose_predict
-from estimators.kernels.trajectory_equations import (
-    PITCH_RATE,
-    ROLL_RATE,
-    ROWS,
-    STATES,
-    YAW_RATE,
-    Y,
-    Z,
-    measured,
-    misprint,
-)
+from estimators.kernels.trajectory_back import linearise, still_rows, transpose_predict
+from estimators.kernels.trajectory_equations import ROWS, STATES
 from simrail.jit import FloatArray, IntArray, njit, njit_borrowed
 
 
@@ -104,7 +94,7 @@ def trajectory_error(
     """
     e, lam = np.empty(STATES), np.zeros(STATES)
     g, j, rows = np.zeros(6), np.zeros((3, 8)), np.zeros((ROWS, WIDTH))
-    rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = rows[6, Y] = rows[7, Z] = 1.0
+    still_rows(rows)
     for i in range(STATES):
         e[i] = start_sd[i] * normals[0, i]
     n = states.shape[0]
@@ -113,10 +103,7 @@ def trajectory_error(
         if k > 0:
             step_error(e, root, kind, normals, k, step_s)
         errors[k] = e
-        measured(states[k], track, k, gravity, g, j)
-        if slips.shape[0] > 0:
-            misprint(states[k], track, slips, k, j)
-        jacobian_rows(states[k], j, rows)
+        linearise(states[k], track, slips, k, gravity, g, j, rows)
         for m in range(ROWS):
             v = noise_sd[kind, m] * normals[k, STATES + m]
             for i in range(STATES):
@@ -125,10 +112,7 @@ def trajectory_error(
                 e[i] -= gains[k, m, i] * v
             innovations[k, m] = v
     for k in range(n - 1, -1, -1):
-        measured(states[k], track, k, gravity, g, j)
-        if slips.shape[0] > 0:
-            misprint(states[k], track, slips, k, j)
-        jacobian_rows(states[k], j, rows)
+        linearise(states[k], track, slips, k, gravity, g, j, rows)
         for m in range(ROWS - 1, -1, -1):
             dot = innovations[k, m] * scaled[k, m, 1]
             for i in range(STATES):

@@ -8,7 +8,7 @@ import numpy as np
 
 from simrail.bands import BANDS, Band
 from simrail.report.geometry_bands import BAND, JUDGED, QUANTITIES, judged_band, waves_words
-from simrail.report.geometry_tables import baseline_of, is_zero, main_of, mappers, sd_of
+from simrail.report.geometry_tables import baseline_of, behind_baseline, is_zero, main_of, mappers, sd_of
 from simrail.report.methods import MethodStyle
 from simrail.report.pivot import Figures
 from simrail.report.sentences import Finding, interval_verdict, listed, significant
@@ -101,13 +101,10 @@ def _beside(case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band
 
 def _lost(case: Figures, styles: Sequence[MethodStyle], band: str) -> list[Finding]:
     """Which of the other methods lose to no IMU at all; the first says so itself."""
-    floor = baseline_of(case, styles)
-    _, *rest = [style for style in mappers(case, styles) if not is_zero(style)]
-    lost = []
-    for quantity in JUDGED if floor else ():
-        assert floor is not None
-        least = sd_of(case, floor, quantity, band=band)
-        worse = [style.label for style in rest if sd_of(case, style, quantity, band=band) > least]
+    first, lost = main_of(case, styles), []
+    for quantity in JUDGED:
+        behind = behind_baseline(case, styles, quantity, band=band)
+        worse = [style.label for style in behind if style is not first]
         if worse:
             lost.append(f"{listed(worse)} in {QUANTITIES[quantity]}")
     return [Finding("bad", f"No IMU at all beats {'; '.join(lost)}.")] if lost else []

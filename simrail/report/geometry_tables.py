@@ -41,6 +41,18 @@ def sd_of(case: Figures, style: MethodStyle, quantity: str, *, band: str) -> flo
     return case.get(style.name, quantity, "sd", band=band).value
 
 
+def behind_baseline(
+    case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band: str
+) -> list[MethodStyle]:
+    """Methods that err more than the baseline, which uses no IMU; none if that was not run."""
+    floor = baseline_of(case, styles)
+    if floor is None:
+        return []
+    least = sd_of(case, floor, quantity, band=band)
+    tested = [style for style in mappers(case, styles) if not is_zero(style)]
+    return [style for style in tested if sd_of(case, style, quantity, band=band) > least]
+
+
 def geometry_table(
     case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS
 ) -> Table | None:
