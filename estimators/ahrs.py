@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import imufusion
 import numpy as np
 import pandas as pd
+from simrail.estimators.attitude.compensation import design_frame, gravity_force
+from simrail.estimators.attitude.quaternions import to_euler
+from simrail.estimators.attitude.rest_bias import rest_bias
 from vqf import VQF
 
-from estimators.compensation import design_frame, gravity_force
-from estimators.quaternions import to_euler
-from estimators.rest_bias import rest_bias
-from simrail.columns import ATTITUDE, GYRO, MAGNETIC
-from simrail.errors import InputError
-from simrail.estimate import Estimate
-from simrail.recording import Recording
+from simrail.core.columns import ATTITUDE, GYRO, MAGNETIC
+from simrail.core.errors import InputError
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
 
 
 @dataclass(frozen=True)

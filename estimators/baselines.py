@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from simrail.estimators.attitude.compensation import design_frame
+from simrail.estimators.trajectory.track_geometry import track_geometry
 
-from estimators.compensation import design_frame
-from estimators.track_geometry import track_geometry
-from simrail.columns import ATTITUDE, RELATIVE_POSITION
-from simrail.estimate import Estimate
-from simrail.recording import Recording
+from simrail.core.columns import ATTITUDE, RELATIVE_POSITION
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
 
 
 @dataclass(frozen=True)

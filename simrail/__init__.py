@@ -12,7 +12,7 @@ The way of the data, and the verbs between the nouns::
 
 The data vocabulary
 -------------------
-Data are pandas frames indexed by ``time_s``; every column is named once, in `simrail.columns`. SI and
+Data are pandas frames indexed by ``time_s``; every column is named once, in `simrail.core.columns`. SI and
 radians inside, units in names; degrees and millimetres in reports only.
 
 =====================  =========================================================================
@@ -31,7 +31,7 @@ place in the track     ``lateral_m``, ``vertical_m`` and their ``..._sd_m``
 innovations            ``innovation_{x,y,z}_mps2``, ``innovation_{x,y,z}_radps``, ``nis``
 rail irregularity      ``alignment_m``, ``vertical_profile_m``, ``cross_level_m``, ``gauge_m``,
                        indexed by ``position_m``
-scores                 `simrail.score_table.SCORE_COLUMNS`: one row per quantity, band, reference,
+scores                 `simrail.scoring.table.SCORE_COLUMNS`: one row per quantity, band, reference,
                        window and metric
 =====================  =========================================================================
 
@@ -50,66 +50,64 @@ only. A person's faulty input raises `InputError`, whose text names file, field,
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simrail.columns import COLUMNS
-    from simrail.errors import InputError
-    from simrail.estimate import Estimate, Estimator
-    from simrail.line_odometry import with_odometry
-    from simrail.measure import measure
-    from simrail.profile import SpeedProfile
-    from simrail.recording import Recording
+    from simrail.core.columns import COLUMNS
+    from simrail.core.errors import InputError
+    from simrail.estimation.choose_odometry import with_odometry
+    from simrail.estimation.estimate import Estimate, Estimator
+    from simrail.recording.files.ride_reader import read_ride
+    from simrail.recording.files.ride_writer import write_ride
+    from simrail.recording.recording import Recording
+    from simrail.recording.sheets.grades import ImuGrade
     from simrail.results import Results, run
-    from simrail.ride import Ride, simulate
+    from simrail.ride.ride import Ride, simulate
+    from simrail.ride.truth import Mount, Truth
     from simrail.scenario.build import Parts
     from simrail.scenario.cells import Cell, cells
     from simrail.scenario.check import judge_scenario
-    from simrail.scenario.ride_reader import read_ride
-    from simrail.scenario.ride_writer import write_ride
     from simrail.scenario.scenario import Scenario, load_scenario
-    from simrail.score import score, score_odometry
-    from simrail.score_geometry import score_geometry
+    from simrail.scoring.geometry import score_geometry
+    from simrail.scoring.score import score, score_odometry
     from simrail.sensors.encoder import EncoderSpec
-    from simrail.sensors.grades import ImuGrade
     from simrail.sensors.magnetometer import MagnetometerSpec
+    from simrail.sensors.measure import measure
     from simrail.sensors.rail_sensor import RailSensorSpec
     from simrail.track.design import TrackDesign
     from simrail.track.irregularity import Irregularity
-    from simrail.track.laid import LaidTrack, lay
-    from simrail.truth import Mount, Truth
+    from simrail.track.laid_track import LaidTrack, lay
     from simrail.vehicle.model import VehicleModel
+    from simrail.vehicle.speed_profile import SpeedProfile
 
 _HOMES = {
-    "columns": ("COLUMNS",),
-    "errors": ("InputError",),
-    "estimate": ("Estimate", "Estimator"),
-    "line_odometry": ("with_odometry",),
-    "measure": ("measure",),
-    "profile": ("SpeedProfile",),
-    "recording": ("Recording",),
+    "core.columns": ("COLUMNS",),
+    "core.errors": ("InputError",),
+    "estimation.choose_odometry": ("with_odometry",),
+    "estimation.estimate": ("Estimate", "Estimator"),
+    "recording.files.ride_reader": ("read_ride",),
+    "recording.files.ride_writer": ("write_ride",),
+    "recording.recording": ("Recording",),
     "results": ("Results", "run"),
-    "ride": ("Ride", "simulate"),
+    "ride.ride": ("Ride", "simulate"),
+    "ride.truth": ("Mount", "Truth"),
     "scenario.build": ("Parts",),
     "scenario.cells": ("Cell", "cells"),
     "scenario.check": ("judge_scenario",),
-    "scenario.ride_reader": ("read_ride",),
-    "scenario.ride_writer": ("write_ride",),
     "scenario.scenario": ("Scenario", "load_scenario"),
-    "score": ("score", "score_odometry"),
-    "score_geometry": ("score_geometry",),
+    "scoring.geometry": ("score_geometry",),
+    "scoring.score": ("score", "score_odometry"),
     "sensors.encoder": ("EncoderSpec",),
-    "sensors.grades": ("ImuGrade",),
+    "recording.sheets.grades": ("ImuGrade",),
     "sensors.magnetometer": ("MagnetometerSpec",),
+    "sensors.measure": ("measure",),
     "sensors.rail_sensor": ("RailSensorSpec",),
     "track.design": ("TrackDesign",),
     "track.irregularity": ("Irregularity",),
-    "track.laid": ("LaidTrack", "lay"),
-    "truth": ("Mount", "Truth"),
+    "track.laid_track": ("LaidTrack", "lay"),
     "vehicle.model": ("VehicleModel",),
+    "vehicle.speed_profile": ("SpeedProfile",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -160,18 +158,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-class _Package(ModuleType):
-    """The package, whose verbs win over the modules that hold them.
-
-    Importing ``simrail.score`` would bind that module to the name ``score`` of the package, so that
-    ``simrail.score(...)`` worked only until then. ``from simrail.score import ...`` is not affected.
-    """
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _HOME_OF and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -2,7 +2,7 @@
 
 Everything is written into a draft folder beside the final one, which takes its place when it is
 complete; an interrupted run leaves the former results as they were, and what it had done beside them
-(`simrail.unfinished`). The manifest says what is needed
+(`simrail.campaign.checkpoint`). The manifest says what is needed
 to make the results again, and nothing of the machine's folders or users.
 """
 
@@ -22,19 +22,21 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from simrail.aggregate import aggregate
-from simrail.campaign import run_campaign
-from simrail.campaign_result import CampaignResult
-from simrail.drafts import draft_of
-from simrail.errors import InputError
-from simrail.former import FormerResults, read_results
-from simrail.job import prepare
-from simrail.report.page import SETS_BESIDE, write_report
-from simrail.retry import keep_good
-from simrail.scenario.files import label
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.checkpoint import LOG, Start, Unfinished, unfinished_of
+from simrail.campaign.job import Job, prepare
+from simrail.campaign.ledger import STAGES
+from simrail.campaign.progress import Watcher
+from simrail.campaign.result import CampaignResult
+from simrail.campaign.stored_results import FormerResults, read_results
+from simrail.campaign.worker import BatchResult
+from simrail.core.atomic_files import draft_of
+from simrail.core.errors import InputError
+from simrail.core.toml_files import label
+from simrail.report.pages.page import SETS_BESIDE, write_report
+from simrail.scenario.cells import cells
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.unfinished import LOG, Start, unfinished_of
-from simrail.watcher import Watcher
+from simrail.scoring.aggregate import aggregate
 
 PACKAGES = (
     "simrail",
@@ -87,13 +89,13 @@ def run(
     overrides : sequence of str, optional
         Settings ``key=value`` that replace what the file says.
     workers, cluster : int, str, optional
-        Who runs it, see `simrail.crew.crew_of`.
+        Who runs it, see `simrail.campaign.executors.crew_of`.
     start : {"auto", "resume", "fresh", "retry-failed"}, optional
         Whether to go on with an unfinished run of the same plan: if there is one, in any case, or not; or
         to run the failed cells of finished results again.
     beside : str or Path, optional
         Folder of other results that the page sets beside these, of the same publication
-        (`simrail.report.page.SETS_BESIDE`).
+        (`simrail.report.pages.page.SETS_BESIDE`).
     watcher : Watcher, optional
         Is told of the progress.
     many : bool
@@ -123,7 +125,7 @@ def run(
     job = prepare(scenario, many=many)
     with unfinished_of(folder, job.key, start=start) as kept:
         if start == "retry-failed":
-            keep_good(folder, job, kept)
+            _keep_good(folder, job, kept)
         campaign = run_campaign(job, workers=workers, cluster=cluster, kept=kept, watcher=watcher)
         manifest = describe(scenario, campaign)
         manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": job.key}
@@ -331,3 +333,47 @@ def _failures(campaign: CampaignResult) -> str:
     home = str(Path.home())
     parts = [f"{'; '.join(names)}\n\n{trace}" for trace, names in cells_of.items()]
     return "\n".join(parts).replace(home, "~")
+
+
+def _keep_good(results: Path, job: Job, kept: Unfinished) -> None:
+    """Keep the cells of finished results that did not fail.
+
+    Parameters
+    ----------
+    results : Path
+        Folder of the results.
+    job : Job
+        What is run.
+    kept : Unfinished
+        Where they are kept.
+
+    Raises
+    ------
+    InputError
+        If there are no results of this plan, or nothing in them failed.
+    """
+
+    def refuse(problem: str, remedy: str) -> InputError:
+        return InputError(problem, field="--retry-failed", value=str(results), remedy=remedy)
+
+    former = read_results(results, field="--retry-failed", remedy="run it without --retry-failed")
+    manifest, scores = former.manifest, former.scores
+    if manifest.get("key") != job.key:
+        raise refuse(
+            "the results there are of another plan, or were made by other code",
+            "run it without --retry-failed; rows of different code do not belong together",
+        )
+    failed = {failure["cell"] for failure in manifest["failures"]}
+    if not failed:
+        raise refuse("nothing failed there", "there is nothing to do")
+    had = set(scores["cell"])  # a run that its stop rule ended has not all
+    said = {ride["number"]: ride for ride in manifest["rides"]}
+    good: dict[int, list[int]] = {}
+    for cell in cells(job.scenario):
+        if cell.number in had - failed:
+            good.setdefault(cell.ride_number, []).append(cell.number)
+    wall, cpu = ({stage: manifest[name][stage] for stage in STAGES} for name in ("wall_s", "cpu_s"))
+    for ride_number, numbers in good.items():
+        rows = scores[scores["cell"].isin(numbers)].reset_index(drop=True)
+        kept.add(BatchResult(tuple(numbers), ride_number, rows, (), said.get(ride_number, {}), wall, cpu))
+        wall = cpu = dict.fromkeys(STAGES, 0.0)

@@ -11,7 +11,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Rides of a module's tests go into a cache of their own."""
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
+        patch.setattr("simrail.ride.cache.cache_folder", lambda: folder)
         yield
 
 

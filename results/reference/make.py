@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.campaign import CampaignResult, run_campaign
+from simrail.campaign.campaign import CampaignResult, run_campaign
 from simrail.scenario.scenario import load_scenario
 
 SCENARIO = "validation_quick"

@@ -1,7 +1,1 @@
-"""The report: one self-contained page with figures, tables and what they say."""
-
-from __future__ import annotations
-
-from simrail.report.page import write_report
-
-__all__ = ["write_report"]
+"""What a person looks at: pages, figures, tables and sentences, made from scores alone."""

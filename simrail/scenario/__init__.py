@@ -1,1 +1,1 @@
-"""A person's text becomes nouns: the only place that reads and judges TOML files."""
+"""What a person asks for: the scenario's tables, its axes, and the cells they make."""

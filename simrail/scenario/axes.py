@@ -16,8 +16,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import WrapValidator
 
+from simrail.core.toml_files import Part
 from simrail.scenario.distributions import Distribution, Value, read_distribution
-from simrail.scenario.files import Part
 
 Scalar = Value
 _T = TypeVar("_T")

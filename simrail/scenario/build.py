@@ -13,33 +13,33 @@ from math import radians
 from pathlib import Path
 from typing import Any, TypeVar
 
-from simrail.bands import BANDS, Band
-from simrail.errors import InputError
-from simrail.estimate import Estimator
-from simrail.profile import SpeedProfile
-from simrail.ride import Ride, rails_of
+from simrail.core.errors import InputError
+from simrail.core.toml_files import Part, blame, load
+from simrail.estimation.estimate import Estimator
+from simrail.recording.sheets.grades import ImuGrade
+from simrail.recording.sheets.imu_file import ImuFile
+from simrail.ride.ride import Ride, rails_of
+from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import estimator_of, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import Distribution
-from simrail.scenario.files import Part, blame, load
-from simrail.scenario.imu_file import ImuFile
 from simrail.scenario.scenario import Scenario, ScenarioFile
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
 from simrail.sensors.encoder import EncoderSpec
-from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.rail_sensor import RailSensorSpec
+from simrail.track.bands import BANDS, Band
 from simrail.track.design import TrackDesign
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import LaidTrack
+from simrail.track.laid_track import LaidTrack
+from simrail.track.quality import Limits
 from simrail.track.rail_condition import FRICTION, RailCondition
-from simrail.track_quality import Limits
-from simrail.truth import Mount
+from simrail.vehicle.contact.profile_files import profiles_digest
+from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.profile_files import profiles_digest
+from simrail.vehicle.speed_profile import SpeedProfile
 
 _Part = TypeVar("_Part", bound=Part)
 

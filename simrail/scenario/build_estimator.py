@@ -18,11 +18,11 @@ from typing import Any, get_args, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
-from simrail.errors import InputError
-from simrail.estimate import SENSORS, Estimator, estimator_class
-from simrail.own_files import load_own
+from simrail.core.errors import InputError
+from simrail.core.toml_files import blame, shipped_folder
+from simrail.estimation.estimate import SENSORS, Estimator, estimator_class
+from simrail.estimation.user_modules import load_own
 from simrail.scenario.cells import Method
-from simrail.scenario.files import blame, shipped_folder
 from simrail.scenario.scenario import Scenario
 
 

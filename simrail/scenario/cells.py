@@ -22,9 +22,9 @@ from math import prod
 from typing import Any
 
 from simrail.scenario.axes import Scalar, axes_of, drawn, expand
-from simrail.scenario.parts import EstimatorPart, ImuPart, RidePart
 from simrail.scenario.samples import sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
+from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
 SENSING = ("odometry", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")

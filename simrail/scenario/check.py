@@ -11,16 +11,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from simrail.errors import InputError
-from simrail.estimate import Estimator
+from simrail.core.errors import InputError
+from simrail.estimation.estimate import Estimator
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.samples import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
-from simrail.score_table import CURVE_PREFIX, METRICS, WINDOWS
-from simrail.stop_rule import judge_stop_rule
+from simrail.scenario.stop_rule import judge_stop_rule
+from simrail.scoring.table import CURVE_PREFIX, METRICS, WINDOWS
 
 MOST_CELLS = 1_000_000
 

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.errors import InputError
-from simrail.profile import SpeedProfile
+from simrail.core.errors import InputError
+from simrail.core.toml_files import blame
 from simrail.scenario.build import Parts, irregularity_of, profile_of
 from simrail.scenario.cells import Cell
 from simrail.scenario.check_wheels import judge_wheels
-from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.track.design import TrackDesign
-from simrail.track.laid import lay
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.step_limit import ACCURATE, contact_resonance
+from simrail.vehicle.speed_profile import SpeedProfile
 
 WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5

@@ -1,17 +1,17 @@
 """Judging sensors: do they fit the vehicle that carries them, the ride and the rate of the truth?
 
-What a sensor may be at all is judged where it is read (`simrail.scenario.imu_file`,
-`simrail.scenario.sensor_parts`) and by the sensors themselves.
+What a sensor may be at all is judged where it is read (`simrail.recording.sheets.imu_file`,
+`simrail.scenario.sensor_tables`) and by the sensors themselves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
+from simrail.core.toml_files import blame
 from simrail.scenario.build import Parts, encoder_of, magnetometer_of, profile_of, rail_sensor_of
 from simrail.scenario.cells import Cell
-from simrail.scenario.files import blame
 from simrail.scenario.scenario import Scenario
 from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
 from simrail.sensors.encoder import check_encoder

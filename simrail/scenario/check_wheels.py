@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 from simrail.scenario.build import conditions_of
 from simrail.scenario.cells import Cell
 from simrail.scenario.scenario import Scenario

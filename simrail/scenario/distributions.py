@@ -17,7 +17,7 @@ from typing import Any
 
 from scipy.special import ndtr, ndtri
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 
 Value = str | int | float | bool
 

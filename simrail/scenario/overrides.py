@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Sequence
 from typing import Any
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 
 _STEP = re.compile(r"^([A-Za-z0-9_+-]+)(?:\[(\d+)\])?$")
 _EXAMPLE = (

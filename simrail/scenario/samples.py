@@ -16,11 +16,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.jit import FloatArray
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
 from simrail.scenario.axes import Scalar, distributions_of
 from simrail.scenario.distributions import Distribution
 from simrail.scenario.scenario import ScenarioFile
-from simrail.seeds import stream
 
 SOBOL_BITS = 30
 ARRAYS = ("ride", "imu", "estimator")

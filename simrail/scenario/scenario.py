@@ -16,12 +16,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from simrail.line_odometry import OdometryName
+from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
+from simrail.estimation.choose_odometry import OdometryName
 from simrail.scenario.axes import Axis, Listed, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
-from simrail.scenario.files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
 from simrail.scenario.overrides import override
-from simrail.scenario.parts import (
+from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart
+from simrail.scenario.tables import (
     EarthPart,
     EstimatorPart,
     GeometryPart,
@@ -34,7 +35,6 @@ from simrail.scenario.parts import (
     StopRulePart,
     TemperaturePart,
 )
-from simrail.scenario.sensor_parts import EncoderPart, MagnetometerPart, RailSensorPart
 
 
 class ScenarioFile(Part):

@@ -1,1 +1,1 @@
-"""What sensors on the train would have recorded of a motion: IMU and wheel encoder, with their errors."""
+"""What is bolted on: the truth becomes a recording here, and nowhere else."""

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray, njit
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray, njit
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.decimation import Sampling
-from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu_noise import Streams
 
 SHIFTS = 256

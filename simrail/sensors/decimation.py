@@ -19,8 +19,8 @@ from functools import lru_cache
 import numpy as np
 from scipy import signal
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray, njit
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray, njit
 
 PASS_EDGE, STOP_EDGE = 0.3, 0.6
 """Edges of the decimation filter, in output rates."""

@@ -10,7 +10,8 @@ creeping under traction, turns as the contact makes it turn, and that angle come
 simulated contact did not do. What the train believes of the wheel's radius is not quite true; that belief
 is made here too, since it belongs to the device as much as its pulses.
 
-Not here: what a logger makes of the counts (`simrail.wheel_speed`, `simrail.odometry`).
+Not here: what a logger makes of the counts (`simrail.recording.wheel_speed`,
+`simrail.estimators.odometry.encoder`).
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.seeds import stream
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
 from simrail.sensors.decimation import decimation_factor
 
 IntArray = npt.NDArray[np.int64]

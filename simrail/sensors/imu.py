@@ -21,12 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from simrail.columns import ATTITUDE, IMU, VELOCITY
-from simrail.jit import FloatArray
-from simrail.seeds import stream
+from simrail.core.columns import ATTITUDE, IMU, VELOCITY
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.clock import lost_samples, sample_by_clock
 from simrail.sensors.decimation import sample_on_time, sampling_of, second_order
-from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu_noise import Streams, add_noise
 from simrail.sensors.imu_response import (
     Temperature,
@@ -77,7 +77,7 @@ def sample_imu(
     Parameters
     ----------
     motion : pandas.DataFrame
-        Indexed by ``time_s`` (uniform), with columns `simrail.columns.IMU` of a perfect sensor; with
+        Indexed by ``time_s`` (uniform), with columns `simrail.core.columns.IMU` of a perfect sensor; with
         `earth` also attitude and velocity.
     grade : ImuGrade
         The device. Its rate, times its oversampling, must divide the rate of the motion.
@@ -95,7 +95,7 @@ def sample_imu(
     Returns
     -------
     imu : pandas.DataFrame
-        Indexed by ``time_s``, a subset of the motion's own time stamps; columns `simrail.columns.IMU`.
+        Indexed by ``time_s``, a subset of the motion's own time stamps; columns `simrail.core.columns.IMU`.
     delay_s : float
         How much later than its time stamp a sample leaves the sensor's filter.
 

@@ -2,7 +2,7 @@
 
 Every term has its own named stream, drawn row by row: a new term, a new sensor or a longer ride changes
 no sample of another. The numbers are drawn in blocks that stay in the processor's cache and added in one
-pass. The closed forms of these processes are in `simrail.sensors.allan`.
+pass. The closed forms of these processes are in `simrail.recording.sheets.allan`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from simrail.jit import FloatArray, njit
-from simrail.sensors.grades import ImuGrade
+from simrail.core.jit import FloatArray, njit
+from simrail.recording.sheets.grades import ImuGrade
 
 BLOCK = 2048
 """Rows drawn at a time."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simrail.jit import FloatArray, njit
-from simrail.rotation import rotation_matrix
-from simrail.sensors.grades import REFERENCE_TEMPERATURE_C, ImuGrade, Triad
+from simrail.core.jit import FloatArray, njit
+from simrail.core.rotation import rotation_matrix
+from simrail.recording.sheets.grades import REFERENCE_TEMPERATURE_C, ImuGrade, Triad
 from simrail.sensors.imu_noise import Streams
 
 _CUBIC = 1.5 * math.sqrt(3.0)

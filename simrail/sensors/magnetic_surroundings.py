@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.seeds import stream
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
 
 MU0_OVER_2PI = 2e-7
 """Magnetic constant over 2 pi, T m/A."""

@@ -18,12 +18,12 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from simrail.columns import ATTITUDE, MAGNETIC, RELATIVE_ATTITUDE, RELATIVE_POSITION
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.resample import interpolated
-from simrail.rotation import rotation_matrix
-from simrail.seeds import stream
+from simrail.core.columns import ATTITUDE, MAGNETIC, RELATIVE_ATTITUDE, RELATIVE_POSITION
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.resample import interpolated
+from simrail.core.rotation import rotation_matrix
+from simrail.core.seeds import stream
 from simrail.sensors.magnetic_surroundings import (
     Steel,
     Traction,
@@ -131,7 +131,7 @@ def sample_magnetometer(
     Parameters
     ----------
     motion : pandas.DataFrame
-        Indexed by ``time_s`` (uniform), columns `simrail.columns.MOTION` of the mount.
+        Indexed by ``time_s`` (uniform), columns `simrail.core.columns.MOTION` of the mount.
     times : pandas.Index
         Uniform times of the samples, s. The field changes slowly: it is sampled as it is, unfiltered.
     spec : MagnetometerSpec
@@ -146,7 +146,7 @@ def sample_magnetometer(
     Returns
     -------
     pandas.DataFrame
-        Indexed by `times`, columns `simrail.columns.MAGNETIC`, T, on the mount's axes.
+        Indexed by `times`, columns `simrail.core.columns.MAGNETIC`, T, on the mount's axes.
 
     Raises
     ------

@@ -14,13 +14,13 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from simrail.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.resample import interpolated
-from simrail.rotation import rotation_matrix
-from simrail.seeds import stream
-from simrail.track.laid import LaidTrack
+from simrail.core.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.resample import interpolated
+from simrail.core.rotation import rotation_matrix
+from simrail.core.seeds import stream
+from simrail.track.laid_track import LaidTrack
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ def sample_rails(
     Parameters
     ----------
     motion : pandas.DataFrame
-        True motion of the IMU's mount, columns `simrail.columns.MOTION`, indexed by ``time_s`` (uniform).
+        True motion of the IMU's mount, columns `simrail.core.columns.MOTION`, indexed by ``time_s``
+        (uniform).
     times : pandas.Index
         Times of the samples, s.
     spec : RailSensorSpec
@@ -72,7 +73,7 @@ def sample_rails(
     Returns
     -------
     pandas.DataFrame
-        Indexed by `times`, columns `simrail.columns.RAIL_DISPLACEMENT`, m.
+        Indexed by `times`, columns `simrail.core.columns.RAIL_DISPLACEMENT`, m.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""The track: its design, its irregularities, and the rails as they lie."""
+"""What the rails are: the design line, its irregularities, and the track that is laid of both."""

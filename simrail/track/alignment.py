@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PPoly
 
-from simrail.jit import FloatArray
+from simrail.core.jit import FloatArray
 from simrail.track.elements import SMOOTH_STEP, Element, Transition
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)

@@ -2,7 +2,7 @@
 
 A `TrackDesign` is what the track's drawing says: straights, clothoids and arcs with cant, gradients
 joined by vertical curves. An estimator may know it. Irregularities are not part of it: see
-`simrail.track.irregularity` and `simrail.track.laid`.
+`simrail.track.irregularity` and `simrail.track.laid_track`.
 
 Conventions (`estimators/EQUATIONS.md`, section 0): X forward in the direction of increasing s,
 Y left, Z up; ZYX Euler angles, pitch positive nose down, roll positive left side up; s is the arc
@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PPoly
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
 from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
 from simrail.track.elements import (
     CURVE,
@@ -121,7 +121,7 @@ class TrackDesign:
 
     @cached_property
     def end_m(self) -> float:
-        """s at the end of the last element."""
+        """S at the end of the last element."""
         return float(element_starts(self.elements, self.start_m)[-1])
 
     def check(self) -> None:

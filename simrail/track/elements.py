@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 
 STRAIGHT, TRANSITION, CURVE = 0, 1, 2
 """Values of `TrackDesign.kind`."""
@@ -76,7 +76,7 @@ class Curve:
 
     @property
     def curvature_1pm(self) -> float:
-        """d yaw / ds, positive to the left."""
+        """D yaw / ds, positive to the left."""
         return 1.0 / self.radius_m
 
     @property

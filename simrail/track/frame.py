@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simrail.jit import FloatArray
+from simrail.core.jit import FloatArray
 
 
 class TrackFrame(NamedTuple):

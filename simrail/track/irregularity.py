@@ -8,7 +8,7 @@ on a frequency grid that never changes. So the value at s depends on s, the seed
 the length of the track or on what was sampled before; another band keeps the phases of the waves that
 remain. The four irregularities have independent streams.
 
-This module knows nothing of rails or splines: see `simrail.track.laid`.
+This module knows nothing of rails or splines: see `simrail.track.laid_track`.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simrail.columns import IRREGULARITY
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.seeds import stream
+from simrail.core.columns import IRREGULARITY
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
 from simrail.track.elements import require_number
 from simrail.track.spectra import SPECTRA
 
@@ -86,7 +86,7 @@ def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float
     irregularity : Irregularity
         Spectrum, band and scale.
     column : str
-        One of `simrail.columns.IRREGULARITY`.
+        One of `simrail.core.columns.IRREGULARITY`.
     seed : int
         Root seed.
     step_m : float
@@ -125,7 +125,7 @@ def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float
 
 
 def realise_all(irregularity: Irregularity, *, seed: int, step_m: float) -> FloatArray:
-    """One period of all four irregularities in the order of `simrail.columns.IRREGULARITY`, (n, 4)."""
+    """One period of all four irregularities in the order of `simrail.core.columns.IRREGULARITY`, (n, 4)."""
     return np.stack([realise(irregularity, name, seed=seed, step_m=step_m) for name in IRREGULARITY], axis=-1)
 
 

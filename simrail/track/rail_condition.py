@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
 
 FRICTION = {"wet": 0.15, "leaves": 0.05}
 """Nominal coefficients. A rail that is "dry" has the coefficient that the vehicle file gives."""

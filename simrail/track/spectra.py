@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simrail.columns import IRREGULARITY
-from simrail.jit import FloatArray
+from simrail.core.columns import IRREGULARITY
+from simrail.core.jit import FloatArray
 
 TWO_PI = 2.0 * np.pi
 
@@ -79,7 +79,7 @@ class Spectrum:
     name, source : str
         Its name in a scenario, and where it comes from.
     densities : mapping of str to RationalPsd
-        One for each of `simrail.columns.IRREGULARITY`: alignment and vertical profile (mean of the
+        One for each of `simrail.core.columns.IRREGULARITY`: alignment and vertical profile (mean of the
         rails), cross-level (left minus right height), gauge (left minus right lateral).
     """
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import PPoly
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 from simrail.track.elements import MAX_SLOPE, SMOOTH_STEP, Gradient, require_number
 
 

@@ -1,0 +1,1 @@
+"""What runs on the rails: bodies, axles, suspensions, their file, and their linear study."""

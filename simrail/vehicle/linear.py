@@ -1,6 +1,6 @@
 """A vehicle in steady running on smooth straight level track, and its equations linearised there.
 
-The right-hand side is the one that the engines integrate (`simrail.vehicle.forces`), so what is
+The right-hand side is the one that the engines integrate (`simrail.vehicle.engines.forces`), so what is
 linearised is what rides. It is written in a frame that travels with the driver's point at the speed V:
 per body the displacement from its nominal place, the turn from its equilibrium (a rotation vector in
 track axes), their rates; then the rate of every spin; then the first-order states (creep, inner states
@@ -23,17 +23,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.profile import SpeedProfile
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
 from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.contact_tables import rest_drops_m
-from simrail.vehicle.force_data import ForceData, pack, states_of
-from simrail.vehicle.forces import forces
+from simrail.track.laid_track import lay
+from simrail.vehicle.contact.contact_tables import rest_drops_m
+from simrail.vehicle.engines.force_data import ForceData, pack, states_of
+from simrail.vehicle.engines.forces import forces
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.speed_profile import SpeedProfile
 
 ComplexArray = npt.NDArray[np.complex128]
 

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from simrail.errors import InputError
-from simrail.jit import FloatArray
-from simrail.vehicle.creep_laws import CreepLaw
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.vehicle.contact.creep_laws import CreepLaw
 from simrail.vehicle.traction import Traction
 
 
@@ -148,9 +148,9 @@ class LinearContact:
 class WheelRail:
     """Which profiles meet, and how slippery they are.
 
-    Profiles are names or the paths of files (`simrail.vehicle.profile_files`); ``profile_scale`` is the
-    size that they have on this vehicle, 0.1 on one of 1:10 whose profiles are full-size ones made small.
-    ``smoothing`` is that of `simrail.vehicle.contact_geometry.build_contact`.
+    Profiles are names or the paths of files (`simrail.vehicle.contact.profile_files`); ``profile_scale`` is
+    the size that they have on this vehicle, 0.1 on one of 1:10 whose profiles are full-size ones made small.
+    ``smoothing`` is that of `simrail.vehicle.contact.contact_geometry.build_contact`.
     """
 
     wheel_profile: str

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from simrail.jit import FloatArray
+from simrail.core.jit import FloatArray
 from simrail.vehicle.linear import ComplexArray, RunningVehicle
 
 DIRECTIONS = ("longitudinal", "lateral", "bounce", "roll", "pitch", "yaw")

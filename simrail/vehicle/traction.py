@@ -1,6 +1,6 @@
 """What drives and brakes a vehicle through its wheels: motors, brakes and the driver's gains.
 
-The forces that come of it are in `simrail.vehicle.traction_forces`.
+The forces that come of it are in `simrail.vehicle.engines.traction_forces`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Traction:
-    """Motors, brakes and driver of a vehicle that its wheels drive (`simrail.vehicle.traction_forces`).
+    """Motors, brakes and driver of a vehicle that its wheels drive
+    (`simrail.vehicle.engines.traction_forces`).
 
     Attributes
     ----------

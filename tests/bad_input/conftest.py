@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simrail.cli import BAD_INPUT, call
+from simrail.cli.main import BAD_INPUT, call
 
 
 @pytest.fixture

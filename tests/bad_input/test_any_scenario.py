@@ -9,10 +9,10 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
+from simrail.core.toml_files import judge, shipped
 from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.files import judge, shipped
 from simrail.scenario.scenario import Scenario, ScenarioFile, load_scenario
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from simrail.cli import BAD_INPUT, call
-from simrail.scenario.files import shipped
+from simrail.cli.main import BAD_INPUT, call
+from simrail.core.toml_files import shipped
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 
@@ -96,7 +96,7 @@ def test_own_estimator_that_cannot_be_imported(place: Path, message_of: Callable
 def test_as_a_process(place: Path) -> None:
     (place / "mine.toml").write_text(GOOD.replace("speed_kmh = 50.0", "speed_kmh = -50.0"))
     done = subprocess.run(
-        [sys.executable, "-m", "simrail.cli", "run", "mine.toml"], capture_output=True, text=True, cwd=place
+        [sys.executable, "-m", "simrail", "run", "mine.toml"], capture_output=True, text=True, cwd=place
     )
     assert done.returncode == BAD_INPUT
     assert done.stdout == "" and done.stderr.count("\n") == 1

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD, RAIL_DISPLACEMENT
-from simrail.errors import InputError
-from simrail.recording import EncoderSheet, ImuSheet, RailSensorSheet, Recording
-from simrail.recording_check import check_recording
+from simrail.core.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD, RAIL_DISPLACEMENT
+from simrail.core.errors import InputError
+from simrail.recording.check_form import check_recording
+from simrail.recording.recording import EncoderSheet, ImuSheet, RailSensorSheet, Recording
 from simrail.track.design import Straight, TrackDesign
 
 

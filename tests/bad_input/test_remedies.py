@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from simrail.cli import BAD_INPUT, call
-from simrail.scenario.files import shipped
+from simrail.cli.main import BAD_INPUT, call
+from simrail.core.toml_files import shipped
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 NINE_AXES = 'method = "Vqf"\n[estimator.options]\nmagnetometer = true\n'

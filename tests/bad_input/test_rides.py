@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.cli import BAD_INPUT, call
-from simrail.new_ride import ride_template
-from simrail.plausible import check_plausible
-from simrail.scenario.ride_reader import read_ride
-from simrail.scenario.ride_writer import write_ride
+from simrail.cli.main import BAD_INPUT, call
+from simrail.cli.template_ride import ride_template
+from simrail.recording.check_physics import check_plausible
+from simrail.recording.files.ride_reader import read_ride
+from simrail.recording.files.ride_writer import write_ride
 
 TOML, DATA = "ride.toml", "ride.csv"
 

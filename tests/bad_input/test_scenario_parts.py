@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simrail.scenario.files import shipped
+from simrail.core.toml_files import shipped
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 

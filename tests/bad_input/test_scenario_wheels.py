@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simrail.scenario.files import shipped
+from simrail.core.toml_files import shipped
 
 LEAVES = shipped("scenario")["leaves"].read_text(encoding="utf-8")
 

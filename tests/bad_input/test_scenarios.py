@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from simrail.cli import call
-from simrail.scenario.files import shipped
+from simrail.cli.main import call
+from simrail.core.toml_files import shipped
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 

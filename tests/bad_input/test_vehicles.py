@@ -2,9 +2,9 @@
 
 import pytest
 
-from simrail.errors import InputError
-from simrail.scenario.files import judge, parse_toml, shipped
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.errors import InputError
+from simrail.core.toml_files import judge, parse_toml, shipped
+from simrail.vehicle.file import VehicleFile
 
 BOGIE = shipped("vehicle")["metro_irw_bogie"].read_text(encoding="utf-8")
 COACH = shipped("vehicle")["manchester_1"].read_text(encoding="utf-8")

@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.aggregate import aggregate
-from simrail.campaign import run_campaign
-from simrail.campaign_result import CampaignResult
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.progress import Watcher
+from simrail.campaign.result import CampaignResult
 from simrail.scenario.scenario import load_scenario
-from simrail.score_table import concat_scores
-from simrail.watcher import Watcher
+from simrail.scoring.aggregate import aggregate
+from simrail.scoring.table import concat_scores
 
 SMALL = [
     *("ride.end_m=60.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "imu.grade='lord_3dm_gx4_25'"),

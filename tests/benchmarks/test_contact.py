@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from simrail.jit import njit
-from simrail.vehicle.contact import build_contact, wheel_force
-from simrail.vehicle.creep_laws import LAWS, CreepLaw
-from simrail.vehicle.profiles import rail_60e1, s1002
+from simrail.core.jit import njit
+from simrail.vehicle.contact.contact import build_contact, wheel_force
+from simrail.vehicle.contact.creep_laws import LAWS, CreepLaw
+from simrail.vehicle.contact.profiles import rail_60e1, s1002
 
 
 @njit

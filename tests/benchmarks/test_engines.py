@@ -9,16 +9,16 @@ import time
 import numpy as np
 import pytest
 
-from simrail.jit import njit
-from simrail.profile import SpeedProfile
-from simrail.scenario.files import load
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.jit import njit
+from simrail.core.toml_files import load
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import Setup
-from simrail.vehicle.exudyn_engine import ExudynEngine
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.exudyn_engine import ExudynEngine
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 ENGINES = {"compiled": CompiledEngine, "exudyn": ExudynEngine}
 VEHICLES = {"axle": "irw_axle", "bogie": "metro_irw_bogie", "car": "irw_car"}

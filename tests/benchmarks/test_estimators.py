@@ -16,27 +16,27 @@ from functools import lru_cache
 import imufusion
 import numpy as np
 import pytest
+from simrail.estimators.attitude.compensation import gravity_force, track_acceleration
+from simrail.estimators.attitude.ekf import BACKENDS, AttitudeEkf
+from simrail.estimators.attitude.gda import AttitudeGda
+from simrail.estimators.attitude.kernel import attitude_gda
+from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
+from simrail.estimators.trajectory.kernel_back import trajectory_back
+from simrail.estimators.trajectory.kernel_equations import ROWS, STATES
+from simrail.estimators.trajectory.kernel_filter import PACKED, trajectory_filter
+from simrail.estimators.trajectory.model import Model
+from simrail.estimators.trajectory.reference import filterpy_backend
+from simrail.estimators.trajectory.smoother import TrajectorySmoother, compiled_backend, log_likelihood
 from vqf import VQF
 
-from estimators.attitude_ekf import BACKENDS, AttitudeEkf
-from estimators.attitude_gda import AttitudeGda
-from estimators.compensation import gravity_force, track_acceleration
-from estimators.kernels.attitude import attitude_gda
-from estimators.kernels.trajectory import PACKED, trajectory_filter
-from estimators.kernels.trajectory_back import trajectory_back
-from estimators.kernels.trajectory_equations import ROWS, STATES
-from estimators.rest_bias import rest_bias, step_rates
-from estimators.trajectory_model import Model
-from estimators.trajectory_reference import filterpy_backend
-from estimators.trajectory_smoother import TrajectorySmoother, compiled_backend, log_likelihood
-from simrail.measure import measure
-from simrail.profile import SpeedProfile
-from simrail.recording import Recording
-from simrail.scenario.imu_file import load_grade
-from simrail.scenario.track_file import track_by_name
+from simrail.recording.recording import Recording
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import harmonic, kinematic_truth
+from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec
-from simrail.truth import Mount
-from simrail.vehicle.kinematic_engine import harmonic, kinematic_truth
+from simrail.sensors.measure import measure
+from simrail.track.file import track_by_name
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SLOW = 4000
 """Samples for those that run in Python."""

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import IMU
-from simrail.sensors.grades import ImuGrade
+from simrail.core.columns import IMU
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.imu import arrived, sample_imu
 from simrail.sensors.imu_response import Temperature
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from simrail.scenario.files import shipped
+from simrail.core.toml_files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario
 
 SHORT = ["ride.end_m=150.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "imu.grade='lord_3dm_gx4_25'"]
@@ -22,7 +22,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimators.baselines import DesignAngles
+from simrail.estimators.baselines import DesignAngles
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail import batch
-from simrail.aggregate import aggregate
-from simrail.campaign import run_campaign
-from simrail.campaign_result import CampaignResult
+from simrail.campaign import worker
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.progress import Watcher
+from simrail.campaign.result import CampaignResult
+from simrail.core.toml_files import shipped
 from simrail.scenario.cells import cells
-from simrail.scenario.files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
-from simrail.score_table import OK, SCORE_COLUMNS
-from simrail.watcher import Watcher
+from simrail.scoring.aggregate import aggregate
+from simrail.scoring.table import OK, SCORE_COLUMNS
 
 SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
 
@@ -133,7 +133,7 @@ class Counter(Watcher):
 FAILING = """
 from dataclasses import dataclass
 import numpy as np
-from estimators.baselines import DesignAngles
+from simrail.estimators.baselines import DesignAngles
 
 @dataclass(frozen=True)
 class Failing:
@@ -183,14 +183,14 @@ def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
 
 
 def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = batch.simulate
+    real = worker.simulate
 
     def derail(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
         if ride.profile.speed_mps > 10.0:
             raise RuntimeError("derailed: axle front left the rail at s = 100.0 m")
         return real(ride, progress=progress)
 
-    monkeypatch.setattr(batch, "simulate", derail)
+    monkeypatch.setattr(worker, "simulate", derail)
     found = run_campaign(short("ride.speed_kmh=[50.0, 30.0]", "monte_carlo.sensor_draws=1"))
     assert len(found.cells) == 2 and len(found.rides) == 1
     statuses = found.scores.groupby("cell")["status"].agg(lambda column: sorted(set(column.astype(str))))
@@ -213,7 +213,7 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
         except KeyboardInterrupt:
             raise RuntimeError("the integrator stopped") from None
 
-    monkeypatch.setattr(batch, "simulate", swallow)
+    monkeypatch.setattr(worker, "simulate", swallow)
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         run_campaign(short("monte_carlo.sensor_draws=1", "ride.speed_kmh=[30.0, 50.0]"))

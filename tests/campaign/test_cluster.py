@@ -20,12 +20,12 @@ import pytest
 
 import simrail
 from simrail import results
-from simrail.campaign import run_campaign
-from simrail.cli import BAD_INPUT, CELL_FAILED, DONE, call
-from simrail.crew import _Cluster
-from simrail.errors import InputError
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.executors import _Cluster
+from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
+from simrail.core.errors import InputError
 from simrail.scenario.scenario import load_scenario
-from simrail.unfinished import Unfinished
 
 pytest.importorskip("distributed")
 
@@ -141,7 +141,7 @@ def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_i
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(results, "write_report", lambda path, **keywords: path.write_text("<html></html>"))
-    monkeypatch.setattr("simrail.crew._WAIT_S", 5.0)
+    monkeypatch.setattr("simrail.campaign.executors._WAIT_S", 5.0)
     cluster.add_worker()
     words = ["run", str(noting_file), "--set", "estimator.noting.options.sleep_s=0.3"]
     done: list[int] = []
@@ -165,7 +165,7 @@ def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_i
 def test_a_cluster_that_cannot_be_used_is_refused_in_one_line(
     cluster: Cluster, noting_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("simrail.crew._WAIT_S", 2.0)
+    monkeypatch.setattr("simrail.campaign.executors._WAIT_S", 2.0)
     scenario = load_scenario(noting_file)
     with pytest.raises(InputError, match=r"has no workers.*dask worker tcp://127"):
         run_campaign(scenario, cluster=cluster.address)
@@ -176,11 +176,11 @@ def test_a_cluster_that_cannot_be_used_is_refused_in_one_line(
     with (other / "simrail" / "score.py").open("a") as source:
         source.write("\n# another version\n")
     cluster.add_worker(path=other)
-    monkeypatch.setattr("simrail.crew._WAIT_S", 20.0)
+    monkeypatch.setattr("simrail.campaign.executors._WAIT_S", 20.0)
     with pytest.raises(InputError, match=r"runs another simrail.*install the same"):
         run_campaign(scenario, cluster=cluster.address)
     cluster.close()
-    monkeypatch.setattr("simrail.crew._WAIT_S", 2.0)
+    monkeypatch.setattr("simrail.campaign.executors._WAIT_S", 2.0)
     with pytest.raises(InputError, match="no dask scheduler answers"):
         run_campaign(scenario, cluster=cluster.address)
     with monkeypatch.context() as patch:

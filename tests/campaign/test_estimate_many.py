@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from simrail.campaign import run_campaign
+from simrail.campaign.campaign import run_campaign
 from simrail.scenario.scenario import load_scenario
 
 MANY = """
@@ -16,7 +16,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimators.baselines import DesignAngles
+from simrail.estimators.baselines import DesignAngles
 
 
 @dataclass(frozen=True)

@@ -16,22 +16,23 @@ from typing import Protocol
 import pandas as pd
 import pytest
 
-from simrail.campaign import run_campaign
-from simrail.cli import DONE, INTERRUPTED
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.checkpoint import Unfinished
+from simrail.cli.main import DONE, INTERRUPTED
 from simrail.scenario.scenario import load_scenario
-from simrail.unfinished import Unfinished
 
 WORKERS, BATCH_CELLS = 2, 2
 
 PROGRAM = """
 import sys
-from simrail import campaign, results
+from simrail import results
+from simrail.campaign import campaign
 
 # The figures of the report take longer than the campaign.
 results.write_report = lambda path, **keywords: path.write_text("<html></html>")
 campaign._MOST_CELLS = int(sys.argv[1])
 if __name__ == "__main__":
-    from simrail.cli import call
+    from simrail.cli.main import call
     sys.exit(call(sys.argv[2:]))
 """
 

@@ -9,19 +9,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
-from simrail import campaign, results
-from simrail.bootstrap import interval
-from simrail.campaign import run_campaign
-from simrail.campaign_result import CampaignResult
-from simrail.cli import CELL_FAILED, DONE, call
-from simrail.job import prepare
 from simrail.retry import keep_good
+
+from simrail import results
+from simrail.campaign import campaign
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.job import prepare
+from simrail.campaign.progress import Watcher
+from simrail.campaign.result import CampaignResult
+from simrail.cli.main import CELL_FAILED, DONE, call
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.stop_rule import Look, StopRule, stop_rule_of
-from simrail.unfinished import Unfinished
-from simrail.watcher import Watcher
+from simrail.scenario.stop_rule import Look, StopRule, stop_rule_of
+from simrail.scoring.bootstrap import interval
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
@@ -316,7 +317,7 @@ FLAKY = """
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimators.baselines import DesignAngles
+from simrail.estimators.baselines import DesignAngles
 
 
 @dataclass(frozen=True)

@@ -9,23 +9,23 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.interpolate import PPoly
+from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry
 
-from estimators.odometry import CurveMatchedOdometry
-from simrail.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
-from simrail.measure import measure
-from simrail.profile import SpeedProfile
-from simrail.recording import ImuSheet, Recording
-from simrail.ride import Ride, rails_of, simulate
-from simrail.scenario.files import load
-from simrail.scenario.imu_file import load_grade
-from simrail.scenario.track_file import track_by_name
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
+from simrail.core.toml_files import load
+from simrail.recording.recording import ImuSheet, Recording
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import Channel, along, kinematic_truth, rail_following
+from simrail.ride.ride import Ride, rails_of, simulate
+from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.measure import measure
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
+from simrail.track.file import track_by_name
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import LaidTrack, lay
-from simrail.truth import Mount, Truth
-from simrail.vehicle.kinematic_engine import Channel, along, kinematic_truth, rail_following
+from simrail.track.laid_track import LaidTrack, lay
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SHEET = ImuSheet(
     grade="test",

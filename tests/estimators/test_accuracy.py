@@ -10,10 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from simrail.estimators.attitude.ekf import AttitudeEkf
+from simrail.estimators.attitude.gda import AttitudeGda
 
-from estimators.attitude_ekf import AttitudeEkf
-from estimators.attitude_gda import AttitudeGda
-from simrail.estimate import Estimator
+from simrail.estimation.estimate import Estimator
 from simrail.track.design import CURVE
 
 ESTIMATORS: dict[tuple[str, bool], Estimator] = {

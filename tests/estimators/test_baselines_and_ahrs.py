@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from simrail.estimators.ahrs import Imufusion, Vqf
+from simrail.estimators.attitude.quaternions import from_euler, level, to_euler
+from simrail.estimators.baselines import DesignAngles, ZeroTrack
 
-from estimators.ahrs import Imufusion, Vqf
-from estimators.baselines import DesignAngles, ZeroTrack
-from estimators.quaternions import from_euler, level, to_euler
-from simrail.columns import ATTITUDE
-from simrail.errors import InputError
-from simrail.testing import check_estimator, standing
+from simrail.core.columns import ATTITUDE
+from simrail.core.errors import InputError
+from simrail.estimation.conformance import check_estimator, standing
 
 
 def test_design_angles_are_the_tracks(bend: Callable, exactly: Callable) -> None:

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from simrail.estimators.attitude.kernel import attitude_ekf
 
-from estimators.kernels.attitude import attitude_ekf
-from simrail.seeds import stream
+from simrail.core.seeds import stream
 
 STEP = 0.004
 GRAVITY = 9.81

@@ -14,18 +14,18 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from simrail.profile import SpeedProfile
-from simrail.recording import EncoderSheet
-from simrail.ride import Ride, simulate
-from simrail.scenario.files import judge, load
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import judge, load
+from simrail.recording.recording import EncoderSheet
+from simrail.recording.wheel_speed import counted_way_m
+from simrail.ride.ride import Ride, simulate
+from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.truth import Mount
-from simrail.vehicle.contact_tables import contacts_of
-from simrail.vehicle.wheelset import contact_state
-from simrail.wheel_speed import counted_way_m
+from simrail.vehicle.contact.contact_tables import contacts_of
+from simrail.vehicle.contact.wheelset import contact_state
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 FROM_M, TO_M = 190.0, 222.0
 """In the curve, well behind the transition and before the brakes."""

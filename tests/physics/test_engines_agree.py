@@ -6,25 +6,25 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import simrail.scenarios
 
-import scenarios
-from simrail.profile import SpeedProfile
-from simrail.rotation import rotation_matrix
-from simrail.scenario.files import load
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.rotation import rotation_matrix
+from simrail.core.toml_files import load
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
+from simrail.track.laid_track import lay
 from simrail.track.rail_condition import RailCondition
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.creep_laws import CreepLaw
-from simrail.vehicle.engine import Setup
-from simrail.vehicle.exudyn_engine import ExudynEngine
+from simrail.vehicle.contact.creep_laws import CreepLaw
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.exudyn_engine import ExudynEngine
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
 BRISK = {"rest_s": 0.3, "final_rest_s": 0.5, "acceleration_mps2": 2.0, "jerk_mps3": 4.0}
 FIELDS = ("time_s", "position", "rotation", "acceleration", "angular_acceleration", "spin_rad", "states")
-VEHICLES = sorted(file.stem for file in (Path(scenarios.__file__).parent / "vehicles").glob("*.toml"))
+VEHICLES = sorted(file.stem for file in (Path(simrail.scenarios.__file__).parent / "vehicles").glob("*.toml"))
 
 
 def run(

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simrail.track.laid import CHANNELS
+from simrail.track.laid_track import CHANNELS
 
 
 def ride_of(km: float) -> dict[str, float]:
@@ -19,12 +19,12 @@ def ride_of(km: float) -> dict[str, float]:
     import resource
     import tempfile
 
-    from simrail.profile import SpeedProfile
-    from simrail.ride import Ride, _drive
-    from simrail.scenario.files import load
-    from simrail.scenario.vehicle_file import VehicleFile
+    from simrail.core.toml_files import load
+    from simrail.ride.ride import Ride, _drive
     from simrail.track.design import Straight, TrackDesign
     from simrail.track.irregularity import Irregularity
+    from simrail.vehicle.file import VehicleFile
+    from simrail.vehicle.speed_profile import SpeedProfile
 
     ride = Ride(
         name="long",

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simrail.scenario.files import load
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import load
+from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle
 from simrail.vehicle.model import LinearContact, Suspension
 from simrail.vehicle.stability import critical_speed, root_locus, standstill_modes

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from simrail.columns import ACCEL, ATTITUDE, POSITION
-from simrail.dead_reckoning import dead_reckon
-from simrail.profile import SpeedProfile
-from simrail.ride import Ride, simulate
-from simrail.scenario.files import load
-from simrail.scenario.imu_file import load_grade
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.columns import ACCEL, ATTITUDE, POSITION
+from simrail.core.toml_files import load
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.dead_reckoning import dead_reckon
+from simrail.ride.ride import Ride, simulate
+from simrail.ride.truth import Mount
 from simrail.sensors.imu import sample_imu
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.truth import Mount
-from simrail.vehicle.engine import DerailedError, Setup
-from simrail.vehicle.exudyn_engine import ExudynEngine
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.engine import DerailedError, Setup
+from simrail.vehicle.engines.exudyn_engine import ExudynEngine
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 20.0)

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simrail.profile import SpeedProfile
-from simrail.scenario.files import load
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import load
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.engine import Setup
-from simrail.vehicle.exudyn_engine import ExudynEngine
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.exudyn_engine import ExudynEngine
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
 PROFILE = SpeedProfile(150.0, 180.0, 12.0, rest_s=0.2, acceleration_mps2=4.0, jerk_mps3=16.0)

@@ -5,17 +5,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from simrail.profile import SpeedProfile
-from simrail.scenario.files import load
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import load
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import DerailedError, Setup
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import DerailedError, Setup
+from simrail.vehicle.engines.step_limit import contact_resonance
+from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle
+from simrail.vehicle.speed_profile import SpeedProfile
 from simrail.vehicle.stability import standstill_modes
-from simrail.vehicle.step_limit import contact_resonance
 
 ROUGH = Irregularity("erri_b176_low", (0.3, 7.0), 3.0, 0.65)
 PROFILE = SpeedProfile(21.0, 80.0, 1.0, rest_s=0.2, acceleration_mps2=1.0, jerk_mps3=5.0)

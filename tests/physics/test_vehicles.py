@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simrail.profile import SpeedProfile
-from simrail.rotation import rotation_matrix
-from simrail.scenario.files import judge, load, shipped
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
-from simrail.scenario.vehicle_parts import RotationEntry
+from simrail.core.rotation import rotation_matrix
+from simrail.core.toml_files import judge, load, shipped
 from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import Setup
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.step_limit import contact_resonance
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.file_tables import RotationEntry
 from simrail.vehicle.model import LinearContact
-from simrail.vehicle.step_limit import contact_resonance
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 20.0)

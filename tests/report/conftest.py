@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
-from simrail.estimate import Estimate
-from simrail.example import CellResult
-from simrail.recording import ImuSheet, Recording
+from simrail.campaign.example import CellResult
+from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import ImuSheet, Recording
 from simrail.scenario.scenario import Scenario, read_scenario
-from simrail.score import reference_of, score, score_odometry
-from simrail.score_table import concat_scores, labelled
+from simrail.scoring.score import reference_of, score, score_odometry
+from simrail.scoring.table import concat_scores, labelled
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 
 SCENARIO = """

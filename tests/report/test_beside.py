@@ -10,8 +10,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from simrail.cli import BAD_INPUT, DONE, call
-from simrail.former import read_results
+from simrail.campaign.stored_results import read_results
+from simrail.cli.main import BAD_INPUT, DONE, call
 
 TEXT = """
 title = "Rails of a short line"
@@ -54,7 +54,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
     here = tmp_path_factory.mktemp("beside")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(here)
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: here / "cache")
+        patch.setattr("simrail.ride.cache.cache_folder", lambda: here / "cache")
         (here / "full.toml").write_text(TEXT)
         (here / "model.toml").write_text(MODEL)
         assert call(["run", "model.toml", "--workers", "1"]) == DONE

@@ -14,19 +14,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.bands import BANDS
-from simrail.example import CellResult
+from simrail.campaign.example import CellResult
 from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import _in_two, box_figure, curvature_figure
 from simrail.report.campaign.heat import _short, heat_figure, side_of
 from simrail.report.campaign.rails import rails_figures
 from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
-from simrail.report.methods import MethodStyle, method_styles
-from simrail.report.page import TABLES, write_report
+from simrail.report.pages.page import TABLES, write_report
+from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
-from simrail.score_table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
-from simrail.statistics import compare
+from simrail.scoring.statistics import compare
+from simrail.scoring.table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
+from simrail.track.bands import BANDS
 
 SCENARIO = """
 title = "A campaign made up: speeds, directions, irregularity and grades"

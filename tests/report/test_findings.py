@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ATTITUDE
-from simrail.estimate import Estimate
-from simrail.example import CellResult
-from simrail.report.findings import findings
-from simrail.report.methods import method_styles
-from simrail.report.pivot import cases
-from simrail.report.sentences import significant
+from simrail.campaign.example import CellResult
+from simrail.core.columns import ATTITUDE
+from simrail.estimation.estimate import Estimate
+from simrail.report.tables.methods import method_styles
+from simrail.report.tables.pivot import cases
+from simrail.report.words.findings import findings
+from simrail.report.words.sentences import significant
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario
 

@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ACCEL, GYRO, IMU
-from simrail.estimate import Estimate
-from simrail.example import CellResult
+from simrail.campaign.example import CellResult
+from simrail.core.columns import ACCEL, GYRO, IMU
+from simrail.estimation.estimate import Estimate
 from simrail.report import write_report
-from simrail.report.ride_words import axis_words
+from simrail.report.words.ride_words import axis_words
 from simrail.scenario.scenario import Scenario
-from simrail.score_table import concat_scores, failed_figures, labelled
+from simrail.scoring.table import concat_scores, failed_figures, labelled
 
 
 @pytest.fixture(scope="module")

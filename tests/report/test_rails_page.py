@@ -12,31 +12,31 @@ import pandas as pd
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from simrail.bands import BANDS, Band, margin_m
-from simrail.campaign import run_campaign
-from simrail.estimate import Estimate
-from simrail.example import CellResult
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.example import CellResult
+from simrail.estimation.estimate import Estimate
 from simrail.report import write_report
-from simrail.report.alike import alike, one_of_each
-from simrail.report.findings import findings
-from simrail.report.geometry_bands import JUDGED, band_words, judged_band, waves_words
-from simrail.report.geometry_figures import rails_figure, stretch_of, stretch_words
-from simrail.report.geometry_findings import geometry_findings
-from simrail.report.geometry_tables import geometry_table, overview_table
-from simrail.report.geometry_view import geometry_view
-from simrail.report.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.page import _ride
-from simrail.report.paper_001.parts import COLOURS
-from simrail.report.paper_001.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
-from simrail.report.pivot import Figure, Figures, cases
-from simrail.report.sentences import degrees, significant, unbroken
-from simrail.report.style import fitting_columns, legend_above, look, panels
-from simrail.report.tiles import tiles
-from simrail.report.track_figures import profile_figure, profile_words
+from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
+from simrail.report.figures.style import fitting_columns, legend_above, look, panels
+from simrail.report.figures.track import profile_figure, profile_words
+from simrail.report.pages.page import _ride
+from simrail.report.papers.gonzalez_2023.parts import COLOURS
+from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
+from simrail.report.tables.geometry_bands import JUDGED, band_words, judged_band, waves_words
+from simrail.report.tables.geometry_tables import geometry_table, overview_table
+from simrail.report.tables.geometry_view import geometry_view
+from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
+from simrail.report.tables.pivot import Figure, Figures, cases
+from simrail.report.tables.tiles import tiles
+from simrail.report.words.alike import alike, one_of_each
+from simrail.report.words.findings import findings
+from simrail.report.words.geometry_findings import geometry_findings
+from simrail.report.words.sentences import degrees, significant, unbroken
 from simrail.results import describe
 from simrail.scenario.build import bands_by_name
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, read_scenario
+from simrail.track.bands import BANDS, Band, margin_m
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 
 TEXT = """
@@ -107,7 +107,7 @@ class Ran:
 def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
-        patch.setattr("simrail.ride_cache.cache_folder", lambda: folder)
+        patch.setattr("simrail.ride.cache.cache_folder", lambda: folder)
         scenario = read_scenario(TEXT, name="model")
         result = run_campaign(scenario, workers=1)
         path = tmp_path_factory.mktemp("page") / "report.html"
@@ -395,7 +395,7 @@ def test_beside_rails_few_attitudes_are_drawn_and_the_rest_counted(
         return view.left_out, "smoother and 1 alike" in str(view.attitude)
 
     assert drawn() == (0, True)
-    monkeypatch.setattr("simrail.report.page.MOST_DRAWN", 0)
+    monkeypatch.setattr("simrail.report.pages.page.MOST_DRAWN", 0)
     assert drawn() == (1, False)
 
 

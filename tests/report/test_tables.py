@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.example import CellResult
-from simrail.report.methods import method_styles
-from simrail.report.pivot import Figures, cases, of_cell
-from simrail.report.tables import error_table
+from simrail.campaign.example import CellResult
+from simrail.report.tables.methods import method_styles
+from simrail.report.tables.pivot import Figures, cases, of_cell
+from simrail.report.tables.tables import error_table
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
+from simrail.core.toml_files import shipped
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells, count, first_cells, methods
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.distributions import Distribution
-from simrail.scenario.files import shipped
 from simrail.scenario.samples import dimensions, samples_of
 from simrail.scenario.scenario import Scenario, read_scenario
 

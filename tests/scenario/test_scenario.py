@@ -9,13 +9,13 @@ from math import radians
 import pytest
 from pydantic import Field
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
+from simrail.core.toml_files import Part, judge, shipped
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
 from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of, profile_of
 from simrail.scenario.build_estimator import estimator_of
 from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.files import Part, judge, shipped
 from simrail.scenario.overrides import override
 from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.sensors.encoder import EncoderSpec, Slip

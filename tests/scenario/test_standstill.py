@@ -7,16 +7,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ACCEL, GYRO, VELOCITY
-from simrail.errors import InputError
-from simrail.measure import measure
-from simrail.ride import simulate
+from simrail.core.columns import ACCEL, GYRO, VELOCITY
+from simrail.core.errors import InputError
+from simrail.core.toml_files import shipped
+from simrail.ride.ride import simulate
 from simrail.scenario.build import Parts, earth_of, encoder_of, mount_of, temperature_of
 from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.files import shipped
 from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.sensors.imu import EARTH_RATE_RADPS
+from simrail.sensors.measure import measure
 
 STANDSTILL = shipped("scenario")["standstill"].read_text(encoding="utf-8")
 QUICK = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
@@ -156,7 +156,7 @@ def test_an_imu_more_changes_no_other_bit_by_bit():
 
 
 def test_a_standing_vehicle_of_the_compiled_engine_stands():
-    from simrail.truth import Mount
+    from simrail.ride.truth import Mount
 
     scenario = load_scenario("standstill", overrides=["ride.rest_s=2.0", 'engine="compiled"'])
     cell = next(iter(cells(scenario)))

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from simrail.estimators.trajectory.noise import Hyperparameters
+from simrail.estimators.tuning.file import Tuning
 
-from estimators.trajectory_noise import Hyperparameters
-from estimators.tuning_file import Tuning
-from simrail.errors import InputError
+from simrail.core.errors import InputError
+from simrail.core.toml_files import shipped
 from simrail.scenario.build import Parts
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simrail.columns import MAGNETIC
+from simrail.core.columns import MAGNETIC
 
 
 @pytest.fixture(scope="session")

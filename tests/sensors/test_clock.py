@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import IMU
-from simrail.errors import InputError
-from simrail.seeds import stream
+from simrail.core.columns import IMU
+from simrail.core.errors import InputError
+from simrail.core.seeds import stream
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.clock import sample_by_clock
 from simrail.sensors.decimation import sample_on_time, sampling_of
-from simrail.sensors.grades import ImuGrade
 from simrail.sensors.imu import arrived, sample_imu
 
 NAMED = {"seed": 3, "draw": 0, "name": "axle"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 from simrail.sensors.decimation import (
     decimate,
     decimation_factor,

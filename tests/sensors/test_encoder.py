@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simrail.errors import InputError
-from simrail.recording import EncoderSheet
+from simrail.core.errors import InputError
+from simrail.recording.recording import EncoderSheet
+from simrail.recording.wheel_speed import counted_way_m, pulse_way_m, speed_by_counting, speed_by_period
 from simrail.sensors.encoder import EncoderSpec, Slip, nominal_radius, sample_encoder
-from simrail.wheel_speed import counted_way_m, pulse_way_m, speed_by_counting, speed_by_period
 
 TIME = np.arange(60_001) / 1000.0
 FAST = {"rate_hz": 1000.0}

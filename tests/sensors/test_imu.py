@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ATTITUDE, IMU, VELOCITY
-from simrail.scenario.imu_file import load_grade
-from simrail.sensors.grades import ImuGrade
+from simrail.core.columns import ATTITUDE, IMU, VELOCITY
+from simrail.recording.sheets.grades import ImuGrade
+from simrail.recording.sheets.imu_file import load_grade
 from simrail.sensors.imu import EARTH_RATE_RADPS, EarthRate, sample_imu
 
 NAMED = {"seed": 3, "draw": 0, "name": "axle"}

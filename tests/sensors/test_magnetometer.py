@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from simrail.columns import ATTITUDE, MOTION
-from simrail.errors import InputError
+from simrail.core.columns import ATTITUDE, MOTION
+from simrail.core.errors import InputError
 from simrail.sensors.magnetic_surroundings import (
     Steel,
     Traction,

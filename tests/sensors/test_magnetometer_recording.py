@@ -7,26 +7,26 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from simrail.estimators.ahrs import Vqf
 
-from estimators.ahrs import Vqf
-from simrail.columns import ATTITUDE
-from simrail.errors import InputError
-from simrail.measure import measure
-from simrail.profile import SpeedProfile
-from simrail.recording_check import check_recording
-from simrail.scenario.imu_file import load_grade
-from simrail.scenario.ride_reader import read_ride
-from simrail.scenario.ride_writer import write_ride
+from simrail.core.columns import ATTITUDE
+from simrail.core.errors import InputError
+from simrail.estimation.conformance import check_estimator
+from simrail.recording.check_form import check_recording
+from simrail.recording.files.ride_reader import read_ride
+from simrail.recording.files.ride_writer import write_ride
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import kinematic_truth
+from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.magnetic_surroundings import (
     Steel,
     Traction,
 )
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
-from simrail.testing import check_estimator
+from simrail.sensors.measure import measure
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
-from simrail.truth import Mount
-from simrail.vehicle.kinematic_engine import kinematic_truth
+from simrail.vehicle.speed_profile import SpeedProfile
 
 LINE = TrackDesign(
     "line",

@@ -6,17 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
-from simrail.errors import InputError
-from simrail.measure import measure
-from simrail.profile import SpeedProfile
-from simrail.scenario.imu_file import load_grade
+from simrail.core.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
+from simrail.core.errors import InputError
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import kinematic_truth
+from simrail.ride.truth import Mount
+from simrail.sensors.measure import measure
 from simrail.sensors.rail_sensor import RailSensorSpec, check_rail_sensor, rails_seen, sample_rails
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.truth import Mount
-from simrail.vehicle.kinematic_engine import kinematic_truth
+from simrail.track.laid_track import lay
+from simrail.vehicle.speed_profile import SpeedProfile
 
 LEVEL = TrackDesign("level", 0.0, (Straight(200.0),))
 SMOOTH = lay(LEVEL, Irregularity("none", fade_m=0.0), seed=1)

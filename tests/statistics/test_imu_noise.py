@@ -16,14 +16,14 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from simrail.columns import ACCEL, GYRO, IMU
-from simrail.sensors.allan import (
+from simrail.core.columns import ACCEL, GYRO, IMU
+from simrail.recording.sheets.allan import (
     FLICKER_FLOOR,
     GAUSS_MARKOV_PEAK_AT,
     bias_sd,
     gauss_markov_allan,
 )
-from simrail.sensors.grades import ImuGrade
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.imu import sample_imu
 
 RATES = (10.0, 100.0, 1000.0)

@@ -18,8 +18,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from simrail.columns import ACCEL, GYRO, IMU
-from simrail.sensors.grades import ImuGrade
+from simrail.core.columns import ACCEL, GYRO, IMU
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.imu import arrived, sample_imu
 from simrail.sensors.imu_response import Temperature
 

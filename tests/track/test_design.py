@@ -14,7 +14,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 from simrail.track.design import (
     CURVE,
     STRAIGHT,

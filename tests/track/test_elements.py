@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 from simrail.track.design import Curve, Element, Straight, TrackDesign, Transition
 
 

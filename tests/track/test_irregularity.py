@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from simrail.columns import IRREGULARITY
-from simrail.errors import InputError
-from simrail.seeds import stream
+from simrail.core.columns import IRREGULARITY
+from simrail.core.errors import InputError
+from simrail.core.seeds import stream
 from simrail.track.irregularity import PERIOD_M, Irregularity, fade, realise, realise_all
 from simrail.track.spectra import SPECTRA
 

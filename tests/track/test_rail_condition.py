@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import CHANNELS, lay
+from simrail.track.laid_track import CHANNELS, lay
 from simrail.track.rail_condition import FADE_M, RailCondition, check_conditions
 
 DESIGN = TrackDesign("level", -20.3, (Straight(300.0),))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from simrail.columns import IRREGULARITY
+from simrail.core.columns import IRREGULARITY
 from simrail.track.spectra import SPECTRA
 
 BANDS = ((3.0, 25.0), (25.0, 70.0), (70.0, 150.0), (3.003, 41.667), (1.0, 100.0))

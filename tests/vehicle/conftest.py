@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from simrail.vehicle.contact import build_contact, wheel_force
-from simrail.vehicle.hertz import kalker_coefficients
-from simrail.vehicle.profiles import rail_60e1, s1002
-from simrail.vehicle.wheelset import contact_state
+from simrail.vehicle.contact.contact import build_contact, wheel_force
+from simrail.vehicle.contact.hertz import kalker_coefficients
+from simrail.vehicle.contact.profiles import rail_60e1, s1002
+from simrail.vehicle.contact.wheelset import contact_state
 
 ARGUMENTS = ("side", "y", "z", "phi", "psi", "y_rail", "z_rail", "V", "v_x", "y_dot", "z_dot", "phi_dot")
 ARGUMENTS += ("psi_dot", "W", "kappa_h", "dy_rail", "dz_rail")

@@ -9,18 +9,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from simrail import ride_cache
-from simrail.profile import SpeedProfile
-from simrail.ride import Ride, simulate
-from simrail.scenario.files import load
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import load
+from simrail.ride import cache as ride_cache
+from simrail.ride.ride import Ride, simulate
 from simrail.track.design import Straight, TrackDesign
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import DerailedError, Setup
-from simrail.vehicle.stepper import BODY
+from simrail.track.laid_track import lay
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import DerailedError, Setup
+from simrail.vehicle.engines.stepper import BODY
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
@@ -246,7 +246,7 @@ def test_needs_no_exudyn():
     """Nothing of it is imported: an interpreter that cannot is enough."""
     code = (
         "import sys; sys.modules['exudyn'] = None\n"
-        "import simrail.ride\n"
-        "from simrail.vehicle.compiled_engine import CompiledEngine"
+        "import simrail.ride.ride\n"
+        "from simrail.vehicle.engines.compiled_engine import CompiledEngine"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

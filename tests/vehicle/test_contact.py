@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simrail.vehicle.contact import static_height
-from simrail.vehicle.contact_geometry import COLUMNS
-from simrail.vehicle.creep_laws import LAWS, CreepLaw
-from simrail.vehicle.wheelset import contact_state
+from simrail.vehicle.contact.contact import static_height
+from simrail.vehicle.contact.contact_geometry import COLUMNS
+from simrail.vehicle.contact.creep_laws import LAWS, CreepLaw
+from simrail.vehicle.contact.wheelset import contact_state
 
 # Manchester contact benchmark, case A-2.2 (S1002 on UIC 60 1:40, 10 kN per wheel, mu 0.3, 2 m/s), from
 # CONTACT's reference output (CONTACT, Apache-2.0). CONTACT has y to the right and z down, and gives

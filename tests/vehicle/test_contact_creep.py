@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from simrail.vehicle.contact import build_contact, static_height
-from simrail.vehicle.contact_geometry import COLUMNS
-from simrail.vehicle.hertz import hertz_ellipse, kalker_coefficients
-from simrail.vehicle.profiles import conical_wheel, rail_60e1
-from simrail.vehicle.wheelset import contact_state
+from simrail.vehicle.contact.contact import build_contact, static_height
+from simrail.vehicle.contact.contact_geometry import COLUMNS
+from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
+from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1
+from simrail.vehicle.contact.wheelset import contact_state
 
 
 @cache

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from simrail.jit import njit
-from simrail.vehicle.contact import build_contact, static_height, wheel_force
-from simrail.vehicle.creep_laws import CreepLaw
-from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002
-from simrail.vehicle.wheelset import conicity, contact_state, push_sideways
+from simrail.core.jit import njit
+from simrail.vehicle.contact.contact import build_contact, static_height, wheel_force
+from simrail.vehicle.contact.creep_laws import CreepLaw
+from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1, s1002
+from simrail.vehicle.contact.wheelset import conicity, contact_state, push_sideways
 
 AXLE_KG, FRAME_KG, ROLL_KGM2, SPIN_KGM2 = 1500.0, 9300.0, 700.0, 60.0
 LOAD_N = 0.5 * (AXLE_KG + FRAME_KG) * 9.81

@@ -5,12 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
-from simrail.vehicle.contact import static_height, wheel_force
-from simrail.vehicle.contact_geometry import COLUMNS, CONSTANTS, build_contact
-from simrail.vehicle.contact_pair import ContactPair, incline
-from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002, wheel_depth
-from simrail.vehicle.wheelset import (
+from simrail.core.errors import InputError
+from simrail.vehicle.contact.contact import static_height, wheel_force
+from simrail.vehicle.contact.contact_geometry import COLUMNS, CONSTANTS, build_contact
+from simrail.vehicle.contact.contact_pair import ContactPair, incline
+from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1, s1002, wheel_depth
+from simrail.vehicle.contact.wheelset import (
     conicity,
     contact_state,
     gravitational_stiffness,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from simrail.vehicle.hertz import hertz_ellipse, kalker_coefficients
+from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
 
 
 @pytest.mark.parametrize("lateral", [0.02, 0.5, 1.087, 3.0, 40.0, 900.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simrail.vehicle.creep_laws import CreepLaw
+from simrail.vehicle.contact.creep_laws import CreepLaw
 
 
 @pytest.mark.parametrize("name, step", [("y", 1e-6), ("z", 2e-7), ("phi", 1e-6), ("psi", 4e-6)])

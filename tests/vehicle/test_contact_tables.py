@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simrail.profile import SpeedProfile
-from simrail.scenario.files import load
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import load
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.contact import build_contact, static_height
-from simrail.vehicle.contact_tables import contacts_of, rest_drops_m
-from simrail.vehicle.engine import Setup
-from simrail.vehicle.profiles import rail_60e1, s1002
+from simrail.track.laid_track import lay
+from simrail.vehicle.contact.contact import build_contact, static_height
+from simrail.vehicle.contact.contact_tables import contacts_of, rest_drops_m
+from simrail.vehicle.contact.profiles import rail_60e1, s1002
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 LEVEL = TrackDesign("level", 0.0, (Straight(60.0),))
 

@@ -7,13 +7,13 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from simrail.errors import InputError
-from simrail.vehicle.contact import build_contact, static_height, wheel_force
-from simrail.vehicle.creep_laws import CreepLaw
-from simrail.vehicle.fastsim import fastsim
-from simrail.vehicle.hertz import hertz_ellipse, kalker_coefficients
-from simrail.vehicle.profiles import RailProfile, conical_wheel, rail_60e1, s1002
-from simrail.vehicle.wheelset import contact_state
+from simrail.core.errors import InputError
+from simrail.vehicle.contact.contact import build_contact, static_height, wheel_force
+from simrail.vehicle.contact.creep_laws import CreepLaw
+from simrail.vehicle.contact.fastsim import fastsim
+from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
+from simrail.vehicle.contact.profiles import RailProfile, conical_wheel, rail_60e1, s1002
+from simrail.vehicle.contact.wheelset import contact_state
 
 # Contact of the published check point (CONTACT's example): 8 x 4 mm, 82 kN, mu 0.3, G 82 GPa.
 PATCH = {"a": 8e-3, "b": 4e-3, "normal": 82e3, "friction": 0.3, "modulus": 82e9}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simrail.vehicle.contact import build_contact, wheel_force
-from simrail.vehicle.hertz import hertz_ellipse
-from simrail.vehicle.profiles import RailProfile, conical_wheel
-from simrail.vehicle.wheelset import contact_state
+from simrail.vehicle.contact.contact import build_contact, wheel_force
+from simrail.vehicle.contact.hertz import hertz_ellipse
+from simrail.vehicle.contact.profiles import RailProfile, conical_wheel
+from simrail.vehicle.contact.wheelset import contact_state
 
 # Kalker (1990), Table E3, nu = 0.25: a/b, then C11, C22, C23, C33.
 TABLE = [

@@ -7,18 +7,18 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from simrail.errors import InputError
-from simrail.profile import SpeedProfile
-from simrail.report.vehicle_study import SLOWEST_MPS, SPEEDS
-from simrail.scenario.files import load
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.errors import InputError
+from simrail.core.toml_files import load
 from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.contact_tables import contacts_of
+from simrail.track.laid_track import lay
+from simrail.vehicle.contact.contact_tables import contacts_of
+from simrail.vehicle.contact.wheelset import rolling_radius_difference
+from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle, state_matrix
 from simrail.vehicle.model import Body, Guide, Suspension, VehicleModel, Wheel, WheelRail
+from simrail.vehicle.speed_profile import SpeedProfile
 from simrail.vehicle.stability import (
     critical_speed,
     first_crossing,
@@ -27,7 +27,7 @@ from simrail.vehicle.stability import (
     root_locus,
     standstill_modes,
 )
-from simrail.vehicle.wheelset import rolling_radius_difference
+from simrail.vehicle.study import SLOWEST_MPS, SPEEDS
 
 M, IZ, R0, B, F11, F22 = 1500.0, 1000.0, 0.45, 0.75, 1e7, 1e7
 """Reference wheelset A of FACTS 1.2."""
@@ -297,8 +297,8 @@ def test_exudyns_own_linearised_system_has_the_same_eigenvalues(bogie):
     Exudyn differentiates its own equations (one-sided, along its Lie-group increments, hence the rate
     of a displacement is the velocity), so this checks coordinates, inertia and differences at once.
     """
-    from simrail.vehicle.engine import Setup
-    from simrail.vehicle.exudyn_engine import ExudynEngine, exu
+    from simrail.vehicle.engines.engine import Setup
+    from simrail.vehicle.engines.exudyn_engine import ExudynEngine, exu
 
     speed = 10.0
     laid = lay(TrackDesign("level", 0.0, (Straight(400.0),)), Irregularity("none", fade_m=1.0), seed=0)

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from simrail.profile import SpeedProfile
-from simrail.scenario.files import judge, load, parse_toml, shipped
-from simrail.scenario.track_file import TrackFile
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.toml_files import judge, load, parse_toml, shipped
+from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
-from simrail.vehicle.contact_geometry import CONSTANTS
-from simrail.vehicle.contact_tables import contacts_of
-from simrail.vehicle.force_data import pack, states_of
-from simrail.vehicle.forces import forces
-from simrail.vehicle.linear_contact import linear_wheel_force
-from simrail.vehicle.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
+from simrail.track.laid_track import lay
+from simrail.vehicle.contact.contact_geometry import CONSTANTS
+from simrail.vehicle.contact.contact_tables import contacts_of
+from simrail.vehicle.contact.linear_contact import linear_wheel_force
+from simrail.vehicle.engines.force_data import pack, states_of
+from simrail.vehicle.engines.forces import forces
+from simrail.vehicle.engines.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 
 def poses(seed=0, turn=0.3):

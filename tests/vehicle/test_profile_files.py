@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
-from simrail.scenario.files import load, shipped
-from simrail.scenario.vehicle_file import VehicleFile
-from simrail.vehicle.contact_geometry import build_contact
-from simrail.vehicle.contact_pair import incline
-from simrail.vehicle.contact_tables import contacts_of
-from simrail.vehicle.profile_files import profiles_digest, rail_profile, wheel_profile
-from simrail.vehicle.profiles import conical_wheel, rail_60e1, s1002, scaled, wheel_depth
-from simrail.vehicle.wheelset import conicity
+from simrail.core.errors import InputError
+from simrail.core.toml_files import load, shipped
+from simrail.vehicle.contact.contact_geometry import build_contact
+from simrail.vehicle.contact.contact_pair import incline
+from simrail.vehicle.contact.contact_tables import contacts_of
+from simrail.vehicle.contact.profile_files import profiles_digest, rail_profile, wheel_profile
+from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1, s1002, scaled, wheel_depth
+from simrail.vehicle.contact.wheelset import conicity
+from simrail.vehicle.file import VehicleFile
 
 # Profiles of the Manchester contact benchmark (CONTACT, Apache-2.0), read where they lie beside the
 # checkout and not part of it.

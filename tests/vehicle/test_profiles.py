@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
-from simrail.vehicle.contact_pair import incline
-from simrail.vehicle.profiles import (
+from simrail.core.errors import InputError
+from simrail.vehicle.contact.contact_pair import incline
+from simrail.vehicle.contact.profiles import (
     WheelProfile,
     check_profile,
     conical_wheel,

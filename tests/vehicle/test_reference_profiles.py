@@ -8,11 +8,11 @@ import pytest
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
-from simrail.vehicle.contact import build_contact
-from simrail.vehicle.contact_pair import ContactPair, incline
-from simrail.vehicle.profiles import wheel_depth
-from simrail.vehicle.reference_profiles import GAUGE_M, en15302_rail_a, en15302_wheel
-from simrail.vehicle.wheelset import conicity
+from simrail.vehicle.contact.contact import build_contact
+from simrail.vehicle.contact.contact_pair import ContactPair, incline
+from simrail.vehicle.contact.profiles import wheel_depth
+from simrail.vehicle.contact.reference_profiles import GAUGE_M, en15302_rail_a, en15302_wheel
+from simrail.vehicle.contact.wheelset import conicity
 
 # Annex J: rolling radius difference (mm) at lateral shifts (mm) of the wheelset.
 DIFFERENCE = {

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
+from simrail.core.errors import InputError
+from simrail.core.toml_files import load, shipped
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.files import load, shipped
 from simrail.scenario.scenario import load_scenario
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.vehicle.engines.step_limit import ACCURATE, STABLE, contact_resonance
+from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle
-from simrail.vehicle.step_limit import ACCURATE, STABLE, contact_resonance
 
 
 def vehicle(name):

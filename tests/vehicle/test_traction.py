@@ -10,21 +10,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from simrail.errors import InputError
-from simrail.profile import SpeedProfile
-from simrail.scenario.files import load
-from simrail.scenario.vehicle_file import VehicleFile
+from simrail.core.errors import InputError
+from simrail.core.toml_files import load
+from simrail.ride.truth import abeam
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.elements import Gradient
 from simrail.track.irregularity import Irregularity
-from simrail.track.laid import lay
+from simrail.track.laid_track import lay
 from simrail.track.rail_condition import RailCondition
-from simrail.truth import abeam
-from simrail.vehicle.compiled_engine import CompiledEngine
-from simrail.vehicle.engine import Setup
-from simrail.vehicle.hertz import hertz_ellipse, kalker_coefficients
+from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.traction_forces import driver
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 from simrail.vehicle.traction import Traction
-from simrail.vehicle.traction_forces import driver
 
 SMOOTH = Irregularity("none", fade_m=0.0)
 ALL = (("axle.left", 0.5), ("axle.right", 0.5))

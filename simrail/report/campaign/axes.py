@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.aggregate import axis_columns
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
-from simrail.score_table import CURVE_PREFIX, EVERY_CURVE, FULL
+from simrail.scoring.aggregate import axis_columns
+from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, FULL
 
 _FIRST = ("speed_kmh", "direction", "imu", "irregularity.scale", "irregularity.spectrum", "vehicle")
 """Columns of the table of cells that come first, and that stand for others which say the same."""

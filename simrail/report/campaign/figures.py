@@ -10,12 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from simrail.example import CellResult
-from simrail.jit import FloatArray
-from simrail.report.attitude_figures import angle_error
+from simrail.campaign.example import CellResult
+from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis
-from simrail.report.methods import MethodStyle
-from simrail.report.style import INK, LEFT_IN, MUTED, WIDTH_IN, fitting_columns, log_ticks, look, to_svg
+from simrail.report.figures.attitude import angle_error
+from simrail.report.figures.style import (
+    INK,
+    LEFT_IN,
+    MUTED,
+    WIDTH_IN,
+    fitting_columns,
+    log_ticks,
+    look,
+    to_svg,
+)
+from simrail.report.tables.methods import MethodStyle
 
 LONG_WORD = 16
 """Longer names of values are told in two lines, so that neighbours do not touch."""

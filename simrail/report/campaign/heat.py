@@ -12,10 +12,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
-from simrail.jit import FloatArray
+from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis
-from simrail.report.methods import MethodStyle
-from simrail.report.style import INK, MUTED, WIDTH_IN, log_ticks, look, to_svg
+from simrail.report.figures.style import INK, MUTED, WIDTH_IN, log_ticks, look, to_svg
+from simrail.report.tables.methods import MethodStyle
 
 HEAT = LinearSegmentedColormap.from_list(
     "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from simrail.bands import Band
 from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
 from simrail.report.campaign.heat import Side, heat_maps, side_of
-from simrail.report.geometry_bands import JUDGED, QUANTITIES, waves_words
-from simrail.report.methods import MethodStyle
+from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, waves_words
+from simrail.report.tables.methods import MethodStyle
+from simrail.track.bands import Band
 
 
 def rails_figures(

@@ -9,17 +9,17 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from simrail.example import CellResult
+from simrail.campaign.example import CellResult
 from simrail.report.campaign.axes import CampaignAxis, campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import box_figure, curvature_figure
 from simrail.report.campaign.heat import Side, heat_figure, side_of
 from simrail.report.campaign.rails import rails_figures
 from simrail.report.campaign.tables import CampaignTables, campaign_tables
-from simrail.report.methods import MethodStyle, attitude_methods, readable
-from simrail.report.tables import Cell, Row, Table
+from simrail.report.tables.methods import MethodStyle, attitude_methods, readable
+from simrail.report.tables.tables import Cell, Row, Table
 from simrail.scenario.build import bands_by_name
 from simrail.scenario.scenario import Scenario
-from simrail.score_table import CURVE_PREFIX, EVERY_CURVE, FULL
+from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, FULL
 
 MOST_METHODS = 8
 """Methods that are drawn: those under test first."""

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from simrail.bootstrap import Interval, interval
 from simrail.report.campaign.axes import CampaignAxis, cluster_of, draws_of
-from simrail.report.methods import MethodStyle
-from simrail.statistics import anees_bounds, compare, coverage_bounds, levels
+from simrail.report.tables.methods import MethodStyle
+from simrail.scoring.bootstrap import Interval, interval
+from simrail.scoring.statistics import anees_bounds, compare, coverage_bounds, levels
 
 HEADLINES = (
     ("roll", "rms", "whole"),

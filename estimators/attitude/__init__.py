@@ -1,0 +1,1 @@
+"""Attitude against the track: filters of Briales et al. 2021."""

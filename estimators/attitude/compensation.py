@@ -1,0 +1,155 @@
+"""Track-frame compensation: what the accelerometer feels of the design track, taken off.
+
+A train that knows where it is on its design track knows the acceleration of the track frame there.
+Briales et al. 2021 (paper 000) subtract it from the accelerometer, so that what is left points along
+gravity. Used by every attitude estimator, and the only place that evaluates the design track for them.
+
+It assumes that the body's axes are those of the track frame and that the body does not move in it;
+what is neglected is the body's own relative motion.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from simrail.core.columns import ACCEL
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
+from simrail.track.design import TrackFrame
+
+
+def design_frame(recording: Recording, *, count: int | None = None) -> TrackFrame:
+    """Design track frame at the odometry's positions.
+
+    Positions beyond the track's ends, where an odometry error may put a train that stands at a
+    terminus, are taken at the end.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    count : int, optional
+        How many samples from the start; all of them by default.
+
+    Returns
+    -------
+    TrackFrame
+        Arrays of `count` rows.
+    """
+    position = recording.odometry["position_m"].to_numpy(dtype=np.float64)[:count]
+    return recording.track.frame(np.clip(position, recording.track.start_m, recording.track.end_m))
+
+
+class TrackMotion(NamedTuple):
+    """How the track frame moves along with the train, and what that does to what is carried in it; n samples.
+
+    Attributes
+    ----------
+    origin : ndarray (n, 3)
+        Acceleration of the frame's origin, m/s2, components in the track frame.
+    of_y, of_z : ndarray (n, 3)
+        What is added per m of y and of z in the frame, 1/s2.
+    rate : ndarray (n, 3)
+        Angular rate of the frame, rad/s, its own components.
+    """
+
+    origin: FloatArray
+    of_y: FloatArray
+    of_z: FloatArray
+    rate: FloatArray
+
+
+def track_motion(
+    recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
+) -> TrackMotion:
+    """Motion of the track frame abeam of the IMU (EQUATIONS 1.1 and 2.1).
+
+    With k the Darboux curvatures of the track frame per metre of horizontal arc length, k' their
+    derivative, V = ds/dt and A = dV/dt (both signed), a place r = (0, y, z) that is fixed in the frame has
+    the acceleration c = origin + y of_y + z of_z:
+
+        w = V k,   alpha = A k + V^2 k'
+        c = (A/cos th + V^2 tan th th'/cos th, V^2 k3/cos th, -V^2 k2/cos th)
+            + alpha x r + w x (w x r)
+
+    Running backwards changes nothing but the signs of V and A.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its odometry frame and design track are used; its signals are not.
+    frame : TrackFrame, optional
+        `design_frame(recording)`, if it is at hand.
+    printed : bool
+        Use paper 000, Eqs. 3-6 as they are printed, to show what it costs: k = (roll', pitch', yaw')
+        without the coupling of cant and slope, k' = (0, 0, yaw''), no 1/cos th.
+    """
+    frame = design_frame(recording) if frame is None else frame
+    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
+    speed_rate = recording.odometry["acceleration_mps2"].to_numpy(dtype=np.float64)
+    square = speed * speed
+    if printed:
+        t, v, h = frame.rates.T
+        t1, v1, h1 = 0.0 * t, 0.0 * t, frame.second[:, 2]
+        origin = (speed_rate, square * h, -square * v)
+    else:
+        t, v, h = frame.k.T
+        t1, v1, h1 = frame.dk.T
+        secant = 1.0 / np.cos(frame.pitch_rad)
+        stretch = np.tan(frame.pitch_rad) * frame.rates[:, 1]
+        origin = ((speed_rate + square * stretch) * secant, square * h * secant, -square * v * secant)
+    a_t, a_v, a_h = (
+        speed_rate * t + square * t1,
+        speed_rate * v + square * v1,
+        speed_rate * h + square * h1,
+    )
+    return TrackMotion(
+        origin=np.column_stack(origin),
+        of_y=np.column_stack([square * t * v - a_h, -square * (t * t + h * h), square * v * h + a_t]),
+        of_z=np.column_stack([square * t * h + a_v, square * v * h - a_t, -square * (t * t + v * v)]),
+        rate=np.column_stack([t, v, h]) * speed[:, None],
+    )
+
+
+def track_acceleration(
+    recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
+) -> FloatArray:
+    """Acceleration of the IMU's nominal place in the moving track frame; see `track_motion`.
+
+    Returns
+    -------
+    ndarray (n, 3)
+        c, m/s2, components in the track frame.
+    """
+    motion = track_motion(recording, frame, printed=printed)
+    _, r_y, r_z = recording.mount_position_m
+    return motion.origin + r_y * motion.of_y + r_z * motion.of_z
+
+
+def gravity_force(
+    recording: Recording, frame: TrackFrame | None = None, *, compensated: bool, printed: bool = False
+) -> FloatArray:
+    """Specific force that is left for gravity, z = accelerometer - c (paper 000, Eq. 33).
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    frame : TrackFrame, optional
+        `design_frame(recording)`, if it is at hand.
+    compensated : bool
+        False leaves the accelerometer as it is: the general-purpose filter.
+    printed : bool
+        See `track_acceleration`.
+
+    Returns
+    -------
+    ndarray (n, 3)
+        m/s2, body frame, C-contiguous.
+    """
+    force = recording.imu[list(ACCEL)].to_numpy(dtype=np.float64)
+    if compensated:
+        force = force - track_acceleration(recording, frame, printed=printed)
+    return np.ascontiguousarray(force)

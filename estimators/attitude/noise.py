@@ -1,0 +1,212 @@
+"""Noise that the attitude EKF assumes: paper 000's two settings, and the recommended one.
+
+Kept apart from the filter because it is a matter of judgement, and the filter is not.
+
+**The recommended setting** follows from the data sheet, the rests and one allowance for the
+body's own motion. Gravity corrects roll and pitch with the time constant tau = sqrt(R Ts / Qc) / g
+(EQUATIONS 2.3), and the error of an angle has three parts that tau trades against each other:
+
+* gyro white noise N leaves the variance N^2 tau / 2;
+* a constant residual gyro bias b leaves the offset b tau;
+* white acceleration of variance R per sample leaves the variance R Ts / (2 g^2 tau).
+
+Their sum is least where R Ts / (g tau)^2 = N^2 + 4 b^2 tau, and the left-hand side is the intensity Qc
+that gives this tau. So **Qc = N^2 + 4 b^2 tau**, solved together with tau: the filter has the best time
+constant, and the variance that it states, N^2 tau + 4 b^2 tau^2, is a little above the one that the three
+parts add up to, N^2 tau + 3 b^2 tau^2.
+
+b^2 = N^2 / T + 2 B^2 after T seconds of rest: the mean's white noise, and the in-run bias now and
+during the rest, each with variance B^2. Before and without a rest, the turn-on bias (b_max^2 / 3) counts.
+
+R is the sum of
+
+* the accelerometer's white noise;
+* the body's own motion in the track frame, which the compensation leaves in. It is far from white: a
+  displacement is bounded, so nothing is left of it at low frequencies. A swing with the velocity sd u
+  disturbs the angle by u / (g tau), white noise by sqrt(R Ts / (2 tau)) / g, hence the allowance
+  R Ts = 2 u^2 / tau. u is proportional to speed, so at rest the filter believes the accelerometer;
+* errors of the odometry through the compensation V^2 k(s): a wrong place shows in transitions, a wrong
+  speed in curves. They last longer than tau, so a variance v of acceleration counts as R Ts = v tau.
+
+R is therefore what disturbs the angle as much as the true disturbance, not the variance of a sample: the
+NIS of a ride is well below 3 at low speed and is a test of the matched model only.
+
+**The accelerometer's turn-on bias** is the floor under all of this: nothing here can tell it from tilt
+(2 mg is 0.11 deg). It does not enter the gain. The stated covariance holds it as a constant of known
+variance ("considered"), and likewise the yaw that the residual gyro bias adds up to.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from simrail.estimators.attitude.rest_bias import RestBias
+
+from simrail.core.columns import ODOMETRY_SD
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import ImuSheet, Recording
+from simrail.track.design import TrackFrame
+
+PAPER = {"paper_initial": (1e-2, 1.5e-2), "paper_final": (1e-3, 15.0)}
+"""Paper 000, Section 6: the printed "Q_{k-1}" and the sd of the accelerometer in m/s2."""
+
+TUNINGS = ("recommended", *PAPER)
+
+SWING_PER_SPEED = 2e-3
+"""Velocity sd of the body's swing in the track frame over train speed: 11 mm/s at 20 km/h and 39 mm/s
+at 70 km/h, two to three times what the axle of the simulated bogie does on ERRI B176 low rails. The
+optimum is flat: a factor of two either way changes the roll error in curves by a tenth at most."""
+
+MODEL_RATE_INTENSITY = 1e-10
+"""rad2/s: what sampling and first-order integration leave; a perfect IMU still gets a finite tau."""
+
+MODEL_FORCE_SD = 1e-3
+"""m/s2: rounding of counts and of the gravity model; keeps a noiseless accelerometer's R positive."""
+
+
+_NEWTON_STEPS = 8
+
+
+class Noise(NamedTuple):
+    """Noise per sample, n samples.
+
+    Attributes
+    ----------
+    process : ndarray (n,)
+        Variance that a step adds to every angle, rad2.
+    force : ndarray (n, 3)
+        Variance of the specific force, (m/s2)^2.
+    considered : ndarray (n, 3)
+        Variance of roll, pitch, yaw from constants that are not estimated, rad2.
+    """
+
+    process: FloatArray
+    force: FloatArray
+    considered: FloatArray
+
+
+def paper_noise(recording: Recording, tuning: str, *, reading: str) -> Noise:
+    """Settings of paper 000, in one of two readings of its Q_{k-1} (EQUATIONS 2.3).
+
+    Parameters
+    ----------
+    recording : Recording
+        For its number of samples and rate.
+    tuning : str
+        ``"paper_initial"`` or ``"paper_final"``.
+    reading : str
+        ``"per_step"``: the printed number is added at every step, as the text has it (final: tau =
+        0.19 s). ``"intensity"``: it is the k of Q = k Ts (final: tau = 3.0 s).
+    """
+    printed, sd = PAPER[tuning]
+    n = len(recording.imu)
+    step = printed / recording.imu_sheet.rate_hz if reading == "intensity" else printed
+    return Noise(np.full(n, step), np.full((n, 3), sd**2), np.zeros((n, 3)))
+
+
+def recommended_noise(
+    recording: Recording, rest: RestBias, *, frame: TrackFrame | None, vibration: float = SWING_PER_SPEED
+) -> Noise:
+    """Settings that follow from the data sheet; the module's docstring derives them.
+
+    Every value uses the past alone.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its data sheet and odometry are used.
+    rest : RestBias
+        How much rest the gyro bias was averaged over.
+    frame : TrackFrame or None
+        Design track frame at the odometry's positions; None for a filter without compensation, which
+        no odometry can disturb.
+    vibration : float
+        Velocity sd of the body in the track frame, as a fraction of train speed.
+    """
+    sheet, gravity = recording.imu_sheet, recording.gravity_mps2
+    n = len(recording.imu)
+    step_s = 1.0 / sheet.rate_hz
+    bias = bias_variance(sheet, rest.samples * step_s)
+    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
+    swing = (vibration * speed) ** 2
+    white = sheet.gyro_noise_radpsqrts**2 + MODEL_RATE_INTENSITY
+    sensor = sheet.accel_noise_mpsqrts**2 + MODEL_FORCE_SD**2 * step_s
+    tau = time_constant(sensor, swing, white, bias, gravity=gravity)
+
+    force = np.empty((n, 3))
+    force[:] = ((sensor + 2.0 * swing / tau) / step_s)[:, None]
+    if frame is not None:
+        place, pace, push = recording.odometry[list(ODOMETRY_SD)].to_numpy(dtype=np.float64).T
+        force[:, 0] += push**2
+        for axis, component in ((1, 2), (2, 1)):
+            by_place = speed**2 * frame.dk[:, component] * place
+            by_pace = 2.0 * speed * frame.k[:, component] * pace
+            force[:, axis] += (by_place**2 + by_pace**2) * tau / step_s
+
+    considered = np.zeros((n, 3))
+    considered[:, :2] = sheet.accel_turn_on_bias_mps2**2 / 3.0 / gravity**2
+    considered[:, 2] = bias * ((np.arange(n) - rest.samples) * step_s) ** 2
+    return Noise((white + 4.0 * bias * tau) * step_s, force, considered)
+
+
+def bias_variance(sheet: ImuSheet, rest_s: FloatArray) -> FloatArray:
+    """Variance (n,) of the gyro bias that is left after averaging over rest_s (n,) seconds, (rad/s)^2."""
+    drift = sheet.gyro_bias_instability_radps**2
+    turn_on = sheet.gyro_turn_on_bias_radps**2 / 3.0
+    averaged = np.full_like(rest_s, np.inf)
+    np.divide(sheet.gyro_noise_radpsqrts**2, rest_s, out=averaged, where=rest_s > 0.0)
+    return np.minimum(averaged + drift, turn_on) + drift
+
+
+def time_constant(
+    sensor: float, swing: FloatArray, white: float, bias: FloatArray, *, gravity: float
+) -> FloatArray:
+    """Best time constant: the tau > 0 of (sensor + 2 swing / tau) / (g tau)^2 = white + 4 bias tau.
+
+    Parameters
+    ----------
+    sensor : float
+        Intensity of the accelerometer's white noise, (m/s2)^2 s.
+    swing : ndarray (n,)
+        Variance of the body's velocity in the track frame, (m/s)^2.
+    white : float
+        Intensity of the gyro's white noise, rad2/s.
+    bias : ndarray (n,)
+        Variance of the residual gyro bias, (rad/s)^2.
+    gravity : float
+        m/s2.
+
+    Returns
+    -------
+    ndarray (n,)
+        s.
+    """
+    # fourth tau^4 + third tau^3 - sensor tau - 2 swing = 0 has one positive root. Both starts lie above
+    # it, and there the left-hand side is convex: Newton falls towards the root and never below. The
+    # number of steps is fixed, so that a sample's value does not depend on the others.
+    third, fourth = white * gravity**2, 4.0 * bias * gravity**2
+    with np.errstate(divide="ignore", invalid="ignore"):  # without bias the second start is not there
+        tau = np.fmin(
+            np.maximum(np.sqrt(2.0 * sensor / third), np.cbrt(4.0 * swing / third)),
+            np.maximum(np.cbrt(2.0 * sensor / fourth), np.sqrt(np.sqrt(4.0 * swing / fourth))),
+        )
+    for _ in range(_NEWTON_STEPS):
+        value = ((fourth * tau + third) * tau * tau - sensor) * tau - 2.0 * swing
+        slope = (4.0 * fourth * tau + 3.0 * third) * tau * tau - sensor
+        tau = tau - value / slope
+    return tau
+
+
+def check_tuning(tuning: str, reading: str) -> None:
+    """Refuse names that are not known."""
+    if tuning not in TUNINGS:
+        raise InputError("no such tuning", field="tuning", value=tuning, limit="one of " + ", ".join(TUNINGS))
+    if reading not in ("intensity", "per_step"):
+        raise InputError(
+            "no such reading of the process noise",
+            field="process_noise",
+            value=reading,
+            limit="intensity or per_step",
+        )

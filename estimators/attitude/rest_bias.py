@@ -1,0 +1,126 @@
+"""Gyro bias from the rests of a ride: each stop refreshes it, and between stops it stays.
+
+Every attitude method uses this one, so that none gets a better gyro than another. It is causal: a sample
+is used only when it is `simrail.recording.standstill.guard_s` old, so that the first jerk of a departure,
+which the encoder notices late, never enters; and no rest is known to be one before it is long enough.
+
+**How much a new rest counts** follows from the data sheet. The mean over a rest of length T has the white
+noise N^2 / T. The in-run bias wanders: as a Gauss-Markov process of variance b^2 (`WANDER_PER_INSTABILITY`)
+and correlation time tau it changes in the time t by a variance of D(t) = 2 b^2 (1 - exp(-t / tau)). Taken as
+a random walk over the rest: the bias b0 at its start is known from before with the variance
+P0 = P + D(gap), the mean is off b0 by noise of M = D(T) / 3 + N^2 / T, and the bias at the end, which is
+wanted, has moved on by D(T), of which the mean has seen one half (the covariance of a walk with its mean).
+The estimate b = b_before + K (mean - b_before) has the error variance
+
+    P = (1 - K)^2 P0 + K^2 M + (1 - K) D(T),     least for     K = (P0 + D(T) / 2) / (P0 + M), at most 1.
+
+Without wandering that is the mean over all rests together; without white noise, the newest alone. The first
+rest counts fully: what the sheet says of the bias at switch-on is no match for it.
+
+A sheet prints B but not tau; `CORRELATION_S` stands for it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from simrail.estimators.attitude.rest_bias_kernel import average_rests
+
+from simrail.core.columns import GYRO
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
+from simrail.recording.standstill import SETTLE_S, SHORTEST_S, guard_s, motion_times
+
+CORRELATION_S = 300.0
+"""Correlation time of the in-run bias, which sheets do not print: some minutes for MEMS gyros."""
+
+WANDER_PER_INSTABILITY = 1.076
+"""Standard deviation b of the process over B: 0.664 / 0.617, since the Allan deviation of a Gauss-Markov
+process peaks at 0.617 of its standard deviation, and the floor of a sheet is 0.664 B (IEEE 952)."""
+
+LEAST_NOISE = 1e-20
+"""(rad/s)^2 s: a sheet without noise still weighs its rests by their lengths."""
+
+
+class RestBias(NamedTuple):
+    """Gyro bias over time, n samples.
+
+    Attributes
+    ----------
+    bias : ndarray (n, 3)
+        Bias as the rests so far have it, rad/s; zero while nothing has been averaged.
+    samples : ndarray (n,)
+        How many samples it has been averaged over.
+    variance : ndarray (n,)
+        Variance of its error on each axis as a measure of the present bias, (rad/s)^2.
+    """
+
+    bias: FloatArray
+    samples: FloatArray
+    variance: FloatArray
+
+
+def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
+    """Average the gyro over the rests of a ride, causally.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    enabled : bool
+        False gives zero bias from zero samples.
+
+    Returns
+    -------
+    RestBias
+        Row k uses samples older than `simrail.recording.standstill.guard_s` only, and only samples from
+        rests.
+    """
+    gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
+    sheet, n = recording.imu_sheet, gyro.shape[0]
+    wander = (WANDER_PER_INSTABILITY * sheet.gyro_bias_instability_radps) ** 2
+    unknown = sheet.gyro_turn_on_bias_radps**2 / 3.0 + wander
+    found = RestBias(np.zeros((n, 3)), np.zeros(n), np.full(n, unknown))
+    if not enabled:
+        return found
+    times = recording.imu.index.to_numpy(dtype=np.float64)
+    moves, guard = motion_times(recording), guard_s(recording)
+    average_rests(
+        # cumsum adds in the order of time, so a prefix of the recording has the very same sums.
+        np.vstack([np.zeros(3), np.cumsum(gyro, axis=0)]),
+        np.searchsorted(times, moves),
+        np.searchsorted(times, moves + max(SETTLE_S, guard)),
+        round(guard * sheet.rate_hz),
+        round(SHORTEST_S * sheet.rate_hz),
+        1.0 / sheet.rate_hz,
+        sheet.gyro_noise_radpsqrts**2 + LEAST_NOISE,
+        wander,
+        CORRELATION_S,
+        unknown,
+        *found,
+    )
+    return found
+
+
+def step_rates(recording: Recording, bias: FloatArray) -> FloatArray:
+    """Body rate over the step that ends at each sample: the mean of its two ends, less the bias.
+
+    The trapezoid takes away the half sample of lag that the rate of one end alone would have.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    bias : ndarray (n, 3)
+        Gyro bias, rad/s.
+
+    Returns
+    -------
+    ndarray (n, 3)
+        rad/s, C-contiguous; row 0 is the first sample itself.
+    """
+    gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
+    rates = gyro - bias
+    rates[1:] -= 0.5 * (gyro[1:] - gyro[:-1])
+    return np.ascontiguousarray(rates)

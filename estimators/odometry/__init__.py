@@ -1,0 +1,1 @@
+"""Where the train is and how fast: odometries, which are estimators like any other."""

@@ -1,0 +1,294 @@
+"""Where is the train, how fast, and with what acceleration: a small causal filter on encoder counts.
+
+A Kalman filter with a constant-acceleration model (white jerk) of position s, speed V and
+acceleration A. What a counter tells is not a position but an interval between two edges; the
+filter's measurement is the middle of the smallest interval that the count allows, with the variance
+width^2/12. A train without pulses is put to rest exactly: its estimated speed would otherwise decay
+for ever, and drift.
+
+Of the wheel it knows the nominal radius; how far the true rolling radius may be from that (wear, taper,
+running on the flange in a curve) enters the standard deviations through `radius_relative_sd`, as one
+constant factor. It knows nothing of slip, nor of the longer way of the outer wheel. The error of a
+count is treated as white. That is wrong in one case: at an exactly constant speed of a whole number
+of pulses per reading the count's error is a slow sawtooth, which the filter follows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD
+from simrail.core.jit import FloatArray, njit
+from simrail.recording.recording import EncoderSheet
+
+JERK_INTENSITY_M2PS5 = 0.01
+"""Intensity of the model's white jerk. Small enough for quiet accelerations at constant speed, large
+enough to follow service braking (0.6 m/s2, jerk 0.4 m/s3) with a lag of about 0.15 s."""
+
+
+def encoder_odometry(
+    encoder: pd.DataFrame,
+    sheet: EncoderSheet,
+    times: FloatArray,
+    *,
+    start_position_m: float,
+    radius_relative_sd: float = 0.0,
+    jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5,
+    still_s: float = 0.5,
+) -> pd.DataFrame:
+    """Position, speed and acceleration from encoder counts.
+
+    The count c says that the train is between (c - 1/2) q and (c + 1/2) q from its start, on average
+    over the unknown place between two edges where the wheel first stood; q is the way of one pulse.
+    A count that has just changed by one says more at low speed: the edge was passed less than one
+    reading ago.
+
+    Parameters
+    ----------
+    encoder : pandas.DataFrame
+        Indexed by ``time_s``, column ``pulse_count``.
+    sheet : EncoderSheet
+        Pulses per revolution and nominal wheel radius.
+    times : ndarray (n,)
+        Increasing times at which the odometry is wanted, s. The answer at a time uses no count read
+        after it.
+    start_position_m : float
+        Position s at the first count.
+    radius_relative_sd : float
+        Relative standard deviation of the rolling radius about the nominal one.
+    jerk_intensity_m2ps5 : float
+        Intensity of the white jerk.
+    still_s : float
+        Shortest time without pulses after which the train is at rest. A train that was slow at its
+        last pulse is given three pulse intervals, at most ten times `still_s`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Indexed by `times`, columns `simrail.core.columns.ODOMETRY` and `ODOMETRY_SD`. At rest speed and
+        acceleration are exactly 0.
+    """
+    quantum = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
+    wanted = np.ascontiguousarray(times, dtype=np.float64)
+    states = _filter(
+        np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
+        encoder["pulse_count"].to_numpy(dtype=np.float64),
+        wanted,
+        quantum,
+        jerk_intensity_m2ps5,
+        still_s,
+    )
+    way, speed, acceleration = states[:, 0], states[:, 1], states[:, 2]
+    # The unknown first place between two edges shifts every position alike, by up to half a pulse.
+    states[:, 3] = np.sqrt(states[:, 3] + quantum**2 / 12.0 + (radius_relative_sd * way) ** 2)
+    states[:, 4] = np.sqrt(states[:, 4] + (radius_relative_sd * speed) ** 2)
+    states[:, 5] = np.sqrt(states[:, 5] + (radius_relative_sd * acceleration) ** 2)
+    states[:, 0] += start_position_m
+    return pd.DataFrame(states, index=pd.Index(wanted, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
+
+
+def speed_odometry(
+    time: FloatArray,
+    speed_mps: FloatArray,
+    times: FloatArray,
+    *,
+    start_position_m: float,
+    speed_sd_mps: float,
+    scale_relative_sd: float = 0.0,
+    jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5,
+    still_mps: float = 0.02,
+) -> pd.DataFrame:
+    """Position, speed and acceleration from an odometer that gives the speed, with the same model.
+
+    Parameters
+    ----------
+    time, speed_mps : ndarray (m,)
+        Increasing times of the readings, s, and the readings, negative towards smaller s.
+    times : ndarray (n,)
+        As in `encoder_odometry`.
+    start_position_m : float
+        Position s at the first reading.
+    speed_sd_mps : float
+        Standard deviation of a reading; its error is treated as white.
+    scale_relative_sd : float
+        Relative standard deviation of the odometer's scale.
+    jerk_intensity_m2ps5 : float
+        Intensity of the white jerk.
+    still_mps : float
+        A reading below this is a train at rest.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As that of `encoder_odometry`.
+    """
+    wanted = np.ascontiguousarray(times, dtype=np.float64)
+    states = _speed_filter(
+        np.ascontiguousarray(time, dtype=np.float64),
+        np.ascontiguousarray(speed_mps, dtype=np.float64),
+        wanted,
+        speed_sd_mps**2,
+        jerk_intensity_m2ps5,
+        still_mps,
+    )
+    states[:, 3:] = np.sqrt(states[:, 3:] + (scale_relative_sd * states[:, :3]) ** 2)
+    states[:, 0] += start_position_m
+    return pd.DataFrame(states, index=pd.Index(wanted, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
+
+
+@njit
+def _predict(x: FloatArray, p: FloatArray, dt: float, intensity: float) -> None:
+    """X <- F x, P <- F P F' + Q in place; F and Q of a triple integrator driven by white noise."""
+    half = 0.5 * dt * dt
+    x[0] += dt * x[1] + half * x[2]
+    x[1] += dt * x[2]
+    for j in range(3):
+        p[0, j] += dt * p[1, j] + half * p[2, j]
+        p[1, j] += dt * p[2, j]
+    for i in range(3):
+        p[i, 0] += dt * p[i, 1] + half * p[i, 2]
+        p[i, 1] += dt * p[i, 2]
+    p[0, 0] += intensity * dt**5 / 20.0
+    p[1, 1] += intensity * dt**3 / 3.0
+    p[2, 2] += intensity * dt
+    p[0, 1] += intensity * dt**4 / 8.0
+    p[1, 0] += intensity * dt**4 / 8.0
+    p[0, 2] += intensity * dt**3 / 6.0
+    p[2, 0] += intensity * dt**3 / 6.0
+    p[1, 2] += intensity * dt**2 / 2.0
+    p[2, 1] += intensity * dt**2 / 2.0
+
+
+@njit
+def _update(x: FloatArray, p: FloatArray, measured: float, variance: float, m: int = 0) -> None:
+    """Kalman update with a measured x[m], in place; P in Joseph's form, so that it stays positive."""
+    s = p[m, m] + variance
+    k0, k1, k2 = p[0, m] / s, p[1, m] / s, p[2, m] / s
+    innovation = measured - x[m]
+    x[0] += k0 * innovation
+    x[1] += k1 * innovation
+    x[2] += k2 * innovation
+    gain = (k0, k1, k2)
+    row = (p[m, 0], p[m, 1], p[m, 2])
+    for i in range(3):
+        for j in range(3):
+            p[i, j] += gain[i] * gain[j] * s - gain[i] * row[j] - row[i] * gain[j]
+
+
+@njit
+def _filter(
+    time: FloatArray, count: FloatArray, wanted: FloatArray, q: float, intensity: float, still: float
+) -> FloatArray:
+    """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
+    out = np.empty((len(wanted), 6))
+    x = np.zeros(3)
+    p = np.zeros((3, 3))
+    ahead_x = np.empty(3)
+    ahead_p = np.empty((3, 3))
+    # A start with constant jerk from rest: speed and acceleration when the first pulse comes.
+    jerk = 0.5
+    start_speed = 0.5 * jerk ** (1.0 / 3.0) * (6.0 * q) ** (2.0 / 3.0)
+    start_acceleration = (6.0 * q * jerk * jerk) ** (1.0 / 3.0)
+    resting = True
+    idle = 0.0
+    patience = still
+    direction = 0.0
+    next_out = 0
+    for k in range(len(time)):
+        dt = time[k] - time[k - 1] if k > 0 else 0.0
+        change = count[k] - count[k - 1] if k > 0 else 0.0
+        way = (count[k] - count[0]) * q
+        idle += dt
+        if not resting:
+            _predict(x, p, dt, intensity)
+        if change != 0.0:
+            direction = 1.0 if change > 0.0 else -1.0
+            steps = abs(change)
+            if resting:
+                fastest = start_speed + q / idle + (steps - 1.0) * q / dt
+                p[:, :] = 0.0
+                p[0, 0] = q * q
+                p[1, 1] = 0.25 * fastest**2
+                p[2, 2] = start_acceleration**2
+                x[1] = 0.5 * direction * fastest
+                resting = False
+            width = q
+            if steps == 1.0:
+                width = min(q, max(0.1 * q, (abs(x[1]) + 2.0 * np.sqrt(p[1, 1])) * dt))
+            _update(x, p, way - 0.5 * direction * (q - width), width * width / 12.0)
+            idle = 0.0
+            patience = min(max(3.0 * q / max(abs(x[1]), 1e-9), still), 10.0 * still)
+        elif not resting:
+            # No pulse although one was due: the train is at most at the edge.
+            if abs(x[0] - way) > 0.5 * q:
+                _update(x, p, way + np.sign(x[0] - way) * 0.5 * q, q * q / 12.0)
+            if x[1] * direction <= 0.0 or idle > patience:
+                resting = True
+        if resting:
+            x[1] = 0.0
+            x[2] = 0.0
+            quiet = max(idle, 1e-3)
+            p[:, :] = 0.0
+            p[0, 0] = q * q / 12.0
+            # Less than one pulse in this time, in either direction: uniform in [-b, b] has sd b/sqrt(3).
+            p[1, 1] = min(start_speed, q / quiet) ** 2 / 3.0
+            p[2, 2] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
+        until = time[k + 1] if k + 1 < len(time) else np.inf
+        while next_out < len(wanted) and wanted[next_out] < until:
+            ahead_x[:] = x
+            ahead_p[:, :] = p
+            lead = wanted[next_out] - time[k]
+            if lead > 0.0 and not resting:
+                _predict(ahead_x, ahead_p, lead, intensity)
+            out[next_out, :3] = ahead_x
+            for i in range(3):
+                out[next_out, 3 + i] = ahead_p[i, i]
+            next_out += 1
+    return out
+
+
+@njit
+def _speed_filter(
+    time: FloatArray, speed: FloatArray, wanted: FloatArray, variance: float, intensity: float, still: float
+) -> FloatArray:
+    """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
+    out = np.empty((len(wanted), 6))
+    x = np.zeros(3)
+    p = np.zeros((3, 3))
+    ahead_x = np.empty(3)
+    ahead_p = np.empty((3, 3))
+    resting = True
+    next_out = 0
+    for k in range(len(time)):
+        if k > 0 and not resting:
+            _predict(x, p, time[k] - time[k - 1], intensity)
+        if abs(speed[k]) < still:
+            resting = True
+            x[1] = 0.0
+            x[2] = 0.0
+            p[1, :] = 0.0
+            p[2, :] = 0.0
+            p[:, 1] = 0.0
+            p[:, 2] = 0.0
+            p[1, 1] = still * still / 3.0
+        else:
+            if resting:
+                # Setting off, or the first reading of a moving train: an acceleration of up to 1 m/s2.
+                x[1] = speed[k]
+                p[1, 1] = variance
+                p[2, 2] = 1.0
+                resting = False
+            _update(x, p, speed[k], variance, 1)
+        until = time[k + 1] if k + 1 < len(time) else np.inf
+        while next_out < len(wanted) and wanted[next_out] < until:
+            ahead_x[:] = x
+            ahead_p[:, :] = p
+            lead = wanted[next_out] - time[k]
+            if lead > 0.0 and not resting:
+                _predict(ahead_x, ahead_p, lead, intensity)
+            out[next_out, :3] = ahead_x
+            for i in range(3):
+                out[next_out, 3 + i] = ahead_p[i, i]
+            next_out += 1
+    return out

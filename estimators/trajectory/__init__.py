@@ -1,0 +1,1 @@
+"""Where a body is in its track, and the rails: the smoother of Gonzalez-Carbajal et al. 2023."""

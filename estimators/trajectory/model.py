@@ -1,0 +1,242 @@
+"""Model of the trajectory smoother: what its kernels take of a recording.
+
+Gonzalez-Carbajal et al. 2023 (paper 001), sections 2 and 3 and appendix 1, with the errata of EQUATIONS 1.3.
+The state is
+
+    x = [roll, roll', pitch, pitch', yaw, yaw', y, y', y'', z, z', z'']
+
+with the angles of the body in the global frame, its place (0, y, z) in the design track frame, ' for d/dt.
+
+Not here: the loops (`simrail.estimators.trajectory.kernel_filter`), the same filter by filterpy
+(`simrail.estimators.trajectory.reference`), the noise (`simrail.estimators.trajectory.noise`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+from simrail.estimators.attitude.compensation import design_frame, track_motion
+from simrail.estimators.attitude.rest_bias import rest_bias
+from simrail.estimators.trajectory.kernel_equations import STATES
+from simrail.estimators.trajectory.noise import Hyperparameters
+
+from simrail.core.columns import ACCEL, GYRO
+from simrail.core.jit import FloatArray, IntArray
+from simrail.recording.recording import Recording
+from simrail.track.design import STRAIGHT
+from simrail.track.frame import TrackFrame
+
+
+class Model(NamedTuple):
+    """What the filter takes, in its order; shapes as in
+    `simrail.estimators.trajectory.kernel_filter.trajectory_filter`.
+    """
+
+    signals: FloatArray
+    track: FloatArray
+    slips: FloatArray
+    kinds: IntArray
+    process: FloatArray
+    noise: FloatArray
+    virtual: FloatArray
+    start: FloatArray
+    start_variance: FloatArray
+    step_s: float
+    gravity: float
+
+
+class Found(NamedTuple):
+    """What a backend finds; n samples.
+
+    Attributes
+    ----------
+    states : ndarray (n, 12)
+        Smoothed or filtered.
+    covariance : ndarray (n, 78) or (0, 78)
+        Upper triangles of their covariances, row by row; of no rows if not wanted.
+    innovations : ndarray (n, 7)
+        Measured minus predicted rates and forces, and their normalised innovation squared.
+    log_likelihood : float
+        Of all measurements, the virtual ones among them.
+    errors : ndarray (m, n, 3), optional
+        Draws of truth minus smoothed roll, y and z (`simrail.estimators.trajectory.draws`).
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    innovations: FloatArray
+    log_likelihood: float
+    errors: FloatArray | None = None
+
+
+def transition(step_s: float) -> FloatArray:
+    """F (12, 12): angles turn with constant rates, places move with constant acceleration."""
+    pair = np.array([[1.0, step_s], [0.0, 1.0]])
+    triple = np.array([[1.0, step_s, 0.5 * step_s**2], [0.0, 1.0, step_s], [0.0, 0.0, 1.0]])
+    return np.asarray(block_diag(pair, pair, pair, triple, triple))
+
+
+def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray]:
+    """Blocks of Q: white angular acceleration, and white jerk, over one step."""
+    dt = step_s
+    pair = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    triple = np.array(
+        [
+            [dt**5 / 20, dt**4 / 8, dt**3 / 6],
+            [dt**4 / 8, dt**3 / 3, dt**2 / 2],
+            [dt**3 / 6, dt**2 / 2, dt],
+        ]
+    )
+    values = parameters.vector()
+    return [q * pair for q in values[:3]] + [q * triple for q in values[3:5]]
+
+
+def packed_process(parameters: Sequence[Hyperparameters], step_s: float) -> FloatArray:
+    """Upper triangles of the blocks of Q, row by row: (c, 21) for c sets of hyper-parameters."""
+    return np.array(
+        [
+            np.concatenate([q[np.triu_indices(len(q))] for q in process_noise(values, step_s)])
+            for values in parameters
+        ]
+    )
+
+
+def with_noise(model: Model, *parameters: Hyperparameters) -> Model:
+    """The model with other noise: one set for all samples, or one for each kind of them."""
+    kinds = model.kinds if len(parameters) > 1 else np.zeros_like(model.kinds)
+    noise = np.array([values.vector()[5:] for values in parameters])
+    return model._replace(kinds=kinds, process=packed_process(parameters, model.step_s), noise=noise)
+
+
+def kinds_of(recording: Recording) -> IntArray:
+    """0 on straights of the design track and 1 in its transitions and curves, (n,), by the odometry."""
+    track, place = recording.track, recording.odometry["position_m"].to_numpy(dtype=np.float64)
+    kind = track.kind(np.clip(place, track.start_m, track.end_m))
+    return np.ascontiguousarray(kind != STRAIGHT, dtype=np.int64)
+
+
+def model_of(
+    recording: Recording,
+    parameters: Sequence[Hyperparameters],
+    *,
+    use_rest_bias: bool = True,
+    second_order: bool = True,
+    printed: bool = False,
+    start_sd: FloatArray,
+    around: FloatArray | None = None,
+) -> Model:
+    """Gather what the filter takes.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    parameters : sequence of Hyperparameters
+        Noise: one set, or one for straights and one for transitions and curves (`kinds_of`).
+    use_rest_bias, second_order, printed : bool
+        See `simrail.estimators.trajectory.smoother.TrajectorySmoother`.
+    start_sd : ndarray (12,)
+        Standard deviations about the start that is assumed: the design's angles and rates, centred.
+    around : ndarray (n, 12), optional
+        States about which `second_order` is taken; the design's angles and rates if not given.
+    """
+    sheet = recording.imu_sheet
+    frame = design_frame(recording)
+    signals = recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64, copy=True)
+    signals[:, :3] -= rest_bias(recording, enabled=use_rest_bias).bias
+    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
+    if second_order and not printed:
+        angles, rates = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]), frame.rates
+        if around is None:
+            rates = speed[:, None] * rates
+        else:
+            angles, rates = around[:, [0, 2, 4]], around[:, [1, 3, 5]]
+        signals -= beyond_first_order(angles, rates, recording.gravity_mps2)
+    _, lateral, height = recording.mount_position_m
+    start = np.zeros(STATES)
+    start[[0, 2, 4]] = frame.roll_rad[0], frame.pitch_rad[0], frame.yaw_rad[0]
+    start[[1, 3, 5]] = speed[0] * frame.rates[0]
+    start[[6, 9]] = lateral, height
+    model = Model(
+        signals=np.ascontiguousarray(signals),
+        track=track_terms(recording, frame, printed=printed),
+        slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
+        kinds=kinds_of(recording),
+        process=np.empty((0, 21)),
+        noise=np.empty((0, 8)),
+        virtual=np.array([lateral, height]),
+        start=start,
+        start_variance=start_sd**2,
+        step_s=1.0 / sheet.rate_hz,
+        gravity=recording.gravity_mps2,
+    )
+    return with_noise(model, *parameters)
+
+
+def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
+    """`simrail.estimators.trajectory.kernel_equations.TERMS` at every sample, (n, 15).
+
+    Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
+    (paper 001, appendix 1, g4C, g5C, g6C).
+    """
+    motion = track_motion(recording, frame, printed=printed)
+    of_z = motion.of_z.copy()
+    if printed:
+        of_z[:, 2] = motion.of_y[:, 1]
+    angles = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
+    return np.ascontiguousarray(
+        np.column_stack([*angles, motion.origin, motion.of_y, of_z, 2.0 * motion.rate])
+    )
+
+
+def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) -> FloatArray:
+    """What the equations, of first order in roll and pitch as they are, leave out of rates and gravity.
+
+    C' g e_z and the body's rate at these angles, less their first order: 0.05 m/s2 along Z at 0.1 rad of
+    roll, which the filter would take for a body that rises.
+
+    Parameters
+    ----------
+    angles, rates : ndarray (n, 3)
+        Roll, pitch and yaw, and their derivatives by time.
+    gravity : float
+        m/s2.
+
+    Returns
+    -------
+    ndarray (n, 6)
+        rad/s and m/s2.
+    """
+    roll, pitch, _ = angles.T
+    _, pitch_rate, yaw_rate = rates.T
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    beyond = [
+        (pitch - sp) * yaw_rate,
+        (cr - 1.0) * pitch_rate + (sr * cp - roll) * yaw_rate,
+        (roll - sr) * pitch_rate + (cr * cp - 1.0) * yaw_rate,
+        gravity * (pitch - sp),
+        gravity * (sr * cp - roll),
+        gravity * (cr * cp - 1.0),
+    ]
+    return np.column_stack(beyond)
+
+
+def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
+    """See `simrail.estimators.trajectory.kernel_equations.misprint`."""
+    _, v, h = frame.rates.T
+    return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
+
+
+def dense_process(process: FloatArray) -> FloatArray:
+    """Q (12, 12) of the upper triangles of its blocks."""
+    blocks, at = [], 0
+    for size in (2, 2, 2, 3, 3):
+        block = np.zeros((size, size))
+        count = size * (size + 1) // 2
+        block[np.triu_indices(size)] = process[at : at + count]
+        blocks.append(block + np.triu(block, 1).T)
+        at += count
+    return np.asarray(block_diag(*blocks))

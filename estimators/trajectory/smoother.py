@@ -1,0 +1,309 @@
+"""Trajectory and attitude of a body on the track by a smoother over twelve states.
+
+Gonzalez-Carbajal et al. 2023 (paper 001): gyro, accelerometer, odometry and the design track give the angles
+of the body and its place (y, z) in the track frame; virtual measurements that say "where it belongs, more or
+less" keep the place from drifting. Forwards it is an extended Kalman filter, backwards a fixed-interval
+smoother, and the first alone is to be had as a causal filter. It works at standstill and backwards, since
+speed enters the measurements only, with its sign. What the rails look like then follows from the trajectory
+(`simrail.estimators.trajectory.track_geometry`).
+
+The model has no sensor bias. An offset of the accelerometer is wholly taken for roll and pitch, and so is the
+turn of the device in its package: their sds by the data sheet are added afterwards (`sensor_bias`). What an
+offset of the gyro does to yaw is not in the standard deviations. Place is another matter: the virtual
+measurements hold it.
+
+What the model lacks is balanced from both sides within a ride, and from one side only at its two ends. A gyro
+bias that no rest has told, a start attitude that is believed too firmly, or virtual positions that are too
+soft show there as a peak of the alignment over some metres, such as paper 001 found and left open.
+
+The model stands in `simrail.estimators.trajectory.model`, the noise in `simrail.estimators.trajectory.noise`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pandas as pd
+from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
+from simrail.estimators.trajectory.kernel_back import trajectory_back
+from simrail.estimators.trajectory.kernel_equations import ROWS, STATES
+from simrail.estimators.trajectory.kernel_filter import PACKED, trajectory_filter
+from simrail.estimators.trajectory.model import Found, Model, model_of
+from simrail.estimators.trajectory.noise import Hyperparameters
+from simrail.estimators.trajectory.reference import filterpy_backend
+from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
+from simrail.estimators.tuning.file import Tuning
+
+from simrail.core.columns import (
+    ATTITUDE,
+    ATTITUDE_SD,
+    INNOVATION,
+    RATE_INNOVATION,
+    RELATIVE_POSITION,
+    RELATIVE_POSITION_SD,
+)
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
+
+OUTPUT = (0, 2, 4, 6, 9)
+"""States of the estimate among the twelve: roll, pitch, yaw, y, z."""
+
+START_RATE_SD = 0.02
+"""rad/s: the train starts from rest, or as steadily as the track turns."""
+
+START_PLACE_SD = (0.01, 0.02, 0.2)
+"""m, m/s, m/s2: place in the track frame and its derivatives."""
+
+MOST_PASSES = 5
+"""Each pass takes the error of the angles squared: two are enough, three change nothing."""
+
+
+MOST_DRAWS = 1000
+"""An interval by so many is 0.1 % wider than by any more; all of them are held at once."""
+
+
+@dataclass(frozen=True)
+class TrajectorySmoother:
+    """Extended Kalman smoother of paper 001, section 3 and appendix 1.
+
+    Attributes
+    ----------
+    smoothed : bool
+        False stops after the filter, which is causal.
+    hyperparameters : Hyperparameters
+        Noise.
+    curve_hyperparameters : Hyperparameters, optional
+        Noise in the transitions and curves of the design track; the same as on straights if not given.
+    tuning : Tuning, optional
+        Hyper-parameters from a file (`simrail.estimators.tuning.file`) to use instead; in a scenario, its
+        path.
+    rest_bias : bool
+        Subtract the gyro's mean over the rests so far.
+    second_order : bool
+        Take what the paper's equations, of first order in cant and slope, leave out off the signals, for a
+        body that keeps to the design (`simrail.estimators.trajectory.model.beyond_first_order`). False for
+        the paper's.
+    passes : int
+        How often to smooth. After the first pass, what is beyond first order is taken at the angles of the
+        pass before, in place of the design's: on rails so narrow or so rough that bodies roll by 10 mrad and
+        more, g roll^2/2 would else pass for a motion along Z.
+    printed : bool
+        The equations as paper 001 prints them (EQUATIONS 1.3), to show what it costs.
+    backend : str
+        ``"compiled"``, or ``"filterpy"``: slow, readable, the reference.
+    with_covariance : bool
+        False leaves out covariances and standard deviations, which take more than half of the time.
+    sensor_bias : bool
+        Add what the accelerometer's turn-on bias and the misalignment of the package, by the data sheet, do
+        to roll and pitch to their variances. False leaves the paper's, of a model in which sensors have none.
+    geometry_step_m : float
+        Distance of the places of the rail geometry; 0 leaves the geometry out. It lies over the track and is
+        made after the ride, also of the filter's states, which are causal.
+    rail_sensor : bool
+        False makes the geometry without a rail sensor, though the recording has one: to show what it gives.
+    draws : int
+        How often to draw what the rails may be from the posterior (`simrail.estimators.trajectory.draws`):
+        their standard deviation in a band of wavelengths follows from that alone. 0 for none; only smoothed,
+        with the compiled backend and a geometry.
+    start_sd_rad, start_yaw_sd_rad : float
+        Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
+    """
+
+    smoothed: bool = True
+    hyperparameters: Hyperparameters = field(default_factory=Hyperparameters)
+    curve_hyperparameters: Hyperparameters | None = None
+    tuning: Tuning | None = None
+    rest_bias: bool = True
+    second_order: bool = True
+    passes: int = 1
+    printed: bool = False
+    backend: str = "compiled"
+    with_covariance: bool = True
+    sensor_bias: bool = True
+    geometry_step_m: float = 0.25
+    rail_sensor: bool = True
+    draws: int = 0
+    start_sd_rad: float = math.radians(1.0)
+    start_yaw_sd_rad: float = math.radians(0.3)
+
+    def __post_init__(self) -> None:
+        if self.backend not in BACKENDS:
+            raise InputError(
+                "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
+            )
+        for name, kinds in (
+            ("hyperparameters", Hyperparameters),
+            ("curve_hyperparameters", Hyperparameters | None),
+            ("tuning", Tuning | None),
+        ):
+            if not isinstance(getattr(self, name), kinds):
+                raise InputError(
+                    "are no hyper-parameters",
+                    field=name,
+                    value=getattr(self, name),
+                    remedy="in a scenario, name a file of them in the option tuning",
+                )
+        for name in ("start_sd_rad", "start_yaw_sd_rad"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
+        again = self.smoothed and self.second_order and not self.printed
+        if self.passes != 1 and not (again and self.passes in range(1, MOST_PASSES + 1)):
+            raise InputError(
+                "cannot be",
+                field="passes",
+                value=self.passes,
+                limit=f"1 to {MOST_PASSES}; 1 unless smoothed, of second order and not as printed",
+            )
+        if not 0.0 <= self.geometry_step_m < math.inf:
+            raise InputError(
+                "is out of range",
+                field="geometry_step_m",
+                value=self.geometry_step_m,
+                limit="0 (none) or more, m",
+            )
+        is_whole = isinstance(self.draws, int) and not isinstance(self.draws, bool)
+        if not is_whole or not 0 <= self.draws <= MOST_DRAWS:
+            raise InputError(
+                "is no number of draws", field="draws", value=self.draws, limit=f"0 to {MOST_DRAWS}"
+            )
+        if self.draws and not (self.smoothed and self.backend == "compiled" and self.geometry_step_m):
+            raise InputError(
+                "cannot be",
+                field="draws",
+                value=self.draws,
+                limit="0 unless smoothed, with the compiled backend and a geometry",
+            )
+        given = self.hyperparameters != Hyperparameters() or self.curve_hyperparameters is not None
+        if self.tuning is not None and given:
+            raise InputError("a file and values cannot both be given", field="tuning")
+
+    @property
+    def causal(self) -> bool:
+        """The filter is causal, the smoother is not."""
+        return not self.smoothed
+
+    @property
+    def noise(self) -> tuple[Hyperparameters, ...]:
+        """The set of hyper-parameters, or those of straights and of transitions and curves."""
+        chosen = self if self.tuning is None else self.tuning
+        both = (chosen.hyperparameters, chosen.curve_hyperparameters)
+        return tuple(values for values in both if values is not None)
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate attitude and place in the track frame at every IMU sample, and the rails below."""
+        estimate, errors = self._trajectory(recording)
+        if not self.geometry_step_m:
+            return estimate
+        if not self.rail_sensor:
+            recording = replace(recording, rail_displacement=None, rail_sensor_sheet=None)
+        sight, step = sight_of(estimate, recording), self.geometry_step_m
+        geometry, drawn = geometry_of(sight, step_m=step), None
+        if errors is not None:
+            tilts = self._tilts(recording)
+            drawn = geometry_draws(sight, geometry, errors, recording, tilts_rad=tilts, step_m=step)
+        return replace(estimate, geometry=geometry, geometry_draws=drawn)
+
+    def _tilts(self, recording: Recording) -> tuple[float, ...]:
+        """Bounds of the roll or pitch that the accelerometer's turn-on bias and the package cause, rad."""
+        sheet = recording.imu_sheet
+        if not self.sensor_bias:
+            return ()
+        return sheet.accel_turn_on_bias_mps2 / recording.gravity_mps2, sheet.package_misalignment_rad
+
+    def _trajectory(self, recording: Recording) -> tuple[Estimate, FloatArray | None]:
+        """Without the geometry; the trace is let go before that is made, since it is large."""
+        found = self.trace(recording)
+        index = recording.imu.index
+        names = [*ATTITUDE, *RELATIVE_POSITION]
+        columns = [found.states[:, list(OUTPUT)]]
+        covariance = None
+        if self.with_covariance:
+            covariance = block(found.covariance, OUTPUT)
+            # Uniform within their bounds.
+            covariance[:, [0, 1], [0, 1]] += sum(bound**2 for bound in self._tilts(recording)) / 3.0
+            columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
+            names += [*ATTITUDE_SD, *RELATIVE_POSITION_SD]
+        estimate = Estimate(
+            states=pd.DataFrame(np.hstack(columns), index=index, columns=names),
+            mount=recording.mount,
+            innovations=pd.DataFrame(found.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
+            covariance=covariance,
+            covariance_of=(*ATTITUDE, *RELATIVE_POSITION) if self.with_covariance else (),
+        )
+        return estimate, found.errors
+
+    def trace(self, recording: Recording) -> Found:
+        """All twelve states with their covariances, the innovations, and the log-likelihood."""
+        run, around = BACKENDS[self.backend], None
+        for _ in range(self.passes - 1):
+            model = self.model(recording, around=around)
+            around = run(model, smoothed=True, with_covariance=False).states
+        model = self.model(recording, around=around)
+        streams = [stream_of(recording, draw, "trajectory") for draw in range(self.draws)]
+        return run(model, smoothed=self.smoothed, with_covariance=self.with_covariance, streams=streams)
+
+    def log_likelihood(self, recording: Recording) -> float:
+        """Log-likelihood of the recording by prediction-error decomposition."""
+        return log_likelihood(self.model(recording))
+
+    def model(self, recording: Recording, *, around: FloatArray | None = None) -> Model:
+        """What the backends take of a recording; `around` is the states (n, 12) of a pass before."""
+        rates, place = [START_RATE_SD] * 3, START_PLACE_SD
+        angles = [self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad]
+        pairs = [sd for pair in zip(angles, rates, strict=True) for sd in pair]
+        return model_of(
+            recording,
+            self.noise,
+            use_rest_bias=self.rest_bias,
+            second_order=self.second_order,
+            printed=self.printed,
+            start_sd=np.array([*pairs, *place, *place]),
+            around=around,
+        )
+
+
+def block(packed: FloatArray, states: tuple[int, ...]) -> FloatArray:
+    """Covariance of some of the states, (n, m, m), from upper triangles (n, 78)."""
+    at = np.zeros((STATES, STATES), dtype=np.intp)
+    upper = np.triu_indices(STATES)
+    at[upper] = np.arange(PACKED)
+    at = np.maximum(at, at.T)
+    return np.ascontiguousarray(packed[:, at[np.ix_(states, states)]])
+
+
+def log_likelihood(model: Model) -> float:
+    """Log-likelihood alone: nothing is kept."""
+    none = np.empty((0, STATES)), np.empty((0, PACKED))
+    updates = np.empty((0, ROWS, STATES)), np.empty((0, ROWS, 2))
+    return trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), np.empty(0))
+
+
+def compiled_backend(
+    model: Model, *, smoothed: bool, with_covariance: bool, streams: Sequence[np.random.Generator] = ()
+) -> Found:
+    """Filter and smoother by the kernels; one draw of the smoother's error for each of the streams."""
+    n = len(model.signals)
+    none = np.empty((0, STATES)), np.empty((0, PACKED))
+    kept = np.empty((n, STATES)), np.empty((n, PACKED))
+    m = n if smoothed else 0
+    updates = np.empty((m, ROWS, STATES)), np.empty((m, ROWS, 2))
+    innovations = np.empty((n, 7))
+    before, after = (kept, none) if smoothed else (none, kept)
+    likelihood = trajectory_filter(*model, *before, *updates, *after, innovations, np.empty(0))
+    errors = None
+    if smoothed:
+        if streams:
+            errors = state_errors(model, *updates, *kept, streams)
+        trajectory_back(
+            model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance
+        )
+    return Found(kept[0], kept[1] if with_covariance else none[1], innovations, likelihood, errors)
+
+
+BACKENDS = {"compiled": compiled_backend, "filterpy": filterpy_backend}
+"""Who can run it, by name."""

@@ -1,0 +1,1 @@
+"""An estimator's parameters from recordings: by likelihood, or against known rails."""

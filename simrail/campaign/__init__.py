@@ -1,0 +1,1 @@
+"""Every cell of a scenario, run by whoever is there, kept as it is done, gone on with."""

@@ -1,0 +1,296 @@
+"""Who runs the batches of a campaign: this process, processes of this machine (loky), or a dask cluster.
+
+All three are executors of the standard library's kind (`concurrent.futures`), with what they have between
+processes made by joblib and dask. What is run, and in which order, is decided in `simrail.campaign.campaign`.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import contextmanager, suppress
+from typing import Any, Protocol
+
+from simrail.core.errors import InputError
+from simrail.core.source_hash import score_code_hash
+from simrail.ride import cache as ride_cache
+
+FEW_CELLS = 20
+"""Up to so many cells run in this process: others would have to be started first."""
+
+_WAIT_S = 20.0
+"""How long a cluster may take to answer."""
+
+
+class Crew(Protocol):
+    """Runs functions, here or elsewhere."""
+
+    here: bool
+    """Whether it is this process: then `submit` returns when the work is done."""
+
+    def workers(self) -> int:
+        """How many batches may be under way at once. A worker gets the next one when the last is kept."""
+        ...
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Begin to run a function."""
+        ...
+
+    def renew(self) -> None:
+        """Go on after workers were lost."""
+        ...
+
+    def close(self) -> None:
+        """End all work, also what is under way."""
+        ...
+
+
+def error_of(future: Future[Any]) -> BaseException | None:
+    """What went wrong with work that has ended; None if nothing did."""
+    return ClusterGone() if future.cancelled() else future.exception()
+
+
+def lost(error: BaseException) -> bool:
+    """Whether an error means that a worker died, rather than that its work failed."""
+    return broken(error) or type(error).__name__ == "KilledWorker"
+
+
+def broken(error: BaseException | None) -> bool:
+    """Whether a worker took the whole crew with it, and nobody knows which batch killed it."""
+    return isinstance(error, BrokenExecutor)
+
+
+@contextmanager
+def crew_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator[Crew]:
+    """Who runs a campaign.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes of this machine; 1 stays in this one. If not given: this process for at most
+        `FEW_CELLS` cells, else one for each core.
+    cluster : str, optional
+        Address of a dask scheduler, ``"tcp://host:8786"``.
+    cells : int
+        How many there are to run.
+
+    Raises
+    ------
+    InputError
+        If both are given, dask is not installed, or the scheduler or its workers do not answer.
+    """
+    if cluster is not None and workers is not None:
+        raise InputError(
+            "a cluster has its own workers",
+            field="--workers",
+            value=workers,
+            remedy="leave out --workers, or --cluster",
+        )
+    if workers is None:
+        workers = 1 if cells <= FEW_CELLS else _cores()
+    crew: Crew
+    if cluster is not None:
+        crew = _Cluster(cluster)
+    else:
+        crew = _Here() if min(workers, cells) <= 1 else _Processes(min(workers, cells))
+    try:
+        yield crew
+    finally:
+        crew.close()
+
+
+class _Here:
+    """This process."""
+
+    here = True
+
+    def workers(self) -> int:
+        return 1
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def renew(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class _Processes:
+    """Processes of this machine."""
+
+    here = False
+
+    def __init__(self, workers: int) -> None:
+        self._workers = workers
+        self._pool = self._new()
+
+    def _new(self) -> Any:
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        # A process that has grown by some 300 MB, as long rides make it, is ended between two batches and
+        # another takes its place: nothing is lost, and nobody needs to do anything about it.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
+        return ProcessPoolExecutor(
+            max_workers=self._workers,
+            env={"SIMRAIL_RIDES": str(ride_cache.folder().absolute()), "NUMBA_NUM_THREADS": "1"},
+            initializer=_begin_worker,
+            initargs=(os.getpid(),),
+        )
+
+    def workers(self) -> int:
+        return self._workers
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        try:
+            future: Future[Any] = self._pool.submit(function, *arguments)
+        except BrokenExecutor as error:  # a worker died since the last one was handed in
+            future = Future()
+            future.set_exception(error)
+        return future
+
+    def renew(self) -> None:
+        self._pool.shutdown(wait=True, kill_workers=True)
+        self._pool = self._new()
+
+    def close(self) -> None:
+        self._pool.shutdown(wait=True, kill_workers=True)
+
+
+class _Cluster:
+    """Workers of a dask scheduler."""
+
+    here = False
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise InputError(
+                "a cluster needs dask, which is not installed",
+                field="--cluster",
+                value=address,
+                remedy='pip install -e ".[cluster]"',
+            ) from None
+        self._address = address
+        self._log = logging.getLogger("distributed")
+        self._log_level = self._log.level
+        self._log.setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
+        try:
+            self._client = Client(address, timeout=_WAIT_S, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            self._log.setLevel(self._log_level)
+            raise InputError(
+                "no dask scheduler answers there",
+                field="--cluster",
+                value=address,
+                limit="an address such as tcp://host:8786",
+                remedy="start one with 'dask scheduler', and workers with 'dask worker ADDRESS --nthreads 1'",
+            ) from error
+        try:
+            self._judge_workers()
+        except BaseException:
+            self.close()
+            raise
+        self._pool: Executor = self._client.get_executor(pure=False)
+        self._busy: set[str] = set()
+
+    def _judge_workers(self) -> None:
+        """Refuse a cluster without workers, or one whose workers run another simrail."""
+        begun = time.perf_counter()
+        while not self._threads():
+            if time.perf_counter() - begun > _WAIT_S:
+                raise InputError(
+                    "the dask scheduler has no workers",
+                    field="--cluster",
+                    value=self._address,
+                    remedy=f"start some with 'dask worker {self._address} --nthreads 1'",
+                )
+            time.sleep(0.2)
+        try:
+            codes = self._client.run(score_code_hash)
+        except Exception as error:
+            raise InputError(
+                f"a worker cannot import simrail: {error}",
+                field="--cluster",
+                value=self._address,
+                remedy="install the same simrail on every machine",
+            ) from error
+        others = sorted(worker for worker, code in codes.items() if code != score_code_hash())
+        if others:
+            raise InputError(
+                "a worker runs another simrail, and would give other bits",
+                field="--cluster",
+                value=others[0],
+                remedy="install the same simrail on every machine",
+            )
+
+    def _threads(self) -> int:
+        return sum(self._client.nthreads().values())
+
+    def workers(self) -> int:
+        # Threads of one worker take turns: it works on one batch at a time.
+        try:
+            return max(1, len(self._client.nthreads()))
+        except (OSError, CancelledError, RuntimeError) as error:
+            raise ClusterGone from error
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        # To a worker whose last result is here: one that dies then takes one batch with it, not two.
+        try:
+            place = next((each for each in self._client.nthreads() if each not in self._busy), None)
+            future: Future[Any] = self._pool.submit(
+                function, *arguments, workers=place, allow_other_workers=place is not None
+            )
+        except (OSError, CancelledError, RuntimeError) as error:
+            raise ClusterGone from error
+        if place is not None:
+            self._busy.add(place)
+            future.add_done_callback(lambda _: self._busy.discard(place))
+        return future
+
+    def renew(self) -> None:
+        pass  # dask replaces workers, and runs again what they had
+
+    def close(self) -> None:
+        with suppress(Exception):  # a scheduler that has gone cannot be told
+            self._client.close(timeout=2)
+        self._log.setLevel(self._log_level)
+
+
+class ClusterGone(OSError):
+    """The scheduler has gone; what was done is kept."""
+
+    def __init__(self) -> None:
+        super().__init__("the dask scheduler has gone")
+
+
+def _begin_worker(parent: int) -> None:
+    """Leave Ctrl-C to the main process, and do not outlive it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,142 @@
+"""A scenario's recordings as files, for work outside of simrail: one folder each, in the form of a ride.
+
+Simulates (or finds in the cache) the rides of a scenario, draws the sensors as a campaign would, and writes
+what they recorded. Nothing is estimated here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+import pandas as pd
+
+from simrail.campaign.cell import record_cell
+from simrail.campaign.progress import Watcher
+from simrail.core.atomic_files import draft_of
+from simrail.core.errors import InputError
+from simrail.core.interrupts import interruptible
+from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
+from simrail.ride.ride import simulate
+from simrail.scenario.build import Parts
+from simrail.scenario.cells import Cell, first_cells
+from simrail.scenario.check import judge_scenario
+from simrail.scenario.scenario import Scenario
+from simrail.scoring.score import truth_at_imu
+
+INDEX_FILE = "recordings.csv"
+TRUTH_STEM = "truth_not_part_of_the_recording"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: the folder, and one name per recording in it."""
+
+    folder: Path
+    recordings: tuple[str, ...]
+
+
+def export(
+    scenario: Scenario,
+    folder: Path,
+    *,
+    format: Format = "csv",
+    draw: int = 0,
+    truth: bool = False,
+    watcher: Watcher | None = None,
+) -> Exported:
+    """Write every recording of a scenario, for one draw of track and sensors.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As read; its estimators are not used.
+    folder : Path
+        Must not exist yet; it appears whole or not at all.
+    format : str
+        ``"csv"`` or ``"parquet"``.
+    draw : int
+        Draw of the sensors; the track is that of its first draw.
+    truth : bool
+        Writes the true motion of the mount at the IMU's times beside each recording, too.
+    watcher : Watcher, optional
+        Is told of the progress.
+
+    Returns
+    -------
+    Exported
+        The folder holds one folder per recording and an index, ``recordings.csv``, with the values of
+        the scenario's axes.
+
+    Raises
+    ------
+    InputError
+        If the folder exists, or the scenario cannot be run; nothing is written then.
+    """
+    watcher = watcher or Watcher()
+    refuse_existing(folder)
+    parts = Parts(scenario)
+    judge_scenario(scenario, parts)
+    chosen = [replace(cell, sensor_draw=draw) for cell in first_cells(scenario)]
+    rides = len({cell.ride_number for cell in chosen})
+    names = _names(chosen)
+    records = []
+    with interruptible() as check, draft_of(folder) as draft:
+        for number, (_, group) in enumerate(groupby(chosen, key=lambda cell: cell.ride_number), start=1):
+            ride_cells = list(group)
+            watcher.ride_begins(number, rides, ride_cells[0].ride.name)
+            try:
+                motion = simulate(parts.ride(ride_cells[0]), progress=watcher.ride_goes)
+            except Exception:
+                check()  # an engine in C++ may have made an error of its own of Ctrl-C
+                raise
+            watcher.ride_ends()
+            for cell in ride_cells:
+                recording = record_cell(cell, motion, parts)
+                name = names[cell.number]
+                (draft / name).mkdir()
+                write_parts(recording, draft / name, format=format)
+                if truth:
+                    true = truth_at_imu(motion, recording)
+                    write_frame(true, draft / name / f"{TRUTH_STEM}.{format}", format=format)
+                records.append(_record(name, cell, draw))
+                watcher.recording_written(len(records), len(chosen), name)
+        pd.DataFrame.from_records(records).to_csv(draft / INDEX_FILE, index=False)
+    return Exported(folder, tuple(names.values()))
+
+
+def _names(chosen: list[Cell]) -> dict[int, str]:
+    """Folder of each cell: ride, IMU and grade, and a number where that is not enough."""
+    plain = {cell.number: f"{cell.ride.name}_{cell.imu.name}_{Path(cell.imu.grade).stem}" for cell in chosen}
+    taken = list(plain.values())
+    width = len(str(len(chosen) - 1))
+    return {
+        number: name if taken.count(name) == 1 else f"{name}_{i:0{width}d}"
+        for i, (number, name) in enumerate(plain.items())
+    }
+
+
+def _record(name: str, cell: Cell, draw: int) -> dict[str, object]:
+    labels: dict[str, object] = {
+        "folder": name,
+        "ride": cell.ride.name,
+        "mount": cell.imu.name,
+        "imu": cell.imu.grade,
+        "track": cell.spec.track,
+        "vehicle": cell.spec.vehicle,
+        "engine": cell.spec.engine,
+        "odometry": cell.spec.odometry,
+        "speed_kmh": cell.ride.speed_kmh or 0.0,
+        "sensor_draw": draw,
+    }
+    return labels | {key: value for key, value in cell.settings.items() if key not in labels}
+
+
+def format_of(word: str) -> Format:
+    """Judge the word for a format."""
+    if word == "csv":
+        return "csv"
+    if word == "parquet":
+        return "parquet"
+    raise InputError("no such format", field="--format", value=word, limit="csv or parquet")

@@ -1,0 +1,137 @@
+"""What a campaign found: made of the batches that are kept, the same whatever their order and size.
+
+Scores come from the batches only. The examples for figures are cells run once more: a recording with its
+estimates is large, and no batch hands it on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pandas as pd
+
+from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.example import CellResult
+from simrail.campaign.job import Job
+from simrail.campaign.ledger import STAGES, Failure, cell_record
+from simrail.campaign.worker import BatchResult, example_of
+from simrail.scenario.cells import Cell, cells
+from simrail.scenario.check import Plan
+from simrail.scenario.stop_rule import Look, StopRule, stop_rule_of
+from simrail.scoring.table import concat_scores, in_order
+
+MOST_EXAMPLES = 6
+"""Recordings that are kept for the report's figures, one per ride."""
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """What a campaign found.
+
+    Attributes
+    ----------
+    scores : pandas.DataFrame
+        The score table, columns `simrail.scoring.table.SCORE_COLUMNS`, in the order of the cells.
+    cells : pandas.DataFrame
+        One row per cell: its labels, and the values of the scenario's axes under their dotted names.
+    examples : list of CellResult
+        First draw of each ride, for figures.
+    rides : list of dict
+        What each engine said of its run; plain values.
+    wall_s, cpu_s : dict of str to float
+        Wall and processor time of the stages ``simulate``, ``measure``, ``estimate``, ``score``, all workers.
+    failures : list of Failure
+        What failed; each is a row of the scores as well.
+    plan : Plan
+        What was planned, with its warnings.
+    stopped : Look, optional
+        The last look of the scenario's stop rule: the tables hold the draws that it looked at.
+    """
+
+    scores: pd.DataFrame
+    cells: pd.DataFrame
+    examples: list[CellResult]
+    rides: list[dict[str, Any]]
+    wall_s: dict[str, float]
+    cpu_s: dict[str, float]
+    failures: list[Failure]
+    plan: Plan
+    stopped: Look | None = None
+
+
+def chosen_cells(job: Job, only: int | None = None, *, draws: int | None = None) -> Iterator[Cell]:
+    """The cells of a job: all, the one that is wanted, or those of the first draws of its stop rule."""
+    rule = stop_rule_of(job.scenario)
+    for cell in cells(job.scenario):
+        beyond = rule is not None and draws is not None and not rule.has(cell, draws)
+        if not beyond and (only is None or cell.number == only):
+            yield cell
+
+
+def look_at_draws(job: Job, kept: Unfinished, rule: StopRule, draws: int) -> Look:
+    """Ask a stop rule about the first so many draws, all of whose cells are kept."""
+    return rule.look(chosen_cells(job), (result.scores for result in kept.results()), draws)
+
+
+def gather(
+    job: Job, kept: Unfinished, *, only: int | None = None, stopped: Look | None = None
+) -> CampaignResult:
+    """Put together the batches that are kept, up to where the stop rule ended the campaign."""
+    listed = list(chosen_cells(job, only, draws=None if stopped is None else stopped.draws))
+    results = list(kept.results())
+    if stopped is not None:
+        results = _without_others(results, {cell.number for cell in listed})
+    failures = [failure for result in results for failure in result.failures]
+    rides: dict[int, dict[str, Any]] = {}
+    for result in results:
+        known = rides.get(result.ride_number)
+        if result.ride and (known is None or (known["from_cache"] and not result.ride["from_cache"])):
+            rides[result.ride_number] = result.ride
+    return CampaignResult(
+        scores=in_order(concat_scores(result.scores for result in results)),
+        cells=pd.DataFrame.from_records([cell_record(cell) for cell in listed]),
+        examples=_examples(job, listed, failures),
+        rides=[rides[number] for number in sorted(rides)],
+        wall_s={stage: sum(result.wall_s[stage] for result in results) for stage in STAGES},
+        cpu_s={stage: sum(result.cpu_s[stage] for result in results) for stage in STAGES},
+        failures=sorted(failures, key=lambda failure: failure.cell),
+        plan=job.plan,
+        stopped=stopped,
+    )
+
+
+def _without_others(results: list[BatchResult], numbers: set[int]) -> list[BatchResult]:
+    """Batches with the cells of these numbers only; a run whose failed cells are tried again has others."""
+    found = []
+    for result in results:
+        if not numbers.issuperset(result.cells):
+            scores = result.scores[result.scores["cell"].isin(numbers)].reset_index(drop=True)
+            failures = tuple(failure for failure in result.failures if failure.cell in numbers)
+            result = replace(result, scores=scores, failures=failures)
+        if numbers.intersection(result.cells):
+            found.append(result)
+    return found
+
+
+def _examples(job: Job, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
+    """The first cell of each ride over the first draw that did not fail altogether, and of added noise."""
+    failed: dict[int, int] = {}
+    for failure in failures:
+        failed[failure.cell] = failed.get(failure.cell, 0) + 1
+    shown: set[int] = set()
+    noise_shown = False
+    found: list[CellResult] = []
+    for cell in listed:
+        if len(found) == MOST_EXAMPLES:
+            break
+        lost = failed.get(cell.number, 0) >= len(job.plan.estimators)
+        first = cell.ride_number not in shown or (cell.imu.noise_added and not noise_shown)
+        if cell.track_draw == cell.sample == 0 and first and not lost:
+            shown.add(cell.ride_number)
+            noise_shown |= cell.imu.noise_added
+            with suppress(Exception):
+                found.append(example_of(job.order, cell))
+    return found

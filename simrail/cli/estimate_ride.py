@@ -1,0 +1,97 @@
+"""One estimator on one recorded ride: what ``simrail estimate`` does. There is no truth, so no scores."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from simrail.core.atomic_files import draft_of
+from simrail.core.errors import InputError
+from simrail.core.toml_files import blame
+from simrail.estimation.estimate import Estimate, Estimator
+from simrail.recording.files.ride_reader import read_ride
+from simrail.recording.files.ride_writer import Format, write_frame
+from simrail.recording.recording import Recording
+from simrail.report.pages.estimate_page import write_estimate_page
+from simrail.report.tables.methods import readable
+from simrail.scenario.build_estimator import class_named, construct
+from simrail.scenario.overrides import override
+
+PAGE = "estimate.html"
+
+
+@dataclass(frozen=True)
+class RideEstimate:
+    """What was read and concluded, the folder with the files, and the time per sample."""
+
+    recording: Recording
+    estimator: Estimator
+    estimate: Estimate
+    folder: Path
+    us_per_sample: float
+
+
+def estimate_ride(
+    ride: Path, method: str, folder: Path, *, settings: Sequence[str] = (), format: Format = "csv"
+) -> RideEstimate:
+    """Read a ride, run an estimator on it, and write what it found.
+
+    Parameters
+    ----------
+    ride : Path
+        A ride file, or a folder with one.
+    method : str
+        Registered name, or ``"file.py:Class"``.
+    folder : Path
+        Where ``estimate.<format>``, ``innovations.<format>``, ``geometry.<format>`` (those that the method
+        has) and ``estimate.html`` go. It appears, or replaces an earlier estimate, whole or not at all.
+    settings : sequence of str
+        Options of the estimator, ``option=value``.
+    format : str
+        ``"csv"`` or ``"parquet"``.
+
+    Raises
+    ------
+    InputError
+        If the ride cannot be read, there is no such estimator or option, or the folder holds other
+        things.
+    """
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / PAGE).is_file())):
+        raise InputError(
+            "holds other things than an estimate, and would be replaced",
+            field="--out",
+            value=str(folder),
+            limit=f"a new folder, or one that holds an {PAGE}",
+            remedy="choose another folder with --out",
+        )
+    with blame("--estimator", method):
+        known = class_named(method, None)
+    with blame("--set", method):
+        estimator = construct(known, override({}, settings))
+    recording = read_ride(ride)
+    begun = time.perf_counter()
+    estimate = estimator.estimate(recording)
+    us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)
+    if not len(estimate.states.columns):
+        raise InputError("concludes nothing", field="--estimator", value=method)
+    place = [name for name in ("position_m", "speed_mps") if name not in estimate.states]
+    with draft_of(folder) as draft:
+        # Where each state belongs on the track stands beside it, as the odometry has it.
+        write_frame(
+            estimate.states.join(recording.odometry[place]), draft / f"estimate.{format}", format=format
+        )
+        for name in ("innovations", "geometry"):
+            frame = getattr(estimate, name)
+            if frame is not None:
+                write_frame(frame, draft / f"{name}.{format}", format=format)
+        write_estimate_page(
+            draft / PAGE,
+            recording,
+            estimate,
+            label=readable(method.rpartition(":")[2]),
+            method=repr(estimator),
+            us_per_sample=us_per_sample,
+        )
+    return RideEstimate(recording, estimator, estimate, folder, us_per_sample)

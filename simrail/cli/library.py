@@ -1,0 +1,125 @@
+"""``simrail list | vehicle | imu | new | cache``: what there is, and parts of your own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simrail.cli.options import DONE, number
+
+
+def list_parts() -> int:
+    """Show the scenarios, tracks, vehicles, IMUs and estimators that are there."""
+    from rich.console import Console
+
+    from simrail.cli.catalogue import catalogue
+
+    console = Console(highlight=False)
+    for kind, entries in catalogue().items():
+        console.print(f"[bold]{kind}[/bold]")
+        width = max((len(name) for name in entries), default=0)
+        for name, title in entries.items():
+            console.print(f"  [cyan]{name:{width}}[/cyan]  ", end="")
+            console.print(title, markup=False, overflow="ignore", crop=False, no_wrap=True)
+    return DONE
+
+
+def vehicle(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", help="A shipped vehicle, or the path of a TOML file.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Write an HTML page with figures there, too.")
+    ] = None,
+    speed: Annotated[
+        float, typer.Option("--speed", metavar="KMH", min=1.0, max=1000.0, help="Speed of the mode table.")
+    ] = 80.0,
+    top: Annotated[
+        float, typer.Option("--to", metavar="KMH", min=10.0, max=1000.0, help="Highest speed searched.")
+    ] = 400.0,
+) -> int:
+    """Show a vehicle: masses, wheel loads, natural frequencies, conicity and critical speed."""
+    from rich.console import Console
+
+    from simrail.core.toml_files import blame, find, judge, label, read_toml
+    from simrail.report.tables.vehicle_text import print_study
+    from simrail.vehicle.file import VehicleFile
+    from simrail.vehicle.study import study_vehicle
+
+    path = find("vehicle", name)
+    model = judge(VehicleFile, read_toml(path), file=label(path)).model(path.stem)
+    console = Console(stderr=True)
+    with console.status("") as status, blame(label(path), "vehicle"):
+        study = study_vehicle(
+            model,
+            running_mps=speed / 3.6,
+            top_mps=top / 3.6,
+            progress=lambda what, share: status.update(f"{what} {100 * share:.0f} %"),
+        )
+    print_study(Console(), study)
+    if out is not None:
+        from simrail.report.pages.vehicle_page import write_vehicle_page
+
+        print(f"wrote {write_vehicle_page(out, study)}")
+    return DONE
+
+
+def imu(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", help="A shipped IMU, or the path of a TOML file.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Write an HTML page with its Allan deviation there, too."),
+    ] = None,
+) -> int:
+    """Show an IMU grade in the units of data sheets, and what was assumed."""
+    from rich.console import Console
+
+    from simrail.recording.sheets.imu_file import load_imu
+    from simrail.report.tables.imu_text import print_imu
+
+    file, grade = load_imu(name)
+    print_imu(Console(), file, grade)
+    if out is not None:
+        from simrail.report.pages.imu_page import write_imu_page
+
+        print(f"wrote {write_imu_page(out, file, grade)}")
+    return DONE
+
+
+def new(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="estimator, track, vehicle, imu, scenario, ride.")
+    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Its name, e.g. my_filter.")],
+    folder: Annotated[Path, typer.Option("--in", metavar="DIR", help="Where to write it.")] = Path(),
+) -> int:
+    """Write a working template: one file, to be changed into your own part."""
+    from simrail.cli.templates import write_template
+
+    written, next_step = write_template(kind, name, folder=folder)
+    print(f"wrote {written}\n{next_step}")
+    return DONE
+
+
+def cache(
+    clear: Annotated[bool, typer.Option("--clear", help="Drop all simulated rides.")] = False,
+) -> int:
+    """Show the cache of simulated rides, or clear it."""
+    from simrail.ride import cache as ride_cache
+
+    if clear:
+        print(f"freed {ride_cache.clear() / 1e6:.0f} MB")
+        return DONE
+    rides = ride_cache.rides()
+    for ride in rides:
+        print(f"{ride.size_bytes / 1e6:8.0f} MB  {ride.key[:12]}  {ride.name}")
+    total = sum(ride.size_bytes for ride in rides)
+    print(
+        f"{number(len(rides), 'ride')}, {total / 1e6:.0f} MB of at most "
+        f"{ride_cache.limit_bytes() / 1e9:g} GB (SIMRAIL_CACHE_GB), in {ride_cache.folder()}"
+    )
+    return DONE

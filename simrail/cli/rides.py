@@ -1,0 +1,76 @@
+"""``simrail export | estimate``: recordings as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simrail.cli.options import DONE, Form, Scenario, Seed, Settings, number
+
+
+def export(
+    scenario: Scenario,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new folder for the recordings.")],
+    form: Form = "csv",
+    draw: Annotated[int, typer.Option("--draw", min=0, help="Draw of the sensors.")] = 0,
+    truth: Annotated[
+        bool, typer.Option("--truth", help="Write the true motion beside each recording, too.")
+    ] = False,
+    seed: Seed = None,
+    settings: Settings = None,
+) -> int:
+    """Write the recordings of a scenario as files: one folder each, one file per sensor."""
+    from rich.console import Console
+
+    from simrail.campaign.export import export as export_scenario
+    from simrail.campaign.export import format_of
+    from simrail.cli.progress_bar import ProgressWatcher
+    from simrail.scenario.scenario import load_scenario
+
+    chosen, read = format_of(form), load_scenario(scenario, overrides=settings or [], seed=seed)
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        written = export_scenario(read, out, format=chosen, draw=draw, truth=truth, watcher=watcher)
+    print(f"wrote {number(len(written.recordings), 'recording')} into {out}:")
+    for name in written.recordings:
+        print(f"  {name}")
+    print(f"next: simrail estimate {out / written.recordings[0]} --estimator AttitudeEkf")
+    return DONE
+
+
+def estimate(
+    ride: Annotated[
+        Path, typer.Argument(metavar="RIDE.toml", help="A ride file, or a folder that holds a ride.toml.")
+    ],
+    estimator: Annotated[
+        str, typer.Option("--estimator", metavar="NAME", help="A registered estimator, or FILE.py:CLASS.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Its folder; results/<ride>_<estimator> if not given."),
+    ] = None,
+    form: Form = "csv",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="OPTION=VALUE", help="Option of the estimator. Repeatable."),
+    ] = None,
+) -> int:
+    """Run an estimator on a recorded ride, of a real train or exported; without truth, without scores."""
+    from simrail.campaign.export import format_of
+    from simrail.cli.estimate_ride import estimate_ride
+    from simrail.report.pages.estimate_page import design_difference_deg, ride_facts
+
+    stem = ride.stem if ride.suffix == ".toml" and ride.stem != "ride" else ride.absolute().stem
+    stem = ride.absolute().parent.name if stem == "ride" else stem
+    folder = out or Path("results") / f"{stem}_{estimator.rpartition(':')[2]}"
+    done = estimate_ride(ride, estimator, folder, settings=settings or [], format=format_of(form))
+    for fact in ride_facts(done.recording):
+        print(fact)
+    for angle in ("roll_rad", "pitch_rad"):
+        if angle in done.estimate.states:
+            rms = design_difference_deg(done.recording, done.estimate, angle)
+            print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
+    print("there is no truth beside a recording, hence no scores")
+    print(f"wrote {folder / f'estimate.{form}'} and {folder / 'estimate.html'}")
+    return DONE

@@ -1,0 +1,200 @@
+"""The scores as the command line shows them at the end of a run: tables of each case, and notes."""
+
+from __future__ import annotations
+
+import pandas as pd
+from rich import box
+from rich.console import Console, Group, RenderableType
+from rich.measure import Measurement
+from rich.table import Table
+from rich.text import Text
+
+from simrail.campaign.result import CampaignResult
+from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
+from simrail.report.tables.geometry_tables import baseline_of, behind_baseline
+from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
+from simrail.report.tables.pivot import Figures, cases
+from simrail.results import Results
+from simrail.scenario.build import bands_by_name
+from simrail.scenario.cells import methods
+from simrail.scoring.table import OK
+from simrail.track.bands import Band
+
+ATTITUDE = (
+    ("roll", "truth", "whole"),
+    ("roll", "truth", "curve"),
+    ("roll", "design", "curve"),
+    ("pitch", "truth", "whole"),
+    ("pitch", "truth", "curve"),
+    ("pitch", "design", "curve"),
+)
+"""Columns of the attitude. Beside rails, those against the design are left out: the design is no goal."""
+
+RAILS = (*JUDGED, "gauge")
+"""Columns of the rails."""
+
+WIDEST = 80
+"""Characters of a line that a table keeps to, however wide the terminal is."""
+
+MOST_GROUPS = 12
+
+
+def print_scores(console: Console, results: Results) -> None:
+    """Print the tables of every case, ride by ride and IMU by IMU: means over all draws."""
+    campaign = results.campaign
+    scores, cells = campaign.scores, campaign.cells
+    styles = list(method_styles(methods(results.scenario)).values())
+    bands = bands_by_name(results.scenario.spec)
+    for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
+        if number == MOST_GROUPS:
+            console.print(f"... and {cells['case'].nunique() - number} more cases: see scores.csv")
+            break
+        rows = scores[scores["cell"].isin(members["cell"])]
+        console.print(_case(console, rows, members, styles, bands))
+    if campaign.stopped is not None:
+        # What was not reached is to be seen; what was, is no less than what was asked for.
+        colour = "green" if campaign.stopped.reached else "yellow"
+        console.print(Text(campaign.stopped.words, style=colour), soft_wrap=True)
+    for warning in campaign.plan.warnings:
+        console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False)
+    reasons = list(dict.fromkeys((failure.estimator, failure.reason) for failure in campaign.failures))
+    for estimator, reason in reasons[:10]:
+        console.print(f"[red]failed:[/red] {estimator}: {reason}", highlight=False)
+    wall = results.manifest["wall_s"]
+    factor = results.manifest["real_time_factor"]
+    speed = f", engine at {factor:.1f} x real time" if factor else ""
+    console.print(
+        f"{wall['total']:.1f} s{speed}. Report: {results.folder / 'report.html'}",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+def print_cell(console: Console, campaign: CampaignResult) -> None:
+    """Print every score of one cell."""
+    first = campaign.cells.iloc[0]
+    console.print(
+        f"[bold]cell {first['cell']}[/bold]: ride {first['ride']}, {first['imu']} on {first['mount']}"
+    )
+    columns = ["estimator", "quantity", "band", "reference", "window", "metric", "value", "unit", "status"]
+    print(campaign.scores[columns].to_string(index=False, float_format=lambda value: f"{value:.9g}"))
+
+
+def _case(
+    console: Console,
+    rows: pd.DataFrame,
+    members: pd.DataFrame,
+    styles: list[MethodStyle],
+    bands: dict[str, Band],
+) -> Group:
+    """Title, rails where they are scored, attitude, and notes; title and notes may be wider than a table."""
+    first = members.iloc[0]
+    draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
+    title = Text(
+        f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
+        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}",
+        style="bold",
+    )
+    shown = rows[(rows["status"] == OK) & rows["metric"].isin(("rms", "sd", "us_per_sample"))]
+    found = cases(shown, members)
+    if not found:
+        return Group(title)
+    case = found[0]
+    notes: list[str] = []
+    parts: list[RenderableType] = [title]
+    mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
+    if mapping:
+        band = judged_band(case)
+        told = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
+        parts += [Text(told), _rails(console, case, mapping, band)]
+        notes += _lost_rails(case, mapping, band)
+    attitude = [s for s in attitude_methods(styles) if case.get(s.name, "roll", "rms").draws]
+    if attitude:
+        parts += [
+            Text(f"Attitude: rms error, deg; {draws}"),
+            _attitude(console, case, attitude, bool(mapping)),
+        ]
+        notes += _lost_attitude(case, attitude)
+    astray = case.get(f"odometry:{first['odometry']}", "position", "rms")
+    if astray.draws and first["odometry"] != "truth":
+        notes.insert(0, f"the odometry's position error is {astray.value:.3g} m rms")
+    if any(style.baseline for style in (*mapping, *attitude)):
+        notes.insert(0, "* baseline")
+    parts.append(Text("; ".join(notes), style="dim"))
+    return Group(*parts)
+
+
+def _rails(console: Console, case: Figures, styles: list[MethodStyle], band: str) -> Table:
+    """Standard deviations of the errors of those methods that say what the rails look like."""
+    columns = [q for q in RAILS if any(case.get(s.name, q, "sd", band=band).draws for s in styles)]
+    heads = [QUANTITIES[q].replace(" ", "\n").replace("cross-", "cross-\n") for q in columns]
+    lines = []
+    for style in styles:
+        sds = [case.get(style.name, quantity, "sd", band=band) for quantity in columns]
+        lines.append((style, [f"{sd.value:.3f}" if sd.draws else "-" for sd in sds], _time(case, style)))
+    return _table(console, heads, lines)
+
+
+def _attitude(console: Console, case: Figures, styles: list[MethodStyle], beside_rails: bool) -> Table:
+    """Rms errors of the attitude; the time is told once, with the rails where there are any."""
+    columns = []
+    for quantity, reference, window in ATTITUDE:
+        key = {"window": window, "reference": reference}
+        # A ride without curves has no columns of them.
+        there = any(case.get(style.name, quantity, "rms", **key).draws for style in styles)
+        if there and not (beside_rails and reference == "design"):
+            columns.append((quantity, reference, window))
+    lines = []
+    for style in styles:
+        found = [case.get(style.name, q, "rms", window=w, reference=r) for q, r, w in columns]
+        time = "" if beside_rails else _time(case, style)
+        lines.append((style, [f"{one.value:.3f}" if one.draws else "-" for one in found], time))
+    heads = [f"{q}\n{w}" + ("\nvs\ndesign" if r == "design" else "") for q, r, w in columns]
+    return _table(console, heads, lines)
+
+
+def _time(case: Figures, style: MethodStyle) -> str:
+    found = case.get(style.name, "roll", "us_per_sample")
+    return f"{found.value:.2f}" if found.draws else "-"
+
+
+def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, list[str], str]]) -> Table:
+    """Method, numbers, and time per sample where any line has it; long names are folded, never cut."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("method", overflow="fold")
+    timed = any(time for _, _, time in lines)
+    for head in [*heads, *(["us per\nsample"] if timed else [])]:
+        table.add_column(head, justify="right", no_wrap=True)
+    for style, numbers, time in lines:
+        table.add_row(
+            f"{style.name}{' *' if style.baseline else ''}",
+            *numbers,
+            *([time] if timed else []),
+            style="dim" if style.baseline else None,
+        )
+    if Measurement.get(console, console.options, table).maximum > WIDEST:
+        table.width = WIDEST
+    return table
+
+
+def _lost_rails(case: Figures, styles: list[MethodStyle], band: str) -> list[str]:
+    """What rails that lie as designed know better than a method, by quantity."""
+    floor, lost = baseline_of(case, styles), []
+    for quantity in RAILS:
+        worse = [style.name for style in behind_baseline(case, styles, quantity, band=band)]
+        if worse:
+            lost.append(f"in {QUANTITIES[quantity]} than {', '.join(worse)}")
+    return [f"{floor.name}, which uses no IMU, errs less {' and '.join(lost)}"] if floor and lost else []
+
+
+def _lost_attitude(case: Figures, styles: list[MethodStyle]) -> list[str]:
+    """Which methods err more in roll in curves than the design angles do."""
+    floor = next((style for style in styles if not style.uses_imu), None)
+    if floor is None:
+        return []
+    least = case.get(floor.name, "roll", "rms", window="curve").value
+    beaten = [
+        s.name for s in styles if s.uses_imu and case.get(s.name, "roll", "rms", window="curve").value > least
+    ]
+    told = f"{floor.name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
+    return [told] if beaten else []

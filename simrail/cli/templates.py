@@ -1,0 +1,173 @@
+"""Templates: ``simrail new estimator NAME`` writes one file that works, to be changed into one's own.
+
+An estimator is written from the template here; a track, vehicle, IMU or scenario is a copy of a
+shipped file, so the template is always one that runs. A ride has its data beside it
+(`simrail.cli.template_ride`).
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from string import Template
+
+from simrail.core.errors import InputError
+from simrail.core.toml_files import label, shipped
+
+SHIPPED = {
+    "track": ("smooth_curve", 'track = "./{file}"', ""),
+    "vehicle": ("metro_irw_bogie", 'vehicle = "./{file}"', "look at it: simrail vehicle {path}\n"),
+    "imu": ("lord_3dm_gx4_25", 'grade = "./{file}" in an [[imu]]', "look at it: simrail imu {path}\n"),
+}
+KINDS = ("estimator", *SHIPPED, "scenario", "ride")
+
+_ESTIMATOR = Template('''"""$Class: what it is for, in one line.
+
+Then what it is not for, and the source of its equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from simrail.core.columns import ACCEL, ATTITUDE, GYRO
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
+
+
+@dataclass(frozen=True)
+class $Class:
+    """Complementary filter: the gyro is integrated, and drawn to the accelerometer's tilt.
+
+    With a = dt / (time_constant_s + dt), and the tilt of the specific force f,
+    roll_f = atan2(f_y, f_z), pitch_f = atan2(-f_x, hypot(f_y, f_z)):
+
+    roll  += (1 - a) roll' dt  + a (roll_f - roll)      (pitch alike)
+    yaw   += yaw' dt
+
+    where roll', pitch', yaw' are the Euler rates of the measured body rate. It knows nothing of curves:
+    see `simrail.estimators.attitude.compensation` for what a train can do about them.
+
+    Attributes
+    ----------
+    time_constant_s : float
+        How long the gyro is trusted.
+    """
+
+    time_constant_s: float = 5.0
+
+    causal = True  # the estimate at a time uses nothing recorded later; check_estimator tests it
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate roll, pitch and yaw from a recording and nothing else."""
+        gyro = recording.imu[list(GYRO)].to_numpy()
+        force = recording.imu[list(ACCEL)].to_numpy()
+        dt = 1.0 / recording.imu_sheet.rate_hz
+        gain = dt / (self.time_constant_s + dt)
+        tilt_roll = np.arctan2(force[:, 1], force[:, 2])
+        tilt_pitch = np.arctan2(-force[:, 0], np.hypot(force[:, 1], force[:, 2]))
+        angles = np.empty((len(gyro), 3))
+        # The train knows where it starts, so it knows its heading: that of the design track.
+        yaw = float(recording.track.frame(recording.start_position_m).yaw_rad)
+        roll, pitch = tilt_roll[0], tilt_pitch[0]
+        for i, (p, q, r) in enumerate(gyro):
+            turn = q * np.sin(roll) + r * np.cos(roll)
+            roll_rate = p + turn * np.tan(pitch)
+            pitch_rate = q * np.cos(roll) - r * np.sin(roll)
+            roll += (1.0 - gain) * roll_rate * dt + gain * (tilt_roll[i] - roll)
+            pitch += (1.0 - gain) * pitch_rate * dt + gain * (tilt_pitch[i] - pitch)
+            yaw += turn / np.cos(pitch) * dt
+            angles[i] = roll, pitch, yaw
+        states = pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE))
+        return Estimate(states=states, mount=recording.mount)
+''')
+
+
+def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path, str]:
+    """Write a template.
+
+    Parameters
+    ----------
+    kind : str
+        ``estimator``, ``track``, ``vehicle``, ``imu``, ``scenario`` or ``ride``.
+    name : str
+        Name of the part: a word of letters, digits and ``_``, e.g. ``my_filter``.
+    folder : Path, optional
+        Where to write it.
+
+    Returns
+    -------
+    Path, str
+        The file, and what to do next.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind, the name is none, or the file exists.
+    """
+    if kind not in KINDS:
+        near = difflib.get_close_matches(kind, KINDS, n=1)
+        raise InputError(
+            "there is no template of this kind",
+            field="KIND",
+            value=kind,
+            limit="one of " + ", ".join(KINDS),
+            remedy=f"did you mean {near[0]}?" if near else None,
+        )
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise InputError(
+            "is no name for a file",
+            field="NAME",
+            value=name,
+            limit="letters, digits and _, a letter first",
+            remedy="e.g. my_filter",
+        )
+    if not folder.is_dir():
+        raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
+    path = folder / f"{name}.{'py' if kind == 'estimator' else 'toml'}"
+    data = folder / f"{name}.csv" if kind == "ride" else None
+    for file in (path, data):
+        if file is not None and file.exists():
+            raise InputError(
+                "the file exists", file=label(file), remedy="choose another name, or move the file away"
+            )
+    if data is not None:
+        from simrail.cli.template_ride import ride_template  # it simulates: too heavy for the other templates
+
+        text, logged = ride_template(name)
+        data.write_text(logged, encoding="utf-8")
+        next_step = f"its data: {label(data)}\ntry it: simrail estimate {label(path)} --estimator AttitudeEkf"
+    elif kind == "estimator":
+        text, next_step = _estimator(name, path)
+    elif kind == "scenario":
+        text, next_step = _copy("scenario", "quick_kinematic", name), f"run it: simrail run {label(path)}"
+    else:
+        source, use, look = SHIPPED[kind]
+        text = _copy(kind, source, name)
+        next_step = look.format(path=label(path))
+        next_step += f"use it in a scenario beside it: {use.format(file=path.name)}"
+    path.write_text(text, encoding="utf-8")
+    return path, next_step
+
+
+def _estimator(name: str, path: Path) -> tuple[str, str]:
+    class_name = "".join(word[:1].upper() + word[1:] for word in name.split("_") if word)
+    text = _ESTIMATOR.substitute(Class=class_name)
+    next_step = (
+        f'use it in a scenario beside it:\n\n    [[estimator]]\n    name = "{name}"\n'
+        f'    method = "{path.name}:{class_name}"\n\n'
+        f"or try it at once: simrail run quick_kinematic "
+        # Quoted: some shells take brackets for a pattern of file names.
+        f"--set 'estimator[0].method={label(path)}:{class_name}' "
+        f"--set 'estimator[0].name={name}' --set 'estimator[0].options={{}}'"
+    )
+    return text, next_step
+
+
+def _copy(kind: str, source: str, name: str) -> str:
+    text = shipped(kind)[source].read_text(encoding="utf-8")
+    return f"# {name}: a copy of the shipped {kind} {source!r}, to be changed.\n\n{text}"

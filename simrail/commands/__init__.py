@@ -1,1 +1,0 @@
-"""The commands of the command line, one function each; `simrail.cli` puts them together."""

@@ -1,0 +1,1 @@
+"""What every room stands on: column names, errors, compiled loops, seeds, rotations, files."""

@@ -1,0 +1,140 @@
+"""Every data column, named once: its name, unit, frame and meaning.
+
+Frames: *body* is the mount (X forward, Y left, Z up, fixed to the body, never turned when the train
+runs backwards); *track* is the design track frame at the mount's own position; *global* is the flat,
+non-rotating Earth. Euler angles are ZYX (yaw, pitch, roll), pitch positive nose down, roll positive
+left side up (`estimators/EQUATIONS.md`, section 0; Briales et al. 2021, Eq. 2).
+
+This module knows names only. It holds no data and reads no files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import pandas as pd
+
+from simrail.core.errors import InputError
+
+
+class Column(NamedTuple):
+    """What one column means."""
+
+    name: str
+    unit: str
+    frame: str
+    meaning: str
+
+
+GYRO = ("gyro_x_radps", "gyro_y_radps", "gyro_z_radps")
+ACCEL = ("accel_x_mps2", "accel_y_mps2", "accel_z_mps2")
+IMU = GYRO + ACCEL
+ATTITUDE = ("roll_rad", "pitch_rad", "yaw_rad")
+ATTITUDE_SD = ("roll_sd_rad", "pitch_sd_rad", "yaw_sd_rad")
+RELATIVE_ATTITUDE = ("relative_roll_rad", "relative_pitch_rad", "relative_yaw_rad")
+POSITION = ("x_m", "y_m", "z_m")
+VELOCITY = ("velocity_x_mps", "velocity_y_mps", "velocity_z_mps")
+ODOMETRY = ("position_m", "speed_mps", "acceleration_mps2")
+ODOMETRY_SD = ("position_sd_m", "speed_sd_mps", "acceleration_sd_mps2")
+RELATIVE_POSITION = ("lateral_m", "vertical_m")
+RELATIVE_POSITION_SD = ("lateral_sd_m", "vertical_sd_m")
+ENCODER = ("pulse_count",)
+EDGE_TIME = "edge_time_s"
+RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
+MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
+MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
+GYRO_BIAS = ("gyro_bias_x_radps", "gyro_bias_y_radps", "gyro_bias_z_radps")
+INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
+RATE_INNOVATION = ("innovation_x_radps", "innovation_y_radps", "innovation_z_radps")
+IRREGULARITY = ("alignment_m", "vertical_profile_m", "cross_level_m", "gauge_m")
+IRREGULARITY_SD = ("alignment_sd_m", "vertical_profile_sd_m", "cross_level_sd_m", "gauge_sd_m")
+
+_TABLE = [
+    Column("time_s", "s", "-", "time since the start of the recording; the index of every signal frame"),
+    Column("gyro_{axis}_radps", "rad/s", "body", "angular rate about the axis"),
+    Column("accel_{axis}_mps2", "m/s2", "body", "specific force along the axis; at rest +g on Z"),
+    Column("roll_rad", "rad", "global", "roll, positive left side up"),
+    Column("pitch_rad", "rad", "global", "pitch, positive nose down"),
+    Column("yaw_rad", "rad", "global", "yaw, positive to the left; unwrapped"),
+    Column("{angle}_sd_rad", "rad", "global", "standard deviation of the angle"),
+    Column("relative_{angle}_rad", "rad", "track", "angle of the body in the design track frame"),
+    Column("{axis}_m", "m", "global", "position of the mount"),
+    Column("velocity_{axis}_mps", "m/s", "global", "velocity of the mount"),
+    Column("position_m", "m", "track", "distance s along the horizontal projection of the track"),
+    Column("speed_mps", "m/s", "track", "ds/dt, negative when running towards smaller s"),
+    Column("acceleration_mps2", "m/s2", "track", "d2s/dt2"),
+    Column("position_sd_m", "m", "track", "standard deviation of position_m"),
+    Column("speed_sd_mps", "m/s", "track", "standard deviation of speed_mps"),
+    Column("acceleration_sd_mps2", "m/s2", "track", "standard deviation of acceleration_mps2"),
+    Column("lateral_m", "m", "track", "lateral position r_y of the mount, positive left"),
+    Column("vertical_m", "m", "track", "vertical position r_z of the mount above the design rail plane"),
+    Column("lateral_sd_m", "m", "track", "standard deviation of lateral_m"),
+    Column("vertical_sd_m", "m", "track", "standard deviation of vertical_m"),
+    Column("pulse_count", "1", "-", "signed encoder counts since the start"),
+    Column("edge_time_s", "s", "-", "time of the last edge that the encoder passed; optional"),
+    Column("magnetic_{axis}_t", "T", "body", "magnetic flux density along the axis"),
+    Column("rail_left_y_m", "m", "body", "left rail seen from the IMU's place, along Y"),
+    Column("rail_left_z_m", "m", "body", "left rail seen from the IMU's place, along Z"),
+    Column("rail_right_y_m", "m", "body", "right rail seen from the IMU's place, along Y"),
+    Column("rail_right_z_m", "m", "body", "right rail seen from the IMU's place, along Z"),
+    Column("gyro_bias_{axis}_radps", "rad/s", "body", "estimated gyro bias"),
+    Column("innovation_{axis}_mps2", "m/s2", "body", "measured minus predicted specific force"),
+    Column("innovation_{axis}_radps", "rad/s", "body", "measured minus predicted angular rate"),
+    Column("nis", "1", "-", "normalised innovation squared of all innovations of the sample together"),
+    Column("alignment_m", "m", "track", "mean lateral deviation of the rails, positive left"),
+    Column("vertical_profile_m", "m", "track", "mean vertical deviation of the rails, positive up"),
+    Column("cross_level_m", "m", "track", "left minus right rail height"),
+    Column("gauge_m", "m", "track", "left minus right lateral deviation, positive wider"),
+    Column("alignment_sd_m", "m", "track", "standard deviation of alignment_m"),
+    Column("vertical_profile_sd_m", "m", "track", "standard deviation of vertical_profile_m"),
+    Column("cross_level_sd_m", "m", "track", "standard deviation of cross_level_m"),
+    Column("gauge_sd_m", "m", "track", "standard deviation of gauge_m"),
+]
+
+
+def _expand() -> dict[str, Column]:
+    values = {"{axis}": ("x", "y", "z"), "{angle}": ("roll", "pitch", "yaw")}
+    columns: dict[str, Column] = {}
+    for column in _TABLE:
+        names = [column.name]
+        for key, replacements in values.items():
+            if key in column.name:
+                names = [column.name.replace(key, word) for word in replacements]
+        columns.update({name: column._replace(name=name) for name in names})
+    return columns
+
+
+COLUMNS: dict[str, Column] = _expand()
+"""Every column by name."""
+
+
+def require(frame: pd.DataFrame, columns: Iterable[str], *, what: str = "frame", file: object = None) -> None:
+    """Refuse a frame that lacks columns.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        The frame to judge.
+    columns : iterable of str
+        Names that must be present, each a key of `COLUMNS`.
+    what : str
+        How the message calls the frame.
+    file : object, optional
+        File that the frame came from.
+
+    Raises
+    ------
+    InputError
+        Naming every missing column with its unit.
+    """
+    missing = [name for name in columns if name not in frame.columns]
+    if missing:
+        listed = ", ".join(f"{name} [{COLUMNS[name].unit}]" for name in missing)
+        raise InputError(
+            f"missing column {listed}",
+            file=file,
+            field=what,
+            value=sorted(map(str, frame.columns)),
+            remedy="add the column or map it from the file's own name",
+        )

@@ -1,0 +1,289 @@
+"""Reading and judging TOML: finds a file by name or path, and turns every fault into one message.
+
+A scenario and each of its parts (track, vehicle, IMU) is one TOML file, checked by a pydantic model
+that derives from `Part`. Shipped files are found by their bare name; a path finds a person's own.
+What the numbers mean physically is judged by the models, not here.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from importlib.resources import files
+from numbers import Integral
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from simrail.core.errors import InputError
+
+FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imus"}
+
+
+class Part(BaseModel):
+    """Base of every file model.
+
+    Unknown keys are refused, numbers are finite, values are frozen. Types are strict: text is never
+    read as a number (``"20 km/h"``), nor true as 1. Whole numbers stand for floats, and TOML arrays
+    for tuples.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+_Part = TypeVar("_Part", bound=Part)
+
+
+def shipped_folder() -> Path:
+    """Where the shipped scenarios lie, and their parts in folders beside them."""
+    return Path(str(files("simrail.scenarios")))
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """Shipped files of a kind (``scenario``, ``track``, ``vehicle``, ``imu``), by name."""
+    folder = shipped_folder() / FOLDERS[kind]
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
+    """Find a file: a path as given, a path in a folder (that of the scenario), or a shipped name.
+
+    Raises
+    ------
+    InputError
+        If there is no such file; the message lists the nearest shipped names.
+    """
+    looks_like_path = name.endswith(".toml") or "/" in name or "\\" in name
+    if looks_like_path:
+        for candidate in (*([folder / name] if folder else []), Path(name)):
+            if candidate.is_file():
+                return candidate
+        raise InputError(
+            "no such file",
+            value=name,
+            limit=f"the path of a {kind} file, or a shipped name",
+            remedy=f"mend the path; shipped: {', '.join(shipped(kind))}",
+        )
+    known = shipped(kind)
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(name, known, n=3) or sorted(known)
+    raise InputError(
+        f"no {kind} of this name is shipped",
+        value=name,
+        limit="e.g. " + ", ".join(near),
+        remedy=f"'simrail list' shows all; a file of your own needs its path, e.g. ./{name}.toml",
+    )
+
+
+def label(path: Path) -> str:
+    """Name a file in messages and results: no more of the machine's folders than its reader needs."""
+    for root, prefix in ((shipped_folder(), "scenarios"), (Path.cwd(), "")):
+        if path.resolve().is_relative_to(root.resolve()):
+            return (Path(prefix) / path.resolve().relative_to(root.resolve())).as_posix()
+    return str(path)
+
+
+def read_text(path: Path) -> str:
+    """Read a text file, or say why it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from error
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text", file=label(path), remedy="save the file as UTF-8") from error
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file, or say in which line it is broken."""
+    return parse_toml(read_text(path), file=label(path))
+
+
+def parse_toml(text: str, *, file: object) -> dict[str, Any]:
+    """Parse TOML text, or say in which line it is broken."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(
+            f"is not valid TOML: {error}",
+            file=file,
+            remedy='mend that place; text stands in quotes, numbers do not: name = "go20A", speed_kmh = 20.0',
+        ) from error
+
+
+def toml_text(data: Mapping[str, Any], *, prefix: str = "") -> str:
+    """TOML text of plain data: text, numbers, tuples or lists of them, tables and arrays of tables.
+
+    Numbers read back bit by bit. None is left out: TOML has no such value.
+    """
+    lines, tables = [], []
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            tables.append(f"\n[{prefix}{key}]\n" + toml_text(value, prefix=f"{prefix}{key}."))
+        elif isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
+            tables += [f"\n[[{prefix}{key}]]\n" + toml_text(item, prefix=f"{prefix}{key}.") for item in value]
+        elif value is not None:
+            lines.append(f"{key} = {_toml_value(value)}\n")
+    return "".join(lines) + "".join(tables)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Integral):
+        return str(int(value))
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_toml_value(item) for item in value)}]"
+    raise TypeError(f"no TOML for {type(value).__name__}")
+
+
+def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Path | None = None) -> _Part:
+    """Build a file model from raw TOML data; the first fault becomes an `InputError`.
+
+    ``folder`` is where files that the data names by a relative path are looked for.
+    """
+    try:
+        # JSON is the mode in which pydantic is strict about numbers and still takes arrays for tuples.
+        return model.model_validate_json(json.dumps(data, default=str), context={"folder": folder})
+    except ValidationError as error:
+        raise _as_input_error(error, model, file) from None
+
+
+def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None) -> _Part:
+    """Find, read and judge one file."""
+    path = find(kind, name, folder=folder)
+    return judge(model, read_toml(path), file=label(path), folder=path.parent)
+
+
+@contextmanager
+def blame(file: object, field: str) -> Iterator[None]:
+    """Say in which file and field an `InputError` arose, where it does not say so itself."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is None:
+            error.file = file
+            error.field = f"{field}.{error.field}" if error.field else field
+        raise
+
+
+def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
+    faults = error.errors()
+    # An unknown key is usually a misspelling that also leaves a required one missing: say it first.
+    first = next((fault for fault in faults if fault["type"] in _UNKNOWN), faults[0])
+    field = ""
+    for step in first["loc"]:
+        field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
+    problem, limit, remedy = first["msg"], None, None
+    value = first.get("input")
+    if isinstance(value, (dict, list)) and len(repr(value)) > 60:
+        value = None
+    context = first.get("ctx", {})
+    kind = first["type"]
+    if kind in _UNKNOWN:
+        allowed = _fields_at(model, first["loc"][:-1])
+        near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
+        problem = "unknown key"
+        # A guess is worth more than a list that nobody reads.
+        limit = "one of " + ", ".join(allowed) if allowed and not (near and len(allowed) > 25) else None
+        remedy = f"did you mean {near[0]}?" if near else "remove it"
+    elif kind == "missing":
+        problem, value, remedy = "is required", None, "add it"
+    elif kind == "value_error":
+        inner = context.get("error")
+        if isinstance(inner, InputError):
+            inner.file = file if inner.file is None else inner.file
+            inner.field = ".".join(part for part in (field, inner.field) if part) or None
+            return inner
+        problem = str(inner)
+    elif kind == "finite_number":
+        problem, limit, remedy = "is not a finite number", "a finite number", "replace NaN or infinity"
+    elif kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
+        sign = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+        key = next(key for key in sign if key in context)
+        problem, limit = "is out of range", f"{sign[key]} {context[key]}"
+        counted = isinstance(context[key], int)  # a count has no unit
+        remedy = (
+            "give a number within the limit"
+            if counted
+            else "mind the unit, which is in the name of the field"
+        )
+    elif kind in _TYPES:
+        problem, limit = "has the wrong type", _TYPES[kind]
+        remedy = (
+            "write it without quotes, in the unit that the field's name says"
+            if isinstance(value, str)
+            else None
+        )
+        remedy = "write it in quotes" if kind == "string_type" else remedy
+        if kind == "tuple_type" and isinstance(value, str) and any(letter.isalpha() for letter in value):
+            limit, remedy = "an array", f'write it in brackets: ["{value}"]'
+        if isinstance(value, list) and kind not in ("tuple_type", "list_type"):
+            remedy = "give one value, not a list"
+    elif kind == "literal_error":
+        expected = str(context.get("expected", ""))
+        problem, limit = "is not one of the possible values", f"one of {expected}"
+        near = difflib.get_close_matches(
+            str(value), expected.replace("'", "").replace(" or ", ", ").split(", "), n=1
+        )
+        remedy = f"did you mean {near[0]}?" if near else None
+    elif kind == "string_pattern_mismatch":
+        problem, limit = "is no name", f"what matches {context.get('pattern')}"
+        field = field.removesuffix(".[key]")
+    elif kind in {"too_short", "too_long"}:
+        problem, limit = "has the wrong number of items", first["msg"].split(" after ")[0]
+    more = len(faults) - 1
+    if more:
+        problem += f" (and {more} more fault{'s' if more > 1 else ''} in this file)"
+    return InputError(problem, file=file, field=field or None, value=value, limit=limit, remedy=remedy)
+
+
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""An unknown key, in a model and in a dataclass."""
+
+_TYPES = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number that fits 64 bits",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "tuple_type": "an array, e.g. [0.0, 0.0, 0.6]",
+    "list_type": "an array of tables, e.g. [[ride]]",
+    "model_type": "a table",
+    "dict_type": "a table",
+}
+
+
+def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Names of the fields that are allowed at a place in a model."""
+    current: type[Any] | None = model
+    for step in location:
+        if isinstance(step, int) or current is None or not issubclass(current, BaseModel):
+            continue
+        annotation = current.model_fields.get(step)
+        current = _model_in(annotation.annotation) if annotation else None
+    if current is None:
+        return []
+    return list(current.model_fields) if issubclass(current, BaseModel) else [f.name for f in fields(current)]
+
+
+def _model_in(annotation: Any) -> type[Any] | None:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None

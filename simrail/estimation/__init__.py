@@ -1,0 +1,1 @@
+"""What an estimator is, what it concludes, and the battery that each one must pass."""

@@ -1,0 +1,1 @@
+"""What the logger saw, and whether it can be true; nothing here knows the truth."""

@@ -1,0 +1,227 @@
+"""Can it be true? Units, axes and signs of a recording, judged by what every train does.
+
+A wrong unit or a device upside down leaves a file that looks sound. It shows against what is known: gravity,
+that a train turns slowly, the curves of the design track, and the odometry's setting off and braking. Each
+test has a limit far from what a sound recording does and far from what the fault does. Faults of form
+(columns, stamps, numbers) are judged by `simrail.recording.check_form`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simrail.core.columns import ACCEL, GYRO
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
+from simrail.recording.signals import FORCES
+from simrail.recording.standstill import at_rest_initially
+
+GRAVITY_SHARE = 0.05
+"""At rest an accelerometer shows gravity to 5 %, beside its bias: units differ by 9.8 times and more."""
+
+UPRIGHT = 0.9
+"""Share of gravity along Z at least: cosine of 26 deg, beyond any cant and gradient."""
+
+MEAN_RATE_RADPS, MEAN_OVER_S = 0.5, 10.0
+"""No train turns by 290 deg in 10 s; in deg/s a curve of 500 m at 50 km/h already shows 1.6."""
+
+LEAST_TURN_RAD = 0.1
+"""Turn of the track on a ride, there and back counted, from which on the gyro is held against it."""
+
+LEAST_WAY_M, LEAST_VARIANCE_M2PS4 = 20.0, 0.01
+"""Way, and variance of the acceleration, from which on the accelerometer is held against the odometry."""
+
+
+SURE = 6.0
+"""Standard deviations that a slope must be off 1 before a ride is refused for it; they take seconds as
+independent, which sway and drift are not."""
+
+BEYOND_TRACK_M = 20.0
+"""How far an odometry may be off the end of the track by its own error."""
+
+
+def check_plausible(recording: Recording, *, file: object = None) -> None:
+    """Refuse a recording whose units, axes or signs cannot be those that are claimed.
+
+    The specific force is judged at rest, where the ride begins with a second of it, else by its median.
+    Where the ride has them, its curves are compared with the gyro's Z (the track's yaw rate, d yaw / ds times
+    speed), its setting off and braking with the accelerometer's X and Y, by least squares. A ride on the
+    straight at constant speed says nothing of either.
+
+    Raises
+    ------
+    InputError
+        If gravity has another size or direction; if the train turns faster than a train; if it leaves the
+        track; if the gyro does not turn with the track: by none of its curves, the other way, or many times
+        as much; if the accelerometer does not push when the train gains speed, or sideways, or backwards.
+    """
+    _check_gravity(recording, file)
+    _check_turning(recording, file)
+    _check_motion(recording, file)
+
+
+def _check_gravity(recording: Recording, file: object) -> None:
+    resting = at_rest_initially(recording)
+    force = recording.imu[list(ACCEL)].to_numpy()
+    if resting >= recording.imu_sheet.rate_hz:
+        found, when = force[:resting].mean(axis=0), "at rest"
+    else:
+        found, when = np.median(force, axis=0), "in the median of the ride"
+    size, gravity = float(np.linalg.norm(found)), recording.gravity_mps2
+    slack = GRAVITY_SHARE * gravity + recording.imu_sheet.accel_turn_on_bias_mps2
+    shown = f"{size:.4g} m/s2 {when}"
+    if abs(size - gravity) > slack:
+        remedy = "set units.accel, or mend the scale"
+        # What the unit would have to be, from the size alone: every unit as read in every other.
+        for unit, (multiply, divide) in FORCES.items():
+            for claimed, (by, over) in FORCES.items():
+                if unit != claimed and abs(size * (multiply / divide) / (by / over) - gravity) < slack:
+                    remedy = f'the values look like {unit}, given as {claimed}: set units.accel = "{unit}"'
+        raise InputError(
+            "is not as large as gravity",
+            file=file,
+            field="imu.accel",
+            value=shown,
+            limit=f"{gravity:g} m/s2 to {slack:.2g} m/s2",
+            remedy=remedy,
+        )
+    if found[2] < -UPRIGHT * size:
+        raise InputError(
+            "points down: at rest an accelerometer shows +g on Z, which points up",
+            file=file,
+            field="imu.accel",
+            value=f"{found[2]:.4g} m/s2 on Z {when}",
+            limit=f"> {UPRIGHT * gravity:.3g} m/s2",
+            remedy='for a device upside down set axes = ["x", "-y", "-z"]; for a logger that writes gravity '
+            'instead of specific force set a negative unit, e.g. units.accel = "-g"',
+        )
+    if found[2] < UPRIGHT * size:
+        axis = int(np.argmax(np.abs(found)))
+        raise InputError(
+            f"gravity lies along {'-' if found[axis] < 0 else ''}{'XYZ'[axis]} of the body, not Z",
+            file=file,
+            field="imu.axes",
+            value=[round(float(part), 3) for part in found],
+            limit=f"> {UPRIGHT * gravity:.3g} m/s2 on Z {when}",
+            remedy="name the axes of the device that point forward, left and up, or its mounting angles",
+        )
+
+
+def _check_turning(recording: Recording, file: object) -> None:
+    rate = recording.imu_sheet.rate_hz
+    window = max(1, min(round(MEAN_OVER_S * rate), len(recording.imu) - 1))
+    for name in GYRO:
+        turned = np.concatenate([[0.0], np.cumsum(recording.imu[name].to_numpy())]) / rate
+        mean = (turned[window:] - turned[:-window]) * rate / window
+        worst = int(np.argmax(np.abs(mean)))
+        if abs(mean[worst]) > MEAN_RATE_RADPS:
+            raise InputError(
+                f"turns faster than a train does, in the mean over {window / rate:.3g} s "
+                f"from time_s = {float(recording.imu.index[worst]):.6g}",
+                file=file,
+                field=f"imu.{name}",
+                value=float(f"{mean[worst]:.4g}"),
+                limit=f"{MEAN_RATE_RADPS:g} rad/s",
+                remedy='the values look like degrees: set units.gyro = "deg/s"',
+            )
+
+
+def _check_motion(recording: Recording, file: object) -> None:
+    """Hold gyro and accelerometer against what track and odometry say, in means over a second."""
+    odometry, track = recording.odometry, recording.track
+    position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
+    for place in (position.min(), position.max()):
+        if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:
+            raise InputError(
+                f"the ride leaves track {track.name!r}",
+                file=file,
+                field="odometry.position_m",
+                value=round(float(place), 2),
+                limit=f"{track.start_m:g} to {track.end_m:g} m",
+                remedy="mend start_position_m or the direction (reverse = true), or lengthen the track",
+            )
+    seconds = max(1, round(recording.imu_sheet.rate_hz))
+    frame = track.frame_extended(_means(position, seconds))
+    bend = frame.rates[:, 2] * _means(speed, seconds)
+    if np.abs(bend).sum() > LEAST_TURN_RAD:
+        _judge_turn(recording, _slope(_means(recording.imu[GYRO[2]].to_numpy(), seconds), bend), file)
+    acceleration = odometry["acceleration_mps2"].to_numpy()
+    along = _means(acceleration, seconds) - recording.gravity_mps2 * np.sin(frame.pitch_rad)
+    # A noisy regressor flattens the line: only an acceleration that the odometry knows is one to hold to.
+    noise = float(np.mean(odometry["acceleration_sd_mps2"].to_numpy() ** 2))
+    if np.ptp(position) > LEAST_WAY_M and np.var(along) > max(2.0 * noise, LEAST_VARIANCE_M2PS4):
+        x, y = (_slope(_means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
+        _judge_push(x, y, file)
+
+
+def _judge_turn(recording: Recording, line: tuple[float, float], file: object) -> None:
+    slope, sd = line
+    if 0.2 < slope < 5.0 or abs(slope - 1.0) < SURE * sd:
+        return
+    if slope <= -0.2:
+        problem = "turns against the curves of the track"
+        remedy = (
+            "mend the axes; or the direction: a train that ran towards smaller s has falling pulse counts "
+            "(reverse = true)"
+        )
+    elif slope < 0.2:
+        problem = "does not turn with the curves of the track"
+        remedy = "mend units.gyro (rad/s?), the axes, start_position_m, or the track"
+    else:
+        problem = "turns many times as much as the track"
+        remedy = 'mend units.gyro: the values look like "deg/s"'
+    raise InputError(
+        problem,
+        file=file,
+        field=f"imu.{GYRO[2]}",
+        value=f"{slope:.3g} times the curvature of {recording.track.name!r} times speed",
+        limit="about 1",
+        remedy=remedy,
+    )
+
+
+def _judge_push(x: tuple[float, float], y: tuple[float, float], file: object) -> None:
+    if x[0] > 0.4 or 1.0 - x[0] < SURE * x[1]:
+        return
+    sideways = abs(y[0]) > max(abs(x[0]), 0.4)
+    if x[0] < -0.4 and not sideways:
+        problem, remedy = (
+            "pushes backwards when the train gains speed",
+            (
+                'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards '
+                "smaller s has falling pulse counts (reverse = true)"
+            ),
+        )
+    elif sideways:
+        axes = '["y", "-x", "z"]' if y[0] > 0.0 else '["-y", "x", "z"]'
+        problem, remedy = "pushes sideways when the train gains speed", f"turn the axes as by axes = {axes}"
+    else:
+        problem, remedy = "does not push when the train gains speed", "mend the axes, or the odometry"
+    raise InputError(
+        problem,
+        file=file,
+        field=f"imu.{ACCEL[0]}",
+        value=f"{x[0]:.2g} times the acceleration of the odometry along X, {y[0]:.2g} along Y",
+        limit="about 1, and 0",
+        remedy=remedy,
+    )
+
+
+def _means(values: FloatArray, count: int) -> FloatArray:
+    """Means (n // count,) of a signal over `count` samples each; of all of it, if it is shorter."""
+    count = min(count, len(values))
+    whole = len(values) // count * count
+    means: FloatArray = values[:whole].reshape(-1, count).mean(axis=1)
+    return means
+
+
+def _slope(measured: FloatArray, expected: FloatArray) -> tuple[float, float]:
+    """Slope of the least-squares line measured = a + slope * expected, and its standard deviation (white)."""
+    x, y = expected - expected.mean(), measured - measured.mean()
+    power = float(x @ x)
+    if power == 0.0:
+        return 1.0, np.inf
+    slope = float(x @ y) / power
+    rest = y - slope * x
+    return slope, float(np.sqrt(rest @ rest / len(x) / power))

@@ -1,0 +1,1 @@
+"""Ride files: recordings of real trains read, recordings written in the same form."""

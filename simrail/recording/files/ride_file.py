@@ -1,0 +1,282 @@
+"""Ride files: one TOML file that says what the data files of a ride hold, and what the train knows.
+
+A ride of a real train maps its logger's columns, units and axes here; a ride that simrail wrote has its own
+column names in SI and needs no map. The models judge the text, `simrail.recording.files.signal_part` the map
+of each signal; `simrail.recording.files.ride_reader` reads the data.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from simrail.core.errors import InputError
+from simrail.core.resample import LONGEST_GAP_S
+from simrail.core.toml_files import Part
+from simrail.recording.files.signal_part import SignalPart, VectorPart
+from simrail.recording.recording import EncoderSheet, ImuSheet, MagnetometerSheet, RailSensorSheet
+from simrail.recording.sheets.imu_file import ImuFile
+from simrail.recording.signals import (
+    ENCODER_SIGNAL,
+    GAPS_SIGNAL,
+    IMU_SIGNAL,
+    MAGNETOMETER_SIGNAL,
+    ODOMETER_SIGNAL,
+    ODOMETRY_SIGNAL,
+    RAIL_SIGNAL,
+    Signal,
+)
+
+
+class ImuSignalPart(VectorPart):
+    """``[imu]``: the IMU, where it sits, and its data sheet (one of three ways to give it).
+
+    Attributes
+    ----------
+    name, body : str
+        Name of the IMU, and of the body that carries it.
+    position_m : tuple of float
+        As `Recording.mount_position_m`.
+    delay_s : float
+        As `ImuSheet.delay_s`, where the sheet does not say it.
+    grade : str, optional
+        A shipped IMU, or the path of an IMU file.
+    datasheet : ImuFile, optional
+        The same figures here.
+    sheet : ImuSheet, optional
+        In SI, as simrail writes it.
+    """
+
+    name: str = "imu"
+    body: str
+    position_m: tuple[float, float, float]
+    delay_s: float = 0.0
+    grade: str | None = None
+    datasheet: ImuFile | None = None
+    sheet: ImuSheet | None = None
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return IMU_SIGNAL
+
+    @model_validator(mode="after")
+    def _one_sheet(self) -> Self:
+        given = [key for key in ("grade", "datasheet", "sheet") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise InputError(
+                "needs its data sheet, given once",
+                field="grade",
+                value=given or None,
+                limit="one of grade, [imu.datasheet], [imu.sheet]",
+                remedy="e.g. grade = \"lord_3dm_gx4_25\"; 'simrail list' shows all",
+            )
+        return self
+
+
+class EncoderSignalPart(SignalPart):
+    """``[encoder]``: pulses of a wheel, signed: falling while the train runs towards smaller s.
+
+    Attributes
+    ----------
+    sheet : EncoderSheet
+        What the train knows of it.
+    reverse : bool
+        True if the logger counts up while the train runs towards smaller s.
+    radius_relative_sd : float
+        Relative standard deviation of the rolling radius about the sheet's, for the odometry.
+    """
+
+    sheet: EncoderSheet
+    reverse: bool = False
+    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return ENCODER_SIGNAL
+
+    @field_validator("sheet")
+    @classmethod
+    def _counts(cls, value: EncoderSheet) -> EncoderSheet:
+        for field in ("pulses_per_revolution", "wheel_radius_m", "rate_hz"):
+            if getattr(value, field) <= 0:
+                raise InputError("is out of range", field=field, value=getattr(value, field), limit="> 0")
+        if not 0.05 <= value.wheel_radius_m <= 1.5:
+            raise InputError(
+                "is no wheel's",
+                field="wheel_radius_m",
+                value=value.wheel_radius_m,
+                limit="0.05 to 1.5 m",
+                remedy="give the radius in metres",
+            )
+        return value
+
+
+class MagnetometerSignalPart(VectorPart):
+    """``[magnetometer]``: the field at the IMU, and what is known of the Earth's.
+
+    At other times than the IMU's it is interpolated by straight lines.
+
+    Attributes
+    ----------
+    sheet : MagnetometerSheet
+        Its noise, and the Earth's field where the train runs.
+    """
+
+    sheet: MagnetometerSheet
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return MAGNETOMETER_SIGNAL
+
+
+class RailSignalPart(SignalPart):
+    """``[rail_displacement]``: both rails seen from the IMU's place, along Y and Z of the body.
+
+    At other times than the IMU's they are interpolated by straight lines.
+
+    Attributes
+    ----------
+    sheet : RailSensorSheet
+        Its noise.
+    """
+
+    sheet: RailSensorSheet
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return RAIL_SIGNAL
+
+    @field_validator("sheet")
+    @classmethod
+    def _possible(cls, value: RailSensorSheet) -> RailSensorSheet:
+        if not 0.0 < value.noise_m <= 0.1:
+            raise InputError(
+                "is out of range",
+                field="noise_m",
+                value=value.noise_m,
+                limit="> 0, <= 0.1 m",
+                remedy="give it in metres",
+            )
+        return value
+
+
+class OdometerPart(SignalPart):
+    """``[odometer]``: the distance or the speed that the train's own odometer gives, instead of pulses.
+
+    Attributes
+    ----------
+    reverse : bool
+        True if the train ran towards smaller s, and the odometer does not say so.
+    resolution_m : float, optional
+        Step of the distance; needed with it.
+    speed_sd_mps : float
+        Standard deviation of a reading of the speed.
+    radius_relative_sd : float
+        Relative standard deviation of its scale.
+    """
+
+    reverse: bool = False
+    resolution_m: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+    speed_sd_mps: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
+    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return ODOMETER_SIGNAL
+
+    @model_validator(mode="after")
+    def _one_quantity(self) -> Self:
+        given = [key for key in ("distance", "speed") if key in self.columns]
+        if len(given) != 1:
+            raise InputError(
+                "needs a column of distance or of speed",
+                field="columns",
+                value=given or None,
+                limit="one of distance, speed",
+                remedy='e.g. columns = { time = "t", speed = "v" }',
+            )
+        if given == ["distance"] and self.resolution_m is None:
+            raise InputError(
+                "is required with a distance",
+                field="resolution_m",
+                remedy="give the odometer's step, e.g. 0.1",
+            )
+        return self
+
+
+class OdometrySignalPart(SignalPart):
+    """``[odometry]``: position, speed and acceleration of the IMU, made elsewhere by `source`.
+
+    At other times than the IMU's they are interpolated by straight lines: that looks ahead by up to one of
+    its intervals.
+    """
+
+    source: str
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return ODOMETRY_SIGNAL
+
+
+class GapsPart(SignalPart):
+    """``[gaps]``: where the IMU's samples had been lost before the file was written."""
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        return GAPS_SIGNAL
+
+
+class RideFile(Part):
+    """A ride file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the ride.
+    track : str
+        A shipped track, or the path of a track file.
+    start_position_m : float
+        s of the IMU at its first sample.
+    gravity_mps2 : float
+        Local gravity.
+    longest_gap_s : float
+        Longest gap in a signal that is bridged by a straight line.
+    imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
+        Its signals. Without an odometry it is made from encoder or odometer.
+    """
+
+    name: str = Field(min_length=1, max_length=200)
+    track: str
+    start_position_m: float
+    gravity_mps2: Annotated[float, Field(ge=9.7, le=9.9)] = 9.81
+    longest_gap_s: Annotated[float, Field(gt=0.0, le=10.0)] = LONGEST_GAP_S
+    imu: ImuSignalPart
+    encoder: EncoderSignalPart | None = None
+    magnetometer: MagnetometerSignalPart | None = None
+    rail_displacement: RailSignalPart | None = None
+    odometer: OdometerPart | None = None
+    odometry: OdometrySignalPart | None = None
+    gaps: GapsPart | None = None
+
+    @model_validator(mode="after")
+    def _knows_where_it_is(self) -> Self:
+        if self.encoder is not None and self.odometer is not None:
+            raise InputError(
+                "says twice how far the train went", field="odometer", remedy="remove [odometer] or [encoder]"
+            )
+        if self.encoder is None and self.odometer is None and self.odometry is None:
+            raise InputError(
+                "a ride needs to know where it is",
+                field="encoder",
+                limit="[encoder], [odometer] or [odometry]",
+                remedy="add the table of the one that was recorded",
+            )
+        return self

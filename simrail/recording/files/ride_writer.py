@@ -1,0 +1,109 @@
+"""A recording as files: a ride file, its track, and one data file per signal, in simrail's own columns.
+
+What `simrail.recording.files.ride_reader` reads: the same form as a ride of a real train, without any map of
+columns or units. Numbers survive the round trip bit by bit, in CSV as in Parquet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+
+from simrail.core.atomic_files import draft_of
+from simrail.core.errors import InputError
+from simrail.core.toml_files import toml_text
+from simrail.recording.files.ride_reader import RIDE_FILE
+from simrail.recording.recording import Recording
+from simrail.recording.signals import SIGNALS
+from simrail.track.file import track_text
+
+Format = Literal["csv", "parquet"]
+
+TRACK_FILE = "track.toml"
+
+
+def write_ride(recording: Recording, folder: Path, *, format: Format = "csv") -> None:
+    """Write a recording into a new folder; it appears whole or not at all.
+
+    Parameters
+    ----------
+    recording : Recording
+        What to write.
+    folder : Path
+        Must not exist yet; its parents are made.
+    format : str
+        ``"csv"`` or ``"parquet"``: the form of the signals.
+
+    Raises
+    ------
+    InputError
+        If the folder exists, or a frame has a column that rides do not have.
+    """
+    refuse_existing(folder)
+    with draft_of(folder) as draft:
+        write_parts(recording, draft, format=format)
+
+
+def refuse_existing(folder: Path) -> None:
+    """Refuse to write where there is something already."""
+    if folder.exists():
+        raise InputError("exists already", file=folder, remedy="remove it or choose another name")
+
+
+def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
+    """Write the files of a recording into a folder that is there."""
+    tables: dict[str, dict[str, Any]] = {}
+    for signal in SIGNALS:
+        frame: pd.DataFrame | None = getattr(recording, signal.name)
+        if frame is None:
+            continue
+        unknown = [str(name) for name in frame.columns if name not in signal.columns]
+        if unknown:
+            raise InputError(
+                "has columns that a ride does not have",
+                field=signal.name,
+                value=unknown,
+                limit="some of " + ", ".join(signal.columns),
+                remedy="drop them",
+            )
+        file = f"{signal.name}.{format}"
+        write_frame(frame, folder / file, format=format)
+        tables[signal.name] = {"file": file}
+    tables["imu"] |= {
+        "name": recording.mount,
+        "body": recording.mount_body,
+        "position_m": recording.mount_position_m,
+        "sheet": asdict(recording.imu_sheet),
+    }
+    tables["odometry"] |= {"source": recording.odometry_source}
+    if recording.encoder_sheet is not None:
+        tables["encoder"] |= {"sheet": asdict(recording.encoder_sheet)}
+    if recording.magnetometer_sheet is not None:
+        tables["magnetometer"] |= {"sheet": asdict(recording.magnetometer_sheet)}
+    if recording.rail_sensor_sheet is not None:
+        tables["rail_displacement"] |= {"sheet": asdict(recording.rail_sensor_sheet)}
+    head = {
+        "name": recording.name,
+        "track": f"./{TRACK_FILE}",
+        "start_position_m": recording.start_position_m,
+        "gravity_mps2": recording.gravity_mps2,
+    }
+    (folder / TRACK_FILE).write_text(track_text(recording.track), encoding="utf-8")
+    (folder / RIDE_FILE).write_text(toml_text({**head, **tables}), encoding="utf-8")
+
+
+def write_frame(frame: pd.DataFrame, path: Path, *, format: Format) -> None:
+    """Write a frame, its index as the first column if it has a name; floats with all their digits."""
+    plain = frame.reset_index() if frame.index.name else frame
+    if format == "parquet":
+        plain.to_parquet(path, index=False)
+    else:
+        table = pa.Table.from_pandas(plain, preserve_index=False)
+        with path.open("wb") as file:
+            file.write((",".join(map(str, plain.columns)) + "\n").encode())
+            pa_csv.write_csv(table, file, pa_csv.WriteOptions(include_header=False))

@@ -1,0 +1,135 @@
+"""What every signal of a ride file has: its data file, names and units of its columns, axes of its device.
+
+The models judge the text: whether a table names quantities that its signal has, in units that it can have,
+and a device as one can be mounted. Which signals there are, and what each says beside that, is in
+`simrail.recording.files.ride_file`; the data are read by `simrail.recording.files.signal_reader`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from simrail.core.errors import InputError
+from simrail.recording.files.data_file import DataPart, near
+from simrail.recording.signals import TIMES, Signal
+
+DATE_TIMES = ("iso", "epoch_s", "epoch_ms", "epoch_us", "epoch_ns")
+"""Time stamps that are dates: text as ISO 8601 has it, or a count since 1970."""
+
+
+def _as_tuple(value: object) -> object:
+    return (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else value
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
+"""Column names: one text, or an array of them."""
+
+Positive = Annotated[float, Field(gt=0.0)]
+Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
+
+
+class SignalPart(DataPart):
+    """One signal: its data file, and the names and units of its columns there.
+
+    Attributes
+    ----------
+    columns : dict
+        Quantity -> column name (three for a vector, in the device's order x, y, z), and ``time``. Left
+        out are those that have simrail's own names.
+    units : dict
+        Quantity -> unit; SI where left out. ``"-g"`` is a logger that prints the negative.
+    rate_hz : float, optional
+        Rate of the samples, for a file without time stamps; beside time stamps, the rate they should have.
+    start_s : float
+        Time of the first sample of a file without time stamps.
+    """
+
+    columns: dict[str, Names] = Field(default_factory=dict)
+    units: dict[str, str] = Field(default_factory=dict)
+    rate_hz: Positive | None = None
+    start_s: float = 0.0
+
+    @classmethod
+    def signal(cls) -> Signal:
+        """What the table describes."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _known_quantities(self) -> Self:
+        quantities = {quantity.key: quantity for quantity in self.signal().quantities}
+        keys = [*quantities, *(["time"] if self.signal().timed else [])]
+        for field, table in (("columns", self.columns), ("units", self.units)):
+            for key in table:
+                if key not in keys:
+                    raise InputError(
+                        "unknown key",
+                        field=f"{field}.{key}",
+                        limit="one of " + ", ".join(keys),
+                        remedy=near(key, keys) or "remove it",
+                    )
+        for key, names in self.columns.items():
+            count = len(quantities[key].columns) if key in quantities else 1
+            if len(names) != count:
+                wanted = "three column names, of the axes x, y, z" if count == 3 else "one column name"
+                raise InputError(
+                    "lacks an axis" if count == 3 else "names several columns",
+                    field=f"columns.{key}",
+                    value=list(names),
+                    limit=wanted,
+                    remedy='e.g. ["ax", "ay", "az"]' if count == 3 else None,
+                )
+        for key, unit in self.units.items():
+            known = [*quantities[key].units] if key in quantities else [*TIMES, *DATE_TIMES]
+            if unit.removeprefix("-" if key in quantities else "") not in known:
+                raise InputError(
+                    "is no unit of this quantity",
+                    field=f"units.{key}",
+                    value=unit,
+                    limit="one of " + ", ".join(known),
+                    remedy=near(unit, known),
+                )
+        return self
+
+
+class VectorPart(SignalPart):
+    """A signal of vectors: how the device sits on its body.
+
+    Attributes
+    ----------
+    axes : tuple of str
+        Which axis of the device points along X (forward), Y (left) and Z (up) of the body, e.g.
+        ``["x", "-y", "-z"]`` for a device turned upside down about its x axis.
+    roll_deg, pitch_deg, yaw_deg : float
+        Angles (ZYX) of the axes so named in the body, where the device does not sit square.
+    """
+
+    axes: tuple[str, str, str] = ("x", "y", "z")
+    roll_deg: Angle = 0.0
+    pitch_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
+    yaw_deg: Angle = 0.0
+
+    @field_validator("axes")
+    @classmethod
+    def _right_handed(cls, value: tuple[str, str, str]) -> tuple[str, str, str]:
+        letters = [axis.removeprefix("-") for axis in value]
+        if sorted(letters) != ["x", "y", "z"]:
+            raise InputError(
+                "does not name each axis of the device once",
+                value=list(value),
+                limit='x, y and z, each with or without "-"',
+                remedy='e.g. ["x", "-y", "-z"]',
+            )
+        order = ["xyz".index(letter) for letter in letters]
+        swaps = sum(order[i] > order[j] for i in range(3) for j in range(i + 1, 3))
+        minus = sum(axis.startswith("-") for axis in value)
+        if (swaps + minus) % 2:
+            raise InputError(
+                "is left-handed: no device can be mounted so",
+                value=list(value),
+                limit="a rotation: an even number of swaps and minus signs",
+                remedy="reverse one axis; if the device itself has left-handed axes, give one column "
+                "of its file the other sign",
+            )
+        return value

@@ -1,0 +1,228 @@
+"""What the logger on the train saw, and what the train may know: the wall before the truth.
+
+A `Recording` holds the signals (IMU, encoder, magnetometer), an odometry frame that says where on the
+track each sample was taken, and the knowledge that a real train has: the design track, the nominal wheel
+radius, the IMU's data sheet, where it is mounted. It never holds a true value, except in an odometry
+frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read into the same
+class, so the same estimators run on them.
+
+This module neither simulates nor estimates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import pandas as pd
+
+from simrail.track.design import TrackDesign
+
+
+@dataclass(frozen=True)
+class ImuSheet:
+    """What the data sheet says of an IMU: what an estimator may use for its tuning.
+
+    Attributes
+    ----------
+    grade : str
+        Name of the grade.
+    rate_hz : float
+        Sample rate.
+    delay_s : float
+        How much later than its time stamp a sample leaves the sensor (group delay of its filter).
+        Time stamps are already corrected for it.
+    gyro_noise_radpsqrts, accel_noise_mpsqrts : float
+        Allan coefficients N of the white noise, rad/s/sqrt(Hz) and m/s2/sqrt(Hz) (IEEE 952): the
+        standard deviation of one sample is N sqrt(rate).
+    gyro_bias_instability_radps, accel_bias_instability_mps2 : float
+        In-run bias instability B (Allan floor / 0.664).
+    gyro_turn_on_bias_radps, accel_turn_on_bias_mps2 : float
+        Bound of the bias at switch-on.
+    lag_s : float
+        Age of what a sample says at its time stamp, for slow motion: response of the device and its
+        averaging, which the time stamps do not correct.
+    bandwidth_hz : float, optional
+        -3 dB frequency of its response; None where the sheet is silent.
+    gyro_bias_correlation_s, accel_bias_correlation_s : float, optional
+        Correlation time of the wandering bias; None where nothing is known.
+    gyro_random_walk_radpspsqrts, accel_random_walk_mps2psqrts : float
+        Rate random walk K, rad/s/sqrt(s) and m/s2/sqrt(s).
+    gyro_scale_error, accel_scale_error : float
+        Bound of the relative error of the scale factor.
+    package_misalignment_rad : float
+        Bound of the turns of the package about its axes.
+    gyro_resolution_radps, accel_resolution_mps2 : float
+        Size of one count; 0 for none.
+    gyro_range_radps, accel_range_mps2 : float, optional
+        Largest magnitude that is measured; None for no limit.
+    clock_drift : float
+        Bound of the relative error of the device's second.
+    """
+
+    grade: str
+    rate_hz: float
+    delay_s: float
+    gyro_noise_radpsqrts: float
+    accel_noise_mpsqrts: float
+    gyro_bias_instability_radps: float
+    accel_bias_instability_mps2: float
+    gyro_turn_on_bias_radps: float
+    accel_turn_on_bias_mps2: float
+    lag_s: float = 0.0
+    bandwidth_hz: float | None = None
+    gyro_bias_correlation_s: float | None = None
+    accel_bias_correlation_s: float | None = None
+    gyro_random_walk_radpspsqrts: float = 0.0
+    accel_random_walk_mps2psqrts: float = 0.0
+    gyro_scale_error: float = 0.0
+    accel_scale_error: float = 0.0
+    package_misalignment_rad: float = 0.0
+    gyro_resolution_radps: float = 0.0
+    accel_resolution_mps2: float = 0.0
+    gyro_range_radps: float | None = None
+    accel_range_mps2: float | None = None
+    clock_drift: float = 0.0
+
+
+@dataclass(frozen=True)
+class EncoderSheet:
+    """What the train knows of its wheel encoder.
+
+    Attributes
+    ----------
+    wheel : str
+        Name of the wheel, e.g. ``"front.left"``.
+    pulses_per_revolution : int
+        Counts per turn of the wheel: its pulses, or four times as many in quadrature.
+    wheel_radius_m : float
+        Nominal wheel radius; the true one differs.
+    rate_hz : float
+        Rate at which the logger reads the counter.
+    """
+
+    wheel: str
+    pulses_per_revolution: int
+    wheel_radius_m: float
+    rate_hz: float
+
+
+@dataclass(frozen=True)
+class MagnetometerSheet:
+    """What the train knows of its magnetometer, and of the field of the Earth where it runs.
+
+    Attributes
+    ----------
+    noise_tpsqrthz : float
+        Density N of the white noise, T/sqrt(Hz): one sample has the standard deviation N sqrt(rate).
+    intensity_t, inclination_rad : float
+        The Earth's field from a model or a chart: total intensity, and dip below the horizontal.
+    north_rad : float
+        Direction of magnetic north, counter-clockwise from the global X axis (seen from above).
+    """
+
+    noise_tpsqrthz: float
+    intensity_t: float
+    inclination_rad: float
+    north_rad: float
+
+
+@dataclass(frozen=True)
+class RailSensorSheet:
+    """What the train knows of the sensor that sees the rails from the body.
+
+    Attributes
+    ----------
+    noise_m : float
+        Standard deviation of each of its values, outliers apart.
+    """
+
+    noise_m: float
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Signals of one ride, and what the train knows.
+
+    Attributes
+    ----------
+    name : str
+        Name of the ride.
+    imu : pandas.DataFrame
+        Indexed by ``time_s``, columns `simrail.core.columns.IMU`, uniform in time.
+    imu_sheet : ImuSheet
+        Its data sheet.
+    mount : str
+        Name of the IMU.
+    mount_body : str
+        Body that it is mounted on, e.g. ``"front"`` (an axle), ``"frame"``, ``"body"``.
+    mount_position_m : tuple of float
+        (x, y, z) of the IMU in its body when it stands centred on level track: x forward from the
+        body's reference point, y left of the track centre, z above the rail plane.
+    track : TrackDesign
+        The design track.
+    encoder : pandas.DataFrame, optional
+        Indexed by ``time_s``, column ``pulse_count``, and ``edge_time_s`` if the logger times edges.
+    encoder_sheet : EncoderSheet, optional
+        Its data sheet.
+    start_position_m : float
+        Where on the track the IMU stood at the first sample (the train knows its platform).
+    odometry : pandas.DataFrame
+        Indexed by the IMU's ``time_s``; columns `simrail.core.columns.ODOMETRY` + `ODOMETRY_SD`: position,
+        speed and acceleration of the IMU along the track.
+    odometry_source : str
+        ``"encoder"``, ``"truth"`` (an ablation), or the name of the method that made it.
+    gravity_mps2 : float
+        Local gravity.
+    gaps : pandas.DataFrame, optional
+        Where the IMU's samples were lost and are interpolated in `imu`, one row per gap, columns
+        `simrail.core.resample.GAPS`; None if none were.
+    magnetometer : pandas.DataFrame, optional
+        Indexed by the IMU's ``time_s``, columns `simrail.core.columns.MAGNETIC`, on the axes of the IMU.
+    magnetometer_sheet : MagnetometerSheet, optional
+        What is known of it.
+    rail_displacement : pandas.DataFrame, optional
+        Indexed by the IMU's ``time_s``, columns `simrail.core.columns.RAIL_DISPLACEMENT`: both rails seen
+        from the place of the IMU, along Y and Z of the body.
+    rail_sensor_sheet : RailSensorSheet, optional
+        What is known of the sensor that sees them.
+    """
+
+    name: str
+    imu: pd.DataFrame
+    imu_sheet: ImuSheet
+    mount: str
+    mount_body: str
+    mount_position_m: tuple[float, float, float]
+    track: TrackDesign
+    encoder: pd.DataFrame | None
+    encoder_sheet: EncoderSheet | None
+    start_position_m: float
+    odometry: pd.DataFrame
+    odometry_source: str
+    gravity_mps2: float = 9.81
+    gaps: pd.DataFrame | None = None
+    magnetometer: pd.DataFrame | None = None
+    magnetometer_sheet: MagnetometerSheet | None = None
+    rail_displacement: pd.DataFrame | None = None
+    rail_sensor_sheet: RailSensorSheet | None = None
+
+    def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
+        """Return the same recording with another odometry frame."""
+        return replace(self, odometry=odometry, odometry_source=source)
+
+
+def beginning(recording: Recording, *, samples: int) -> Recording:
+    """The first samples of a recording, counted by the IMU."""
+    imu = recording.imu.iloc[:samples]
+    encoder = recording.encoder
+    if encoder is not None:
+        encoder = encoder.loc[: imu.index[-1]]
+    magnetic, seen = recording.magnetometer, recording.rail_displacement
+    return replace(
+        recording,
+        imu=imu,
+        encoder=encoder,
+        odometry=recording.odometry.iloc[:samples],
+        magnetometer=None if magnetic is None else magnetic.iloc[:samples],
+        rail_displacement=None if seen is None else seen.iloc[:samples],
+    )

@@ -1,0 +1,323 @@
+"""IMU grades: the error terms of a device, in SI units.
+
+A grade is a handful of numbers; `simrail.sensors.imu` turns them into samples,
+`simrail.recording.sheets.datasheet` makes them from what a data sheet prints, and
+`simrail.recording.sheets.imu_file` reads files of such figures.
+
+Conventions (IEEE Std 952): noise is given by the Allan coefficient N, so the standard deviation of one
+sample is N sqrt(rate). Bias instability is the coefficient B, whose Allan deviation is flat at
+sqrt(2 ln 2 / pi) B = 0.664 B. Whatever a sheet prints as "+-b" (initial bias, scale factor error,
+misalignment, ...) is the bound of a uniform distribution, drawn once per device and axis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.recording.sheets.allan import (
+    bias_sd,
+    flicker_stages,
+    gauss_markov_allan,
+    random_walk_allan,
+    white_allan,
+)
+
+REFERENCE_TEMPERATURE_C = 25.0
+"""Where a device has no temperature error: that of its calibration."""
+
+TRIAD_TERMS: dict[str, tuple[str, str]] = {
+    "noise": ("radpsqrts", "mpsqrts"),
+    "bias_instability": ("radps", "mps2"),
+    "bias_correlation": ("s", "s"),
+    "random_walk": ("radpspsqrts", "mps2psqrts"),
+    "turn_on_bias": ("radps", "mps2"),
+    "scale_error": ("", ""),
+    "nonlinearity": ("", ""),
+    "nonorthogonality": ("rad", "rad"),
+    "g_sensitivity": ("radspm", ""),
+    "vibration_rectification": ("rads3pm2", "s2pm"),
+    "bias_temperature": ("radpspk", "mps2pk"),
+    "scale_temperature": ("1pk", "1pk"),
+    "range": ("radps", "mps2"),
+    "resolution": ("radps", "mps2"),
+}
+"""Terms that both triads have, and the units at the end of their names, of gyro and accelerometer."""
+
+
+@dataclass(frozen=True)
+class Triad:
+    """The terms of one triad of a grade, without their units: see `ImuGrade`."""
+
+    noise: float
+    bias_instability: float
+    bias_correlation: float
+    random_walk: float
+    turn_on_bias: float
+    scale_error: float
+    nonlinearity: float
+    nonorthogonality: float
+    g_sensitivity: float
+    vibration_rectification: float
+    bias_temperature: float
+    scale_temperature: float
+    range: float
+    resolution: float
+
+
+@dataclass(frozen=True)
+class ImuGrade:
+    """Error terms of an IMU; every axis of a triad has the same figures and its own draws.
+
+    A term that is left out is not there. "Bound" means a constant of each axis and device, uniform
+    between minus and plus.
+
+    Attributes
+    ----------
+    name : str
+        Name of the grade.
+    rate_hz : float
+        Output rate, > 0.
+    gyro_noise_radpsqrts, accel_noise_mpsqrts : float
+        Allan coefficient N of the white noise (angle and velocity random walk), rad/s/sqrt(Hz) and
+        m/s2/sqrt(Hz).
+    gyro_bias_instability_radps, accel_bias_instability_mps2 : float
+        In-run bias instability B, by the process that `bias_process` names.
+    gyro_bias_correlation_s, accel_bias_correlation_s : float
+        Correlation time of the Gauss-Markov process. Data sheets do not print it.
+    bias_process : {"gauss_markov", "flicker"}
+        One Gauss-Markov process whose Allan deviation peaks at 0.664 B, or a sum of them that is flat at
+        0.664 B over `flicker_range_s`. Stationary from the first sample, either way.
+    flicker_range_s : tuple of float
+        Averaging times between which the floor is flat.
+    gyro_random_walk_radpspsqrts, accel_random_walk_mps2psqrts : float
+        Rate random walk K, rad/s/sqrt(s) and m/s2/sqrt(s); 0 at the first sample.
+    gyro_turn_on_bias_radps, accel_turn_on_bias_mps2 : float
+        Bound of the constant bias.
+    gyro_scale_error, accel_scale_error : float
+        Bound of the relative error of the scale factor.
+    gyro_nonlinearity, accel_nonlinearity : float
+        Largest deviation from the straight line through zero and full scale, as a fraction of the range:
+        bound of the amplitude of an odd cubic. Needs a range.
+    package_misalignment_rad : float
+        Bound of the turns of the whole package about its three axes.
+    gyro_nonorthogonality_rad, accel_nonorthogonality_rad : float
+        Bound of the three angles by which Y leans towards X, and Z towards X and Y.
+    gyro_g_sensitivity_radspm : float
+        Bound of each of the nine coefficients from specific force to rate, rad/s per m/s2.
+    gyro_vibration_rectification_rads3pm2, accel_vibration_rectification_s2pm : float
+        Bound of the bias per mean square of the vibration along the axis, rad/s and m/s2 per (m/s2)2.
+    vibration_averaging_s : float
+        Time constant of the running means of force and squared vibration.
+    gyro_bias_temperature_radpspk, accel_bias_temperature_mps2pk : float
+        Bound of the bias per kelvin away from 25 degrees Celsius.
+    gyro_scale_temperature_1pk, accel_scale_temperature_1pk : float
+        Bound of the relative scale error per kelvin away from 25 degrees Celsius.
+    gyro_range_radps, accel_range_mps2 : float
+        Largest magnitude that is measured; infinite for no limit.
+    gyro_resolution_radps, accel_resolution_mps2 : float
+        Size of one count of the rate; 0 for no quantisation. Of increments, one count is this times the
+        sample interval.
+    bandwidth_hz : float, optional
+        -3 dB frequency of the device's own second-order response (Butterworth), before sampling.
+    oversampling : int
+        The device samples this many times as fast and averages over each interval; 1 for no averaging.
+    output : {"rates", "increments"}
+        Whether the device sends rates or angle and velocity increments; see `simrail.sensors.imu`.
+    clock_jitter_s : float
+        Standard deviation of the time at which a sample is really taken; below a tenth of the interval.
+    clock_drift : float
+        Bound of the relative error of the device's second.
+    dropped_fraction : float
+        Share of the samples that never arrive, < 0.5.
+    dropped_burst : float
+        Mean number of samples that are lost in a row, >= 1.
+    source : str
+        Where the figures come from.
+    assumed : tuple of str
+        What was assumed where the source is silent, a sentence each.
+    """
+
+    name: str
+    rate_hz: float
+    gyro_noise_radpsqrts: float = 0.0
+    accel_noise_mpsqrts: float = 0.0
+    gyro_bias_instability_radps: float = 0.0
+    accel_bias_instability_mps2: float = 0.0
+    gyro_bias_correlation_s: float = 300.0
+    accel_bias_correlation_s: float = 300.0
+    bias_process: Literal["gauss_markov", "flicker"] = "gauss_markov"
+    flicker_range_s: tuple[float, float] = (1.0, 1000.0)
+    gyro_random_walk_radpspsqrts: float = 0.0
+    accel_random_walk_mps2psqrts: float = 0.0
+    gyro_turn_on_bias_radps: float = 0.0
+    accel_turn_on_bias_mps2: float = 0.0
+    gyro_scale_error: float = 0.0
+    accel_scale_error: float = 0.0
+    gyro_nonlinearity: float = 0.0
+    accel_nonlinearity: float = 0.0
+    package_misalignment_rad: float = 0.0
+    gyro_nonorthogonality_rad: float = 0.0
+    accel_nonorthogonality_rad: float = 0.0
+    gyro_g_sensitivity_radspm: float = 0.0
+    gyro_vibration_rectification_rads3pm2: float = 0.0
+    accel_vibration_rectification_s2pm: float = 0.0
+    vibration_averaging_s: float = 1.0
+    gyro_bias_temperature_radpspk: float = 0.0
+    accel_bias_temperature_mps2pk: float = 0.0
+    gyro_scale_temperature_1pk: float = 0.0
+    accel_scale_temperature_1pk: float = 0.0
+    gyro_range_radps: float = math.inf
+    accel_range_mps2: float = math.inf
+    gyro_resolution_radps: float = 0.0
+    accel_resolution_mps2: float = 0.0
+    bandwidth_hz: float | None = None
+    oversampling: int = 1
+    output: Literal["rates", "increments"] = "rates"
+    clock_jitter_s: float = 0.0
+    clock_drift: float = 0.0
+    dropped_fraction: float = 0.0
+    dropped_burst: float = 1.0
+    source: str = ""
+    assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, int | float):
+                _judge(self.name, field.name, value)
+        _one_of(self.name, "bias_process", self.bias_process, ("gauss_markov", "flicker"))
+        _one_of(self.name, "output", self.output, ("rates", "increments"))
+        _judge_together(self)
+
+    @classmethod
+    def from_datasheet(cls, name: str, rate_hz: float, **figures: Any) -> ImuGrade:
+        """Build a grade in the units of data sheets: see
+        `simrail.recording.sheets.datasheet.grade_from_datasheet`.
+        """
+        from simrail.recording.sheets.datasheet import grade_from_datasheet
+
+        return grade_from_datasheet(name, rate_hz, **figures)
+
+    def triad(self, kind: str) -> Triad:
+        """Terms of the triad ``"gyro"`` or ``"accel"``; those that it does not have are 0."""
+        side = ("gyro", "accel").index(kind)
+        values: dict[str, float] = {}
+        for term, units in TRIAD_TERMS.items():
+            name = "_".join(part for part in (kind, term, units[side]) if part)
+            values[term] = getattr(self, name, 0.0)
+        return Triad(**values)
+
+    @property
+    def lag_s(self) -> float:
+        """Age of what a sample says at its time stamp, for slow motion: response and averaging.
+
+        sqrt(2) / (2 pi bandwidth), and half the time over which the device averages. Like a real device,
+        the simulated one does not correct it.
+        """
+        response = math.sqrt(2.0) / (2.0 * math.pi * self.bandwidth_hz) if self.bandwidth_hz else 0.0
+        return response + 0.5 * (self.oversampling - 1) / (self.oversampling * self.rate_hz)
+
+    def bias_stages(self, kind: str) -> tuple[FloatArray, FloatArray]:
+        """Correlation times and standard deviations (m,) of the processes that make the wandering bias."""
+        terms = self.triad(kind)
+        if terms.bias_instability == 0.0:
+            return np.empty(0), np.empty(0)
+        if self.bias_process == "flicker":
+            return flicker_stages(terms.bias_instability, self.flicker_range_s)
+        return np.array([terms.bias_correlation]), np.array([bias_sd(terms.bias_instability)])
+
+    def allan(self, averaging_s: FloatArray) -> dict[str, FloatArray]:
+        """Analytic Allan deviation of each triad of a resting device.
+
+        The root sum of squares of white noise, wandering bias, random walk and quantisation. A count of a
+        rate, c, is white noise of c / sqrt(12 rate) where the noise crosses many counts; a count of an
+        increment, q, is sqrt(3) (q / sqrt(12)) / tau (IEEE Std 952). Constants do not show.
+
+        Parameters
+        ----------
+        averaging_s : ndarray (n,)
+            Averaging times, s.
+
+        Returns
+        -------
+        dict of str to ndarray (n,)
+            ``"gyro"`` in rad/s and ``"accel"`` in m/s2.
+        """
+        tau = np.asarray(averaging_s, dtype=np.float64)
+        found = {}
+        for kind in ("gyro", "accel"):
+            terms = self.triad(kind)
+            if self.output == "rates":
+                counting = white_allan(tau, terms.resolution / math.sqrt(12.0 * self.rate_hz))
+            else:
+                counting = 0.5 * terms.resolution / self.rate_hz / tau
+            parts = [white_allan(tau, terms.noise), random_walk_allan(tau, terms.random_walk), counting]
+            for correlation, sd in zip(*self.bias_stages(kind), strict=True):
+                parts.append(gauss_markov_allan(tau, sd=float(sd), correlation_s=float(correlation)))
+            found[kind] = np.sqrt(np.sum(np.square(parts), axis=0))
+        return found
+
+
+_POSITIVE = ("rate_hz", "correlation_s", "bandwidth_hz", "averaging_s")
+_SMALL = ("scale_error", "nonlinearity", "misalignment_rad", "nonorthogonality_rad", "1pk", "clock_drift")
+
+
+def _judge(grade: str, name: str, value: float) -> None:
+    """Refuse a figure that no device can have."""
+    limit, fine = ">= 0", value >= 0.0
+    if name.endswith(_POSITIVE) or "range" in name:
+        limit, fine = "> 0", value > 0.0
+    elif name in ("oversampling", "dropped_burst"):
+        limit, fine = ">= 1", value >= 1.0
+    elif name == "dropped_fraction":
+        limit, fine = ">= 0 and < 0.5", 0.0 <= value < 0.5
+    elif name.endswith(_SMALL):
+        limit, fine = ">= 0 and < 0.2", 0.0 <= value < 0.2
+    if not fine or (math.isinf(value) and "range" not in name):
+        raise InputError("is out of range", field=f"imu grade {grade}: {name}", value=value, limit=limit)
+
+
+def _one_of(grade: str, name: str, value: Any, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InputError(
+            "is not one of the possible values",
+            field=f"imu grade {grade}: {name}",
+            value=value,
+            limit="one of " + ", ".join(known),
+        )
+
+
+def _judge_together(grade: ImuGrade) -> None:
+    """Refuse figures that contradict each other."""
+    field = f"imu grade {grade.name}: "
+    for kind, unit in (("gyro", "radps"), ("accel", "mps2")):
+        terms = grade.triad(kind)
+        if terms.nonlinearity > 0.0 and math.isinf(terms.range):
+            raise InputError(
+                "is a fraction of a full scale that is not given",
+                field=f"{field}{kind}_nonlinearity",
+                value=terms.nonlinearity,
+                remedy=f"give {kind}_range_{unit} as well",
+            )
+    if grade.clock_jitter_s > 0.1 / grade.rate_hz:
+        raise InputError(
+            "is more than a tenth of the sample interval",
+            field=f"{field}clock_jitter_s",
+            value=grade.clock_jitter_s,
+            limit=f"<= {0.1 / grade.rate_hz:g} s",
+        )
+    low, high = grade.flicker_range_s
+    if grade.bias_process == "flicker" and not 10.0 / grade.rate_hz <= low < high < math.inf:
+        raise InputError(
+            "is not (shortest, longest)",
+            field=f"{field}flicker_range_s",
+            value=grade.flicker_range_s,
+            limit=f"{10.0 / grade.rate_hz:g} s <= shortest < longest",
+            remedy="the floor is flat from the shortest to the longest averaging time",
+        )

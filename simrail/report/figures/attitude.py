@@ -1,0 +1,152 @@
+"""Figures of the attitude: estimated, true and design over distance, and the errors.
+
+They follow Figs. 11, 13 and 14 of Briales et al. 2021, with the truth added, which a real train does
+not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from simrail.campaign.example import CellResult
+from simrail.core.columns import ATTITUDE
+from simrail.core.jit import FloatArray
+from simrail.report.figures.decimate import Bins
+from simrail.report.figures.ride import direction_of, limits_of
+from simrail.report.figures.style import (
+    DESIGN,
+    TRUTH,
+    distance_axis,
+    legend_above,
+    look,
+    pad_limits,
+    panels,
+    shade_track,
+    to_svg,
+)
+from simrail.report.tables.methods import MethodStyle
+
+_NAMES = ("roll", "pitch", "yaw")
+
+
+def attitude_figure(example: CellResult, styles: Sequence[MethodStyle], *, what: str) -> str:
+    """Roll, pitch and yaw over distance: design, truth and some methods.
+
+    Parameters
+    ----------
+    example : CellResult
+        The ride.
+    styles : sequence of MethodStyle
+        Methods to draw, the first on top.
+    what : str
+        Description for those who cannot see it.
+    """
+    with look():
+        bins = Bins(example.motion["position_m"].to_numpy())
+        frame = example.recording.track.frame(bins.x)
+        design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
+        figure, axes = panels([2.05, 2.05, 1.75])
+        for column, (axis, angle, name) in enumerate(zip(axes, ATTITUDE, _NAMES, strict=True)):
+            true = np.rad2deg(example.motion[angle].to_numpy())
+            x, y = bins.line(true)
+            axis.plot(x, y, color=TRUTH, lw=2.2, label="truth", zorder=2)
+            lines = [y, np.rad2deg(design[column])]
+            axis.plot(bins.x, lines[1], color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
+            for order, style in enumerate(styles):
+                error = np.rad2deg(angle_error(example, style.name, column))
+                x, y = bins.line(true + error)
+                depth: dict[str, Any] = {"lw": 1.05, "zorder": 12 - 0.1 * order}
+                axis.plot(x, y, color=style.colour, ls=style.stroke, label=style.label, **depth)
+                lines.append(y)
+            finite = np.concatenate(lines)
+            finite = finite[np.isfinite(finite)]
+            pad_limits(axis, *np.percentile(finite, [0.05, 99.95]), top=0.16 if column == 0 else 0.08)
+            axis.set_ylabel(f"{name}, \u00b0")
+        legend_above(axes[0])
+        shade_track(axes, example.recording.track, limits=limits_of(example))
+        distance_axis(axes[-1], direction=direction_of(example))
+        return to_svg(figure, description=what)
+
+
+def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
+    """Errors against the truth over distance, scaled to the methods under test.
+
+    Methods under test are lines through the extremes of each stretch of track; of the baselines the
+    mean is drawn, and the range of 'design angles only' as a band. Where a baseline leaves the panel,
+    a note says how far it goes.
+    """
+    with look():
+        bins = Bins(example.motion["position_m"].to_numpy())
+        figure, axes = panels([1.9, 1.9, 1.9])
+        tested = [style for style in styles if not style.baseline] or list(styles)
+        for column, axis in enumerate(axes):
+            error = {style.name: _shown_error(example, style, column) for style in styles}
+            reach = max(1.15 * max(_percentile(error[s.name], 99.8) for s in tested), 1e-3)
+            lowest = 1.15 * min(float(np.nanmin(error[s.name], initial=0.0)) for s in tested)
+            highest = 1.15 * max(float(np.nanmax(error[s.name], initial=0.0)) for s in tested)
+            beyond = []
+            for style in styles:
+                look_of: dict[str, Any] = {"color": style.colour, "ls": style.stroke, "label": style.label}
+                if style in tested:
+                    axis.plot(
+                        *bins.line(error[style.name]), lw=1.2, zorder=4 - 0.1 * len(axis.lines), **look_of
+                    )
+                elif not style.uses_imu:
+                    found = bins.envelope(error[style.name])
+                    tint: dict[str, Any] = {
+                        "color": "#b9bec7",
+                        "lw": 0,
+                        "alpha": 0.55,
+                        "label": f"{style.label}, range",
+                    }
+                    axis.fill_between(found.x, found.low, found.high, zorder=1.5, **tint)
+                else:
+                    axis.plot(bins.x, bins.envelope(error[style.name]).mean, lw=0.9, zorder=2, **look_of)
+                largest = _percentile(error[style.name], 100.0)
+                if largest > 1.3 * reach:
+                    beyond.append((largest, style.label))
+            axis.axhline(0.0, color="#98a1af", lw=0.7, zorder=-1)
+            low, high = max(lowest, -reach), min(highest, reach)
+            axis.set_ylim(low - 0.15 * reach, high + (0.3 if column == 0 else 0.05) * reach)
+            axis.set_ylabel("yaw drift, \u00b0" if column == 2 else f"{_NAMES[column]} error, \u00b0")
+            _note_beyond(axis, beyond)
+        legend_above(axes[0])
+        shade_track(axes, example.recording.track, limits=limits_of(example))
+        distance_axis(axes[-1], direction=direction_of(example))
+        return to_svg(figure, description="Errors of roll, pitch and yaw over distance")
+
+
+def _percentile(error: FloatArray, share: float) -> float:
+    """Percentile of the size of an error; 0 if it is nowhere finite."""
+    finite = np.abs(error[np.isfinite(error)])
+    return float(np.percentile(finite, share)) if len(finite) else 0.0
+
+
+def _note_beyond(axis: Axes, beyond: list[tuple[float, str]]) -> None:
+    if not beyond:
+        return
+    listed = ", ".join(f"{label} {largest:.2g}\u00b0" for largest, label in sorted(beyond, reverse=True))
+    box: dict[str, Any] = {"facecolor": "white", "alpha": 0.85, "lw": 0, "pad": 1.5}
+    style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.8, "color": "#475467", "zorder": 30}
+    axis.text(
+        0.995, 0.03, f"beyond the panel, at most: {listed}", transform=axis.transAxes, bbox=box, **style
+    )
+
+
+def angle_error(example: CellResult, name: str, column: int) -> FloatArray:
+    """Error (n,) of an angle against the truth, wrapped, rad."""
+    angle = ATTITUDE[column]
+    error = (
+        example.estimates[name].states[angle].to_numpy(dtype=np.float64) - example.motion[angle].to_numpy()
+    )
+    wrapped: FloatArray = (error + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped
+
+
+def _shown_error(example: CellResult, style: MethodStyle, column: int) -> FloatArray:
+    error = angle_error(example, style.name, column)
+    return np.rad2deg(error - error[0] if column == 2 else error)

@@ -1,0 +1,104 @@
+"""Figures of an estimate on a ride without a truth: attitude beside the design, and innovations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from simrail.core.columns import ATTITUDE, ATTITUDE_SD, COLUMNS, INNOVATION, RATE_INNOVATION
+from simrail.core.jit import FloatArray
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
+from simrail.report.figures.decimate import Bins
+from simrail.report.figures.style import (
+    DESIGN,
+    distance_axis,
+    legend_above,
+    look,
+    pad_limits,
+    panels,
+    shade_track,
+    to_svg,
+)
+
+ESTIMATE, BAND = "#0072B2", "#0072B2"
+LEAST_WAY_M = 10.0
+"""A ride shorter than this is drawn over time."""
+
+
+def moves(recording: Recording) -> bool:
+    """True if the ride is long enough to be drawn over distance."""
+    return bool(np.ptp(recording.odometry["position_m"].to_numpy()) > LEAST_WAY_M)
+
+
+def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label: str) -> str:
+    """Estimated roll, pitch and yaw with their 95 % bands, and the design angles."""
+    with look():
+        x = _axis(recording)
+        bins = Bins(x)
+        position = recording.odometry["position_m"].to_numpy()
+        frame = recording.track.frame_extended(position[bins.first])
+        design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
+        drawn = [name for name in ATTITUDE if name in estimate.states]
+        figure, axes = panels([1.9] * len(drawn))
+        for axis, name in zip(axes, drawn, strict=True):
+            angle = np.rad2deg(estimate.states[name].to_numpy(dtype=np.float64))
+            place, line = bins.line(angle)
+            sd = ATTITUDE_SD[ATTITUDE.index(name)]
+            if sd in estimate.states:
+                wide = 1.96 * np.rad2deg(estimate.states[sd].to_numpy(dtype=np.float64))
+                low, high = bins.envelope(angle - wide).mean, bins.envelope(angle + wide).mean
+                axis.fill_between(bins.x, low, high, color=BAND, alpha=0.16, lw=0, label="its own 95 % band")
+            axis.plot(place, line, color=ESTIMATE, lw=1.05, zorder=12, label=label)
+            planned = np.rad2deg(design[ATTITUDE.index(name)])
+            axis.plot(bins.x, planned, color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
+            finite = np.concatenate([line, planned])
+            pad_limits(axis, *np.percentile(finite[np.isfinite(finite)], [0.05, 99.95]), top=0.16)
+            axis.set_ylabel(f"{name.removesuffix('_rad')}, \u00b0")
+        legend_above(axes[0])
+        _finish(axes, recording, x)
+        return to_svg(figure, description=f"Attitude of ride {recording.name}, estimated and by design")
+
+
+def innovation_figure(recording: Recording, estimate: Estimate) -> str:
+    """Range and mean of each innovation."""
+    assert estimate.innovations is not None
+    with look():
+        times = recording.imu.index.to_numpy()
+        # Innovations may come at fewer times than the samples: an update that was left out has none.
+        x = np.interp(estimate.innovations.index.to_numpy(), times, _axis(recording))
+        bins = Bins(x, bins=500)
+        names = [name for name in (*RATE_INNOVATION, *INNOVATION) if name in estimate.innovations]
+        figure, axes = panels([1.0] * len(names), top_in=0.15)
+        for axis, name in zip(axes, names, strict=True):
+            values = np.nan_to_num(estimate.innovations[name].to_numpy(dtype=np.float64))
+            found = bins.envelope(values)
+            axis.fill_between(found.x, found.low, found.high, color="#009E73", alpha=0.28, lw=0)
+            axis.plot(found.x, found.mean, color="#009E73", lw=1.1)
+            unit = COLUMNS[name].unit.replace("s2", "s\u00b2")
+            word = "NIS" if name == "nis" else f"innov. {name.split('_')[1].upper()}\n{unit}"
+            axis.set_ylabel(word, fontsize=8.2)
+            pad_limits(axis, np.percentile(found.low, 1.0), np.percentile(found.high, 99.0))
+        _finish(axes, recording, x)
+        return to_svg(figure, description="Innovations: measured minus predicted signals")
+
+
+def _axis(recording: Recording) -> FloatArray:
+    """What the figures are drawn over: distance, or time for a train that hardly moves."""
+    if moves(recording):
+        return recording.odometry["position_m"].to_numpy()
+    return recording.imu.index.to_numpy()
+
+
+def _finish(axes: list[Axes], recording: Recording, x: FloatArray) -> None:
+    low, high = float(x.min()), float(x.max())
+    room = 0.01 * max(high - low, 1e-3)
+    if moves(recording):
+        limits: Any = (low - room, high + room)
+        shade_track(axes, recording.track, limits=limits)
+        distance_axis(axes[-1], direction=1 if x[-1] >= x[0] else -1)
+    else:
+        axes[0].set_xlim(low - room, high + room)
+        axes[-1].set_xlabel("time, s")

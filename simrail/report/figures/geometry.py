@@ -1,0 +1,234 @@
+"""Figures of rail geometry: true and estimated rails with their 95 % band, and error by band."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from simrail.campaign.example import CellResult
+from simrail.core.columns import IRREGULARITY
+from simrail.core.jit import FloatArray
+from simrail.report.figures.ride import direction_of
+from simrail.report.figures.style import (
+    INK,
+    TRUTH,
+    WIDTH_IN,
+    distance_axis,
+    fitting_columns,
+    legend_above,
+    log_ticks,
+    look,
+    pad_limits,
+    panels,
+    shade_track,
+    to_svg,
+)
+from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case
+from simrail.report.tables.geometry_tables import is_zero, mappers
+from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.pivot import Figures
+from simrail.scoring.table import FULL
+from simrail.track.bands import BANDS, Band, band_pass, sd_of_draws, why_not
+
+_MARKS = "osv^PX<>*"
+
+ROOMY = 4
+"""So many bands leave room for their wavelengths below the axis."""
+
+
+def stretch_of(example: CellResult, name: str, *, band: Band | None, length_m: float) -> tuple[float, float]:
+    """First and last place of a stretch of some length: in the middle of what there is to draw.
+
+    That is where the ride went and a method says what the rails look like, in a band or unfiltered; the
+    stretch is shorter where there is no more of it.
+    """
+    position = example.motion["position_m"]
+    low, high = float(position.min()), float(position.max())
+    there = []
+    for quantity in JUDGED:
+        place, _, found, _ = lines_of(example, name, quantity, band)
+        there.append(place[np.isfinite(found) & (place >= low) & (place <= high)])
+    places = np.concatenate(there)
+    if len(places):
+        low, high = float(places.min()), float(places.max())
+    middle = 0.5 * (low + high)
+    return max(low, middle - 0.5 * length_m), min(high, middle + 0.5 * length_m)
+
+
+def stretch_words(example: CellResult, stretch: tuple[float, float]) -> str:
+    """A stretch as captions say it: ``120 m in the middle of the ride``."""
+    length = stretch[1] - stretch[0]
+    is_all = length > 0.98 * float(np.ptp(example.motion["position_m"].to_numpy()))
+    return f"all {length:.0f} m of the ride" if is_all else f"{length:.0f} m in the middle of the ride"
+
+
+def lines_of(
+    example: CellResult, name: str, quantity: str, band: Band | None, *, by_draws: bool = False
+) -> tuple[FloatArray, ...]:
+    """Places, true rails, estimated rails and their sd (NaN if unknown), mm; in a band or unfiltered.
+
+    The sd in a band is that of the unfiltered rails, as paper 001 has it, or by draws that of the filtered
+    ones.
+    """
+    geometry = example.estimates[name].geometry
+    assert geometry is not None and example.rails is not None
+    place = geometry.index.to_numpy(dtype=np.float64)
+    column = f"{quantity}_m"
+    true = 1e3 * example.rails.irregularities(place)[column].to_numpy()
+    found = 1e3 * geometry[column].to_numpy(dtype=np.float64)
+    sd_name = f"{quantity}_sd_m"
+    sd = 1e3 * geometry[sd_name].to_numpy() if sd_name in geometry else np.full(len(place), np.nan)
+    if band is not None:
+        edges = band.edges_m(quantity)
+        step = float(place[1] - place[0]) if len(place) > 1 else 0.0
+        if why_not(edges, count=len(place), step_m=step):
+            nothing = np.full(len(place), np.nan)
+            return place, nothing, nothing, nothing
+        draws = example.estimates[name].geometry_draws
+        if by_draws:
+            sd = np.full(len(place), np.nan)
+            if draws is not None:
+                drawn = 1e3 * draws[:, :, IRREGULARITY.index(column)]
+                sd = sd_of_draws(band_pass(drawn, edges, step_m=step))
+        true, found = (band_pass(line, edges, step_m=step) for line in (true, found))
+    return place, true, found, sd
+
+
+def rails_figure(
+    example: CellResult,
+    styles: Sequence[MethodStyle],
+    *,
+    band: Band | None,
+    limits: tuple[float, float],
+    with_interval: bool,
+    what: str,
+) -> str:
+    """Vertical profile, cross-level and alignment over a stretch: truth, and some methods.
+
+    Parameters
+    ----------
+    example : CellResult
+        The ride, with its rails.
+    styles : sequence of MethodStyle
+        Methods to draw, the first on top and the one whose 95 % interval is drawn.
+    band : Band, optional
+        Wavelengths to show.
+    limits : tuple of float
+        First and last place, m.
+    with_interval : bool
+        Whether to draw the interval: by draws where the method has them.
+    what : str
+        Description for those who cannot see it.
+    """
+    with look():
+        figure, axes = panels([1.55] * len(JUDGED))
+        for axis, quantity in zip(axes, JUDGED, strict=True):
+            reach = [0.0]
+            for order, style in enumerate(styles):
+                drawn = example.estimates[style.name].geometry_draws is not None
+                place, true, found, sd = lines_of(example, style.name, quantity, band, by_draws=drawn)
+                at = (place >= limits[0]) & (place <= limits[1]) & np.isfinite(found)
+                if order == 0:
+                    axis.plot(place[at], true[at], color=TRUTH, lw=2.6, label="truth", zorder=2)
+                    reach += [*true[at]]
+                    if with_interval and np.isfinite(sd).any():
+                        low, high = found[at] - 1.96 * sd[at], found[at] + 1.96 * sd[at]
+                        tint: dict[str, Any] = {"color": style.colour, "alpha": 0.16, "lw": 0}
+                        axis.fill_between(place[at], low, high, label="its 95 % interval", zorder=1, **tint)
+                        reach += [*low, *high]
+                axis.plot(
+                    place[at],
+                    found[at],
+                    color=style.colour,
+                    ls=style.stroke,
+                    lw=1.1,
+                    label=style.label,
+                    zorder=9 - 0.1 * order,
+                )
+                reach += [*found[at]]
+            pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
+            axis.set_ylabel(f"{QUANTITIES[quantity]},\nmm")
+        legend_above(axes[0])
+        shade_track(axes, example.recording.track, limits=limits)
+        distance_axis(axes[-1], direction=direction_of(example))
+        return to_svg(figure, description=what)
+
+
+def bands_figure(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> str:
+    """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without any.
+
+    Parameters
+    ----------
+    case, styles : Figures, sequence of MethodStyle
+        The case and the scenario's methods.
+    known : mapping of str to Band
+        Bands whose wavelengths are told, if there is room.
+    """
+    bands = bands_of_case(case)
+    shown = mappers(case, styles)
+    if not bands or not shown:
+        return ""
+    with look():
+        gap, left, top, bottom = 0.42, 0.62, 0.62, 0.42
+        height = 2.0 + top + bottom
+        figure = Figure(figsize=(WIDTH_IN, height))
+        wide = (WIDTH_IN - left - 0.15 - 2 * gap) / 3
+        step = 0.7 / max(len(shown), 1)
+        for i, quantity in enumerate(JUDGED):
+            box = (
+                (left + i * (wide + gap)) / WIDTH_IN,
+                bottom / height,
+                wide / WIDTH_IN,
+                1.0 - (top + bottom) / height,
+            )
+            axis = figure.add_axes(box)
+            for order, style in enumerate(shown):
+                found = [case.get(style.name, quantity, "sd", band=band) for band in bands]
+                value, sd = np.array([f.value for f in found]), np.nan_to_num([f.sd for f in found])
+                x = np.arange(len(bands)) + (order + 0.5) * step - 0.35
+                hollow = is_zero(style)
+                axis.errorbar(
+                    x,
+                    value,
+                    [np.minimum(sd, 0.7 * value), sd],
+                    fmt="D" if hollow else _MARKS[order % len(_MARKS)],
+                    ms=5.0,
+                    color=style.colour,
+                    mfc="white" if hollow else style.colour,
+                    mew=1.2,
+                    lw=1.0,
+                    label=style.label,
+                )
+            for at in range(1, len(bands)):
+                axis.axvline(at - 0.5, color="#d0d5dd", lw=0.7)
+            axis.set_yscale("log")
+            log_ticks(axis.yaxis)
+            axis.grid(axis="x", visible=False)
+            axis.grid(axis="y", which="minor", color="#f2f4f7", lw=0.5)
+            axis.set_xlim(-0.5, len(bands) - 0.5)
+            words = [_tick(band, known if len(bands) <= ROOMY else {}) for band in bands]
+            axis.set_xticks(range(len(bands)), words)
+            axis.tick_params(axis="x", length=0)
+            axis.set_title(QUANTITIES[quantity], color=INK)
+            if i == 0:
+                axis.set_ylabel("sd of the error, mm")
+                handles, labels = axis.get_legend_handles_labels()
+        figure.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(left / WIDTH_IN - 0.01, 1.0),
+            ncols=fitting_columns(labels, WIDTH_IN - left),
+            borderaxespad=0.1,
+        )
+        return to_svg(figure, description="Standard deviation of the error of the rail geometry by band")
+
+
+def _tick(band: str, known: Mapping[str, Band]) -> str:
+    """Name of a band below an axis, and its wavelengths below that."""
+    if band == FULL:
+        return "all"
+    return band_words(band, known).replace(" (", "\n").removesuffix(")")

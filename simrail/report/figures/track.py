@@ -1,0 +1,160 @@
+"""Figures of the track: its plan, profile, curvature and cant (as Figs. 8 to 10 of Briales et al. 2021)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from simrail.core.jit import FloatArray
+from simrail.report.figures.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
+from simrail.report.words.sentences import listed
+from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
+
+_KIND_COLOUR = {STRAIGHT: "#98a1af", TRANSITION: "#56B4E9", CURVE: "#D55E00"}
+_KIND_WORD = {STRAIGHT: "straight", TRANSITION: "transition", CURVE: "curve"}
+
+
+def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
+    """Plan of the track, with its curves named and the stops of the rides marked.
+
+    Parameters
+    ----------
+    track : TrackDesign
+        The design.
+    stops : dict of str to float
+        Label and position s of the places to mark.
+    """
+    with look():
+        s = np.linspace(track.start_m, track.end_m, 1500)
+        xy = track.frame(s).position[:, :2]
+        turned = _along_the_page(xy)
+        span = np.ptp(turned, axis=0)
+        wide = WIDTH_IN - 0.9
+        tall = float(np.clip(wide * (span[1] / span[0]) + 1.1, 1.8, 4.2))
+        figure = Figure(figsize=(WIDTH_IN, tall + 0.4))
+        axis = figure.add_axes((0.45 / WIDTH_IN, 0.12 / (tall + 0.4), wide / WIDTH_IN, tall / (tall + 0.4)))
+        kind = track.kind(s)
+        steps = np.flatnonzero(np.diff(kind)) + 1
+        named: set[int] = set()
+        for part in np.split(np.arange(len(s)), steps):
+            k = int(kind[part[0]])
+            reach = np.append(part, min(part[-1] + 1, len(s) - 1))
+            word = _KIND_WORD[k] if k not in named else None
+            axis.plot(*turned[reach].T, color=_KIND_COLOUR[k], lw=3.0, solid_capstyle="butt", label=word)
+            named.add(k)
+        _name_curves(axis, track, s, turned)
+        for label, at in stops.items():
+            place = (float(np.interp(at, s, turned[:, 0])), float(np.interp(at, s, turned[:, 1])))
+            axis.plot(*place, marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=5)
+            axis.annotate(
+                label, place, (0, -15), textcoords="offset points", ha="center", fontsize=8.4, color=INK
+            )
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.margins(x=0.03, y=0.22)
+        axis.grid(False)
+        axis.set_xticks([])
+        axis.set_yticks([])
+        axis.spines[:].set_visible(False)
+        axis.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=3)
+        _scale_bar(axis, span[0])
+        return to_svg(figure, description=f"Plan of the track {track.name}")
+
+
+FLAT_M = 1e-6
+"""Height, or cant, that changes by less is none."""
+
+
+def profile_figure(track: TrackDesign) -> str:
+    """Curvature over distance, with height above and cant below it where the line has any."""
+    with look():
+        s, height, cant = _profile(track)
+        is_level, has_cant = np.ptp(height) < FLAT_M, np.abs(cant).max() > FLAT_M
+        figure, axes = panels([*([] if is_level else [1.35]), 1.2, *([1.2] if has_cant else [])], top_in=0.12)
+        rest = list(axes)
+        if not is_level:
+            axis = rest.pop(0)
+            span = max(float(np.ptp(height)), 1.0)
+            floor = float(height.min()) - 0.1 * span
+            axis.fill_between(s, height, floor, color="#e8ebf0", lw=0)
+            axis.plot(s, height, color=INK, lw=1.4)
+            axis.set_ylim(floor, float(height.min()) + 1.35 * span)
+            axis.set_ylabel("height, m")
+        rest[0].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
+        rest[0].set_ylabel("curvature, 1/km")
+        if has_cant:
+            rest[1].plot(s, 1e3 * cant, color="#0072B2", lw=1.4)
+            rest[1].set_ylabel("cant, mm")
+        for axis in rest:
+            axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
+        shade_track(axes, track, limits=(track.start_m, track.end_m))
+        axes[-1].set_xlabel("distance along the track, m")
+        return to_svg(figure, description=profile_words(track))
+
+
+def profile_words(track: TrackDesign) -> str:
+    """Caption of `profile_figure`: what it shows, and what the line has none of."""
+    _, height, cant = _profile(track)
+    shown, none = ["curvature (positive to the left)"], []
+    if np.ptp(height) < FLAT_M:
+        none.append("is level")
+    else:
+        shown.insert(0, "height")
+    if np.abs(cant).max() > FLAT_M:
+        shown.append("cant (positive with the right rail raised, as a left curve needs)")
+    else:
+        none.append("has no cant")
+    return f"Design {listed(shown)} over distance." + (f" The line {listed(none)}." if none else "")
+
+
+def _profile(track: TrackDesign) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Distance, height and cant (positive with the right rail raised), m."""
+    s = np.linspace(track.start_m, track.end_m, 1200)
+    frame = track.frame(s)
+    return s, frame.position[:, 2], -track.rail_base_m * np.sin(frame.roll_rad)
+
+
+def _along_the_page(xy: FloatArray) -> FloatArray:
+    """Turn a plan so that it runs from left to right; left stays up."""
+    chord = xy[-1] - xy[0]
+    if np.hypot(*chord) < 0.2 * np.abs(np.diff(xy, axis=0)).sum():
+        return xy - xy[0]
+    angle = np.arctan2(chord[1], chord[0])
+    c, s = np.cos(angle), np.sin(angle)
+    turned: FloatArray = (xy - xy[0]) @ np.array([[c, -s], [s, c]])
+    return turned
+
+
+def _name_curves(axis: Axes, track: TrackDesign, s: FloatArray, xy: FloatArray) -> None:
+    start = track.start_m
+    for element in track.elements:
+        if isinstance(element, Curve):
+            middle = start + 0.5 * element.length_m
+            i = int(np.clip(np.searchsorted(s, middle), 1, len(s) - 2))
+            tangent = xy[i + 1] - xy[i - 1]
+            outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
+            axis.annotate(
+                f"R {abs(element.radius_m):.0f} m"
+                + (f"\ncant {1e3 * abs(element.cant_m):.0f} mm" if element.cant_m else ""),
+                (float(xy[i, 0]), float(xy[i, 1])),
+                (26.0 * outside[0], 26.0 * outside[1]),
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontsize=7.8,
+                color=MUTED,
+                linespacing=1.25,
+            )
+        start += element.length_m
+
+
+def _scale_bar(axis: Axes, length_m: float) -> None:
+    bar = 10.0 ** np.floor(np.log10(length_m / 4.0))
+    bar *= max(k for k in (1, 2, 5) if k * bar <= length_m / 4.0)
+    high = axis.get_xlim()[1]
+    foot = axis.get_xaxis_transform()  # at the foot of the panel, also below a track without any height
+    axis.plot([high - bar, high], [0.03, 0.03], color=INK, lw=1.6, transform=foot, scalex=False, scaley=False)
+    middle = (high - bar / 2, 0.03)
+    axis.annotate(
+        f"{bar:.0f} m", middle, (0, 4), xycoords=foot, textcoords="offset points", ha="center", fontsize=8
+    )

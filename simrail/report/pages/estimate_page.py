@@ -1,0 +1,125 @@
+"""The page of one estimate on one ride, without scores: one self-contained HTML file."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
+
+from simrail.campaign.example import CellResult
+from simrail.core.columns import ATTITUDE
+from simrail.core.resample import GAPS
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
+from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves
+from simrail.report.figures.ride import imu_figure, speed_figure
+
+MOST_GAPS = 20
+
+
+def write_estimate_page(
+    path: Path, recording: Recording, estimate: Estimate, *, label: str, method: str, us_per_sample: float
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    path : Path
+        The HTML file.
+    recording : Recording
+        The ride.
+    estimate : Estimate
+        What the method concluded from it.
+    label, method : str
+        Name of the method, and its options in full.
+    us_per_sample : float
+        Time that it took.
+    """
+    environment = Environment(
+        loader=PackageLoader("simrail.report", "."),
+        autoescape=select_autoescape(default=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # Where there is no truth, the odometry says where the figures of the ride are drawn.
+    ride = CellResult({}, recording, recording.odometry, {})
+    moving = moves(recording)
+    has_attitude = any(name in estimate.states for name in ATTITUDE)
+    text = environment.get_template("pages/estimate.html.j2").render(
+        recording=recording,
+        label=label,
+        method=method,
+        version=version("simrail"),
+        tiles=_tiles(recording, estimate, us_per_sample),
+        facts=ride_facts(recording),
+        attitude=Markup(estimated_attitude_figure(recording, estimate, label=label))
+        if has_attitude
+        else None,
+        speed=Markup(speed_figure(ride)) if moving else None,
+        imu=Markup(imu_figure(ride)) if moving else None,
+        innovations=None
+        if estimate.innovations is None or len(estimate.innovations) < 2
+        else Markup(innovation_figure(recording, estimate)),
+        gaps=_gaps(recording),
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def ride_facts(recording: Recording) -> list[str]:
+    """What there is to know of a recording, one line each."""
+    position = recording.odometry["position_m"].to_numpy()
+    time = recording.imu.index.to_numpy()
+    speed = 3.6 * float(np.abs(recording.odometry["speed_mps"].to_numpy()).max())
+    x, y, z = recording.mount_position_m
+    lost = "no gaps"
+    if recording.gaps is not None and len(recording.gaps):
+        missing = int(recording.gaps["missing"].sum())
+        lost = f"{missing} of them lost and interpolated, in {len(recording.gaps)} gaps"
+    track = recording.track
+    return [
+        f"{len(time)} samples at {recording.imu_sheet.rate_hz:g} Hz, {time[-1] - time[0]:.1f} s; {lost}",
+        f"from s = {position[0]:.1f} to {position[-1]:.1f} m of track '{track.name}'"
+        f"{' (synthetic)' if track.synthetic else ''}, at most {speed:.1f} km/h",
+        f"IMU {recording.imu_sheet.grade} on '{recording.mount_body}', "
+        f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
+        f"position and speed from the odometry '{recording.odometry_source}'"
+        + (" (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""),
+    ]
+
+
+def design_difference_deg(recording: Recording, estimate: Estimate, angle: str) -> float:
+    """RMS difference of an estimated angle to the design track's, in degrees; it is no error."""
+    frame = recording.track.frame_extended(recording.odometry["position_m"].to_numpy())
+    difference = estimate.states[angle].to_numpy(dtype=np.float64) - getattr(frame, angle)
+    wrapped = (difference + np.pi) % (2.0 * np.pi) - np.pi
+    return float(np.rad2deg(np.sqrt(np.mean(wrapped**2))))
+
+
+def _tiles(recording: Recording, estimate: Estimate, us_per_sample: float) -> list[tuple[str, str, str]]:
+    position = recording.odometry["position_m"].to_numpy()
+    way = float(abs(position[-1] - position[0]))
+    tiles = [("way", f"{way:.0f} m", f"in {recording.imu.index[-1] - recording.imu.index[0]:.0f} s")]
+    for angle in ("roll_rad", "pitch_rad"):
+        if angle in estimate.states:
+            word = angle.removesuffix("_rad")
+            difference = design_difference_deg(recording, estimate, angle)
+            tiles.append(
+                (f"{word} less design", f"{difference:.3f}\u00b0", "rms; not an error: there is no truth")
+            )
+    tiles.append(("time", f"{us_per_sample:.2f} \u00b5s", "per sample"))
+    return tiles
+
+
+def _gaps(recording: Recording) -> list[str]:
+    if recording.gaps is None:
+        return []
+    lines = [
+        f"{missing:.0f} samples between {start_s:.3f} and {end_s:.3f} s"
+        for start_s, end_s, missing in recording.gaps.head(MOST_GAPS)[list(GAPS)].to_numpy(dtype=np.float64)
+    ]
+    more = len(recording.gaps) - MOST_GAPS
+    return lines + ([f"and {more} more"] if more > 0 else [])

@@ -1,0 +1,1 @@
+"""The papers' results beside ours, one folder each, by authors and year."""

@@ -1,0 +1,173 @@
+"""What the report knows of a method: its label, its colour, and what it is a baseline for.
+
+All of it follows from the scenario (class and options of each estimator), not from names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.colors import to_hex, to_rgb
+
+from simrail.core.errors import InputError
+from simrail.estimation.estimate import estimator_class
+from simrail.scenario import cells
+
+# Okabe and Ito's colours, which people with any colour vision tell apart: (compensated, not compensated).
+_COLOURS = {
+    "AttitudeEkf": ("#0072B2", "#56B4E9"),
+    "AttitudeGda": ("#D55E00", "#E69F00"),
+    "Vqf": ("#AA4499", "#CC79A7"),
+    "DesignAngles": ("#6b7280", "#6b7280"),
+    "ZeroTrack": ("#6b7280", "#6b7280"),
+}
+_NO_IMU = ("DesignAngles", "ZeroTrack")
+_OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
+_MOST_ALIKE = 3
+"""So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
+shades of it, which stay beside those of their twins."""
+_APART = (
+    "#0072B2",
+    "#D55E00",
+    "#56B4E9",
+    "#E69F00",
+    "#CC79A7",
+    "#332288",
+    "#882255",
+    "#7b5e2a",
+    "#999933",
+)
+"""Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
+_STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
+_SPELLED = {
+    "sabatini": "Sabatini",
+    "yuan": "Yuan",
+    "ekf": "EKF",
+    "gda": "GDA",
+    "vqf": "VQF",
+    "ahrs": "AHRS",
+    "kf": "KF",
+    "imu": "IMU",
+}
+
+
+@dataclass(frozen=True)
+class MethodStyle:
+    """One method as the report shows it.
+
+    Attributes
+    ----------
+    name, label : str
+        Name in the tables; the same, readable.
+    baseline : str
+        ``""`` for a method under test, else what kind of baseline it is.
+    uses_imu : bool
+        False for "design angles only", and for rails that lie as designed.
+    twin : str
+        Name of the method that differs in compensation only; "" if there is none.
+    compensated : bool or None
+        Whether it compensates track-frame accelerations; None if it has no such option.
+    colour, stroke
+        For plots.
+    """
+
+    name: str
+    label: str
+    baseline: str
+    uses_imu: bool
+    twin: str
+    compensated: bool | None
+    colour: str
+    stroke: str | tuple[float, tuple[float, ...]]
+
+
+def readable(name: str) -> str:
+    """Name of a method in words: ``"ekf_compensated"`` becomes ``"EKF compensated"``."""
+    head, bracket, tail = name.partition("[")
+    words = " ".join(_SPELLED.get(word, word) for word in head.split("_"))
+    return words + bracket + tail
+
+
+def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
+    """Styles of the scenario's methods, by name, in their order."""
+    compensated = {method.name: _compensated(method) for method in methods}
+    styles: dict[str, MethodStyle] = {}
+    seen: list[tuple[str, bool | None]] = []
+    other_classes: list[str] = []
+    for method in methods:
+        family, flag = method.part.method, compensated[method.name]
+        if family not in _COLOURS and family not in other_classes:
+            other_classes.append(family)
+        pair = _COLOURS.get(family) or _OTHERS[other_classes.index(family) % len(_OTHERS)]
+        twins = [m.name for m in methods if m is not method and _is_twin(method, m, compensated)]
+        baseline = ""
+        if family in _NO_IMU:
+            baseline = "no IMU"
+        elif flag is False:
+            baseline = "uncompensated" if twins else "general purpose"
+        styles[method.name] = MethodStyle(
+            name=method.name,
+            label=readable(method.name),
+            baseline=baseline,
+            uses_imu=family not in _NO_IMU,
+            twin=twins[0] if twins else "",
+            compensated=flag,
+            colour=pair[1] if flag is False else pair[0],
+            stroke=_STROKES[seen.count((family, flag)) % len(_STROKES)],
+        )
+        seen.append((family, flag))
+    return _shaded(styles)
+
+
+def attitude_methods(styles: Sequence[MethodStyle]) -> list[MethodStyle]:
+    """Methods that are told apart by their attitude: of those without an IMU, the first.
+
+    Rails that lie as designed give the design angles once more.
+    """
+    first = next((style for style in styles if not style.uses_imu), None)
+    return [style for style in styles if style.uses_imu or style is first]
+
+
+def _shaded(styles: dict[str, MethodStyle]) -> dict[str, MethodStyle]:
+    """Tell methods apart that share a colour: by colours that no other has, or by shades."""
+    sharing: dict[str, list[str]] = {}
+    for style in styles.values():
+        if style.uses_imu:
+            sharing.setdefault(style.colour, []).append(style.name)
+    shaded = dict(styles)
+    free = [colour for colour in _APART if colour not in sharing]
+    for colour, names in sharing.items():
+        fit = 1 < len(names) <= len(free) + 1 and all(styles[name].compensated is None for name in names)
+        if fit:
+            for name in names[1:]:
+                shaded[name] = replace(styles[name], colour=free.pop(0))
+        elif len(names) > _MOST_ALIKE:
+            for place, name in zip(np.linspace(-0.6, 0.6, len(names)), names, strict=True):
+                shaded[name] = replace(styles[name], colour=_mixed(colour, float(place)))
+    return shaded
+
+
+def _mixed(colour: str, share: float) -> str:
+    """A colour with a share of white, or of black if it is negative."""
+    red, green, blue = ((1.0 - abs(share)) * part + max(share, 0.0) for part in to_rgb(colour))
+    return to_hex((red, green, blue))
+
+
+def _compensated(method: cells.Method) -> bool | None:
+    if "compensated" in method.part.options:
+        return bool(method.part.options["compensated"])
+    try:
+        default = getattr(estimator_class(method.part.method), "compensated", None)
+    except InputError:
+        return None
+    return default if isinstance(default, bool) else None
+
+
+def _is_twin(one: cells.Method, other: cells.Method, compensated: dict[str, bool | None]) -> bool:
+    flags = compensated[one.name], compensated[other.name]
+    if None in flags or flags[0] == flags[1] or one.part.method != other.part.method:
+        return False
+    rest = [{k: v for k, v in m.part.options.items() if k != "compensated"} for m in (one, other)]
+    return rest[0] == rest[1]

@@ -1,0 +1,114 @@
+"""The figures of one case, by method, quantity, metric, window and reference.
+
+A case is what cells share that differ in their draws only: one ride, IMU, mount and odometry, and
+one value of every axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import pandas as pd
+
+from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
+from simrail.scoring.table import CURVE_PREFIX, FULL, SCORE_COLUMNS
+
+CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry")
+
+
+class Figure(NamedTuple):
+    """Mean over draws, its standard deviation between draws (NaN for one draw), number of draws."""
+
+    value: float
+    sd: float
+    draws: int
+
+
+NOTHING = Figure(float("nan"), float("nan"), 0)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Averaged figures of one case.
+
+    Attributes
+    ----------
+    labels : dict of str to str
+        What the case is: `CASE_COLUMNS` and the axes.
+    table : pandas.DataFrame
+        Rows of `simrail.scoring.table.aggregate` of this case.
+    found : dict
+        (estimator, quantity, band, reference, window, metric) to `Figure`.
+    """
+
+    labels: dict[str, str]
+    table: pd.DataFrame
+    found: dict[tuple[str, str, str, str, str, str], Figure]
+
+    def get(
+        self,
+        estimator: str,
+        quantity: str,
+        metric: str,
+        *,
+        band: str = FULL,
+        window: str = "whole",
+        reference: str = "truth",
+    ) -> Figure:
+        """One figure; NaN and no draws if there is none."""
+        return self.found.get((estimator, quantity, band, reference, window, metric), NOTHING)
+
+    def estimators(self) -> list[str]:
+        """Names of the methods, odometry included, in the order of the table."""
+        return [str(name) for name in self.table["estimator"].unique()]
+
+    def curves(self) -> list[str]:
+        """Windows of the single curves that have a figure, in the order of the track."""
+        rows = self.table[self.table["draws"] > 0]
+        names = {str(name) for name in rows["window"].unique() if str(name).startswith(CURVE_PREFIX)}
+        return sorted(names, key=_segment_number)
+
+    def metric_of_any(self, estimator: str, metric: str, *, window: str = "whole") -> Figure:
+        """A figure that belongs to a method as a whole (nis, us_per_sample)."""
+        for (name, _, _, reference, where, what), figure in self.found.items():
+            if (name, reference, where, what) == (estimator, "truth", window, metric):
+                return figure
+        return NOTHING
+
+
+def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Figures]:
+    """Split a score table into its cases and average each over its draws."""
+    table = aggregate(scores, cell_table)
+    if table.empty:
+        return []
+    axes = [str(n) for n in table.columns if n not in (*SCORE_COLUMNS, *AGGREGATE_COLUMNS)]
+    keys = [*CASE_COLUMNS, *axes]
+    result = []
+    for values, rows in table.groupby(keys, observed=True, dropna=False, sort=False):
+        labels = {name: str(value) for name, value in zip(keys, values, strict=True)}
+        result.append(Figures(labels, rows, _index(rows)))
+    return result
+
+
+def of_cell(all_cases: list[Figures], cell: dict[str, object]) -> Figures | None:
+    """The case that a cell belongs to."""
+    for case in all_cases:
+        if all(str(cell[name]) == value for name, value in case.labels.items() if name in cell):
+            return case
+    return None
+
+
+def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str, str], Figure]:
+    keys = ("estimator", "quantity", "band", "reference", "window", "metric")
+    names = [rows[name].astype(str) for name in keys]
+    # Two levels of draws: what differs between tracks and what differs between sensors add up.
+    variance = rows["sd_sensor"].fillna(0.0) ** 2 + rows["sd_track"].fillna(0.0) ** 2
+    sd = (variance**0.5).where(rows["draws"] > 1)
+    values = zip(rows["value"], sd, rows["draws"], strict=True)
+    return {key: Figure(*value) for key, value in zip(zip(*names, strict=True), values, strict=True)}
+
+
+def _segment_number(window: str) -> tuple[int, str]:
+    digits = [word for word in window.split() if word.isdigit()]
+    return (int(digits[0]) if digits else 0, window)

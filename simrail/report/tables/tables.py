@@ -1,0 +1,178 @@
+"""Tables of the page: the subset of the score table that a person reads first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.pivot import Figure, Figures
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One table cell: its text, the spread behind it, and how it is marked."""
+
+    text: str
+    spread: str = ""
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method."""
+
+    label: str
+    baseline: str
+    colour: str
+    cells: list[Cell]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with one or two header lines.
+
+    Attributes
+    ----------
+    groups : list of (str, int)
+        Upper header: text and number of columns; empty for none.
+    columns : list of str
+        Lower header.
+    rows : list of Row
+        The rows.
+    """
+
+    groups: list[tuple[str, int]]
+    columns: list[str]
+    rows: list[Row]
+
+
+DECIMALS = 3
+"""Of an error in the table, degrees."""
+
+_ERRORS = (
+    ("roll", "rms", "straight", "straight"),
+    ("roll", "rms", "transition", "transition"),
+    ("roll", "rms", "curve", "curve"),
+    ("roll", "rms", "whole", "whole"),
+    ("roll", "max", "whole", "max"),
+    ("pitch", "rms", "curve", "curve"),
+    ("pitch", "rms", "whole", "whole"),
+    ("pitch", "max", "whole", "max"),
+    ("yaw_debiased", "rms", "whole", "whole"),
+    ("yaw_debiased", "final", "whole", "final"),
+)
+_GROUPS = (
+    ("roll error, rms", 4),
+    ("", 1),
+    ("pitch error, rms", 2),
+    ("", 1),
+    ("yaw error\u00b9, rms", 1),
+    ("", 1),
+)
+
+
+def error_table(case: Figures, styles: Sequence[MethodStyle], *, reference: str) -> Table:
+    """Errors of every method in degrees; the best method under test and losses to 'design angles' marked."""
+    design = next((style.name for style in styles if not style.uses_imu), None)
+    columns = [c for c in _ERRORS if _is_there(case, styles, *c[:3], reference)]
+    marks: list[dict[str, str]] = []
+    for quantity, metric, window, _ in columns:
+        values = {
+            s.name: abs(case.get(s.name, quantity, metric, window=window, reference=reference).value)
+            for s in styles
+        }
+        tested = {s.name: values[s.name] for s in styles if s.uses_imu and values[s.name] >= 0.0}
+        floor = values.get(design or "", float("nan"))
+        mark = {name: "worse" for name, value in tested.items() if reference == "truth" and value > floor}
+        if tested:
+            # As they are shown: what reads the same is as good.
+            least = round(min(tested.values()), DECIMALS)
+            for name, value in tested.items():
+                if round(value, DECIMALS) == least:
+                    mark[name] = (mark.get(name, "") + " best").strip()
+        marks.append(mark)
+    rows = []
+    for style in styles:
+        cells = []
+        for (quantity, metric, window, _), mark in zip(columns, marks, strict=True):
+            found = case.get(style.name, quantity, metric, window=window, reference=reference)
+            cells.append(_cell(found, decimals=DECIMALS, mark=mark.get(style.name, "")))
+        rows.append(Row(style.label, style.baseline, style.colour, cells))
+    return Table(_group_spans(columns), [word for *_, word in columns], rows)
+
+
+def consistency_table(case: Figures, styles: Sequence[MethodStyle]) -> Table:
+    """NEES, coverage, NIS and time per sample."""
+    rows = []
+    for style in styles:
+        cells = [
+            _cell(case.get(style.name, quantity, metric), decimals=decimals, scale=scale)
+            for metric, decimals, scale in (("nees", 2, 1.0), ("coverage95", 1, 100.0))
+            for quantity in ("roll", "pitch", "yaw")
+        ]
+        cells.append(_cell(case.metric_of_any(style.name, "nis"), decimals=2))
+        cells.append(_cell(case.metric_of_any(style.name, "us_per_sample"), decimals=3))
+        rows.append(Row(style.label, style.baseline, style.colour, cells))
+    groups = [("NEES (1 is right)", 3), ("inside the 95 % interval, %", 3), ("NIS", 1), ("time", 1)]
+    return Table(
+        groups, ["roll", "pitch", "yaw", "roll", "pitch", "yaw", "(1 is right)", "\u00b5s per sample"], rows
+    )
+
+
+def odometry_table(all_cases: Sequence[Figures]) -> Table:
+    """Position and speed errors of the odometry, one row per case that differs."""
+    rows, seen = [], set()
+    for case in all_cases:
+        for name in case.estimators():
+            if not name.startswith("odometry:"):
+                continue
+            cells = [
+                _cell(case.get(name, "position", "rms"), decimals=3),
+                _cell(case.get(name, "position", "max"), decimals=3),
+                _cell(case.get(name, "distance_relative", "final"), decimals=3, scale=100.0),
+                _cell(case.get(name, "speed", "rms", window="moving"), decimals=4),
+                _cell(case.get(name, "position", "coverage95"), decimals=1, scale=100.0),
+            ]
+            label = (
+                f"{case.labels['ride']} \u00b7 {case.labels['mount']} ({case.labels['imu']}) \u00b7 "
+                f"{name.removeprefix('odometry:')}"
+            )
+            key = (label, *(cell.text for cell in cells))
+            if key not in seen:
+                seen.add(key)
+                rows.append(Row(label, "", "", cells))
+    groups = [("position error, m", 2), ("distance", 1), ("speed error, m/s", 1), ("inside its 95 %", 1)]
+    return Table(groups, ["rms", "max", "final, %", "rms, moving", "interval, %"], rows)
+
+
+def _cell(found: Figure, *, decimals: int, mark: str = "", scale: float = 1.0) -> Cell:
+    if found.draws == 0 or found.value != found.value:
+        return Cell("\u2013", mark="none")
+    spread = f"{scale * found.sd:.{decimals}f}" if found.sd > 0.0 else ""
+    value = round(scale * found.value, decimals) + 0.0  # no negative zero
+    return Cell(f"{value:.{decimals}f}".replace("-", "\u2212"), spread, mark)
+
+
+def _is_there(
+    case: Figures, styles: Sequence[MethodStyle], quantity: str, metric: str, window: str, reference: str
+) -> bool:
+    return any(case.get(s.name, quantity, metric, window=window, reference=reference).draws for s in styles)
+
+
+_WORDS = {
+    "roll": "roll error, \u00b0",
+    "pitch": "pitch error, \u00b0",
+    "yaw_debiased": "yaw error\u00b9, \u00b0",
+}
+
+
+def _group_spans(columns: Sequence[tuple[str, str, str, str]]) -> list[tuple[str, int]]:
+    spans: list[tuple[str, int]] = []
+    for quantity, metric, _, _ in columns:
+        word = _WORDS[quantity] + (" rms" if metric == "rms" else "")
+        if spans and spans[-1][0] == word:
+            spans[-1] = (word, spans[-1][1] + 1)
+        else:
+            spans.append((word if metric == "rms" else "", 1))
+    return spans

@@ -1,0 +1,1 @@
+"""What happened: a vehicle's ride over a laid track, its truth, and the cache of both."""

@@ -1,0 +1,167 @@
+"""A truth on disk: arrays that an engine fills piece by piece, and a header that says they are complete.
+
+Large arrays are mapped, not copied, so a long ride neither needs nor takes memory. What a truth means
+is said in `simrail.ride.truth`; which rides are kept, in `simrail.ride.cache`.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import os
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simrail.core.jit import FloatArray
+from simrail.ride.truth import BodyMotion, Truth
+from simrail.track.design import TrackDesign
+
+BODY_ARRAYS = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
+"""Columns of a body on disk: six triples, in this order."""
+
+
+def create_arrays(
+    folder: Path, rows: int, *, bodies: int, wheels: int, wheel_states: int
+) -> dict[str, FloatArray]:
+    """Create the arrays of a truth on disk, to be filled piece by piece in bounded memory.
+
+    Returns
+    -------
+    dict of str to ndarray
+        ``time_s`` and ``reference_position_m`` (rows,), ``body_<i>`` (rows, 18), ``wheel_<i>`` (rows,)
+        and, if `wheel_states` > 0, ``wheel_state_<i>`` (rows, wheel_states), mapped to .npy files.
+
+    Raises
+    ------
+    OSError
+        If the disk has no room for all of them.
+    """
+    shapes: dict[str, tuple[int, ...]] = {"time_s": (rows,), "reference_position_m": (rows,)}
+    shapes |= {f"body_{i}": (rows, 3 * len(BODY_ARRAYS)) for i in range(bodies)}
+    shapes |= {f"wheel_{i}": (rows,) for i in range(wheels)}
+    if wheel_states:
+        shapes |= {f"wheel_state_{i}": (rows, wheel_states) for i in range(wheels)}
+    folder.mkdir(parents=True, exist_ok=True)
+    made: dict[str, FloatArray] = {}
+    for name, shape in shapes.items():
+        place = folder / f"{name}.npy"
+        made[name] = np.lib.format.open_memmap(place, mode="w+", dtype=np.float64, shape=shape)
+        # A mapped file has holes: a disk that is full when they are written to kills the process.
+        if hasattr(os, "posix_fallocate"):
+            with place.open("r+b") as file:
+                os.posix_fallocate(file.fileno(), 0, place.stat().st_size)
+    return made
+
+
+def let_go(arrays: dict[str, FloatArray]) -> None:
+    """Drop the pages of arrays on disk from this process; the system writes out what was changed."""
+    for array in arrays.values():
+        mapped = getattr(array, "_mmap", None)
+        if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
+            mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def write_header(
+    folder: Path,
+    *,
+    track: TrackDesign,
+    bodies: dict[str, tuple[float, float]],
+    wheels: dict[str, float],
+    gravity_mps2: float,
+    manifest: dict[str, Any],
+) -> None:
+    """Write what goes with the arrays. Done last: a folder without it was interrupted, and is no truth.
+
+    ``bodies`` maps names to (offset_m, height_m), ``wheels`` names to radii, in the order of the arrays.
+    """
+    plain = {
+        "track": track.to_dict(),
+        "bodies": bodies,
+        "wheels": wheels,
+        "gravity_mps2": gravity_mps2,
+        "manifest": manifest,
+        "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))},
+    }
+    (folder / "truth.json").write_text(json.dumps(plain), encoding="utf-8")
+
+
+def save_truth(truth: Truth, folder: Path) -> None:
+    """Write a truth into a folder, losslessly."""
+    states = max((state.shape[1] for state in truth.wheel_states.values()), default=0)
+    arrays = create_arrays(
+        folder,
+        len(truth.time_s),
+        bodies=len(truth.bodies),
+        wheels=len(truth.wheel_angles),
+        wheel_states=states,
+    )
+    arrays["time_s"][:] = truth.time_s
+    arrays["reference_position_m"][:] = truth.reference_position_m
+    for i, body in enumerate(truth.bodies.values()):
+        arrays[f"body_{i}"][:] = np.hstack([getattr(body, name) for name in BODY_ARRAYS])
+    for i, wheel in enumerate(truth.wheel_angles):
+        arrays[f"wheel_{i}"][:] = truth.wheel_angles[wheel]
+        if states:
+            arrays[f"wheel_state_{i}"][:] = truth.wheel_states[wheel]
+    write_header(
+        folder,
+        track=truth.track,
+        bodies={name: (body.offset_m, body.height_m) for name, body in truth.bodies.items()},
+        wheels={name: truth.wheel_radius_m[name] for name in truth.wheel_angles},
+        gravity_mps2=truth.gravity_mps2,
+        manifest=truth.manifest,
+    )
+
+
+def load_truth(folder: Path) -> Truth:
+    """Read what `save_truth` or an engine wrote; large arrays are mapped from disk, not copied.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If the folder is incomplete or damaged.
+    """
+    plain = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    for name, crc32 in plain["crc32"].items():
+        if _crc32(folder / name) != crc32:
+            raise ValueError(f"{name} is not what was written")
+
+    def read(name: str) -> FloatArray:
+        array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
+        return array
+
+    time_s = np.array(read("time_s"))
+    bodies = {}
+    for i, (name, (offset, height)) in enumerate(plain["bodies"].items()):
+        stored = read(f"body_{i}")
+        if len(stored) != len(time_s):
+            raise ValueError(f"body_{i}.npy has {len(stored)} rows, not {len(time_s)}")
+        parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(BODY_ARRAYS)}
+        bodies[name] = BodyMotion(offset_m=offset, height_m=height, **parts)
+    wheels = plain["wheels"]
+    has_states = (folder / "wheel_state_0.npy").exists()
+    return Truth(
+        time_s=time_s,
+        track=TrackDesign.from_dict(plain["track"]),
+        reference_position_m=np.array(read("reference_position_m")),
+        bodies=bodies,
+        wheel_angles={wheel: read(f"wheel_{i}") for i, wheel in enumerate(wheels)},
+        wheel_states={wheel: read(f"wheel_state_{i}") for i, wheel in enumerate(wheels)}
+        if has_states
+        else {},
+        wheel_radius_m=wheels,
+        gravity_mps2=plain["gravity_mps2"],
+        manifest=plain["manifest"],
+    )
+
+
+def _crc32(file: Path) -> int:
+    """Checksum of a file: a disk, or a copy between machines, may change bits in silence."""
+    found = 0
+    with file.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            found = zlib.crc32(block, found)
+    return found

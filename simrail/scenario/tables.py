@@ -1,0 +1,268 @@
+"""What a person writes into the tables of a scenario, as models, one per table.
+
+Only the form of each field is judged here. Sensors beside the IMU are in `simrail.scenario.sensor_tables`;
+the scenario itself, and the reading of it, in `simrail.scenario.scenario`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from simrail.core.errors import InputError
+from simrail.core.toml_files import Part
+from simrail.scenario.axes import Listed, each
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
+"""A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
+
+Positive = Annotated[float, Field(gt=0.0)]
+
+Draws = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class IrregularityPart(Part):
+    """``[irregularity]``: how the rails deviate from the design. Without it they do not."""
+
+    spectrum: Listed[str]
+    wavelengths_m: Annotated[tuple[Positive, Positive], Field(description="shortest, longest")] = (1.5, 100.0)
+    fade_m: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 40.0
+    scale: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = 1.0
+
+    @field_validator("wavelengths_m")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[0] >= value[1]:
+            raise ValueError(f"are not (shortest, longest): {list(value)}")
+        return value
+
+
+class StopPart(Part):
+    """A stop on the way: where the reference point of the vehicle stands, and for how long."""
+
+    position_m: float
+    dwell_s: Annotated[float, Field(ge=0.0, le=3600.0)]
+
+
+class RidePart(Part):
+    """``[[ride]]``: one ride over the track. It runs backwards if ``end_m < start_m``.
+
+    With ``reverse = true`` it is ridden the other way, from ``end_m`` to ``start_m``, stops in turn; with
+    ``reverse = [false, true]`` both ways. Without ``end_m`` and ``speed_kmh`` the vehicle stands where it
+    is, for ``rest_s + final_rest_s``.
+    """
+
+    name: Name
+    start_m: Listed[float]
+    end_m: Listed[float] | None = None
+    speed_kmh: Listed[Annotated[float, Field(gt=0.0, le=400.0)]] | None = None
+    acceleration_mps2: Listed[Annotated[float, Field(gt=0.0, le=3.0)]] = 0.6
+    jerk_mps3: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = 0.4
+    rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 20.0
+    final_rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 5.0
+    stops: tuple[StopPart, ...] = ()
+    drive: Listed[Literal["guide", "wheels"]] = "guide"
+    reverse: Listed[bool] = False
+
+    @model_validator(mode="after")
+    def _goes_or_stands(self) -> RidePart:
+        if (self.end_m is None) != (self.speed_kmh is None):
+            missing = "end_m" if self.end_m is None else "speed_kmh"
+            raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")
+        if self.end_m is None and self.stops:
+            raise ValueError("a standstill, without end_m, has no stops on the way")
+        if self.end_m is None and any(each(self.reverse)):
+            raise ValueError("a standstill, without end_m, cannot be reversed")
+        return self
+
+    @property
+    def as_ridden(self) -> RidePart:
+        """The ride from where it really starts to where it really ends; itself unless reversed."""
+        if not self.reverse:
+            return self
+        turned = {"start_m": self.end_m, "end_m": self.start_m, "stops": self.stops[::-1], "reverse": False}
+        return self.model_copy(update=turned)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle does not move."""
+        return self.end_m is None
+
+
+class RailConditionPart(Part):
+    """``[[rail_condition]]``: what lies on the rails, by a name or by its friction coefficient."""
+
+    start_m: float
+    end_m: float
+    condition: Literal["dry", "wet", "leaves"] | None = None
+    friction: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    rails: Literal["both", "left", "right"] = "both"
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.condition is None) == (self.friction is None):
+            raise InputError(
+                "needs either a condition or a friction coefficient",
+                field="condition",
+                value=None if self.condition is None else f"{self.condition}, friction {self.friction:g}",
+                limit="dry, wet or leaves",
+                remedy='give condition = "leaves" or friction = 0.05',
+            )
+        return self
+
+    @property
+    def words(self) -> str:
+        """What lies there, for reports."""
+        what = self.condition or f"friction {self.friction:g}"
+        return what if self.rails == "both" else f"{what}, {self.rails} rail"
+
+
+NOISE = "noise"
+"""Word in the name of an IMU or of its grade that says that noise was added to its signals."""
+
+
+class ImuPart(Part):
+    """``[[imu]]``: an IMU of some grade, mounted on a body of the vehicle.
+
+    ``sensor_draws`` limits the draws of this IMU below those of ``[monte_carlo]``: an ideal one has no
+    errors to be drawn, so that one or two draws (of the encoder) say all.
+    """
+
+    name: Name
+    grade: Listed[str]
+    body: Listed[str]
+    position_m: tuple[float, float, float]
+    roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
+    yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    sensor_draws: Draws | None = None
+
+    @property
+    def noise_added(self) -> bool:
+        """Whether it stands for another one with noise added, as a report sets the two side by side."""
+        return NOISE in self.name or NOISE in str(self.grade)
+
+    @field_validator("position_m")
+    @classmethod
+    def _metres(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        if max(abs(part) for part in value) > 50.0:
+            raise ValueError(
+                f"lies more than 50 m from the vehicle's reference point: {list(value)}; it is in metres"
+            )
+        return value
+
+
+class EarthPart(Part):
+    """``[earth]``: the Earth turns. Without it, it is at rest.
+
+    ``x_axis_deg`` is the direction of the track's X axis, counter-clockwise from east.
+    """
+
+    latitude_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]]
+    x_axis_deg: Listed[Annotated[float, Field(ge=-360.0, le=360.0)]] = 0.0
+
+
+class TemperaturePart(Part):
+    """``[temperature]``: of the IMUs, from ``start_c`` to ``ambient_c``. Without it, that of calibration."""
+
+    start_c: Listed[Annotated[float, Field(ge=-60.0, le=120.0)]]
+    ambient_c: Listed[Annotated[float, Field(ge=-60.0, le=120.0)]]
+    time_constant_s: Listed[Positive] = 600.0
+
+
+class EstimatorPart(Part):
+    """``[[estimator]]``: a method under a name, with the keyword arguments of its class."""
+
+    name: Name
+    method: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
+class MonteCarloPart(Part):
+    """``[monte_carlo]``: how often chance is asked.
+
+    Each of the ``samples`` draws a value from every distribution of the scenario, jointly by ``method``,
+    and has draws of its own: ``track_draws`` lay the rails anew, and each ride over them is recorded with
+    ``sensor_draws`` draws of the sensors. Without a distribution there is one sample.
+    """
+
+    samples: Draws = 1
+    method: Literal["latin_hypercube", "sobol"] = "latin_hypercube"
+    track_draws: Draws = 1
+    sensor_draws: Draws = 1
+
+    @model_validator(mode="after")
+    def _fills_the_space(self) -> MonteCarloPart:
+        if self.method == "sobol" and self.samples & (self.samples - 1):
+            raise InputError(
+                "Sobol points are balanced in powers of two only",
+                field="samples",
+                value=self.samples,
+                limit="1, 2, 4, 8, ...",
+                remedy=f"take {1 << self.samples.bit_length()}, or the method latin_hypercube",
+            )
+        return self
+
+
+class StopRulePart(Part):
+    """``[stop]``: draw no more once the 95 % interval of a mean is narrower than ``width``, in every case.
+
+    The mean over the draws of one figure of the score table, in its unit there; see
+    `simrail.scenario.stop_rule`.
+    """
+
+    estimator: str
+    quantity: str
+    metric: str
+    width: Positive
+    window: str = "whole"
+    reference: Literal["truth", "design"] = "truth"
+    band: str = "full"
+    least_draws: Annotated[int, Field(ge=2, le=1_000_000)] = 10
+
+
+class ScorePart(Part):
+    """``[score]``: what of the score table is kept; everything, unless said otherwise.
+
+    ``"curve:*"`` among the windows keeps every single curve.
+    """
+
+    windows: tuple[str, ...] | None = None
+    metrics: tuple[str, ...] | None = None
+
+
+class GeometryLimitsPart(Part):
+    """``[geometry.limits.<quantity>]``: limits that the report holds sections of 200 m against, mm.
+
+    ``error_sd_mm`` is asked of the estimate, not of the rails: standard deviation of its error in D1.
+    """
+
+    sd_mm: Positive | None = None
+    defect_mm: Positive | None = None
+    error_sd_mm: Positive | None = None
+
+
+class GeometryPart(Part):
+    """``[geometry]``: in which wavelength bands, and over which base of twist, rail geometry is scored.
+
+    ``bands`` are those of `simrail.track.bands` by name; ``own_bands`` are others, name = [shortest,
+    longest], m. ``limits`` change no score: what lies beyond them is marked in the report.
+    """
+
+    bands: tuple[Literal["D0", "D1", "D2", "D3"], ...] = ("D0", "D1", "D2", "D3")
+    own_bands: dict[Name, tuple[Positive, Positive]] = Field(default_factory=dict)
+    twist_base_m: Annotated[float, Field(gt=0.0, le=50.0)] = 3.0
+    limits: dict[Literal["alignment", "vertical_profile", "cross_level"], GeometryLimitsPart] = Field(
+        default_factory=dict
+    )
+
+    @field_validator("own_bands")
+    @classmethod
+    def _bands(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        for name, (shortest, longest) in value.items():
+            if name in ("full", "D0", "D1", "D2", "D3"):
+                raise ValueError(f"{name} is a name that is taken; give the band another one")
+            if shortest >= longest:
+                raise ValueError(f"{name} is not (shortest, longest): {[shortest, longest]}")
+        return value

@@ -1,0 +1,1 @@
+"""Truth meets estimate: metrics over windows, their table, and statistics over draws."""

@@ -1,0 +1,225 @@
+"""Confidence intervals by resampling, where draws hang together in clusters.
+
+Chance has two levels in a campaign: the track is laid anew (a cluster), and each ride over it is recorded
+with several draws of the sensors. Draws over one track have the track in common and are not independent
+of each other. An interval therefore resamples whole clusters (Davison & Hinkley 1997, section 3.8:
+resample the upper level only, and what lies below goes with it); one that counts all draws as independent
+would be too narrow by as much as the track matters.
+
+* Means: bootstrap-t (Hall 1988; Efron & Tibshirani 1993, chapter 12), right also for ten clusters.
+* Standard deviations and percentiles: BCa (Efron 1987), which needs some thirty clusters.
+* Fewer than `FEWEST` clusters say too little of themselves to be resampled: Student's t for the mean, and
+  no interval for the rest.
+
+Resamples come from streams of their own names, so the same table gives the same intervals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+from scipy.special import ndtr, ndtri
+
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
+
+CONFIDENCE = 0.95
+RESAMPLES = 2000
+FEWEST = 5
+"""Clusters below which nothing is resampled."""
+
+SEED = 1
+"""Of the resampling: an analysis has no draws of the scenario."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate and its confidence interval; bounds are NaN where there are too few draws."""
+
+    value: float
+    low: float
+    high: float
+
+
+def resampled(clusters: int, *, resamples: int = RESAMPLES) -> FloatArray:
+    """How often each cluster is drawn in each resample, (resamples, clusters)."""
+    drawn = stream(SEED, "bootstrap", clusters).multinomial(
+        clusters, np.full(clusters, 1.0 / clusters), size=resamples
+    )
+    return drawn.astype(np.float64)
+
+
+def mean_interval(
+    sums: FloatArray, counts: FloatArray, *, confidence: float = CONFIDENCE
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means over all draws with their intervals, of many groups at once.
+
+    Parameters
+    ----------
+    sums, counts : ndarray (g, k)
+        Sum and number of the values of each of k clusters in each of g groups; a cluster without values
+        has 0 of both.
+    confidence : float
+        Of the interval, two-sided.
+
+    Returns
+    -------
+    value, low, high : ndarray (g,)
+        Bounds are NaN for groups with fewer than two clusters.
+    """
+    sums, counts = np.atleast_2d(sums), np.atleast_2d(counts)
+    value, low, high = (np.full(len(sums), np.nan) for _ in range(3))
+    filled = counts > 0
+    number = filled.sum(axis=1)
+    for k in np.unique(number[number > 0]):
+        rows = np.flatnonzero(number == k)
+        # Clusters with values first: the others take no part in the resampling.
+        order = np.argsort(~filled[rows], axis=1, kind="stable")[:, :k]
+        n = np.take_along_axis(counts[rows], order, axis=1).astype(np.float64)
+        total = np.take_along_axis(sums[rows], order, axis=1)
+        value[rows], low[rows], high[rows] = _means(total, n, confidence)
+    return value, low, high
+
+
+def _means(total: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means (g,) and intervals of groups whose k clusters all have values."""
+    k = n.shape[1]
+    every = n.sum(axis=1)
+    mean = total.sum(axis=1) / every
+    off = total - mean[:, None] * n
+    scale = np.sqrt(k / max(k - 1, 1))
+    error = scale * np.sqrt(np.square(off).sum(axis=1)) / every
+    tail = 0.5 * (1.0 - confidence)
+    if k == 1:
+        return mean, np.full_like(mean, np.nan), np.full_like(mean, np.nan)
+    if k < FEWEST:
+        reach = float(stats.t(k - 1).ppf(1.0 - tail)) * error
+        return mean, mean - reach, mean + reach
+    weights = resampled(k)
+    low, high = np.empty_like(mean), np.empty_like(mean)
+    step = max(1, 4_000_000 // len(weights))
+    for begin in range(0, len(mean), step):
+        part = slice(begin, begin + step)
+        m, d = n[part].T, off[part].T
+        drawn = weights @ m
+        shift = (weights @ d) / drawn
+        square = weights @ d**2 - 2.0 * shift * (weights @ (d * m)) + shift**2 * (weights @ m**2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = shift * drawn / (scale * np.sqrt(np.maximum(square, 0.0)))
+        # One cluster drawn k times has no spread: the resample says nothing.
+        t[~np.isfinite(t)] = np.nan
+        known = ~np.isnan(t).all(axis=0)
+        t[:, ~known] = 0.0
+        upper, lower = np.nanquantile(t, [1.0 - tail, tail], axis=0)
+        low[part] = mean[part] - upper * error[part]
+        high[part] = mean[part] - lower * error[part]
+    return mean, low, high
+
+
+def interval(
+    values: npt.ArrayLike,
+    clusters: npt.ArrayLike | None = None,
+    *,
+    statistic: str = "mean",
+    confidence: float = CONFIDENCE,
+) -> Interval:
+    """Confidence interval of a statistic of all draws.
+
+    Parameters
+    ----------
+    values : array_like (n,)
+        One per draw; what is not finite is left out.
+    clusters : array_like (n,), optional
+        What belongs together (the track); without, or where there is one cluster only, each value is one
+        of its own and the interval speaks of this track.
+    statistic : str
+        ``"mean"``, ``"sd"``, or ``"p"`` and a percentile, e.g. ``"p95"``.
+    confidence : float
+        Of the interval, two-sided.
+    """
+    kept, labels = clustered(values, clusters)
+    if len(kept) == 0:
+        return Interval(np.nan, np.nan, np.nan)
+    k = int(labels.max()) + 1
+    if statistic == "mean":
+        sums = np.asarray(np.bincount(labels, kept, k), dtype=np.float64)
+        counts = np.asarray(np.bincount(labels, minlength=k), dtype=np.float64)
+        value, low, high = mean_interval(sums, counts, confidence=confidence)
+        return Interval(float(value[0]), float(low[0]), float(high[0]))
+    of = _weighted(statistic, kept)
+    whole = float(of(np.ones((1, len(kept))))[0])
+    if k < FEWEST:
+        return Interval(whole, np.nan, np.nan)
+    found = np.concatenate(
+        [of(part[:, labels]) for part in np.array_split(resampled(k), max(1, len(kept) // 500))]
+    )
+    left_out = of((1.0 - np.eye(k))[:, labels])
+    return Interval(whole, *_bca(whole, found, left_out, confidence))
+
+
+def _bca(value: float, found: FloatArray, left_out: FloatArray, confidence: float) -> tuple[float, float]:
+    """Bounds of the bias-corrected, accelerated bootstrap."""
+    found = found[np.isfinite(found)]
+    if len(found) == 0 or found.min() == found.max():
+        return np.nan, np.nan
+    below = np.mean(found < value) + 0.5 * np.mean(found == value)
+    bias = ndtri(np.clip(below, 1e-6, 1.0 - 1e-6))
+    away = left_out.mean() - left_out
+    spread = np.square(away).sum()
+    skew = np.power(away, 3).sum() / (6.0 * spread**1.5) if spread > 0.0 else 0.0
+    tail = ndtri(np.array([0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence)]))
+    shares = ndtr(bias + (bias + tail) / (1.0 - skew * (bias + tail)))
+    low, high = np.quantile(found, shares)
+    return float(low), float(high)
+
+
+def _weighted(statistic: str, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """A statistic as a function of how often each value counts, (resamples, n) -> (resamples,)."""
+    if statistic == "sd":
+        centred = values - values.mean()
+
+        def sd(weights: FloatArray) -> FloatArray:
+            n = weights.sum(axis=1)
+            mean = weights @ centred / n
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return np.sqrt(np.maximum(weights @ centred**2 - n * mean**2, 0.0) / (n - 1.0))
+
+        return sd
+    if not (statistic.startswith("p") and statistic[1:].replace(".", "", 1).isdigit()):
+        raise ValueError(f"no such statistic: {statistic}; mean, sd, or p and a percentile")
+    share = float(statistic[1:]) / 100.0
+    order = np.argsort(values, kind="stable")
+    ranked = values[order]
+
+    def percentile(weights: FloatArray) -> FloatArray:
+        # As numpy's: at share (n - 1) of the sorted values, in which each stands as often as it counts.
+        reach = np.cumsum(weights[:, order], axis=1)
+        place = share * (reach[:, -1] - 1.0)
+        lower = np.floor(place)
+        first = ranked[(reach <= lower[:, None]).sum(axis=1)]
+        after = np.minimum(lower + 1.0, reach[:, -1] - 1.0)
+        second = ranked[(reach <= after[:, None]).sum(axis=1)]
+        return first + (place - lower) * (second - first)
+
+    return percentile
+
+
+def clustered(
+    values: npt.ArrayLike, clusters: npt.ArrayLike | None, *, apart: bool = True
+) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """Finite values (n,), and the numbers of their clusters from 0 (n,).
+
+    Without clusters, or where there is one only (unless ``apart`` is false), each value is one of its own.
+    """
+    found = np.asarray(values, dtype=np.float64)
+    good = np.isfinite(found)
+    kept = found[good]
+    if clusters is not None and len(kept):
+        _, labels = np.unique(np.asarray(clusters)[good], return_inverse=True)
+        if labels.max() > 0 or not apart:
+            return kept, labels.astype(np.intp)
+    return kept, np.arange(len(kept), dtype=np.intp)

@@ -1,0 +1,236 @@
+"""Scores: where the truth and the estimate meet, and the only place.
+
+An estimate is compared with the true attitude of its mount and with the design angles of the track
+at its true position (the papers' reference), over windows that the track and the true speed define.
+Figures go into the score table of `simrail.scoring.table`. Nothing here knows scenarios or draws.
+
+``nis`` and ``us_per_sample`` belong to a method as a whole and stand beside its first quantity. What
+the other metrics mean stands in `simrail.scoring.metrics`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pandas as pd
+
+from simrail.core.columns import ATTITUDE, MOTION, ODOMETRY, require
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
+from simrail.ride.truth import Mount
+from simrail.scoring.metrics import IntArray, Row, Series, figures, nis_figures
+from simrail.scoring.table import OK, table_of
+from simrail.scoring.windows import chosen_windows, kept_metrics, windows_of
+
+
+class HasMotion(Protocol):
+    """A truth: anything that gives the motion of a mount."""
+
+    def motion(self, mount: Mount) -> pd.DataFrame:
+        """Motion of a mount, indexed by ``time_s``, columns `simrail.core.columns.MOTION`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What estimates of one recording are compared with; made once by `reference_of`.
+
+    Attributes
+    ----------
+    motion : pandas.DataFrame
+        True motion of the mount at the recording's IMU times.
+    design : ndarray (n, 3)
+        Design roll, pitch and yaw of the track at the true position, rad.
+    windows : dict of str to ndarray of int
+        Sample numbers of every window, possibly none.
+    """
+
+    motion: pd.DataFrame
+    design: FloatArray
+    windows: Mapping[str, IntArray]
+
+
+def truth_at_imu(truth: HasMotion, recording: Recording) -> pd.DataFrame:
+    """True motion of the recording's mount at its IMU times.
+
+    Raises
+    ------
+    InputError
+        If the recording is not inside the time span of the truth.
+    """
+    mount = Mount(recording.mount, recording.mount_body, recording.mount_position_m)
+    motion = truth.motion(mount)
+    have = motion.index.to_numpy(dtype=np.float64)
+    want = recording.imu.index.to_numpy(dtype=np.float64)
+    step = (have[-1] - have[0]) / max(len(have) - 1, 1)
+    if want[0] < have[0] - 1e-6 * step or want[-1] > have[-1] + 1e-6 * step:
+        raise InputError(
+            "the recording is not inside the time span of the truth",
+            field="imu.time_s",
+            value=(float(want[0]), float(want[-1])),
+            limit=f"{have[0]} to {have[-1]} s",
+            remedy="score a recording against the ride that it was measured on",
+        )
+    place = (want - have[0]) / step if step > 0 else np.zeros(len(want))
+    nearest = np.rint(place).astype(np.intp)
+    if np.abs(place - nearest).max() < 1e-3:
+        return motion.iloc[nearest].set_axis(recording.imu.index)
+    columns = {name: np.interp(want, have, motion[name].to_numpy()) for name in motion.columns}
+    return pd.DataFrame(columns, index=recording.imu.index)
+
+
+def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Reference:
+    """Make what the estimates of a recording are compared with.
+
+    Parameters
+    ----------
+    truth : Truth or pandas.DataFrame
+        The truth, or its motion at the IMU times as `truth_at_imu` gives it.
+    recording : Recording
+        The recording; its design track defines the windows.
+    """
+    motion = truth if isinstance(truth, pd.DataFrame) else truth_at_imu(truth, recording)
+    require(motion, (*ATTITUDE, *ODOMETRY), what="truth")
+    if len(motion) != len(recording.imu):
+        raise InputError("the truth is not at the IMU's times", field="truth", value=len(motion))
+    if not np.isfinite(motion[[n for n in MOTION if n in motion.columns]].to_numpy()).all():
+        raise InputError("the truth holds a value that is not finite", field="truth")
+    position = motion["position_m"].to_numpy()
+    frame = recording.track.frame(position)
+    design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
+    time = recording.imu.index.to_numpy(dtype=np.float64)
+    found = windows_of(recording.track, position, motion["speed_mps"].to_numpy(), time_s=time)
+    return Reference(motion, design, found)
+
+
+def score(
+    estimate: Estimate,
+    truth: HasMotion | pd.DataFrame | Reference,
+    recording: Recording,
+    *,
+    us_per_sample: float | None = None,
+    windows: Collection[str] | None = None,
+    metrics: Collection[str] | None = None,
+) -> pd.DataFrame:
+    """Score an estimate.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What the estimator concluded, at the recording's IMU times.
+    truth : Truth, pandas.DataFrame or Reference
+        The truth, its motion at the IMU times, or (fastest for many estimates) `reference_of` both.
+    recording : Recording
+        What the estimator saw.
+    us_per_sample : float, optional
+        Time that the method took, in microseconds per IMU sample.
+    windows, metrics : collection of str, optional
+        What to keep; by default all. ``"curve:*"`` in `windows` keeps the window of every curve.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns `simrail.scoring.table.FIGURE_COLUMNS`, one row per figure. What could not be computed
+        is a row whose status says why.
+
+    Raises
+    ------
+    InputError
+        If the estimate speaks of another mount or other times.
+    """
+    against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
+    states = estimate.states
+    if estimate.mount != recording.mount:
+        raise InputError("the estimate speaks of another mount", value=estimate.mount, limit=recording.mount)
+    if not np.array_equal(states.index.to_numpy(), recording.imu.index.to_numpy()):
+        raise InputError("the estimate is not at the recording's IMU times", field="states.time_s")
+    chosen = chosen_windows(against.windows, windows)
+    keep = kept_metrics(metrics)
+    rows: list[Row] = []
+    for series in _attitude_series(states, against):
+        rows += figures(series, chosen, keep)
+    for series in _other_series(states, against.motion):
+        rows += figures(series, chosen, keep)
+    first = rows[0][0] if rows else "roll"
+    if estimate.innovations is not None and "nis" in keep:
+        rows += nis_figures(estimate.innovations, first, chosen)
+    if us_per_sample is not None and "us_per_sample" in keep:
+        n = len(states)
+        rows.append((first, "full", "truth", "whole", "us_per_sample", float(us_per_sample), "us", n, OK))
+    return table_of(rows)
+
+
+def score_odometry(
+    recording: Recording,
+    truth: HasMotion | pd.DataFrame | Reference,
+    *,
+    windows: Collection[str] | None = None,
+    metrics: Collection[str] | None = None,
+) -> pd.DataFrame:
+    """Score the recording's odometry: position, speed and relative distance, as `score` does.
+
+    The estimator's name for it in the score table is ``odometry:<source>``. The relative distance
+    is the position error gained since the start over the true distance run in the whole ride.
+    """
+    against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
+    chosen, keep = chosen_windows(against.windows, windows), kept_metrics(metrics)
+    rows: list[Row] = []
+    states = recording.odometry
+    if recording.odometry_source == "truth":
+        states = states[list(ODOMETRY)]  # its sds are zero, of which nothing can be scored
+    for series in _other_series(states, against.motion):
+        rows += figures(series, chosen, keep)
+    return table_of(rows)
+
+
+def _wrap(angle: FloatArray) -> FloatArray:
+    """Angle in [-pi, pi)."""
+    with np.errstate(invalid="ignore"):  # what is not finite stays so, and is counted later
+        wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped
+
+
+def _attitude_series(states: pd.DataFrame, against: Reference) -> Iterator[Series]:
+    for column, name in enumerate(ATTITUDE):
+        if name not in states.columns:
+            continue
+        quantity = name.removesuffix("_rad")
+        angle = states[name].to_numpy(dtype=np.float64)
+        sd_name = f"{quantity}_sd_rad"
+        sd = np.rad2deg(states[sd_name].to_numpy(dtype=np.float64)) if sd_name in states.columns else None
+        for reference, values in (
+            ("truth", against.motion[name].to_numpy()),
+            ("design", against.design[:, column]),
+        ):
+            error = _wrap(angle - values)
+            yield Series(quantity, reference, np.rad2deg(error), sd if reference == "truth" else None)
+            if quantity == "yaw":
+                # The initial heading is given to the methods, not found by them.
+                reason = "" if np.isfinite(error[0]) else "estimate not finite at the first sample"
+                yield Series("yaw_debiased", reference, np.rad2deg(_wrap(error - error[0])), None, reason)
+
+
+_LINEAR = (
+    ("lateral", "lateral_m", "lateral_sd_m", 1e3),
+    ("vertical", "vertical_m", "vertical_sd_m", 1e3),
+    ("position", "position_m", "position_sd_m", 1.0),
+    ("speed", "speed_mps", "speed_sd_mps", 1.0),
+)
+
+
+def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[Series]:
+    for quantity, name, sd_name, scale in _LINEAR:
+        if name not in states.columns or name not in motion.columns:
+            continue
+        error = scale * (states[name].to_numpy(dtype=np.float64) - motion[name].to_numpy())
+        sd = scale * states[sd_name].to_numpy(dtype=np.float64) if sd_name in states.columns else None
+        yield Series(quantity, "truth", error, sd)
+        if quantity == "position":
+            run = float(np.abs(np.diff(motion[name].to_numpy())).sum())
+            reason = "" if run > 1.0 else "less than 1 m run"
+            yield Series("distance_relative", "truth", (error - error[0]) / max(run, 1.0), None, reason)

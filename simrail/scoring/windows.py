@@ -1,0 +1,76 @@
+"""Windows of a ride and the choice among windows and metrics, for every score alike."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.scoring.metrics import IntArray
+from simrail.scoring.table import (
+    CURVE_PREFIX,
+    EVERY_CURVE,
+    METRICS,
+    WINDOWS,
+)
+from simrail.track.design import CURVE, STRAIGHT, TRANSITION, TrackDesign
+
+STANDSTILL_MPS = 0.01
+"""Below this true speed the vehicle counts as standing."""
+
+
+CROP_S = 2.0
+"""What the window ``cropped`` leaves out at either end, as Briales et al. 2021 (section 7.1) do."""
+
+
+def windows_of(
+    track: TrackDesign, position: FloatArray, speed: FloatArray, *, time_s: FloatArray | None = None
+) -> dict[str, IntArray]:
+    """Sample numbers of every window, from places (n,) on the track, speeds (n,) and times (n,).
+
+    Without times there is no window ``cropped``.
+    """
+    moving = np.abs(speed) >= STANDSTILL_MPS
+    kind = track.kind(position)
+    masks = {
+        "whole": np.ones(len(position), dtype=bool),
+        "straight": moving & (kind == STRAIGHT),
+        "transition": moving & (kind == TRANSITION),
+        "curve": moving & (kind == CURVE),
+        "standstill": ~moving,
+        "moving": moving,
+    }
+    if time_s is not None:
+        masks["cropped"] = (time_s >= time_s[0] + CROP_S) & (time_s <= time_s[-1] - CROP_S)
+    found = {name: np.flatnonzero(mask) for name, mask in masks.items()}
+    in_curve = found["curve"]
+    segments = np.asarray(track.segment(position[in_curve]))
+    for number in np.unique(segments):
+        name = CURVE_PREFIX + track.segment_name(int(number))
+        found[name] = in_curve[segments == number]
+    return found
+
+
+def chosen_windows(found: Mapping[str, IntArray], wanted: Collection[str] | None) -> dict[str, IntArray]:
+    """Those of the windows found that are wanted; all if nothing is said."""
+    if wanted is None:
+        return dict(found)
+    for name in wanted:
+        if name not in WINDOWS and not name.startswith(CURVE_PREFIX):
+            raise InputError(
+                "no such window", value=name, limit="one of " + ", ".join((*WINDOWS, EVERY_CURVE))
+            )
+    every_curve = EVERY_CURVE in wanted
+    return {n: i for n, i in found.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
+
+
+def kept_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
+    """The metrics that are wanted; all if nothing is said."""
+    if wanted is None:
+        return METRICS
+    for name in wanted:
+        if name not in METRICS:
+            raise InputError("no such metric", value=name, limit="one of " + ", ".join(METRICS))
+    return tuple(name for name in METRICS if name in wanted)

@@ -1,0 +1,188 @@
+"""Truth in, recording out: everything that the logger on the train would have seen of a ride.
+
+The only place where sensors meet the truth. What comes out holds no true value, unless the true
+odometry is asked for by name (an ablation, labelled in every table).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD
+from simrail.core.errors import InputError
+from simrail.core.resample import resample
+from simrail.estimators.odometry.encoder import encoder_odometry
+from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
+from simrail.recording.sheets.grades import ImuGrade
+from simrail.recording.sheets.imu_sheet import imu_sheet
+from simrail.ride.truth import Mount, Truth
+from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
+from simrail.sensors.imu import EarthRate, arrived, sample_imu
+from simrail.sensors.imu_response import Temperature
+from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
+from simrail.sensors.rail_sensor import RailSensorSpec, sample_rails
+from simrail.track.laid_track import LaidTrack
+
+
+def measure(
+    truth: Truth,
+    *,
+    name: str,
+    mount: Mount,
+    grade: ImuGrade,
+    encoder: EncoderSpec | None = None,
+    magnetometer: MagnetometerSpec | None = None,
+    rail_sensor: RailSensorSpec | None = None,
+    rails: LaidTrack | None = None,
+    odometry: str = "encoder",
+    seed: int,
+    draw: int,
+    earth_rate: EarthRate | None = None,
+    temperature: Temperature | None = None,
+) -> Recording:
+    """Record a ride.
+
+    Parameters
+    ----------
+    truth : Truth
+        What happened.
+    name : str
+        Name of the ride.
+    mount : Mount
+        Where the IMU sits.
+    grade : ImuGrade
+        The IMU.
+    encoder : EncoderSpec, optional
+        The wheel encoder; None for a train without one.
+    magnetometer : MagnetometerSpec, optional
+        A magnetometer in the housing of the IMU, sampled at the IMU's times.
+    rail_sensor : RailSensorSpec, optional
+        A sensor beside the IMU that sees both rails.
+    rails : LaidTrack, optional
+        The rails that the ride was run on (`simrail.ride.ride.rails_of`), for that sensor.
+    odometry : str
+        ``"encoder"``, or ``"truth"`` for the true position, speed and acceleration of the mount.
+    seed, draw : int
+        Seed of the scenario and number of the sensor draw: a new draw is a new set of sensors.
+    earth_rate : EarthRate, optional
+        Rotation of the Earth; None for an Earth at rest.
+    temperature : Temperature, optional
+        Temperature of the IMU over the ride; None for that of its calibration.
+
+    Returns
+    -------
+    Recording
+        Its odometry speaks of the mount; the train knows where the mount stood at time 0. Samples of the
+        IMU that got lost are filled by straight lines and listed in `Recording.gaps`.
+
+    Raises
+    ------
+    InputError
+        If body, wheel or odometry is unknown, a rate does not divide the truth's, or a rail sensor has no
+        rails to see.
+    """
+    motion = truth.motion(mount)
+    imu, delay_s = sample_imu(
+        motion,
+        grade,
+        seed=seed,
+        draw=draw,
+        name=mount.name,
+        earth=earth_rate,
+        temperature=temperature,
+    )
+    gaps = None
+    if grade.dropped_fraction > 0.0:
+        came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
+        imu, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
+    start_m = float(motion["position_m"].iloc[0])
+    counts, sheet = None, None
+    if encoder is not None:
+        wheel = truth.wheel_at(encoder.wheel)
+        angle = truth.wheel_angle(wheel)
+        radius = truth.wheel_radius_m[wheel]
+        if encoder.radius == "calibrated":
+            position = motion["position_m"].to_numpy()
+            radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
+        counts = sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw)
+        sheet = EncoderSheet(
+            wheel=wheel,
+            pulses_per_revolution=encoder.counts_per_revolution,
+            wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
+            rate_hz=encoder.rate_hz,
+        )
+    magnetic = None
+    if magnetometer is not None:
+        magnetic = sample_magnetometer(
+            motion,
+            imu.index,
+            magnetometer,
+            seed=seed,
+            draw=draw,
+            name=mount.name,
+            track_m=(truth.track.start_m, truth.track.end_m),
+        )
+    seen = None
+    if rail_sensor is not None:
+        if rails is None:
+            raise InputError("a rail sensor needs rails to see", field="rails", remedy="give rails_of(ride)")
+        seen = sample_rails(motion, imu.index, rail_sensor, rails, seed=seed, draw=draw, name=mount.name)
+    if odometry == "truth":
+        frame = true_odometry(motion, imu.index)
+    elif odometry != "encoder":
+        raise InputError("no such odometry", field="odometry", value=odometry, limit="encoder, truth")
+    elif encoder is None or counts is None or sheet is None:
+        raise InputError(
+            "the odometry needs an encoder",
+            field="odometry",
+            value=odometry,
+            remedy='add an [encoder], or set odometry = "truth" for an ablation',
+        )
+    else:
+        frame = encoder_odometry(
+            counts,
+            sheet,
+            imu.index.to_numpy(),
+            start_position_m=start_m,
+            radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
+        )
+    return Recording(
+        name=name,
+        imu=imu,
+        imu_sheet=imu_sheet(grade, delay_s=delay_s),
+        mount=mount.name,
+        mount_body=mount.body,
+        mount_position_m=mount.position_m,
+        track=truth.track,
+        encoder=counts,
+        encoder_sheet=sheet,
+        start_position_m=start_m,
+        odometry=frame,
+        odometry_source=odometry,
+        gravity_mps2=truth.gravity_mps2,
+        gaps=gaps,
+        magnetometer=magnetic,
+        magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
+        rail_displacement=seen,
+        rail_sensor_sheet=None if rail_sensor is None else RailSensorSheet(rail_sensor.noise_m),
+    )
+
+
+def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:
+    """What a chart of the Earth's field and the data sheet tell an estimator; nothing of disturbances."""
+    return MagnetometerSheet(
+        noise_tpsqrthz=spec.noise_tpsqrthz,
+        intensity_t=spec.field.intensity_t,
+        inclination_rad=spec.field.inclination_rad,
+        north_rad=spec.field.north_rad,
+    )
+
+
+def true_odometry(motion: pd.DataFrame, times: pd.Index) -> pd.DataFrame:
+    """The true odometry of a mount at times of its motion, with standard deviations of zero."""
+    frame = motion.loc[times, list(ODOMETRY)].copy()
+    frame[list(ODOMETRY_SD)] = np.zeros((len(frame), len(ODOMETRY_SD)))
+    return frame

@@ -1,0 +1,233 @@
+"""The track as it lies: the design and one realisation of its irregularities, as one table of splines.
+
+The table holds what an engine needs at every wheel and every step: the design line, the deviations of both
+rails and their friction, as C2 cubic splines on a uniform grid. C2, because the second derivative of a
+rail is what shakes an axle: a piecewise-linear table puts 0.4 m/s^2 of facet noise on it. The splines *are*
+the rails: truth and references are read from the same table.
+
+This module knows nothing of wheels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.interpolate import CubicSpline
+
+from simrail.core.columns import IRREGULARITY
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.track.design import TrackDesign
+from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
+from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
+
+CHANNELS = (
+    "x",
+    "y",
+    "z",
+    "yaw",
+    "pitch",
+    "roll",
+    "y_left",
+    "z_left",
+    "y_right",
+    "z_right",
+    "friction_left",
+    "friction_right",
+)
+"""Columns of the table: design line (global, m and rad), rail deviations in the track frame (m), friction
+of each rail over that of a clean one."""
+
+RAILS = slice(6, 10)
+"""The rail deviations among the channels."""
+
+
+@dataclass(frozen=True, eq=False)
+class LaidTrack:
+    """A design track with one realisation of its irregularities.
+
+    Attributes
+    ----------
+    design : TrackDesign
+        The design.
+    irregularity : Irregularity
+        What was drawn.
+    seed : int
+        With which root seed.
+    table_start_m, table_step_m : float
+        Knot i stands at table_start_m + i table_step_m; knots are whole multiples of the step, so the
+        first lies at most one step before the track's start and the last one after its end.
+    conditions : tuple of RailCondition
+        What lies on the rails.
+    table : ndarray (n_intervals, 12, 4)
+        Cubic coefficients of `CHANNELS`, C-contiguous, read-only. In interval i with
+        t = s - s_i: value = ((c0 t + c1) t + c2) t + c3.
+    """
+
+    design: TrackDesign
+    irregularity: Irregularity
+    seed: int
+    table_start_m: float
+    table_step_m: float
+    table: FloatArray
+    conditions: tuple[RailCondition, ...] = ()
+
+    def channels(self, s: npt.ArrayLike, *, derivative: int = 0) -> FloatArray:
+        """All channels, or their derivative with respect to s, at places s.
+
+        Parameters
+        ----------
+        s : array_like (...)
+            Places on the track, m.
+        derivative : int
+            0, 1, 2 or 3.
+
+        Returns
+        -------
+        ndarray (..., 12)
+            In the order of `CHANNELS`.
+
+        Raises
+        ------
+        InputError
+            If a place is off the track.
+        """
+        return self._evaluate(s, slice(None), derivative)
+
+    def rails(self, s: npt.ArrayLike, *, derivative: int = 0) -> FloatArray:
+        """Rail deviations y_left, z_left, y_right, z_right in the track frame, m; (..., 4)."""
+        return self._evaluate(s, RAILS, derivative)
+
+    def irregularities(self, s: npt.ArrayLike) -> pd.DataFrame:
+        """The four irregularities of the rails at places s (n,).
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by ``position_m``, columns `simrail.core.columns.IRREGULARITY`, m.
+        """
+        s = np.atleast_1d(np.asarray(s, dtype=float))
+        y_left, z_left, y_right, z_right = self.rails(s).T
+        values = (
+            0.5 * (y_left + y_right),
+            0.5 * (z_left + z_right),
+            z_left - z_right,
+            y_left - y_right,
+        )
+        index = pd.Index(s, name="position_m")
+        return pd.DataFrame(dict(zip(IRREGULARITY, values, strict=True)), index=index)
+
+    def _evaluate(self, s: npt.ArrayLike, columns: slice, derivative: int) -> FloatArray:
+        s = self.design.on_track(s)
+        interval = np.floor((s - self.table_start_m) / self.table_step_m).astype(np.int64)
+        interval = np.clip(interval, 0, self.table.shape[0] - 1)
+        t = (s - (self.table_start_m + interval * self.table_step_m))[..., None]
+        c = self.table[interval, columns]
+        if derivative == 0:
+            return ((c[..., 0] * t + c[..., 1]) * t + c[..., 2]) * t + c[..., 3]
+        if derivative == 1:
+            return (3.0 * c[..., 0] * t + 2.0 * c[..., 1]) * t + c[..., 2]
+        if derivative == 2:
+            return 6.0 * c[..., 0] * t + 2.0 * c[..., 1]
+        return 6.0 * c[..., 0] + 0.0 * t
+
+
+def knot_step_m(irregularity: Irregularity) -> float:
+    """Distance of the spline knots: 0.125 m, or the half, quarter, ... of it that shorter waves need."""
+    needed = irregularity.wavelengths_m[0] / SAMPLES_PER_WAVE
+    return 0.125 * 0.5 ** max(0, math.ceil(math.log2(0.125 / needed)))
+
+
+def lay(
+    design: TrackDesign,
+    irregularity: Irregularity,
+    *,
+    seed: int,
+    table_step_m: float | None = None,
+    conditions: Sequence[RailCondition] = (),
+) -> LaidTrack:
+    """Draw the irregularities and lay the track.
+
+    Parameters
+    ----------
+    design : TrackDesign
+        The design.
+    irregularity : Irregularity
+        What to draw.
+    seed : int
+        Root seed; another seed is another track.
+    table_step_m : float, optional
+        Distance of the spline knots, a divisor of 65536 m; `knot_step_m` if not given.
+    conditions : sequence of RailCondition
+        What lies on the rails, and where.
+
+    Raises
+    ------
+    InputError
+        If the design makes no line, the irregularity cannot be drawn, the track is shorter than both
+        fades, or longer than the period of the irregularity, or a rail condition does not fit.
+    """
+    design.check()
+    irregularity.check()
+    table_step_m = table_step_m or knot_step_m(irregularity)
+    check_conditions(conditions, design.start_m, design.end_m)
+    if not 2.0 * irregularity.fade_m <= design.length_m <= PERIOD_M:
+        raise InputError(
+            "track and irregularity do not fit",
+            field="irregularity.fade_m" if design.length_m <= PERIOD_M else "irregularity",
+            value=f"{irregularity.fade_m:g} m twice on a track of {design.length_m:g} m",
+            limit=f"twice the fade <= track <= {PERIOD_M:g} m, where the realisation would repeat",
+            remedy="shorten fade_m" if design.length_m <= PERIOD_M else "cut the track in two",
+        )
+    first = math.floor(design.start_m / table_step_m)
+    last = max(math.ceil(design.end_m / table_step_m), first + 4)
+    knots = np.arange(first, last + 1)
+    s = np.asarray(knots * table_step_m, dtype=np.float64)
+    period = realise_all(irregularity, seed=seed, step_m=table_step_m)
+    drawn = period[knots % period.shape[0]]
+    drawn *= fade(s, design.start_m, end_m=design.end_m, length_m=irregularity.fade_m)[:, None]
+    splines = (
+        _design_splines(design, s),
+        _coefficients(CubicSpline(s, _rails(drawn))),
+        _coefficients(CubicSpline(s, friction_factors(conditions, s))),
+    )
+    table = np.concatenate(splines, axis=1)
+    table = np.ascontiguousarray(table)
+    table.flags.writeable = False
+    start = float(s[0])
+    return LaidTrack(design, irregularity, int(seed), start, float(table_step_m), table, tuple(conditions))
+
+
+def _rails(drawn: FloatArray) -> FloatArray:
+    """Rail deviations from alignment, vertical profile, cross-level and gauge, (n, 4) each."""
+    alignment, vertical, level, gauge = drawn.T
+    return np.stack(
+        [alignment + 0.5 * gauge, vertical + 0.5 * level, alignment - 0.5 * gauge, vertical - 0.5 * level],
+        axis=-1,
+    )
+
+
+def _design_splines(design: TrackDesign, s: FloatArray) -> FloatArray:
+    frame = design.frame_extended(s)
+    values = np.column_stack([frame.position, frame.yaw_rad, frame.pitch_rad, frame.roll_rad])
+    # Exact slopes at both ends: the ends then are as good as the middle.
+    ends = [0, -1]
+    slope = np.column_stack(
+        [
+            np.cos(frame.yaw_rad[ends]),
+            np.sin(frame.yaw_rad[ends]),
+            -np.tan(frame.pitch_rad[ends]),
+            frame.rates[ends][:, ::-1],
+        ]
+    )
+    return _coefficients(CubicSpline(s, values, bc_type=((1, slope[0]), (1, slope[1]))))
+
+
+def _coefficients(spline: CubicSpline) -> FloatArray:
+    """Coefficients (intervals, channels, 4) of a spline, highest power first."""
+    return np.asarray(spline.c.transpose(1, 2, 0))

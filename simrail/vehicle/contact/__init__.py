@@ -1,0 +1,1 @@
+"""Where wheel and rail touch: profiles, contact geometry, normal and creep forces."""

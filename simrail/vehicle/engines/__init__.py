@@ -1,0 +1,1 @@
+"""What integrates a vehicle's equations: Exudyn, or the same equations compiled."""

@@ -1,0 +1,110 @@
+"""The fast engine: the equations of the reference engine, every step of them compiled.
+
+Forces, contact, track and output rows are those of `simrail.vehicle.engines.exudyn_engine`; only who
+integrates differs (`simrail.vehicle.engines.stepper`). At the same step both agree far below a millionth of
+m/s2, so each is the test of the other. It needs no Exudyn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from simrail.core.jit import FloatArray
+from simrail.vehicle.engines.engine import (
+    Segment,
+    Setup,
+    refuse_derailed,
+    start_memo,
+    start_poses,
+    stretches,
+    wheel_loads_n,
+)
+from simrail.vehicle.engines.force_data import states_of
+from simrail.vehicle.engines.stepper import BODY, march
+
+
+class CompiledEngine:
+    """One vehicle on one laid track, ready to run.
+
+    Parameters
+    ----------
+    setup : Setup
+        What runs, where and how.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup, model = setup, setup.model
+        self.data = setup.pack()
+        self.memo = start_memo(setup)
+        self._inertia = np.array([[body.mass_kg, *body.inertia_kgm2] for body in model.bodies])
+        self._spin_inertia = self.data.spins[:, 0].copy()
+        self._turned = BODY * len(model.bodies)
+        self._first_state = self._turned + 2 * len(self.data.spins)
+        self.state = np.zeros(self._first_state + states_of(self.data))
+        bodies = len(model.bodies)
+        self._scratch = (
+            np.zeros((3, len(self.state))), np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(34)
+        )  # fmt: skip
+        poses = start_poses(setup)
+        for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
+            body[:3] = position
+            body[3:7] = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+        # Compiled now, so that no clock of a ride counts it.
+        self._march(0, np.zeros((0, len(self.state))))
+
+    def run(self, duration_s: float, *, segment_s: float = 5.0) -> Iterator[Segment]:
+        """Simulate from rest; yields the output segment by segment (also the way to see progress).
+
+        Raises
+        ------
+        DerailedError
+            If a wheel leaves the rail beyond its flange tip.
+        """
+        for time_s, rows, slopes in stretches(
+            self.setup,
+            self._solve,
+            lambda steps: self._bodies(steps)[:, :, 7:],
+            duration_s=duration_s,
+            segment_s=segment_s,
+        ):
+            bodies = self._bodies(rows)
+            turn = Rotation.from_quat(bodies[:, :, 3:7].reshape(-1, 4), scalar_first=True).as_matrix()
+            yield Segment(
+                time_s=time_s,
+                position=bodies[:, :, :3],
+                velocity=bodies[:, :, 7:10],
+                acceleration=slopes[:, :, :3],
+                rotation=turn.reshape(*bodies.shape[:2], 3, 3),
+                rate=bodies[:, :, 10:],
+                angular_acceleration=slopes[:, :, 3:],
+                spin_rad=rows[:, self._turned : self._turned + len(self.data.spins)],
+                states=rows[:, self._first_state :],
+            )
+
+    def wheel_loads_n(self) -> FloatArray:
+        """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
+        return wheel_loads_n(self.memo)
+
+    def _bodies(self, states: FloatArray) -> FloatArray:
+        """The bodies' part of states (..., n), as (..., b, 13)."""
+        return states[..., : self._turned].reshape(*states.shape[:-1], -1, BODY)
+
+    def _march(self, first: int, rows: FloatArray) -> int:
+        return march(
+            first, self.setup.step_s, self.state, rows, self._inertia, self._spin_inertia, self.memo,
+            *self._scratch, tuple(self.data),
+        )  # fmt: skip
+
+    def _solve(self, first: int, last: int) -> FloatArray:
+        """Integrate from the present state; the state (steps + 1, n) at every step."""
+        rows = np.empty((last - first + 1, len(self.state)))
+        rows[0] = self.state
+        made = self._march(first, rows[1:])
+        refuse_derailed(self.memo, self.setup.model)
+        if made < last - first or not np.isfinite(self.state).all():
+            begin, end = first * self.setup.step_s, last * self.setup.step_s
+            raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")
+        return rows

@@ -1,0 +1,284 @@
+"""A vehicle file: bodies, springs, wheels and guide in one TOML, judged and made a `VehicleModel`."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+
+from simrail.core.errors import InputError
+from simrail.core.toml_files import Part, blame
+from simrail.vehicle.contact.creep_laws import CreepLaw
+from simrail.vehicle.contact.profile_files import profile_place, rail_profile, wheel_profile
+from simrail.vehicle.file_tables import (
+    AxleEntry,
+    BodyEntry,
+    CreepEntry,
+    GuideEntry,
+    LinearContactEntry,
+    RotationEntry,
+    SuspensionEntry,
+    TabledEntry,
+    TractionEntry,
+    ends_of,
+)
+from simrail.vehicle.model import (
+    Body,
+    Guide,
+    LinearContact,
+    Rotation,
+    SeriesDamper,
+    Suspension,
+    Tabled,
+    VehicleModel,
+    Wheel,
+    WheelRail,
+)
+from simrail.vehicle.traction import Traction
+
+
+class VehicleFile(Part):
+    """A whole vehicle file; profiles that it names by a relative path lie beside it."""
+
+    title: str
+    source: str
+    synthetic: bool
+    gauge_m: Annotated[float, Field(gt=0.1, lt=2.0)]
+    rail_inclination: Annotated[float, Field(ge=0, le=0.1)]
+    wheel_profile: str
+    rail_profile: str
+    profile_scale: Annotated[float, Field(ge=0.02, le=1.0)] = 1.0
+    contact_smoothing: Annotated[float, Field(ge=0.1, le=5.0)] = 0.22
+    friction: Annotated[float, Field(gt=0, le=1.0)]
+    axle: Annotated[list[AxleEntry], Field(min_length=1)]
+    body: tuple[BodyEntry, ...] = ()
+    suspension: tuple[SuspensionEntry, ...] = ()
+    rotation: tuple[RotationEntry, ...] = ()
+    tabled: tuple[TabledEntry, ...] = ()
+    creep: CreepEntry = CreepEntry()
+    linear_contact: LinearContactEntry | None = None
+    gyroscopic: bool = True
+    guide: GuideEntry
+    traction: TractionEntry | None = None
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _consistent(self, info: ValidationInfo) -> Self:
+        self._folder = (info.context or {}).get("folder")
+        names = [axle.name for axle in self.axle] + [body.name for body in self.body]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise InputError(
+                "two bodies share a name", field="name", value=sorted(twice)[0], remedy="rename one"
+            )
+        asked = [
+            (f"{kind}[{i}].between", name)
+            for kind in ("suspension", "rotation", "tabled")
+            for i, entry in enumerate(getattr(self, kind))
+            for name in entry.between
+        ]
+        for field, name in [*asked, ("guide.body", self.guide.body)]:
+            if name not in names:
+                raise InputError("no such body", field=field, value=name, limit="one of " + ", ".join(names))
+        solids = [(f"body[{i}].inertia_kgm2", entry.inertia_kgm2) for i, entry in enumerate(self.body)]
+        solids += [
+            (f"axle[{i}].bridge_inertia_kgm2", entry.bridge_inertia_kgm2) for i, entry in enumerate(self.axle)
+        ]
+        for field, inertia in solids:
+            if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
+                raise InputError(
+                    "no rigid body has such inertias",
+                    field=field,
+                    value=inertia,
+                    limit="the largest at most the sum of the other two",
+                )
+        self._check_elements()
+        self._check_wheels()
+        self._check_held(names)
+        self._check_traction(names)
+        return self
+
+    def _check_elements(self) -> None:
+        for i, spring in enumerate(self.suspension):
+            for stiffness, damping in zip(spring.series_stiffness_npm, spring.damping_nspm, strict=True):
+                if stiffness > 0.0 and damping == 0.0:
+                    raise InputError(
+                        "a series stiffness without a damper",
+                        field=f"suspension[{i}].series_stiffness_npm",
+                        value=spring.series_stiffness_npm,
+                        remedy="give that axis damping, or 0 in series",
+                    )
+        for i, entry in enumerate(self.tabled):
+            x, force = zip(*entry.points, strict=True)
+            if any(b <= a for a, b in pairwise(x)) or any(b < a for a, b in pairwise(force)):
+                raise InputError(
+                    "the points of a law must rise",
+                    field=f"tabled[{i}].points",
+                    value=entry.points,
+                    limit="first column rising, second not falling",
+                )
+        # Each says itself what it cannot read.
+        wheel_profile(self.wheel_profile, self._folder)
+        rail_profile(self.rail_profile, self._folder)
+
+    def _check_wheels(self) -> None:
+        """Wheels must stand on the rails, all alike: one contact table serves them."""
+        first = self.axle[0]
+        for i, axle in enumerate(self.axle):
+            left, right = axle.wheel_y_m
+            excess = (left - 0.5 * self.gauge_m) / self.gauge_m
+            if left != -right or not 0.0 < excess < 0.05:
+                raise InputError(
+                    "a wheel off the axle's place over its rail",
+                    field=f"axle[{i}].wheel_y_m",
+                    value=axle.wheel_y_m,
+                    limit=f"y and -y, {0.5 * self.gauge_m:.4g} < y < {0.55 * self.gauge_m:.4g} m",
+                )
+            for field in ("wheel_y_m", "wheel_radius_m"):
+                if getattr(axle, field) != getattr(first, field):
+                    raise InputError(
+                        "the wheels of a vehicle are alike",
+                        field=f"axle[{i}].{field}",
+                        value=getattr(axle, field),
+                        limit=f"{getattr(first, field)}, as axle[0] has it",
+                    )
+
+    def _check_held(self, names: list[str]) -> None:
+        """Every body must hang together with the guide's body by springs."""
+        held = {self.guide.body}
+        pairs = [set(entry.between) for entry in self.suspension if any(entry.stiffness_npm)]
+        for _ in names:
+            held = held.union(*(pair for pair in pairs if pair & held))
+        for i, name in enumerate(names):
+            if name not in held:
+                axles = len(self.axle)
+                raise InputError(
+                    "nothing holds this body: no suspension with stiffness leads from it to the guide",
+                    field=f"axle[{i}].name" if i < axles else f"body[{i - axles}].name",
+                    value=name,
+                    remedy="mount it with a [[suspension]]",
+                )
+
+    def _check_traction(self, names: list[str]) -> None:
+        if self.traction is None:
+            return
+        wheels, _ = self._wheels()
+        with blame(None, "traction"):
+            for kind in ("driven", "braked"):
+                self.traction.shares(kind, wheels)
+            if self.traction.reaction not in ("axle", *names):
+                raise InputError(
+                    "no such body",
+                    field="reaction",
+                    value=self.traction.reaction,
+                    limit="axle, or one of " + ", ".join(names),
+                )
+
+    def _wheels(self) -> tuple[list[Wheel], dict[str, float]]:
+        """The wheels, and the inertia of each spin."""
+        wheels: list[Wheel] = []
+        spins: dict[str, float] = {}
+        for axle in self.axle:
+            for side, word in ((1, "left"), (-1, "right")):
+                wheel = f"{axle.name}.{word}"
+                spin = wheel if axle.wheels == "independent" else axle.name
+                spins[spin] = spins.get(spin, 0.0) + axle.wheel_spin_inertia_kgm2
+                wheels.append(
+                    Wheel(name=wheel, axle=axle.name, side=side, spin=spin, radius_m=axle.wheel_radius_m)
+                )
+        return wheels, spins
+
+    def _traction(self, wheels: list[Wheel]) -> Traction | None:
+        made = self.traction
+        if made is None:
+            return None
+        return Traction(
+            driven=tuple(made.shares("driven", wheels).items()),
+            braked=tuple(made.shares("braked", wheels).items()),
+            **made.model_dump(exclude={"driven", "braked"}),
+        )
+
+    def model(self, name: str) -> VehicleModel:
+        """Build the vehicle that the file describes."""
+        bodies: list[Body] = []
+        wheels, spins = self._wheels()
+        for axle in self.axle:
+            # The wheels ride on the bridge at the tape circles: their mass and transverse inertia count.
+            carried = 2.0 * (axle.wheel_mass_kg * axle.wheel_y_m[0] ** 2 + axle.wheel_transverse_inertia_kgm2)
+            roll, pitch, yaw = axle.bridge_inertia_kgm2
+            bodies.append(
+                Body(
+                    name=axle.name,
+                    mass_kg=axle.bridge_mass_kg + 2.0 * axle.wheel_mass_kg,
+                    inertia_kgm2=(roll + carried, pitch, yaw + carried),
+                    position_m=(axle.x_m, 0.0, axle.wheel_radius_m),
+                )
+            )
+        bodies += [Body(**entry.model_dump()) for entry in self.body]
+        springs: list[Suspension] = []
+        series: list[SeriesDamper] = []
+        for entry in self.suspension:
+            elastic = entry.series_stiffness_npm
+            rigid = [0.0 if k > 0.0 else c for k, c in zip(elastic, entry.damping_nspm, strict=True)]
+            for ends in ends_of(entry):
+                springs.append(
+                    Suspension(
+                        **ends,
+                        stiffness_npm=entry.stiffness_npm,
+                        damping_nspm=(rigid[0], rigid[1], rigid[2]),
+                    )
+                )
+                series += [
+                    SeriesDamper(**ends, axis=k, stiffness_npm=elastic[k], damping_nspm=entry.damping_nspm[k])
+                    for k in range(3)
+                    if elastic[k] > 0.0
+                ]
+        linear = self.linear_contact
+        return VehicleModel(
+            name=name,
+            title=self.title,
+            source=self.source,
+            synthetic=self.synthetic,
+            bodies=tuple(bodies),
+            suspensions=tuple(springs),
+            wheels=tuple(wheels),
+            spin_inertia_kgm2=spins,
+            guide=Guide(**self.guide.model_dump()),
+            wheel_rail=WheelRail(
+                wheel_profile=profile_place(self.wheel_profile, self._folder),
+                rail_profile=profile_place(self.rail_profile, self._folder),
+                profile_scale=self.profile_scale,
+                smoothing=self.contact_smoothing,
+                gauge_m=self.gauge_m,
+                rail_inclination=self.rail_inclination,
+                friction=self.friction,
+                creep=CreepLaw(name=self.creep.law, **self.creep.model_dump(exclude={"law"})),
+                tape_circle_half_m=self.axle[0].wheel_y_m[0],
+                linear=None if linear is None else LinearContact(**linear.model_dump()),
+            ),
+            series=tuple(series),
+            rotations=tuple(
+                Rotation(
+                    name=entry.name,
+                    inner=entry.between[0],
+                    outer=entry.between[1],
+                    stiffness_nmprad=entry.stiffness_nmprad,
+                    damping_nmsprad=entry.damping_nmsprad,
+                )
+                for entry in self.rotation
+            ),
+            tabled=tuple(
+                Tabled(
+                    **ends,
+                    axis="xyz".index(entry.axis),
+                    over=entry.over,
+                    points=tuple(entry.points),
+                )
+                for entry in self.tabled
+                for ends in ends_of(entry)
+            ),
+            gyroscopic=self.gyroscopic,
+            traction=self._traction(wheels),
+        )

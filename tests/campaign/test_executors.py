@@ -1,0 +1,241 @@
+"""Who runs a campaign, in which batches and order, changes no bit; a worker that dies loses nothing."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.campaign import campaign, executors
+from simrail.campaign.campaign import run_campaign
+from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.executors import FEW_CELLS, crew_of
+from simrail.campaign.job import prepare
+from simrail.campaign.result import CampaignResult, gather
+from simrail.core.errors import InputError
+from simrail.scenario.scenario import Scenario, load_scenario
+from simrail.scoring.table import OK
+
+AXES = ["ride.speed_kmh=[30.0, 50.0]", "monte_carlo.track_draws=2", "monte_carlo.sensor_draws=3"]
+
+
+class Notes(Protocol):
+    """See conftest."""
+
+    file: Path
+
+    def __iter__(self) -> Iterator[tuple[int, str]]: ...
+
+    def repeated(self, *, main: int) -> int: ...
+
+
+Same = Callable[[pd.DataFrame, pd.DataFrame], None]
+
+
+@pytest.fixture(scope="module")
+def module_rides(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SIMRAIL_RIDES", str(tmp_path_factory.mktemp("rides")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def alone(module_rides: None, short: Callable[..., Scenario]) -> CampaignResult:
+    """A campaign of 4 rides and 12 cells, run in this process in batches of one."""
+    return run_campaign(short(*AXES), workers=1, batch_cells=1)
+
+
+@pytest.mark.parametrize(("workers", "batch_cells"), [(1, 3), (2, 2), (4, None)])
+def test_workers_and_batches_change_no_bit(
+    workers: int,
+    batch_cells: int | None,
+    alone: CampaignResult,
+    short: Callable[..., Scenario],
+    assert_same: Same,
+) -> None:
+    found = run_campaign(short(*AXES), workers=workers, batch_cells=batch_cells)
+    assert_same(alone.scores, found.scores)
+    pd.testing.assert_frame_equal(alone.cells, found.cells)
+    assert found.failures == [] and len(found.rides) == 4
+    ours, theirs = alone.examples[0], found.examples[0]
+    pd.testing.assert_frame_equal(ours.recording.imu, theirs.recording.imu, check_exact=True)
+
+
+def test_order_of_rides_changes_no_bit(
+    alone: CampaignResult,
+    short: Callable[..., Scenario],
+    assert_same: Same,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    real = campaign.chosen_cells
+
+    def shuffled(*arguments, **keywords):  # type: ignore[no-untyped-def]
+        listed = list(real(*arguments, **keywords))
+        random.Random(1).shuffle(listed)
+        return sorted(listed, key=lambda cell: -cell.ride_number)
+
+    monkeypatch.setattr(campaign, "chosen_cells", shuffled)
+    assert_same(alone.scores, run_campaign(short(*AXES), batch_cells=2).scores)
+
+
+def test_one_cell_alone_has_the_bits_that_it_has_among_others(
+    alone: CampaignResult, short: Callable[..., Scenario], assert_same: Same
+) -> None:
+    found = run_campaign(short(*AXES), only=7)
+    rows = alone.scores[alone.scores["cell"] == 7].reset_index(drop=True)
+    for name in rows.columns:  # one cell has not the words of them all
+        if rows[name].dtype == "category":
+            rows[name] = rows[name].astype(str)
+            found.scores[name] = found.scores[name].astype(str)
+    assert_same(rows, found.scores)
+    assert list(found.cells["cell"]) == [7]
+
+
+def test_each_ride_is_simulated_once_whoever_runs_it(rides: Path, short: Callable[..., Scenario]) -> None:
+    found = run_campaign(short(*AXES), workers=2, batch_cells=1)
+    assert [ride["from_cache"] for ride in found.rides] == [False] * 4
+    assert len(list(rides.glob("[!.]*"))) == 4
+
+
+def test_a_result_that_was_taken_is_let_go_before_more_is_asked_for(
+    short: Callable[..., Scenario], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cluster computes again what is held and whose worker died."""
+    submit, handed_out, held = executors._Here.submit, [], []
+
+    def noting(self: executors._Here, *arguments: Any) -> Any:
+        held.append(sum(reference() is not None for reference in handed_out))
+        future = submit(self, *arguments)
+        handed_out.append(weakref.ref(future))
+        return future
+
+    monkeypatch.setattr(executors._Here, "submit", noting)
+    run_campaign(short(*AXES), workers=1, batch_cells=1)
+    assert len(held) > 3 and not any(held)
+
+
+@pytest.mark.parametrize("kills", [2])
+def test_killed_workers_lose_nothing(
+    kills: int, noting_file: Path, notes: Notes, tmp_path: Path, assert_same: Same
+) -> None:
+    scenario = load_scenario(noting_file, overrides=["monte_carlo.sensor_draws=10"])
+    whole = run_campaign(scenario, workers=1)
+    assert notes.repeated(main=0) == 2  # the examples
+    notes.file.unlink()
+    killed: list[int] = []
+    finished = threading.Event()
+
+    def kill() -> None:
+        chance = random.Random(2)
+        while len(killed) < kills and not finished.is_set():
+            time.sleep(chance.uniform(0.1, 0.6))
+            for pid, _ in list(notes)[-1:]:
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                    killed.append(pid)
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    kept = Unfinished(tmp_path / "kept")
+    try:
+        found = run_campaign(scenario, workers=2, batch_cells=2, kept=kept)
+    finally:
+        finished.set()
+        thread.join()
+    assert len(killed) == kills
+    assert_same(whole.scores, found.scores)
+    assert found.failures == []
+    assert "a worker died" in (kept.folder / "run.log").read_text()
+    # One batch of each of the two workers, for each kill.
+    assert notes.repeated(main=os.getpid()) <= kills * 2 * 2
+
+
+KILLER = """
+import os
+import signal
+from dataclasses import dataclass
+
+from simrail.estimators.baselines import DesignAngles
+
+
+@dataclass(frozen=True)
+class Killer:
+    "Kills its process on some recordings, as a fault in a library would."
+    causal = True
+
+    def estimate(self, recording):
+        if len(recording.imu) > 64 and recording.imu.iloc[0, 0] > 0.0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return DesignAngles().estimate(recording)
+"""
+
+
+def test_a_cell_that_kills_its_worker_fails_and_its_fellows_do_not(tmp_path: Path, noting_file: Path) -> None:
+    (tmp_path / "noting.py").write_text(KILLER.replace("Killer", "Noting"))
+    settings = ["ride.speed_kmh=50", "monte_carlo.sensor_draws=3"]
+    found = run_campaign(load_scenario(noting_file, overrides=settings), workers=2, batch_cells=2)
+    failed = {failure.cell for failure in found.failures}
+    assert 0 < len(failed) < 3
+    assert all("the worker died" in failure.reason for failure in found.failures)
+    rms = found.scores.query(
+        "estimator == 'noting' and metric == 'rms' and window == 'whole' and status == 'ok'"
+    )
+    assert set(rms["cell"]) == set(range(3)) - failed
+    lost = found.scores[found.scores["cell"].isin(failed)]
+    assert (lost["status"] != OK).all() and np.isnan(lost["value"]).all()
+    assert len(lost) == 2 * len(failed)  # a row for each of the two estimators
+
+
+def test_few_cells_stay_in_this_process_and_one_crew_is_chosen() -> None:
+    with crew_of(None, None, cells=FEW_CELLS) as crew:
+        assert executors.here and crew.workers() == 1
+    with crew_of(8, None, cells=1) as crew:
+        assert executors.here
+    with pytest.raises(InputError, match="has its own workers"), crew_of(2, "tcp://127.0.0.1:1", cells=9):
+        pass
+
+
+def test_estimators_that_cannot_be_sent_are_refused_by_name(tmp_path: Path, noting_file: Path) -> None:
+    (tmp_path / "noting.py").write_text(
+        "from dataclasses import dataclass, field\nimport threading\n\n\n"
+        "@dataclass(frozen=True)\nclass Noting:\n"
+        "    lock: object = field(default_factory=threading.Lock)\n    causal = True\n\n"
+        "    def estimate(self, recording):\n        raise ValueError\n"
+    )
+    with pytest.raises(InputError, match="'noting'"):
+        prepare(load_scenario(noting_file))
+
+
+def test_a_result_is_the_same_from_kept_batches_alone(
+    alone: CampaignResult, rides: Path, short: Callable[..., Scenario], tmp_path: Path, assert_same: Same
+) -> None:
+    job, kept = prepare(short(*AXES)), Unfinished(tmp_path / "kept")
+    run_campaign(job, kept=kept, batch_cells=5)
+    assert_same(alone.scores, gather(job, kept).scores)
+
+
+def test_a_worker_that_is_replaced_is_no_news() -> None:
+    """loky tells of it in a warning, with a path and advice that do not concern the user."""
+    program = (
+        "import warnings\n"
+        "from simrail.campaign.executors import crew_of\n"
+        "with crew_of(2, None, cells=9) as crew:\n"
+        "    assert executors.submit(abs, -3).result() == 3\n"
+        "    warnings.warn('A worker stopped while some jobs were given to the executor.', UserWarning)\n"
+        "    warnings.warn('something else', UserWarning)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stderr
+    assert "something else" in said and "A worker stopped" not in said

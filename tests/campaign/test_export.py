@@ -1,0 +1,221 @@
+"""What is exported is what was recorded, bit by bit, whole or not at all; and estimators run on it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.campaign.cell import record_cell
+from simrail.campaign.export import TRUTH_STEM, export
+from simrail.cli.main import BAD_INPUT, DONE, call
+from simrail.core.columns import ENCODER, IMU, MOTION, ODOMETRY, ODOMETRY_SD
+from simrail.core.toml_files import shipped
+from simrail.recording.files.ride_reader import read_ride
+from simrail.recording.recording import Recording
+from simrail.ride.ride import simulate
+from simrail.scenario.build import Parts
+from simrail.scenario.cells import Cell, cells
+from simrail.scenario.scenario import Scenario, load_scenario
+from simrail.scoring.score import score
+
+QUICK = ["ride.end_m=150.0", "ride.rest_s=1.0", "ride.speed_kmh=30.0"]
+SETTINGS = [word for setting in QUICK for word in ("--set", setting)]
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+
+
+def names_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def recorded(scenario: Scenario, cell: Cell) -> Recording:
+    parts = Parts(scenario)
+    return record_cell(cell, simulate(parts.ride(cell)), parts)
+
+
+def assert_same(a: Recording, b: Recording) -> None:
+    for part in ("imu", "odometry", "encoder", "gaps"):
+        left, right = getattr(a, part), getattr(b, part)
+        if left is None:
+            assert right is None
+            continue
+        pd.testing.assert_frame_equal(left, right, check_exact=True)
+        assert left.to_numpy().tobytes() == right.to_numpy().tobytes()
+        assert left.index.to_numpy().tobytes() == right.index.to_numpy().tobytes()
+    blank = pd.DataFrame()
+    bare = [replace(r, imu=blank, odometry=blank, encoder=None, gaps=None) for r in (a, b)]
+    assert repr(bare[0]) == repr(bare[1])
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_exported_rides_read_back_bit_by_bit(
+    here: Path, form: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+
+    assert (
+        call(["export", "quick_kinematic", *SETTINGS, "--format", form, "--out", "a/b", "--draw", "3"])
+        == DONE
+    )
+    assert "2 recordings" in capsys.readouterr().out
+    scenario = load_scenario("quick_kinematic", overrides=QUICK)
+    first = [cell for cell in cells(scenario) if cell.sensor_draw == 0]
+    folders = ["out_axle_lord_3dm_gx4_25", "out_axle_ideal"]
+    assert names_in(here / "a" / "b") == {*folders, "recordings.csv"}
+    for cell, folder in zip(first, folders, strict=True):
+        found = here / "a" / "b" / folder
+        assert names_in(found) == {
+            "ride.toml", "track.toml", f"imu.{form}", f"encoder.{form}", f"odometry.{form}",
+        }  # fmt: skip
+        assert_same(recorded(scenario, replace(cell, sensor_draw=3)), read_ride(found))
+    index = pd.read_csv(here / "a" / "b" / "recordings.csv")
+    assert index["folder"].tolist() == folders
+    assert index["imu.grade"].tolist() == ["lord_3dm_gx4_25", "ideal"]
+
+
+def test_several_imus_draws_and_rides_have_folders_of_their_own(here: Path) -> None:
+    text = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
+    text += """
+[[imu]]
+name = "box"
+grade = "ideal"
+body = "front"
+position_m = [0.5, 0.1, 0.7]
+roll_deg = 3.0
+"""
+    (here / "two.toml").write_text(text)
+    scenario = load_scenario("two.toml", overrides=[*QUICK[:2], "ride.speed_kmh=[20.0, 30.0]"])
+    done = export(scenario, here / "out", format="parquet")
+    assert len(done.recordings) == 6 == len(set(done.recordings))
+    first = [cell for cell in cells(scenario) if cell.sensor_draw == 0]
+    for cell, name in zip(first, done.recordings, strict=True):
+        again = read_ride(here / "out" / name)
+        assert again.mount == cell.imu.name and again.imu_sheet.grade == cell.imu.grade
+        assert_same(recorded(scenario, cell), again)
+
+
+def test_columns_of_the_files_are_those_of_the_vocabulary(here: Path) -> None:
+    assert call(["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal", "--out", "x"]) == DONE
+    folder = here / "x" / "out_axle_ideal"
+    for name, columns in (("imu", IMU), ("encoder", ENCODER), ("odometry", ODOMETRY + ODOMETRY_SD)):
+        header = (folder / f"{name}.csv").read_text().split("\n", 1)[0]
+        assert header == ",".join(("time_s", *columns))
+
+
+def test_truth_stands_beside_the_recording_and_is_no_part_of_it(here: Path) -> None:
+    settings = [*SETTINGS, "--set", "imu.grade=lord_3dm_gx4_25"]
+    assert call(["export", "quick_kinematic", *settings, "--truth", "--out", "x"]) == DONE
+    folder = here / "x" / "out_axle_lord_3dm_gx4_25"
+    truth = pd.read_csv(folder / f"{TRUTH_STEM}.csv", index_col="time_s")
+    assert list(truth.columns) == list(MOTION)
+    recording = read_ride(folder)
+    np.testing.assert_array_equal(truth.index, recording.imu.index)
+    assert "truth" not in (folder / "ride.toml").read_text()
+    # The perfect signal beside the recorded one: they differ by no more than the noise and bias of the grade.
+    difference = recording.imu["accel_z_mps2"] - truth["accel_z_mps2"]
+    assert 0.0 < np.abs(difference).median() < 0.1
+
+
+def test_estimate_of_an_exported_ride_is_that_of_the_campaign(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = [*SETTINGS, "--set", "imu.grade=lord_3dm_gx4_25"]
+    assert call(["export", "quick_kinematic", *settings, "--out", "x"]) == DONE
+    capsys.readouterr()
+    command = ["estimate", "x/out_axle_lord_3dm_gx4_25", "--estimator", "AttitudeEkf"]
+    assert call([*command, "--set", "compensated=false", "--out", "est", "--format", "parquet"]) == DONE
+    said = capsys.readouterr().out
+    assert "no truth" in said and "roll less design" in said and "250 Hz" in said
+    assert names_in(here / "est") == {"estimate.parquet", "innovations.parquet", "estimate.html"}
+    from simrail.estimators.attitude.ekf import AttitudeEkf
+
+    scenario = load_scenario("quick_kinematic", overrides=[*QUICK, "imu.grade='lord_3dm_gx4_25'"])
+    cell = next(cells(scenario))
+    recording = recorded(scenario, cell)
+    direct = AttitudeEkf(compensated=False).estimate(recording)
+    found = pd.read_parquet(here / "est" / "estimate.parquet").set_index("time_s")
+    for name in direct.states:
+        assert found[name].to_numpy().tobytes() == direct.states[name].to_numpy().tobytes()
+    assert found["position_m"].to_numpy().tobytes() == recording.odometry["position_m"].to_numpy().tobytes()
+    page = (here / "est" / "estimate.html").read_text(encoding="utf-8")
+    assert "no truth beside it" in page and "compensated=False" in page
+    assert page.count("<svg") == 4 and "http" not in page.replace("http://www.w3.org", "")
+    truth = simulate(Parts(scenario).ride(cell))
+    assert len(score(direct, truth, recording))  # only with the truth at hand is there a score
+    assert call([*command, "--out", "est"]) == DONE  # an earlier estimate is replaced as a whole
+    assert names_in(here / "est") == {"estimate.csv", "innovations.csv", "estimate.html"}
+    assert call([*command, "--out", "x"]) == BAD_INPUT  # other things are not
+    assert names_in(here / "x") == {"out_axle_lord_3dm_gx4_25", "recordings.csv"}
+
+
+def test_estimate_of_a_train_that_stands(here: Path) -> None:
+    assert call(["new", "ride", "mine"]) == DONE
+    frame = pd.read_csv("mine.csv").iloc[:450]
+    frame.to_csv("mine.csv", index=False)
+    assert call(["estimate", "mine.toml", "--estimator", "Vqf"]) == DONE
+    assert names_in(here / "results" / "mine_Vqf") == {"estimate.csv", "estimate.html"}
+    table = pd.read_csv(here / "results" / "mine_Vqf" / "estimate.csv")
+    assert (table["speed_mps"] == 0.0).all()
+
+
+def test_an_estimator_of_ones_own_runs_on_the_template(here: Path) -> None:
+    assert call(["new", "ride", "mine"]) == DONE
+    assert call(["new", "ride", "mine"]) == BAD_INPUT
+    assert call(["new", "estimator", "my_filter"]) == DONE
+    command = [
+        "estimate",
+        "mine.toml",
+        "--estimator",
+        "my_filter.py:MyFilter",
+        "--set",
+        "time_constant_s=2.0",
+    ]
+    assert call([*command, "--out", "out"]) == DONE
+    assert "time_constant_s=2.0" in (here / "out" / "estimate.html").read_text(encoding="utf-8")
+
+
+def test_nothing_is_exported_of_a_faulty_scenario_or_into_a_full_place(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["export", "quick_kinematic", "--set", "imu.grade=nothing", "--out", "x"]) == BAD_INPUT
+    assert call(["export", "quick_kinematic", "--format", "mat", "--out", "x"]) == BAD_INPUT
+    assert not list(here.iterdir())
+    (here / "x").mkdir()
+    assert call(["export", "quick_kinematic", "--out", "x"]) == BAD_INPUT
+    assert "exists already" in capsys.readouterr().err
+    assert not list((here / "x").iterdir())
+
+
+def test_killed_export_leaves_no_folder_and_can_be_repeated(here: Path) -> None:
+    command = [sys.executable, "-m", "simrail", "export", "quick_kinematic", "--out", "x"]
+    environment = {**os.environ, "XDG_CACHE_HOME": str(here / "cache")}
+    command += ["--set", "ride.end_m=590.0", "--set", "ride.speed_kmh=[20.0, 21.0, 22.0, 23.0]"]
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for _ in range(2000):
+        if list(here.glob(".x.*.draft/*/imu.csv")):
+            break
+        time.sleep(0.02)
+    else:
+        pytest.fail("no recording was begun")
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert not (here / "x").exists()
+    assert call(["export", "quick_kinematic", *SETTINGS, "--out", "x"]) == DONE
+    assert (here / "x" / "recordings.csv").is_file()
+
+
+def test_interrupted_export_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*arguments: object, **keywords: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("simrail.campaign.export.write_parts", stop)
+    assert call(["export", "quick_kinematic", *SETTINGS, "--out", "x"]) == 130
+    assert not list(here.iterdir())

@@ -1,0 +1,147 @@
+"""What ``simrail run --plan`` says, held against the campaign that it speaks of."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from simrail.campaign.campaign import CampaignResult, run_campaign
+from simrail.campaign.forecast import Forecast, forecast
+from simrail.cli.main import BAD_INPUT, DONE, call
+from simrail.core.toml_files import shipped
+from simrail.ride import cache as ride_cache
+from simrail.scenario.check import judge_scenario
+from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+
+SETTINGS = [
+    "ride.reverse=[false, true]",
+    "monte_carlo.track_draws=2",
+    "monte_carlo.sensor_draws=3",
+    "score.windows=['whole', 'curve', 'curve:*']",
+    "ride.rest_s=2.0",
+]
+
+
+@pytest.fixture
+def message_of(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str]], str]:
+    """The one line of a command that must end with code 2."""
+
+    def message(arguments: list[str]) -> str:
+        assert call(arguments) == BAD_INPUT
+        said = capsys.readouterr()
+        assert said.out == "" and said.err.count("\n") == 1
+        return said.err
+
+    return message
+
+
+def scenario(*settings: str) -> Scenario:
+    return load_scenario("quick_kinematic", overrides=[*SETTINGS, *settings])
+
+
+@pytest.fixture(scope="module")
+def told_and_done() -> tuple[Forecast, CampaignResult, float]:
+    told = forecast(scenario())
+    begun = time.process_time()
+    done = run_campaign(scenario(), workers=1)  # here, where its time is seen
+    return told, done, time.process_time() - begun
+
+
+def test_counts_are_those_of_the_campaign(told_and_done: tuple[Forecast, CampaignResult, float]) -> None:
+    told, done, _ = told_and_done
+    assert (told.plan.rides, told.plan.cells) == (len(done.rides), len(done.cells)) == (4, 24)
+    assert told.rows == pytest.approx(len(done.scores), rel=0.01)
+    assert told.cached == 0 and not told.failed
+
+
+def test_what_was_run_is_found_in_the_cache(told_and_done: tuple[Forecast, CampaignResult, float]) -> None:
+    again = forecast(scenario())
+    assert again.cached == 4 and again.simulate_s == 0.0
+    more = forecast(scenario("monte_carlo.track_draws=3", "monte_carlo.sensor_draws=1"))
+    assert (more.plan.rides, more.cached) == (6, 4)
+
+
+def test_disk_is_that_of_the_rides(told_and_done: tuple[Forecast, CampaignResult, float]) -> None:
+    told, _, _ = told_and_done
+    size = sum(ride.size_bytes for ride in ride_cache.rides() if "rehearsal" not in ride.name)
+    assert told.ride_bytes == pytest.approx(size, rel=0.05)
+
+
+def test_time_is_of_the_right_size(told_and_done: tuple[Forecast, CampaignResult, float]) -> None:
+    """Processor time, not wall time. A machine that others use still swings by a factor of two."""
+    told, _, seconds = told_and_done
+    assert 0.33 < told.total_s / seconds < 3.0
+
+
+def test_time_grows_with_draws_of_the_sensors_only_where_they_are_used() -> None:
+    few, many = forecast(scenario()), forecast(scenario("monte_carlo.sensor_draws=300"))
+    assert many.simulate_s == few.simulate_s and many.motion_s == pytest.approx(few.motion_s, rel=1.0)
+    assert many.rows == 100 * few.rows
+    assert 30.0 < many.measure_s / few.measure_s < 300.0
+
+
+def test_an_estimator_that_fails_in_rehearsal_is_told_and_not_counted(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Mine:\n    causal = True\n\n"
+        "    def estimate(self, recording):\n        raise ValueError('too short')\n"
+    )
+    text = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
+    text += '[[estimator]]\nname = "mine"\nmethod = "./mine.py:Mine"\n'
+    told = forecast(read_scenario(text, name="mine", folder=tmp_path))
+    assert told.failed == {"mine": "ValueError: too short"} and "mine" not in told.methods_s
+
+
+def test_the_command_shows_it_and_runs_nothing(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    settings = [word for setting in SETTINGS for word in ("--set", setting)]
+    assert call(["run", "quick_kinematic", "--plan", *settings]) == DONE
+    text = capsys.readouterr().out
+    for words in (
+        "rides to simulate",
+        "of 4",
+        "cells .* 24",
+        "score rows .* about",
+        "an estimate",
+        "in the cache",
+    ):
+        assert re.search(words, text), text
+    assert list(here.iterdir()) == []
+
+
+def test_with_a_stop_rule_the_numbers_are_called_upper_limits(capsys: pytest.CaptureFixture[str]) -> None:
+    rule = 'estimator="ekf_compensated", quantity="roll", metric="rms", width=0.1, least_draws=2'
+    words = ["run", "quick_kinematic", "--plan", "--set", "monte_carlo.sensor_draws=4"]
+    assert call(words) == DONE
+    assert "upper limits" not in capsys.readouterr().out
+    assert call([*words, "--set", f"stop={{{rule}}}"]) == DONE
+    text = " ".join(capsys.readouterr().out.split())
+    assert "upper limits: the stop rule may end it after 2 of 4 draws of the sensors" in text
+    assert re.search("cells 8 recordings", text)
+
+
+@pytest.mark.parametrize("command", ["run", "check", "plan"])
+def test_more_than_a_million_cells_need_a_yes(
+    command: str, here: Path, message_of: Callable[[list[str]], str]
+) -> None:
+    words = ["run", "quick_kinematic", "--plan"] if command == "plan" else [command, "quick_kinematic"]
+    text = message_of([*words, "--set", "monte_carlo.sensor_draws=600000"])
+    for part in ("too many cells", "1200000", "1000000", "--yes"):
+        assert part in text
+    assert list(here.iterdir()) == []
+
+
+def test_a_yes_is_a_yes(capsys: pytest.CaptureFixture[str]) -> None:
+    million = ["--set", "monte_carlo.sensor_draws=600000"]
+    assert call(["run", "quick_kinematic", "--plan", "--yes", *million]) == DONE
+    assert "1,200,000" in capsys.readouterr().out
+    judge_scenario(scenario("monte_carlo.sensor_draws=600000"), many=True)
+
+
+def test_a_plan_refuses_what_a_run_would_refuse(message_of: Callable[[list[str]], str]) -> None:
+    text = message_of(["run", "quick_kinematic", "--plan", "--set", "ride.speed_kmh={ normal = [50, 5] }"])
+    assert "without bounds" in text

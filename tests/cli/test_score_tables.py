@@ -1,0 +1,203 @@
+"""Scores on the command line: rails first where they are scored, in the band that counts, and no name cut."""
+
+from __future__ import annotations
+
+from io import StringIO
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from simrail.cli.score_tables import WIDEST, print_scores
+from simrail.scenario.scenario import Scenario, read_scenario
+from simrail.scoring.table import NO_SAMPLES, OK, QUANTITY_UNITS, SCORE_COLUMNS, TOO_SHORT, UNOBSERVABLE
+
+TEXT = """
+title = "Rails"
+seed = 1
+track = "scale_track"
+vehicle = "scale_vehicle"
+engine = "kinematic"
+[monte_carlo]
+sensor_draws = 2
+[[ride]]
+name = "out"
+start_m = 1.0
+end_m = 89.0
+speed_kmh = 3.6
+[[imu]]
+name = "body"
+grade = "lord_3dm_gx4_25"
+body = "body"
+position_m = [0.0, 0.0, 0.05]
+[geometry]
+bands = ["D1"]
+own_bands = { paper = [0.3, 7.0] }
+[[estimator]]
+name = "smoother_camera_free_of_the_whole_ride_tuned_on_the_other_ride"
+method = "TrajectorySmoother"
+[[estimator]]
+name = "smoother"
+method = "TrajectorySmoother"
+[[estimator]]
+name = "design_angles"
+method = "DesignAngles"
+[[estimator]]
+name = "zero_track"
+method = "ZeroTrack"
+"""
+LONG, SHORT, DESIGN, ZERO = (
+    "smoother_camera_free_of_the_whole_ride_tuned_on_the_other_ride",
+    "smoother",
+    "design_angles",
+    "zero_track",
+)
+SD_MM = {
+    (LONG, "vertical_profile"): 0.11,
+    (LONG, "cross_level"): 0.22,
+    (LONG, "alignment"): 0.97,
+    (SHORT, "vertical_profile"): 0.12,
+    (SHORT, "cross_level"): 0.23,
+    (SHORT, "alignment"): 0.34,
+    (SHORT, "gauge"): 0.45,
+    (ZERO, "vertical_profile"): 0.71,
+    (ZERO, "cross_level"): 0.82,
+    (ZERO, "alignment"): 0.93,
+}
+"""Of the band ``paper``, mean of two draws that lie 0.01 mm to either side; in D1 ten times as much."""
+
+
+def scores(*, bands: dict[str, str], rails: bool = True) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Score table and cells of two draws; `bands`: by name, the status of the figures in it."""
+    labels = {
+        "scenario": "rails",
+        "ride": "out",
+        "vehicle": "v",
+        "mount": "body",
+        "imu": "lord_3dm_gx4_25",
+        "odometry": "encoder",
+        "tuning": "default",
+        "track_draw": 0,
+    }
+    rows: list[dict[str, Any]] = []
+
+    def add(draw: int, name: str, quantity: str, metric: str, value: float | None, **other: Any) -> None:
+        where = {"band": "full", "reference": "truth", "window": "whole", "status": OK} | other
+        unit = "us" if metric == "us_per_sample" else QUANTITY_UNITS[quantity]
+        own = {"cell": draw, "sensor_draw": draw, "estimator": name, "quantity": quantity, "metric": metric}
+        rows.append(labels | own | where | {"value": value, "unit": unit, "n_samples": 9})
+
+    for draw, sign in enumerate((-1.0, 1.0)):
+        for name in (LONG, SHORT, DESIGN, ZERO):
+            angle = 0.4 if name in (DESIGN, ZERO) else 0.05
+            for quantity in ("roll", "pitch"):
+                for window in ("whole", "curve"):
+                    add(draw, name, quantity, "rms", angle, window=window)
+                add(draw, name, quantity, "rms", 0.777, window="curve", reference="design")
+            add(draw, name, "roll", "us_per_sample", 3.25)
+            if name == DESIGN or not rails:
+                continue
+            for quantity in ("vertical_profile", "cross_level", "alignment", "gauge"):
+                known = SD_MM.get((name, quantity))
+                for band, status in {"full": OK, **bands}.items():
+                    size = {"full": 100.0, "D1": 10.0}.get(band, 1.0)
+                    value = None if known is None else size * (known + 0.01 * sign)
+                    status = status if value is not None else UNOBSERVABLE
+                    add(draw, name, quantity, "sd", value if status == OK else None, band=band, status=status)
+    cells = pd.DataFrame(
+        [
+            labels | {"cell": i, "sensor_draw": i, "case": 0, "speed_kmh": 3.6, "direction": "forward"}
+            for i in range(2)
+        ]
+    )
+    return pd.DataFrame(rows)[list(SCORE_COLUMNS)], cells
+
+
+def shown(scenario: Scenario, table: pd.DataFrame, cells: pd.DataFrame, *, width: int = WIDEST) -> list[str]:
+    """Lines that the command line prints."""
+    campaign = SimpleNamespace(
+        scores=table, cells=cells, stopped=None, plan=SimpleNamespace(warnings=[]), failures=[]
+    )
+    manifest = {"wall_s": {"total": 1.0}, "real_time_factor": None}
+    results = SimpleNamespace(campaign=campaign, scenario=scenario, manifest=manifest, folder=Path("there"))
+    console = Console(width=width, record=True, file=StringIO())
+    print_scores(console, results)  # type: ignore[arg-type]
+    return console.export_text().splitlines()
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    return read_scenario(TEXT, name="rails")
+
+
+def row_of(lines: list[str], name: str, *, after: str) -> list[str]:
+    """Numbers of a method's line in the table that follows a title."""
+    start = next(i for i, line in enumerate(lines) if line.startswith(after))
+    return next(line for line in lines[start:] if line.split()[:1] == [name]).split()[1:]
+
+
+def test_rails_come_first_in_the_scenarios_own_band_where_d1_is_too_long(scenario: Scenario) -> None:
+    lines = shown(scenario, *scores(bands={"D1": TOO_SHORT, "paper": OK}))
+    titles = [line for line in lines if line.startswith(("Rails", "Attitude"))]
+    assert titles == [
+        "Rails: sd of the error in wavelengths of 0.3\u20137 m (paper), mm; mean of 2 draws",
+        "Attitude: rms error, deg; mean of 2 draws",
+    ]
+    assert row_of(lines, SHORT, after="Rails") == ["0.120", "0.230", "0.340", "0.450", "3.25"]
+    assert row_of(lines, ZERO, after="Rails") == ["*", "0.710", "0.820", "0.930", "-", "3.25"]
+    assert row_of(lines, SHORT, after="Attitude") == ["0.050"] * 4
+    text = "\n".join(lines)
+    assert "0.777" not in text, "against the design angles nothing is told beside rails"
+    attitude = text[text.index("Attitude") :]
+    assert DESIGN in attitude and "zero_track *" not in attitude, "the design angles are told once"
+    assert " ".join(text.split()).count(f"{ZERO}, which uses no IMU, errs less in alignment than {LONG}") == 1
+
+
+def test_rails_are_told_in_d1_where_it_has_figures(scenario: Scenario) -> None:
+    lines = shown(scenario, *scores(bands={"D1": OK, "paper": OK}))
+    assert any(
+        line.startswith("Rails: sd of the error in wavelengths of 3\u201325 m (D1), mm") for line in lines
+    )
+    assert row_of(lines, SHORT, after="Rails")[0] == "1.200"
+
+
+def test_rails_without_any_band_are_told_unfiltered(scenario: Scenario) -> None:
+    lines = shown(scenario, *scores(bands={"D1": TOO_SHORT, "paper": TOO_SHORT}))
+    assert any(line.startswith("Rails: sd of the error unfiltered, mm") for line in lines)
+    assert row_of(lines, SHORT, after="Rails")[0] == "12.000"
+
+
+@pytest.mark.parametrize("width", [80, 200])
+def test_no_line_of_a_table_is_wider_than_80_and_no_name_is_cut(scenario: Scenario, width: int) -> None:
+    for rails in (True, False):
+        lines = shown(scenario, *scores(bands={"paper": OK}, rails=rails), width=width)
+        rules = [line for line in lines if "\u2500\u2500" in line]
+        assert rules and max(len(line.rstrip()) for line in rules) <= WIDEST
+        text = "".join(line.split()[0] for line in lines if line.startswith(" ") and line.split())
+        assert LONG in text, "folded, not cut"
+        assert "\u2026" not in "\n".join(lines)
+
+
+def test_a_ride_without_rails_has_the_attitude_against_both_references(scenario: Scenario) -> None:
+    lines = shown(scenario, *scores(bands={}, rails=False))
+    assert not any(line.startswith("Rails") for line in lines)
+    assert row_of(lines, SHORT, after="Attitude") == [
+        "0.050",
+        "0.050",
+        "0.777",
+        "0.050",
+        "0.050",
+        "0.777",
+        "3.25",
+    ]
+
+
+def test_a_failed_figure_is_a_dash(scenario: Scenario) -> None:
+    table, cells = scores(bands={"paper": OK})
+    gone = (table["estimator"] == SHORT) & (table["quantity"] == "alignment")
+    table.loc[gone, "value"] = None
+    table.loc[gone, "status"] = NO_SAMPLES
+    assert row_of(shown(scenario, table, cells), SHORT, after="Rails")[2] == "-"

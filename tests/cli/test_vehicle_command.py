@@ -1,0 +1,99 @@
+"""``simrail vehicle``: what it prints and writes, and how it refuses."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from simrail.cli.main import BAD_INPUT, DONE, call
+from simrail.core.toml_files import shipped
+
+
+@pytest.fixture(scope="module")
+def bogie(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str, float]:
+    """What ``simrail vehicle metro_irw_bogie --out`` says, its page, and the seconds that it took."""
+    folder = tmp_path_factory.mktemp("vehicle")
+    begun = time.perf_counter()
+    command = [
+        sys.executable,
+        "-m",
+        "simrail",
+        "vehicle",
+        "metro_irw_bogie",
+        "--out",
+        str(folder / "new"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=None)
+    assert done.returncode == DONE, done.stderr
+    page = (folder / "new" / "metro_irw_bogie.html").read_text(encoding="utf-8")
+    return done.stdout, page, time.perf_counter() - begun
+
+
+def test_prints_what_is_asked_of_a_vehicle(bogie: tuple[str, str, float]) -> None:
+    """Masses, wheel loads, frequencies, conicity, critical speed; says that it is synthetic."""
+    text = " ".join(bogie[0].split())
+    assert "metro_irw_bogie (synthetic)" in text
+    assert "12,000 18,000 75,000 75,000 1.450" in text
+    # 16.1 t on four wheels.
+    assert "front.left 39.49" in text and "in all 16,100 kg" in text
+    assert "critical speed: none below 400 km/h" in text
+    # The body's bounce is at sqrt(4 k/m) = 1.30 Hz less what the frame gives way.
+    bounce = re.search(r"(\d\.\d+) ([\d.]+) body bounce 100%", text)
+    assert bounce and 1.15 < float(bounce[1]) < 1.30 and 5.0 < float(bounce[2]) < 25.0
+    at_3_mm = re.search(r"equivalent conicity at 3 mm: (0\.\d+)", text)
+    assert at_3_mm and 0.2 < float(at_3_mm[1]) < 0.3
+
+
+def test_page_stands_alone_and_shows_four_figures(bogie: tuple[str, str, float]) -> None:
+    page = bogie[1]
+    assert page.count("<svg") == 4 and "<script" not in page
+    assert not re.search(r"""(?:src|href)=["'](?:https?:)?//""", page)
+    assert "Synthetic: its figures are not those of a real vehicle" in page
+    for heading in ("Masses and loads", "Contact", "Modes", "Root locus"):
+        assert f">{heading}" in page
+    assert "nan" not in re.sub(r"<[^>]*>", "", page).lower().split()
+
+
+@pytest.mark.slow
+def test_answers_within_20_s(bogie: tuple[str, str, float]) -> None:
+    assert bogie[2] < 20.0
+
+
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [("metro_irw_boggie", "metro_irw_bogie"), ("./nowhere.toml", "no such file")],
+)
+def test_bad_names_are_refused_in_one_line(
+    argument: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2, the nearest name or the path, and nothing written."""
+    assert call(["vehicle", argument, "--out", str(tmp_path / "out")]) == BAD_INPUT
+    captured = capsys.readouterr()
+    assert captured.err.startswith("simrail: ") and len(captured.err.splitlines()) == 1
+    assert said in captured.err and captured.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bad_file_is_refused_with_its_field(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = shipped("vehicle")["metro_irw_bogie"].read_text(encoding="utf-8")
+    mine = tmp_path / "mine.toml"
+    mine.write_text(text.replace("friction = 0.3", "friction = -0.3"), encoding="utf-8")
+    assert call(["vehicle", str(mine)]) == BAD_INPUT
+    assert "mine.toml: friction" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_scale_vehicle_is_told_in_figures_of_its_size(capsys: pytest.CaptureFixture[str]) -> None:
+    """Three digits of grams and newtons; the conicity of S1002 at a tenth of 3 mm."""
+    assert call(["vehicle", "scale_vehicle"]) == DONE
+    text = " ".join(capsys.readouterr().out.split())
+    assert "in all 40 kg" in text and "axle_f1.left 0.04905" in text
+    assert "axle_f1 1.6 0.00695 5e-05 0.00695 0.045" in text
+    assert "wheel S1002 on rail 60E1 at 1:10, gauge 127 mm" in text
+    at_3_mm = re.search(r"equivalent conicity at 0.29 mm: (0\.\d+)", text)
+    assert at_3_mm and 0.15 < float(at_3_mm[1]) < 0.2

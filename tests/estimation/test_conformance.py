@@ -1,0 +1,389 @@
+"""The battery passes what it should, and each of its checks fails on a fault planted for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from simrail.estimators.ahrs import Imufusion, Vqf
+from simrail.estimators.attitude.ekf import AttitudeEkf
+from simrail.estimators.attitude.gda import AttitudeGda
+from simrail.estimators.baselines import DesignAngles
+from simrail.estimators.trajectory.smoother import TrajectorySmoother
+
+from simrail.core.columns import ATTITUDE, IRREGULARITY
+from simrail.estimation.conformance import check_estimator, require_well_formed
+from simrail.estimation.estimate import Estimate, Estimator
+from simrail.recording.recording import Recording
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import harmonic, kinematic_truth
+from simrail.ride.truth import Mount
+from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.measure import measure
+from simrail.track.file import track_by_name
+from simrail.vehicle.speed_profile import SpeedProfile
+
+
+@lru_cache
+def ride(direction: int = 1, imu: str = "lord_3dm_gx4_25") -> Recording:
+    """A short ride with a rest of 3 s, through a curve."""
+    start, end = (430.0, 560.0) if direction > 0 else (560.0, 430.0)
+    truth = kinematic_truth(
+        track_by_name("condequinto_olivar"),
+        SpeedProfile(start, end, 10.0, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=3.0),
+        channels={"roll": harmonic(0.005, frequency_hz=1.1), "lateral": harmonic(0.003, frequency_hz=0.7)},
+    )
+    return measure(
+        truth,
+        name="short",
+        mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
+        grade=load_grade(imu),
+        encoder=EncoderSpec("wheel", radius_error_sd=0.001),
+        seed=1,
+        draw=0,
+    )
+
+
+OURS = [
+    AttitudeEkf(),
+    AttitudeEkf(compensated=False),
+    AttitudeEkf(tuning="paper_final"),
+    AttitudeEkf(tuning="paper_initial", process_noise="per_step", rest_bias=False),
+    AttitudeEkf(tuning="paper_final", process_noise="per_step", rest_bias=False),
+    AttitudeEkf(printed=True),
+    AttitudeEkf(compensated=False, doubt=100.0),
+    AttitudeGda(),
+    AttitudeGda(tuning="paper", rest_bias=False),
+    AttitudeGda(printed=True),
+    AttitudeGda(compensated=False, tuning="paper"),
+    DesignAngles(),
+    Vqf(),
+    Vqf(compensated=True),
+    Imufusion(),
+    Imufusion(compensated=True, rest_bias=False),
+    TrajectorySmoother(),
+    TrajectorySmoother(with_covariance=False),
+    TrajectorySmoother(smoothed=False),
+    TrajectorySmoother(smoothed=False, printed=True, rest_bias=False),
+]
+
+
+@pytest.mark.parametrize("estimator", OURS, ids=lambda estimator: type(estimator).__name__)
+def test_ours_pass(estimator: Estimator) -> None:
+    check_estimator(estimator, ride())
+
+
+BACKWARDS = {
+    "ekf": AttitudeEkf(),
+    "gda": AttitudeGda(),
+    "vqf": Vqf(),
+    "imufusion": Imufusion(),
+    "trajectory": TrajectorySmoother(draws=2),
+    "trajectory_filter": TrajectorySmoother(smoothed=False),
+}
+
+
+@pytest.mark.parametrize("estimator", BACKWARDS.values(), ids=list(BACKWARDS))
+def test_ours_pass_backwards_and_with_a_perfect_imu(estimator: Estimator) -> None:
+    check_estimator(estimator, ride(-1, "ideal"))
+
+
+def test_a_smoother_that_says_it_is_causal_is_caught() -> None:
+    """The trajectory smoother does look ahead."""
+
+    @dataclass(frozen=True)
+    class Liar(TrajectorySmoother):
+        causal = True
+
+    with pytest.raises(AssertionError, match="sees_no_future"):
+        check_estimator(Liar(), ride())
+
+
+def test_ours_pass_without_an_encoder() -> None:
+    check_estimator(AttitudeEkf(), replace(ride(), encoder=None, encoder_sheet=None))
+
+
+def angles(recording: Recording) -> pd.DataFrame:
+    """A harmless estimate to put faults into."""
+    gyro = recording.imu.to_numpy()[:, :3]
+    return pd.DataFrame(np.cumsum(gyro, axis=0) * 0.004, index=recording.imu.index, columns=list(ATTITUDE))
+
+
+@dataclass(frozen=True)
+class Sound:
+    """What the faulty ones would be without their fault."""
+
+    causal = True
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return Estimate(states=self.spoil(angles(recording), recording), mount=recording.mount)
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states
+
+
+def test_the_sound_one_passes() -> None:
+    check_estimator(Sound(), ride())
+
+
+class LookAhead(Sound):
+    """Uses the next sample."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.shift(-1).ffill()
+
+
+class MeanOfAll(Sound):
+    """Takes off the mean of the whole ride: the commonest look-ahead."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states - states.mean()
+
+
+class BiasFromTheWholeRest(Sound):
+    """Subtracts the mean over the whole rest, also at the rest's start: shows in the rest only."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        speed = recording.odometry["speed_mps"].to_numpy()
+        rest = int(np.argmax(speed != 0.0)) or len(speed)
+        return states - recording.imu.to_numpy()[:rest, :3].mean(axis=0)
+
+
+class Mutating(Sound):
+    """Takes the bias off in place."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        recording.imu["gyro_x_radps"] -= 0.001
+        return states
+
+
+class AddsOdometryColumn(Sound):
+    """Leaves something behind in the odometry."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        recording.odometry["curvature_1pm"] = 0.0
+        return states
+
+
+class WrongColumn(Sound):
+    """Degrees, under a name of its own."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return np.degrees(states).rename(columns={"roll_rad": "roll_deg"})
+
+
+class NotANumber(Sound):
+    """One NaN in the middle."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        states.iloc[len(states) // 2, 1] = np.nan
+        return states
+
+
+class Shorter(Sound):
+    """Drops the first sample."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.iloc[1:]
+
+
+class NegativeSd(Sound):
+    """States a negative standard deviation."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.assign(roll_sd_rad=-1.0)
+
+
+class Random(Sound):
+    """Jitters by itself."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states + 1e-12 * np.random.default_rng().standard_normal(states.shape)
+
+
+MEMORY: list[float] = [0.0]
+
+
+class Remembers(Sound):
+    """Carries the last ride's end into the next."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        states = states + MEMORY[0]
+        MEMORY[0] = float(states.iloc[-1, 0])
+        return states
+
+
+class DividesBySpeed(Sound):
+    """Cannot stand: 0/0 at rest."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        speed = np.abs(recording.odometry["speed_mps"]).cummax()
+        with np.errstate(invalid="ignore"):
+            return states.mul(speed.iloc[-1] / speed.iloc[-1], axis=0)
+
+
+class ForwardOnly(Sound):
+    """Cannot run backwards: a square root of the way made."""
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        way = recording.odometry["position_m"].iloc[-1] - recording.start_position_m
+        with np.errstate(invalid="ignore"):
+            return states + 0.0 * np.sqrt(way + 1e-6)
+
+
+class OtherMount(Sound):
+    """Speaks of another IMU."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return replace(super().estimate(recording), mount="roof")
+
+
+class CrookedCovariance(Sound):
+    """A covariance that is not symmetric."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        covariance = np.tile(np.eye(3), (len(recording.imu), 1, 1))
+        covariance[:, 0, 1] = 0.1
+        return replace(super().estimate(recording), covariance=covariance, covariance_of=ATTITUDE)
+
+
+class IndefiniteCovariance(Sound):
+    """A correlation of 2."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        covariance = np.tile(np.eye(3), (len(recording.imu), 1, 1))
+        covariance[:, 0, 1] = covariance[:, 1, 0] = 2.0
+        return replace(super().estimate(recording), covariance=covariance, covariance_of=ATTITUDE)
+
+
+@dataclass(frozen=True)
+class Rails(Sound):
+    """Says something of the rails as well; gauge is left open."""
+
+    fault: str = ""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        places = pd.Index(0.25 * np.arange(40.0, 60.0), name="position_m")
+        geometry = pd.DataFrame(0.0, index=places, columns=list(IRREGULARITY)).assign(gauge_m=np.nan)
+        if self.fault == "hole":
+            geometry.iloc[3, 0] = np.nan
+        elif self.fault == "column":
+            geometry = geometry.rename(columns={"gauge_m": "gauge_mm"})
+        elif self.fault == "step":
+            geometry = geometry.drop(index=12.0)
+        return replace(super().estimate(recording), geometry=geometry)
+
+
+def test_geometry_may_leave_a_quantity_open_but_not_in_places() -> None:
+    check_estimator(Rails(), ride())
+    for fault, words in (
+        ("hole", "not finite in alignment_m, here and there"),
+        ("column", "geometry lacks gauge_m"),
+        ("step", "geometry is not uniform"),
+    ):
+        with pytest.raises(AssertionError, match=words):
+            require_well_formed(Rails(fault).estimate(ride()), ride())
+
+
+@dataclass(frozen=True)
+class Draws(Rails):
+    """Draws what the rails may be."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        rails = Rails().estimate(recording)
+        assert rails.geometry is not None
+        rng = np.random.default_rng(None if self.fault == "seed" else 1)
+        draws = 1e-3 * rng.standard_normal((3, len(rails.geometry), 4))
+        if self.fault != "gauge":
+            draws[:, :, 3] = np.nan
+        if self.fault == "hole":
+            draws[1, 2, 0] = np.nan
+        if self.fault == "places":
+            draws = draws[:, 1:]
+        return replace(
+            rails, geometry=None if self.fault == "alone" else rails.geometry, geometry_draws=draws
+        )
+
+
+def test_draws_are_of_the_geometry_and_the_same_bits_again() -> None:
+    check_estimator(Draws(), ride())
+    for fault, words in (
+        ("hole", "not finite where the geometry is"),
+        ("gauge", "not finite where the geometry is"),
+        ("places", "have the shape"),
+        ("alone", "without a geometry"),
+    ):
+        with pytest.raises(AssertionError, match=words):
+            require_well_formed(Draws(fault).estimate(ride()), ride())
+    with pytest.raises(AssertionError, match="geometry_draws"):
+        check_estimator(Draws("seed"), ride())
+
+
+class UnsaidCausal(Sound):
+    """Does not say whether it is causal."""
+
+    causal = None
+
+
+class NoDataclass:
+    """Has no parameters that could be written down."""
+
+    causal = True
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return Sound().estimate(recording)
+
+
+@dataclass
+class Thawed:
+    """Parameters that can be changed behind one's back."""
+
+    causal = True
+
+    def estimate(self, recording: Recording) -> Estimate:
+        return Sound().estimate(recording)
+
+
+class SmootherThatSaysSo(MeanOfAll):
+    """Looks ahead, and says so: allowed."""
+
+    causal = False
+
+
+@pytest.mark.parametrize(
+    ("faulty", "check", "words"),
+    [
+        (LookAhead, "sees_no_future", "differs from sample"),
+        (MeanOfAll, "sees_no_future", "differs from sample"),
+        (BiasFromTheWholeRest, "sees_no_future", "differs from sample 0"),
+        (Mutating, "leaves_the_recording_alone", "changed imu"),
+        (AddsOdometryColumn, "leaves_the_recording_alone", "changed odometry"),
+        (WrongColumn, "estimate_is_well_formed", "roll_deg"),
+        (NotANumber, "estimate_is_well_formed", "not finite in pitch_rad"),
+        (Shorter, "estimate_is_well_formed", "not at the IMU's times"),
+        (NegativeSd, "estimate_is_well_formed", "negative"),
+        (Random, "is_deterministic", "run again"),
+        (Remembers, "is_deterministic", "run again"),
+        (DividesBySpeed, "works_at_standstill", "not finite"),
+        (ForwardOnly, "works_backwards", "not finite"),
+        (OtherMount, "estimate_is_well_formed", "roof"),
+        (CrookedCovariance, "estimate_is_well_formed", "not symmetric"),
+        (IndefiniteCovariance, "estimate_is_well_formed", "positive semidefinite"),
+        (UnsaidCausal, "says_whether_causal", "causal"),
+        (NoDataclass, "frozen_dataclass", "no dataclass"),
+        (Thawed, "frozen_dataclass", "not frozen"),
+    ],
+)
+def test_a_planted_fault_is_caught_by_its_check(faulty: Callable, check: str, words: str) -> None:
+    with pytest.raises(AssertionError) as caught:
+        check_estimator(faulty(), ride())
+    lines = [line for line in str(caught.value).splitlines() if line.startswith(check)]
+    assert lines and words in lines[0]
+
+
+def test_a_smoother_may_look_ahead() -> None:
+    check_estimator(SmootherThatSaysSo(), ride())

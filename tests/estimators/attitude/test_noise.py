@@ -1,0 +1,118 @@
+"""The recommended tuning does what its derivation says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+from simrail.estimators.attitude.compensation import design_frame
+from simrail.estimators.attitude.noise import bias_variance, paper_noise, recommended_noise, time_constant
+from simrail.estimators.attitude.rest_bias import rest_bias
+
+from simrail.estimation.conformance import prefix
+from simrail.recording.recording import Recording
+
+GRAVITY = 9.81
+
+
+@pytest.fixture
+def recording(bend: Callable, exactly: Callable) -> Recording:
+    ride = exactly(bend())
+    ride.odometry[["position_sd_m", "speed_sd_mps", "acceleration_sd_mps2"]] = 1.5, 0.02, 0.04
+    return ride
+
+
+@pytest.mark.parametrize("sensor", [1e-9, 1e-6, 1e-4])
+@pytest.mark.parametrize("swing", [0.0, 1e-6, 1e-3, 1e-1])
+@pytest.mark.parametrize("bias", [0.0, 1e-10, 1e-7])
+def test_time_constant_minimises_the_error(sensor: float, swing: float, bias: float) -> None:
+    """Against a numerical search of N^2 tau/2 + b^2 tau^2 + noise/(2 g^2 tau), the noise held."""
+    white = 8e-9
+    tau = float(time_constant(sensor, np.array([swing]), white, np.array([bias]), gravity=GRAVITY)[0])
+    noise = sensor + 2.0 * swing / tau
+
+    def error(log_tau: float) -> float:
+        at = np.exp(log_tau)
+        return float(np.log(white * at / 2 + bias * at**2 + noise / (2 * GRAVITY**2 * at)))
+
+    best = minimize_scalar(error, bracket=(np.log(tau) - 1.0, np.log(tau) + 1.0), tol=1e-12)
+    # A minimum is found to the square root of the rounding only.
+    assert tau == pytest.approx(np.exp(best.x), rel=1e-6)
+    residual = (sensor + 2 * swing / tau) / (GRAVITY * tau) ** 2 - white - 4 * bias * tau
+    assert abs(residual) < 1e-9 * (white + 4 * bias * tau)
+
+
+def test_process_noise_gives_that_time_constant(recording: Recording) -> None:
+    """sqrt(R Ts / Qc) / g = tau on every sample, without the odometry's share of R."""
+    rest = rest_bias(recording)
+    noise = recommended_noise(recording, rest, frame=None)
+    intensity = noise.process * 250.0
+    tau = np.sqrt(noise.force[:, 2] / 250.0 / intensity) / GRAVITY
+    white = recording.imu_sheet.gyro_noise_radpsqrts**2 + 1e-10
+    bias = bias_variance(recording.imu_sheet, rest.samples / 250.0)
+    np.testing.assert_allclose(intensity, white + 4 * bias * tau, rtol=1e-9)
+    # Standing, the accelerometer is quiet and trusted quickly; running, it is not.
+    standing, running = tau[200], tau[len(tau) // 2]
+    assert 0.3 < standing < 1.5 and 2.0 < running < 10.0
+
+
+def test_odometry_widens_the_force_where_it_matters(recording: Recording) -> None:
+    rest, frame = rest_bias(recording), design_frame(recording)
+    blind = recommended_noise(recording, rest, frame=None)
+    aware = recommended_noise(recording, rest, frame=frame)
+    np.testing.assert_allclose((aware.force - blind.force)[:, 0], 0.04**2, rtol=1e-9)
+    extra = (aware.force - blind.force)[:, 1]
+    kind = recording.track.kind(frame.s_m)
+    tau = np.sqrt(blind.force[:, 1] / 250.0 / (blind.process * 250.0)) / GRAVITY
+    speed = recording.odometry["speed_mps"].to_numpy()
+    in_curve = (2 * speed * frame.k[:, 2] * 0.02) ** 2 * tau * 250.0
+    arc = (kind == 2) & (np.abs(frame.dk[:, 2]) < 1e-12)
+    np.testing.assert_allclose(extra[arc], in_curve[arc], rtol=1e-6)
+    assert extra[kind == 1].max() > 20 * extra[kind == 2].max()
+    level = (kind == 0) & (np.abs(frame.k).max(axis=1) == 0.0)
+    assert level.any() and not extra[level].any()
+
+
+def test_residual_bias_shrinks_with_the_rest_to_the_drift(recording: Recording) -> None:
+    sheet = recording.imu_sheet
+    drift, turn_on = sheet.gyro_bias_instability_radps**2, sheet.gyro_turn_on_bias_radps**2 / 3
+    found = bias_variance(sheet, np.array([0.0, 1e-4, 20.0, 1e9]))
+    white = sheet.gyro_noise_radpsqrts**2
+    np.testing.assert_allclose(
+        found, [turn_on + drift, turn_on + drift, white / 20 + 2 * drift, 2 * drift], rtol=1e-6
+    )
+    perfect = replace(sheet, gyro_turn_on_bias_radps=0.0, gyro_bias_instability_radps=0.0)
+    assert not bias_variance(perfect, np.array([0.0, 20.0])).any()
+
+
+def test_a_perfect_imu_gets_finite_positive_noise(recording: Recording) -> None:
+    zero = {
+        field: 0.0
+        for field in vars(recording.imu_sheet)
+        if field.endswith(("radps", "mps2", "radpsqrts", "mpsqrts"))
+    }
+    ideal = replace(recording, imu_sheet=replace(recording.imu_sheet, **zero))
+    noise = recommended_noise(ideal, rest_bias(ideal), frame=design_frame(ideal))
+    assert (noise.process > 0.0).all() and (noise.force > 0.0).all()
+    assert np.isfinite(noise.process).all() and np.isfinite(noise.force).all()
+    assert not noise.considered.any()
+
+
+def test_paper_noise_in_both_readings(recording: Recording) -> None:
+    """Section 6: Q_{k-1} = 1e-2 I with k = 2.5 and Ts = 4 ms; final 1e-3 and R = 1.5^2 10^2."""
+    assert paper_noise(recording, "paper_initial", reading="per_step").process[0] == 1e-2
+    assert paper_noise(recording, "paper_initial", reading="intensity").process[0] == pytest.approx(4e-5)
+    final = paper_noise(recording, "paper_final", reading="intensity")
+    assert final.process[0] == pytest.approx(4e-6) and final.force[0, 0] == 225.0
+
+
+def test_noise_of_a_prefix_is_the_prefix_of_the_noise(recording: Recording) -> None:
+    def noise(ride: Recording) -> tuple[np.ndarray, ...]:
+        return recommended_noise(ride, rest_bias(ride), frame=design_frame(ride))
+
+    for n in (3, 301, 7001):
+        for whole, part in zip(noise(recording), noise(prefix(recording, n)), strict=True):
+            np.testing.assert_array_equal(whole[:n], part)

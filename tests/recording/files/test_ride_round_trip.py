@@ -1,0 +1,211 @@
+"""Recordings survive the disk bit by bit, whole or not at all."""
+
+from dataclasses import replace
+from typing import get_type_hints
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simrail.core.errors import InputError
+from simrail.core.toml_files import judge, parse_toml, shipped
+from simrail.recording.check_form import check_recording
+from simrail.recording.check_physics import check_plausible
+from simrail.recording.files.ride_file import RideFile
+from simrail.recording.files.ride_reader import read_ride
+from simrail.recording.files.ride_writer import write_ride
+from simrail.recording.files.signal_part import SignalPart, VectorPart
+from simrail.recording.recording import Recording
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.recording.signals import SIGNALS
+from simrail.ride.kinematic import kinematic_truth
+from simrail.ride.truth import Mount
+from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.magnetometer import MagnetometerSpec
+from simrail.sensors.measure import measure
+from simrail.sensors.rail_sensor import RailSensorSpec
+from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
+from simrail.track.file import TrackFile, track_by_name, track_text
+from simrail.track.irregularity import Irregularity
+from simrail.track.laid_track import lay
+from simrail.vehicle.speed_profile import SpeedProfile
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    track = TrackDesign(
+        "curve",
+        -50.0,
+        (
+            Straight(80.0),
+            Transition(30.0),
+            Curve(100.0, 1.0 / 3.0e-3, 0.07),
+            Transition(30.0),
+            Straight(100.0),
+        ),
+        gradients=(Gradient(0.0, 0.005), Gradient(90.0, -0.0123)),
+        vertical_radius_m=1500.0,
+    )
+    truth = kinematic_truth(track, SpeedProfile(start_m=0.0, end_m=150.0, speed_mps=8.0, rest_s=2.0))
+    return measure(
+        truth,
+        name="Montequinto é",
+        mount=Mount("axle", "body", (0.1, -0.2, 0.6)),
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("wheel", radius_error_sd=1e-3, edge_times=True),
+        magnetometer=MagnetometerSpec(),
+        rail_sensor=RailSensorSpec(),
+        rails=lay(track, Irregularity("erri_b176_low", fade_m=20.0), seed=1),
+        seed=1,
+        draw=0,
+    )
+
+
+def assert_same(a: Recording, b: Recording) -> None:
+    for part in ("imu", "odometry", "encoder", "magnetometer", "rail_displacement", "gaps"):
+        left, right = getattr(a, part), getattr(b, part)
+        if left is None:
+            assert right is None
+        else:
+            pd.testing.assert_frame_equal(left, right, check_exact=True)
+            assert left.to_numpy().tobytes() == right.to_numpy().tobytes()
+            assert left.index.to_numpy().tobytes() == right.index.to_numpy().tobytes()
+            assert right.index.name == (None if part == "gaps" else "time_s")
+            assert left.dtypes.equals(right.dtypes)
+    blank = pd.DataFrame()
+    assert replace(
+        a, imu=blank, odometry=blank, encoder=None, magnetometer=None, rail_displacement=None, gaps=None
+    ).__repr__() == (
+        replace(
+            b, imu=blank, odometry=blank, encoder=None, magnetometer=None, rail_displacement=None, gaps=None
+        ).__repr__()
+    )
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_round_trip_is_exact(recording, tmp_path, format):
+    write_ride(recording, tmp_path / "ride", format=format)
+    assert sorted(path.name for path in (tmp_path / "ride").iterdir()) == [
+        f"encoder.{format}",
+        f"imu.{format}",
+        f"magnetometer.{format}",
+        f"odometry.{format}",
+        f"rail_displacement.{format}",
+        "ride.toml",
+        "track.toml",
+    ]
+    again = read_ride(tmp_path / "ride")
+    assert_same(recording, again)
+    assert_same(recording, read_ride(tmp_path / "ride" / "ride.toml"))
+    s = np.linspace(-40.0, 280.0, 50)
+    np.testing.assert_array_equal(again.track.frame(s).k, recording.track.frame(s).k)
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_numbers_of_every_size_survive(recording, tmp_path, format):
+    """Signed zeros, denormals, seventeen digits, whole numbers: in the noise of a sound recording."""
+    imu = recording.imu.copy()
+    hard = [-0.0, 5e-324, -1e-17, 0.1 + 0.2, 1.0, 2.0**-30, np.nextafter(1.0, 2.0), -1.2345678901234567e-5]
+    imu.iloc[1000 : 1000 + len(hard), 0] = hard
+    imu["gyro_y_radps"] = 0.0
+    gaps = pd.DataFrame({"start_s": [1.2 / 3.0, 5.0], "end_s": [1.6, 5.5 / 3.1], "missing": [4, 7]})
+    for number, lost in enumerate((gaps, gaps.iloc[:0])):
+        hostile = replace(recording, imu=imu, gaps=lost, name='a "b" # \\ \t é')
+        write_ride(hostile, tmp_path / str(number), format=format)
+        assert_same(hostile, read_ride(tmp_path / str(number)))
+
+
+@settings(max_examples=200, deadline=None)
+@given(value=st.floats(-1.0, 1.0).map(lambda v: round(v, 9)))
+def test_track_in_drawing_units_reads_back_bit_by_bit(value):
+    sloped = TrackDesign(
+        "a track",
+        -3.0,
+        (
+            Straight(20.1),
+            Transition(30.0),
+            Curve(11.0, -317.7, abs(value) * 0.2),
+            Transition(9.0),
+            Straight(60.0),
+        ),
+        gradients=(Gradient(80.0, value * 0.01),),
+        vertical_radius_m=(1134.5,),
+        source="made up",
+        synthetic=True,
+        start_position_m=(1.0, 2.0 / 3.0, -3.0),
+        start_yaw_rad=0.1 + 0.2,
+    )
+    try:
+        text = track_text(sloped)
+    except InputError as error:
+        assert "no decimal" in str(error)  # a value of 17 digits may have no decimal in mm
+    else:
+        assert judge(TrackFile, parse_toml(text, file="t"), file="t").design("other") == sloped
+    simple = replace(sloped, elements=(Straight(300.0),), gradients=(Gradient(80.0, round(0.02 * value, 3)),))
+    assert judge(TrackFile, parse_toml(track_text(simple), file="t"), file="t").design("") == simple
+
+
+def test_whatever_a_track_file_can_say_can_be_written_again():
+    """Cants of seventeen digits, as a fit of measured track gives them: a file said them, so a file can."""
+    for cant_mm in np.random.default_rng(4).uniform(1.0, 150.0, 300):
+        design = TrackDesign(
+            "t",
+            0.0,
+            (Straight(10.0), Transition(30.0), Curve(11.0, 300.0, cant_mm / 1000.0)),
+        )
+        assert judge(TrackFile, parse_toml(track_text(design), file="t"), file="t").design("") == design
+
+
+@pytest.mark.parametrize("name", sorted(shipped("track")))
+def test_every_shipped_track_can_be_written(name):
+    design = track_by_name(name)
+    assert judge(TrackFile, parse_toml(track_text(design), file="t"), file="t").design("") == design
+
+
+def test_round_trip_without_an_encoder(recording, tmp_path):
+    blind = replace(recording, encoder=None, encoder_sheet=None, odometry_source="truth")
+    blind = replace(blind, magnetometer=None, magnetometer_sheet=None)
+    blind = replace(blind, rail_displacement=None, rail_sensor_sheet=None)
+    write_ride(blind, tmp_path / "deep" / "ride")
+    assert_same(blind, read_ride(tmp_path / "deep" / "ride"))
+
+
+def test_every_frame_of_a_recording_is_a_signal():
+    """A new signal of `Recording` cannot be forgotten by reader and writer."""
+    hints = get_type_hints(Recording)
+    frames = {name for name, hint in hints.items() if "DataFrame" in str(hint)}
+    assert frames == {signal.name for signal in SIGNALS}
+    assert frames <= set(RideFile.model_fields)
+    for signal in SIGNALS:
+        form = next(
+            p
+            for p in SignalPart.__subclasses__() + VectorPart.__subclasses__()
+            if p is not VectorPart and p.signal() is signal
+        )
+        assert form.signal() is signal
+
+
+def test_a_folder_in_use_is_not_overwritten(recording, tmp_path):
+    write_ride(recording, tmp_path / "ride")
+    with pytest.raises(ValueError, match="exists already"):
+        write_ride(replace(recording, name="other"), tmp_path / "ride")
+    assert read_ride(tmp_path / "ride").name == "Montequinto é"
+
+
+def test_nothing_half_written_is_left(recording, tmp_path):
+    broken = replace(recording, gravity_mps2=object())  # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        write_ride(broken, tmp_path / "ride")
+    extra = replace(recording, imu=recording.imu.assign(colour=1.0))
+    with pytest.raises(InputError, match="colour"):
+        write_ride(extra, tmp_path / "ride")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_judges_change_nothing(recording):
+    before = recording.imu.copy(deep=True)
+    check_recording(recording)
+    check_plausible(recording)
+    pd.testing.assert_frame_equal(recording.imu, before, check_exact=True)

@@ -1,0 +1,184 @@
+"""Rides and their cache: simulated once, found again, never half there, never in the way of another."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simrail.core.toml_files import load
+from simrail.ride import cache as ride_cache
+from simrail.ride import ride as ride_module
+from simrail.ride.ride import Ride, is_cached, simulate
+from simrail.ride.truth import Mount
+from simrail.ride.truth_files import load_truth, save_truth
+from simrail.track.file import TrackFile
+from simrail.track.irregularity import Irregularity
+from simrail.track.rail_condition import RailCondition
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setattr(ride_cache, "cache_folder", lambda: tmp_path)
+    return tmp_path / "rides"
+
+
+@pytest.fixture
+def ride():
+    return Ride(
+        name="short",
+        track=load(TrackFile, "track", "smooth_curve").design("smooth_curve"),
+        irregularity=Irregularity("erri_b176_low", (3.0, 100.0), 20.0),
+        track_seed=4,
+        vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
+        profile=SpeedProfile(30.0, 90.0, 10.0, rest_s=1.0, final_rest_s=0.5),
+        engine="kinematic",
+    )
+
+
+def all_arrays(truth):
+    yield truth.time_s
+    yield truth.reference_position_m
+    for body in truth.bodies.values():
+        yield from (body.position, body.velocity, body.acceleration, body.angles, body.rate)
+        yield body.angular_acceleration
+    yield from truth.wheel_angles.values()
+
+
+def assert_same(one, other):
+    for a, b in zip(all_arrays(one), all_arrays(other), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_simulated_once_then_found(ride, monkeypatch):
+    assert not is_cached(ride)
+    first = simulate(ride)
+    assert is_cached(ride)
+    monkeypatch.setattr(ride_module, "_follow", lambda ride: pytest.fail("simulated again"))
+    assert_same(simulate(ride), first)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"track_seed": 5},
+        {"step_s": 0.25e-3},
+        {"rate_hz": 500.0},
+        {"gravity_mps2": 9.80665},
+        {"engine": "exudyn"},
+        {"engine": "compiled"},
+        {"irregularity": Irregularity("erri_b176_high", (3.0, 100.0), 20.0)},
+        {"profile": SpeedProfile(30.0, 90.0, 11.0, rest_s=1.0, final_rest_s=0.5)},
+        {"drive": "wheels"},
+        {"conditions": (RailCondition(40.0, 60.0, 0.2),)},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_key_covers_what_the_truth_depends_on(ride, change):
+    assert ride_cache.key_of(ride.describe()) != ride_cache.key_of(replace(ride, **change).describe())
+
+
+def test_key_covers_vehicle_and_sources(ride, monkeypatch):
+    key = ride_cache.key_of(ride.describe())
+    bodies = (replace(ride.vehicle.bodies[0], mass_kg=1051.0), *ride.vehicle.bodies[1:])
+    heavier = replace(ride, vehicle=replace(ride.vehicle, bodies=bodies))
+    assert ride_cache.key_of(heavier.describe()) != key
+    monkeypatch.setattr(ride_module, "source_hash", lambda *names: "other code")
+    assert ride_cache.key_of(ride.describe()) != key
+
+
+def test_interrupted_simulation_leaves_no_ride(ride, own_cache, monkeypatch):
+    def interrupted(truth, folder):
+        folder.mkdir(parents=True)
+        (folder / "time_s.npy").write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ride_module, "save_truth", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(ride)
+    assert not is_cached(ride)
+    assert list(own_cache.iterdir()) == []
+
+
+@pytest.mark.parametrize("damage", ["truncated array", "missing array", "broken header", "one bit"])
+def test_damaged_ride_is_made_again(ride, own_cache, damage):
+    first = simulate(ride)
+    kept = [np.array(array) for array in all_arrays(first)]
+    place = own_cache / ride_cache.key_of(ride.describe())
+    if damage == "truncated array":
+        with (place / "body_1.npy").open("r+b") as file:
+            file.truncate(1000)
+    elif damage == "missing array":
+        (place / "wheel_0.npy").unlink()
+    elif damage == "one bit":
+        content = bytearray((place / "body_1.npy").read_bytes())
+        content[len(content) // 2] ^= 1
+        (place / "body_1.npy").write_bytes(content)
+    else:
+        (place / "truth.json").write_text("{")
+    told = []
+    again = simulate(ride, told=told.append)
+    for array, expected in zip(all_arrays(again), kept, strict=True):
+        np.testing.assert_array_equal(array, expected)
+    assert len(told) == 1 and "damaged" in told[0] and "\n" not in told[0]
+    assert [path.name for path in own_cache.iterdir()] == [place.name]
+    simulate(ride, told=told.append)
+    assert len(told) == 1
+
+
+def test_oldest_rides_make_room(ride, own_cache, monkeypatch):
+    rides = [replace(ride, track_seed=seed) for seed in range(3)]
+    for age, one in enumerate(rides[:2]):
+        simulate(one)
+        header = own_cache / ride_cache.key_of(one.describe()) / "truth.json"
+        os.utime(header, (1000.0 + age, 1000.0 + age))
+    size = ride_cache.rides()[0].size_bytes
+    monkeypatch.setenv("SIMRAIL_CACHE_GB", str(2.5 * size / 1e9))
+    simulate(rides[2])
+    assert [is_cached(one) for one in rides] == [False, True, True]
+
+
+def test_clear_frees_everything(ride):
+    simulate(ride)
+    size = sum(found.size_bytes for found in ride_cache.rides())
+    assert ride_cache.clear() == size
+    assert ride_cache.rides() == []
+
+
+def test_truth_survives_the_disk_bit_by_bit(ride, tmp_path):
+    truth = simulate(ride)
+    save_truth(truth, tmp_path / "copy")
+    copy = load_truth(tmp_path / "copy")
+    assert_same(copy, truth)
+    assert copy.manifest == truth.manifest
+    mount = Mount("imu", "frame", (0.2, 0.1, 0.5))
+    assert copy.motion(mount).equals(truth.motion(mount))
+
+
+def test_place_in_the_direction_of_travel(ride):
+    truth = simulate(ride)
+    assert truth.wheel_at("leading.left") == "front.left"
+    assert truth.wheel_at("trailing.right") == "rear.right"
+    assert truth.wheel_at("front.left") == "front.left"
+    back = simulate(replace(ride, profile=SpeedProfile(90.0, 30.0, 10.0)))
+    assert back.wheel_at("leading.left") == "rear.left"
+
+
+def test_wheels_over_leaves_are_late_and_the_truth_knows_where(ride):
+    """The reference point is where the vehicle is, metres behind the profile: the mount's s, to 1 mm."""
+    late = replace(
+        ride,
+        engine="compiled",
+        drive="wheels",
+        conditions=(RailCondition(20.0, 80.0, 0.05 / 0.3),),
+        profile=SpeedProfile(30.0, 90.0, 10.0, rest_s=1.0, final_rest_s=0.5, acceleration_mps2=1.2),
+    )
+    truth = simulate(late)
+    planned = late.profile.motion(truth.time_s)[0]
+    assert np.max(planned - truth.reference_position_m) > 3.0
+    there = truth.motion(Mount("body", "body", (0.0, 0.0, 1.45)))["position_m"].to_numpy()
+    np.testing.assert_allclose(truth.reference_position_m, there, rtol=0.0, atol=1e-3)
+    assert truth.manifest["drive"] == "wheels"
+    assert truth.manifest["conditions"][0]["start_m"] == 20.0

@@ -1,0 +1,82 @@
+"""The averaged table: every group has the interval and the spread of its own draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
+from simrail.scoring.bootstrap import interval
+from simrail.scoring.table import as_score_table, concat_scores, labelled
+
+LABELS: dict[str, object] = {
+    "scenario": "test",
+    "ride": "out",
+    "vehicle": "none",
+    "mount": "axle",
+    "imu": "ideal",
+    "odometry": "encoder",
+    "tuning": "default",
+}
+
+
+def table(draws: dict[str, tuple[int, int]], *, seed: int = 1) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Scores of some estimators with (tracks, sensors) draws, in random order, and their cells."""
+    rng = np.random.default_rng(seed)
+    parts, cells = [], []
+    for name, (tracks, sensors) in draws.items():
+        for track, sensor in np.ndindex(tracks, sensors):
+            figure = pd.DataFrame(
+                {
+                    "quantity": ["roll"],
+                    "band": ["full"],
+                    "reference": ["truth"],
+                    "window": ["whole"],
+                    "metric": ["rms"],
+                    "value": [5.0 + rng.normal()],
+                    "unit": ["deg"],
+                    "n_samples": [10],
+                    "status": ["ok"],
+                }
+            )
+            number = len(cells)
+            draw: dict[str, object] = {"cell": number, "track_draw": track, "sensor_draw": sensor}
+            parts.append(labelled(as_score_table(figure), LABELS | draw | {"estimator": name}))
+            cells.append({"cell": number, "case": 0, "sample": 0})
+    order = rng.permutation(len(parts))
+    return concat_scores([parts[i] for i in order]), pd.DataFrame(cells)
+
+
+def test_every_group_has_the_interval_of_its_own_draws() -> None:
+    scores, cells = table(
+        {"many": (8, 3), "few": (3, 4), "one_track": (1, 12), "alone": (1, 1), "plain": (9, 1)}
+    )
+    # One value is missing, as if its cell had failed.
+    scores.loc[scores.index[5], "value"] = np.nan
+    scores["status"] = scores["status"].cat.add_categories("broken")
+    scores.loc[scores.index[5], "status"] = "broken"
+    found = aggregate(scores, cells).set_index("estimator")
+    assert [name for name in found.columns if name in AGGREGATE_COLUMNS] == list(AGGREGATE_COLUMNS)
+    for name, rows in scores.groupby("estimator", observed=True):
+        rows = rows.sort_values("cell")
+        expected = interval(rows["value"], rows["track_draw"])
+        row = found.loc[name]
+        assert (row["value"], row["low95"], row["high95"]) == pytest.approx(
+            (expected.value, expected.low, expected.high), nan_ok=True, rel=1e-9
+        )
+    assert np.isnan(found.loc["alone", "low95"]) and found["failed"].sum() == 1
+
+
+def test_samples_are_clusters_of_their_own() -> None:
+    scores, cells = table({"ekf": (6, 4)})
+    cells["sample"] = cells["cell"] % 4  # each draw of the sensors as a sample: 24 tracks, one draw each
+    row = aggregate(scores, cells).iloc[0]
+    assert row["track_draws"] == row["draws"] == 24 and np.isnan(row["sd_sensor"])
+    assert row["low95"] == pytest.approx(interval(scores["value"]).low, rel=0.2)
+
+
+def test_the_order_of_the_rows_does_not_matter() -> None:
+    scores, cells = table({"a": (6, 3), "b": (1, 9)})
+    shuffled = scores.sample(frac=1.0, random_state=2).reset_index(drop=True)
+    pd.testing.assert_frame_equal(aggregate(scores, cells), aggregate(shuffled, cells), check_exact=True)
