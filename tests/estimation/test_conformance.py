@@ -16,6 +16,7 @@ from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
 from simrail.core.columns import ATTITUDE, IRREGULARITY
+from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.conformance import check_estimator, require_well_formed
 from simrail.estimation.estimate import Estimate, Estimator
 from simrail.recording.recording import Recording
@@ -37,7 +38,7 @@ def ride(direction: int = 1, imu: str = "lord_3dm_gx4_25") -> Recording:
         SpeedProfile(start, end, 10.0, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=3.0),
         channels={"roll": harmonic(0.005, frequency_hz=1.1), "lateral": harmonic(0.003, frequency_hz=0.7)},
     )
-    return measure(
+    recording = measure(
         truth,
         name="short",
         mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
@@ -46,6 +47,7 @@ def ride(direction: int = 1, imu: str = "lord_3dm_gx4_25") -> Recording:
         seed=1,
         draw=0,
     )
+    return with_odometry(recording, "encoder")
 
 
 OURS = [

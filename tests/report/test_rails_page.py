@@ -97,7 +97,7 @@ class Ran:
     def __init__(self, scenario: Scenario, result: Any, page: str) -> None:
         self.scenario, self.page = scenario, page
         self.cases = cases(result.scores, result.cells)
-        self.styles = list(method_styles(methods(scenario)).values())
+        self.styles = list(method_styles(scenario).values())
         self.example: CellResult = result.examples[0]
         self.known = bands_by_name(scenario.spec)
         self.examples = result.examples
@@ -413,7 +413,7 @@ def test_methods_are_alike_only_if_every_figure_is(
 ) -> None:
     one = example()
     states = one.estimates["ekf_compensated"].states
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     styles = [*styles, *(replace(styles[0], name=name, label=name, twin="") for name in ("b", "c", "d"))]
     for factor, groups in ((1.005, [["ekf_compensated", "b"], ["c"], ["d"]]), (1.02, [["ekf_compensated"]])):
         error = np.deg2rad(0.1) * (factor - 1.0)
@@ -437,8 +437,8 @@ def test_many_methods_are_told_together(
     tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
 ) -> None:
     one = example()
-    style = method_styles(methods(scenario))["ekf_compensated"]
-    design = method_styles(methods(scenario))["design_angles"]
+    style = method_styles(scenario)["ekf_compensated"]
+    design = method_styles(scenario)["design_angles"]
     names = ["m1", "m2", "m3", "m4"]
     estimates = {"design_angles": one.estimates["design_angles"]}
     for k, name in enumerate(names):

@@ -218,7 +218,7 @@ def view_of(names: tuple[str, ...], draws: int = 2) -> PaperView:
     scenario, result = campaign(names, draws)
     listed = methods(scenario)
     view = paper_view(
-        cases(result.scores, result.cells), listed, list(method_styles(listed).values()), result.examples
+        cases(result.scores, result.cells), listed, list(method_styles(scenario).values()), result.examples
     )
     assert view is not None
     return view
