@@ -15,11 +15,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.example import CellResult
 from simrail.estimation.estimate import Estimate
-from simrail.report import write_report
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.figures.style import fitting_columns, legend_above, look, panels
 from simrail.report.figures.track import profile_figure, profile_words
-from simrail.report.pages.page import _ride
+from simrail.report.pages.page import _ride, write_report
 from simrail.report.papers.gonzalez_2023.parts import COLOURS
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.tables.geometry_bands import JUDGED, band_words, judged_band, waves_words

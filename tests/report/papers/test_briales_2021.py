@@ -15,7 +15,7 @@ import pytest
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
 from simrail.core.errors import InputError
-from simrail.report import write_report
+from simrail.report.pages.page import write_report
 from simrail.report.papers.briales_2021.figures import spread_of
 from simrail.report.papers.briales_2021.method_claims import method_claims
 from simrail.report.papers.briales_2021.printed import TABLE_3, TIME_CONSTANTS_S

@@ -26,7 +26,7 @@ from simrail.campaign.example import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.seeds import stream
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.report import write_report
+from simrail.report.pages.page import write_report
 from simrail.report.papers.claim import Claim
 from simrail.report.papers.gonzalez_2023.claims import Peak, claims, errata_note
 from simrail.report.papers.gonzalez_2023.parts import Rows, part_of, rows_of
