@@ -23,6 +23,8 @@ vehicle = "scale_vehicle"
 engine = "kinematic"
 [monte_carlo]
 sensor_draws = 2
+[encoder]
+wheel = "wheel"
 [[ride]]
 name = "out"
 start_m = 1.0
