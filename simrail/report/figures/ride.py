@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO
 from simrail.report.figures.decimate import Bins
 from simrail.report.figures.style import INK, distance_axis, legend_above, look, panels, shade_track, to_svg

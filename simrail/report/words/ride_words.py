@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.ride import direction_of
 
 _UNITS = {"kmh": "km/h", "mps2": "m/s\u00b2", "mps3": "m/s\u00b3", "m": "m", "s": "s", "hz": "Hz"}
