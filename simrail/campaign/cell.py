@@ -18,7 +18,7 @@ import pandas as pd
 from simrail.campaign.example import CellResult
 from simrail.campaign.ledger import Ledger
 from simrail.core.interrupts import Check
-from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
 from simrail.ride.truth import Truth
@@ -88,7 +88,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, ledger: Ledger,
 
 
 def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
-    """Measure a cell: its sensors on its ride."""
+    """Measure a cell, its sensors on its ride, and run its odometry."""
     recording = measure(
         truth,
         name=cell.ride.name,
@@ -98,13 +98,16 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         magnetometer=magnetometer_of(cell),
         rail_sensor=rail_sensor_of(cell),
         rails=None if rail_sensor_of(cell) is None else parts.rails(cell),
-        odometry="truth" if cell.spec.odometry == "truth" else "encoder",
+        odometry=TRUTH if cell.spec.odometry == TRUTH else None,
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,
         earth_rate=earth_of(cell),
         temperature=temperature_of(cell),
     )
-    return with_odometry(recording, cell.spec.odometry)
+    odometry = parts.odometry(cell)
+    if odometry is None:
+        return recording
+    return with_odometry(recording, odometry, source=cell.spec.odometry)
 
 
 def look_at(
@@ -122,13 +125,14 @@ def look_at(
 
 
 def _record(cell: Cell, truth: Truth, parts: Parts, ledger: Ledger) -> _Recorded:
-    """Record one cell and score its odometry."""
+    """Record one cell and score its odometry, if it has one."""
     with ledger.timed("measure"):
         recording = record_cell(cell, truth, parts)
     with ledger.timed("score"):
         reference = reference_of(truth_at_imu(truth, recording), recording)
-        figures = score_odometry(recording, reference, **kept_of(cell))
-        ledger.scored(cell, f"odometry:{recording.odometry_source}", figures)
+        if recording.odometry is not None:
+            figures = score_odometry(recording, reference, **kept_of(cell))
+            ledger.scored(cell, f"odometry:{recording.odometry_source}", figures)
     return _Recorded(cell, recording, reference)
 
 

@@ -161,7 +161,8 @@ def order_of(parts: Parts) -> Order:
     InputError
         If an estimator cannot be sent to another process.
     """
-    for name, estimator in parts.estimators(0).items():
+    estimators = {**parts.estimators(0), **parts.odometries()}
+    for name, estimator in estimators.items():
         try:
             pickle.dumps(estimator)
         except Exception as error:
@@ -171,7 +172,7 @@ def order_of(parts: Parts) -> Order:
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
             ) from error
-    sources = sources_of(list(parts.estimators(0).values()))
+    sources = sources_of(list(estimators.values()))
     data = pickle.dumps((sources, pickle.dumps(parts)))
     return Order(data, hashlib.sha256(data).hexdigest(), score_code_hash())
 

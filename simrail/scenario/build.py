@@ -20,7 +20,7 @@ from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.ride.ride import Ride, rails_of
 from simrail.ride.truth import Mount
-from simrail.scenario.build_estimator import estimator_of, option_files
+from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import Distribution
 from simrail.scenario.scenario import Scenario, ScenarioFile
@@ -132,6 +132,19 @@ class Parts:
                     self._content[f"estimator {method.name} {option} {sample}"] = content
             self._estimators[sample] = made
         return self._estimators[sample]
+
+    def odometry(self, cell: Cell) -> Estimator | None:
+        """Odometry of a cell; None where there is none to be run (`odometry_estimator`)."""
+        name = cell.spec.odometry
+        if ("odometry", name) not in self._read:
+            self._read["odometry", name] = odometry_estimator(self.scenario, name)
+        odometry: Estimator | None = self._read["odometry", name]
+        return odometry
+
+    def odometries(self) -> dict[str, Estimator]:
+        """Odometries of the cells asked for so far, by the names that the scenario gives them."""
+        made = {name: value for (kind, name), value in self._read.items() if kind == "odometry"}
+        return {name: estimator for name, estimator in made.items() if estimator is not None}
 
     def _load(self, model: type[_Part], kind: str, name: str) -> _Part:
         part = load(model, kind, name, folder=self.scenario.folder)

@@ -50,6 +50,7 @@ def judge_sensors(scenario: Scenario, cell: Cell, parts: Parts) -> None:
         with blame(scenario.file, "rail_sensor"):
             check_rail_sensor(rail_sensor)
     _judge_encoder(scenario, cell, vehicle)
+    parts.odometry(cell)
 
 
 def _judge_imu(
@@ -83,14 +84,6 @@ def _judge_imu(
 def _judge_encoder(scenario: Scenario, cell: Cell, vehicle: VehicleModel) -> None:
     encoder = encoder_of(cell)
     if encoder is None:
-        if cell.spec.odometry != "truth":
-            raise InputError(
-                "the odometry needs an encoder",
-                file=scenario.file,
-                field="odometry",
-                value=cell.spec.odometry,
-                remedy='add an [encoder], or set odometry = "truth" for an ablation',
-            )
         return
     sides = {name.partition(".")[2] for name in vehicle.wheel_names}
     places = [f"{where}.{side}" for where in ("leading", "trailing") for side in sorted(sides)]
