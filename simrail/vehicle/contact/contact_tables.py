@@ -14,7 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from simrail.core.jit import FloatArray
-from simrail.vehicle.contact.contact import ContactTable, build_contact, static_height
+from simrail.vehicle.contact.contact import static_height
+from simrail.vehicle.contact.contact_geometry import ContactTable, build_contact
 from simrail.vehicle.contact.profile_files import profiles_digest, profiles_of
 from simrail.vehicle.model import VehicleModel, WheelRail
 
@@ -74,7 +75,7 @@ def _built(
         creep_law=pair.creep,
     )
     # Many share it.
-    table.coef.flags.writeable = table.const.flags.writeable = False
+    table.coef.flags.writeable = False
     return table
 
 
