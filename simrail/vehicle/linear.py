@@ -228,7 +228,7 @@ class RunningVehicle:
         bodies : tuple of int
             Their numbers.
         """
-        axles = set(self.data.axles[:, 0].astype(int))
+        axles = set(self.data.axles["body"])
         free = tuple(i for i in range(self.bodies) if i not in axles)
         first = np.concatenate([np.arange(6 * i, 6 * i + 6) for i in free]) if free else np.zeros(0, int)
         creep = 12 * self.bodies + len(self.data.spins) + 4 * len(self.model.wheels)

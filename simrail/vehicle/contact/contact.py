@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.contact_geometry import ContactTable
 from simrail.vehicle.contact.creep_laws import FASTSIM, fallen, saturation
 from simrail.vehicle.contact.cubic import slope, value
@@ -118,7 +118,7 @@ def static_height(table: ContactTable) -> float:
     return float(np.polyval(piece, x) - pressed)
 
 
-@njit_borrowed
+@njit_inner
 def _place(
     const: Any, intervals: int, side: float, motion: Motion, rail: RailHere
 ) -> tuple[float, int, float, float]:
@@ -135,7 +135,7 @@ def _place(
     return u, i, x, motion.z + 0.5 * r0 * phi * phi - rail.z
 
 
-@njit_borrowed
+@njit_inner
 def _touch(patch: Any, x: float, const: Any, height: float, p: float, psi: float) -> Touch:
     """One patch of a wheel; slope and abscissa are 0 when it is apart.
 
@@ -172,7 +172,7 @@ def read_patch(patches: Any, const: Any, side: float, patch: int, motion: Motion
     return _touch(patches[patch, i], x, const, height, side * motion.phi, motion.psi)
 
 
-@njit_borrowed
+@njit_inner
 def rolling(V: float, spin_speed: float) -> float:
     """1/V of a rolling contact, 0 at rest, where a contact does not spin: V^3/(V^4 + v^4)."""
     return V * V * V / (V * V * V * V + spin_speed * spin_speed * spin_speed * spin_speed)

@@ -59,9 +59,9 @@ def contacts_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> WheelCont
 
 @lru_cache(maxsize=64)
 def _built(
-    pair: WheelRail, shape: str, wheel_radius_m: float, load_n: float, grid_load_n: float
+    pair: WheelRail, _shape: str, wheel_radius_m: float, load_n: float, grid_load_n: float
 ) -> ContactTable:
-    """One table. ``shape`` is the digest of the profiles: a file that has changed is another key."""
+    """One table. ``_shape`` is the digest of the profiles: a file that has changed is another key."""
     table = build_contact(
         *profiles_of(pair),
         gauge_m=pair.gauge_m,

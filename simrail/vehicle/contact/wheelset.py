@@ -129,9 +129,9 @@ def push_sideways(table: ContactTable, y_m: FloatArray) -> WheelsetAtRest:
                 break
         radii = []
         for side in (1.0, -1.0):
-            patches = contact_state(table, side, y_m=at, z_m=lift, roll_rad=roll).values()
-            total = sum(p["normal_n"] for p in patches)
-            radii.append(sum(p["normal_n"] * p["radius_m"] for p in patches) / total)
+            touching = contact_state(table, side, y_m=at, z_m=lift, roll_rad=roll).values()
+            total = sum(p["normal_n"] for p in touching)
+            radii.append(sum(p["normal_n"] * p["radius_m"] for p in touching) / total)
         rest[:, i] = lift, roll, radii[0], radii[1], forces[0].fy + forces[1].fy
     shape = np.shape(y_m)
     return WheelsetAtRest(y.reshape(shape), *(row.reshape(shape) for row in rest))

@@ -26,6 +26,7 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 import exudyn as exu
+import numba
 import numpy as np
 from exudyn.itemInterface import (
     MarkerBodyRigid,
@@ -48,7 +49,7 @@ from simrail.vehicle.engines.engine import (
     stretches,
     wheel_loads_n,
 )
-from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arena, generalized_forces_of
+from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces
 from simrail.vehicle.engines.force_data import states_of
 
 _NOTHING = [0.0]
@@ -74,10 +75,11 @@ class ExudynEngine:
         self._states = states_of(data)
         self._spins = data.spins["inertia"]
         self.size = 6 * len(model.bodies) + len(data.spins) + self._states
-        self._arena = Arena(self.size, data, start_memory(setup))
-        self.memory = self._arena.memory
+        self.memory = start_memory(setup)
+        self._arguments = Arguments(self.size, data, self.memory)
         # Compiled now, so that no clock of a ride counts it.
-        generalized_forces_of.compile("void(float64, float64[::1])")  # type: ignore[attr-defined]
+        compiled = generalized_forces.compile  # type: ignore[attr-defined]
+        compiled((numba.float64, numba.typeof(self._arguments.places)))
         self._build()
 
     def run(self, duration_s: float, *, segment_s: float = 10.0) -> Iterator[Segment]:
@@ -199,15 +201,15 @@ class ExudynEngine:
         ready arrays is the cheapest plain-Python way found (2 us a call instead of 5).
         """
         n = self.size
-        state = self._arena.state
+        state = self._arguments.state
         view = memoryview(state.data).cast("B")
         put = struct.Struct(f"{2 * n}d").pack_into
         get = state[2 * n :].tolist
-        arena, settle = self._arena.array, self.setup.settle_s
+        places, settle = self._arguments.places, self.setup.settle_s
 
-        def user_function(mbs: Any, t: float, item: int, q: list[float], v: list[float]) -> list[float]:
+        def user_function(_mbs: Any, t: float, _item: int, q: list[float], v: list[float]) -> list[float]:
             put(view, 0, *q, *v)
-            generalized_forces_of(t - settle, arena)
+            generalized_forces(t - settle, places)
             forces_now: list[float] = get()
             return forces_now
 
@@ -217,7 +219,7 @@ class ExudynEngine:
         """Copies coordinates and rates into the rows of the present solution, step by step."""
         system, step = self.mbs.systemData, self.setup.step_s
 
-        def user_function(mbs: Any, t: float, numbers: Any, factors: Any, configuration: Any) -> list[float]:
+        def user_function(_mbs: Any, t: float, *_others: Any) -> list[float]:
             row = self._rows[round((t - self._rows_start_s) / step)]
             row[0] = system.GetODE2Coordinates()
             row[1] = system.GetODE2Coordinates_t()

@@ -1,16 +1,21 @@
 """The force kernel in the coordinates of Exudyn: what its user function calls, without Exudyn itself.
 
 Rotation vectors and rates in the axes of the nodes come in, generalised forces in these axes go out; the
-forces are those of `simrail.vehicle.engines.forces`. All arguments lie in one array, the arena, since every
-array that is handed over takes its time. What the nodes are, and why, is said in
+forces are those of `simrail.vehicle.engines.forces`. What the nodes are, and why, is said in
 `simrail.vehicle.engines.exudyn_engine`.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from simrail.core.jit import FloatArray, njit
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
+
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.contact_geometry import CONST, PATCH
 from simrail.vehicle.engines.force_data import ForceData, Memory
 from simrail.vehicle.engines.forces import forces
@@ -39,29 +44,16 @@ from simrail.vehicle.engines.records import (
     rotated_back,
 )
 
+_FLOAT = np.dtype("f8")
+
 HALF_TURN = np.array([1.0, -1.0, -1.0])
 """Diagonal of the half turn about X between the axes of a body and those of its node."""
 
 
-@njit
-def generalized_forces(
-    t: float,
-    state: FloatArray,
-    data: ForceData,
-    memory: Memory,
-    pose: RecordArray,
-    wrench: RecordArray,
-) -> None:
-    """Forces in Exudyn's coordinates.
-
-    ``state`` (3 n,) holds coordinates, rates and, as the output, generalised forces, each n = 6 b + p +
-    the number of first-order states long. Rates and moments of a node are in its own axes: the body's,
-    half a turn about X.
-    """
-    nb = data.bodies.shape[0]
-    n = state.shape[0] // 3
-    q, v, out = state[:n], state[n : 2 * n], state[2 * n :]
-    for b in range(nb):
+@njit_inner
+def poses_of(q: FloatArray, v: FloatArray, pose: RecordArray) -> None:
+    """Poses of the bodies from Exudyn's coordinates and rates: six numbers of each body, (6 b + ...,)."""
+    for b in range(pose.shape[0]):
         p, j = pose[b], 6 * b
         p.x, p.y, p.z = q[j], q[j + 1], q[j + 2]
         p.vx, p.vy, p.vz = v[j], v[j + 1], v[j + 2]
@@ -76,86 +68,107 @@ def generalized_forces(
         r[0, 0], r[0, 1], r[0, 2] = c + d * rx * rx, s * rz - d * rx * ry, -s * ry - d * rx * rz
         r[1, 0], r[1, 1], r[1, 2] = s * rz + d * rx * ry, -c - d * ry * ry, s * rx - d * ry * rz
         r[2, 0], r[2, 1], r[2, 2] = d * rx * rz - s * ry, -s * rx - d * ry * rz, -c - d * rz * rz
-        p.wx, p.wy, p.wz = rotated(p, v[j + 3], -v[j + 4], -v[j + 5])
-    spins = 6 * nb
-    states = spins + data.spins.shape[0]
-    forces(t, pose, v[spins:states], v[states:], data, wrench, out[spins:states], out[states:], memory)
-    for b in range(nb):
+        p.wx, p.wy, p.wz = rotated(r, v[j + 3], -v[j + 4], -v[j + 5])
+
+
+@njit_inner
+def loads_of(pose: RecordArray, wrench: RecordArray, out: FloatArray) -> None:
+    """Forces and moments on the bodies as generalised forces: moments in the axes of the nodes."""
+    for b in range(pose.shape[0]):
         w, j = wrench[b], 6 * b
         out[j], out[j + 1], out[j + 2] = w.fx, w.fy, w.fz
-        mx, my, mz = rotated_back(pose[b], w.mx, w.my, w.mz)
+        mx, my, mz = rotated_back(pose[b].rotation, w.mx, w.my, w.mz)
         out[j + 3], out[j + 4], out[j + 5] = mx, -my, -mz
 
 
-_PARTS = ("state", *ForceData._fields, *Memory._fields, "pose", "wrench")
-_HEAD = np.dtype([(name, "f8", (2,)) for name in _PARTS], align=True)
-"""Head of an arena: where each part begins and ends."""
-_HEAD_SIZE = 2 * len(_PARTS)
+@intrinsic
+def records_at(_typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
+    """Array of records, C-contiguous, at an address: numba's `carray`, compiled in no time.
+
+    The caller must keep what lies there. ``shape`` is a tuple, ``dtype`` a numpy dtype.
+    """
+    array = types.Array(dtype.dtype, len(shape), "C")
+
+    def lower(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        made = context.make_array(array)(context, builder)
+        size = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(dtype.dtype)))
+        sizes, strides = cgutils.unpack_tuple(builder, args[1]), [size]
+        for n in reversed(sizes[1:]):
+            strides.insert(0, builder.mul(strides[0], n))
+        data = builder.inttoptr(args[0], made.data.type)
+        populate_array(made, data, sizes, strides, size, None)
+        return made._getvalue()
+
+    return array(address, shape, dtype), lower
 
 
-class Arena:
-    """All arguments of `generalized_forces` in one array, behind a head that says where each lies.
+_PLACES = np.dtype(
+    [(name, "i8", (4,)) for name in ("state", *ForceData._fields, *Memory._fields, "pose", "wrench")],
+    align=True,
+)
+
+
+class Arguments:
+    """Arguments of `generalized_forces`, of which only the addresses are handed over.
 
     A compiled function takes some 0.15 us per array that it is handed; at 8,000 calls a simulated second
-    one array instead of twenty-one is worth it.
+    one array instead of twenty-two is worth it.
 
     Attributes
     ----------
-    array : ndarray (m,)
-        The arena, for `generalized_forces_of`.
+    places : ndarray of records (1,)
+        Address and shape of every array, for `generalized_forces`. They hold as long as this object lives.
     state : ndarray (3 n,)
-        Coordinates, rates and generalised forces in it.
-    memory : Memory
-        The kernel's memory in it.
+        Coordinates, rates and, as the output, generalised forces, each n = 6 b + p + the number of
+        first-order states long.
     """
 
     def __init__(self, size: int, data: ForceData, memory: Memory) -> None:
+        self.state = np.zeros(3 * size)
         bodies = len(data.bodies)
-        parts = [np.zeros(3 * size), *data, *memory, np.zeros(bodies, POSE), np.zeros(bodies, WRENCH)]
-        flat = [np.ascontiguousarray(part).reshape(-1).view(np.float64) for part in parts]
-        ends = _HEAD_SIZE + np.cumsum([0, *(part.size for part in flat)])
-        self.array = np.concatenate([np.column_stack([ends[:-1], ends[1:]]).ravel(), *flat])
-        views = {
-            name: self.array[begin:end].view(part.dtype)
-            for name, begin, end, part in zip(_PARTS, ends, ends[1:], parts, strict=False)
-        }
-        self.state = views["state"]
-        self.memory = Memory(*(views[name] for name in Memory._fields))
+        parts = [self.state, *data, *memory, np.zeros(bodies, POSE), np.zeros(bodies, WRENCH)]
+        self._parts = [np.ascontiguousarray(part) for part in parts]
+        rows = [(part.ctypes.data, *part.shape, *(1,) * (3 - part.ndim)) for part in self._parts]
+        self.places = np.array([tuple(rows)], _PLACES)
 
 
-@njit
-def _part(arena: FloatArray, ends: FloatArray) -> FloatArray:
-    """A part of an arena."""
-    return arena[int(ends[0]) : int(ends[1])]
+@njit_borrowed
+def generalized_forces(t: float, places: RecordArray) -> None:
+    """Forces in Exudyn's coordinates, of the arrays in `Arguments.places`.
 
-
-@njit
-def generalized_forces_of(t: float, arena: FloatArray) -> None:
-    """`generalized_forces` of the arguments in an `Arena`."""
-    head = arena[:_HEAD_SIZE].view(_HEAD)[0]
-    const = _part(arena, head.const).view(CONST)
+    Rates and moments of a node are in its own axes: the body's, half a turn about X.
+    """
+    at = places[0]
     data = ForceData(
-        _part(arena, head.bodies).view(BODY),
-        _part(arena, head.springs).view(SPRING),
-        _part(arena, head.series).view(SERIES),
-        _part(arena, head.turns).view(TURN),
-        _part(arena, head.stops).view(STOP),
-        _part(arena, head.laws).view(LAW),
-        _part(arena, head.wheels).view(WHEEL),
-        _part(arena, head.spins).view(SPIN),
-        _part(arena, head.axles).view(AXLE),
-        _part(arena, head.guide).view(GUIDE),
-        _part(arena, head.traction).view(TRACTION),
-        _part(arena, head.options).view(OPTIONS),
-        _part(arena, head.drive).view(DRIVE),
-        _part(arena, head.track).view(TRACK),
-        _part(arena, head.patches).view(PATCH).reshape(const.shape[0], 2, -1),
-        const,
+        records_at(at.bodies[0], (at.bodies[1],), BODY),
+        records_at(at.springs[0], (at.springs[1],), SPRING),
+        records_at(at.series[0], (at.series[1],), SERIES),
+        records_at(at.turns[0], (at.turns[1],), TURN),
+        records_at(at.stops[0], (at.stops[1],), STOP),
+        records_at(at.laws[0], (at.laws[1],), LAW),
+        records_at(at.wheels[0], (at.wheels[1],), WHEEL),
+        records_at(at.spins[0], (at.spins[1],), SPIN),
+        records_at(at.axles[0], (at.axles[1],), AXLE),
+        records_at(at.guide[0], (1,), GUIDE),
+        records_at(at.traction[0], (1,), TRACTION),
+        records_at(at.options[0], (1,), OPTIONS),
+        records_at(at.drive[0], (at.drive[1],), DRIVE),
+        records_at(at.track[0], (at.track[1],), TRACK),
+        records_at(at.patches[0], (at.patches[1], at.patches[2], at.patches[3]), PATCH),
+        records_at(at.const[0], (at.const[1],), CONST),
     )
     memory = Memory(
-        _part(arena, head.guide_memo).view(GUIDE_MEMO),
-        _part(arena, head.axle_memos).view(AXLE_MEMO),
-        _part(arena, head.frame).view(FRAME),
+        records_at(at.guide_memo[0], (1,), GUIDE_MEMO),
+        records_at(at.axle_memos[0], (at.axle_memos[1],), AXLE_MEMO),
+        records_at(at.frame[0], (1,), FRAME),
     )
-    pose, wrench = _part(arena, head.pose).view(POSE), _part(arena, head.wrench).view(WRENCH)
-    generalized_forces(t, _part(arena, head.state), data, memory, pose, wrench)
+    pose = records_at(at.pose[0], (at.pose[1],), POSE)
+    wrench = records_at(at.wrench[0], (at.wrench[1],), WRENCH)
+    n = at.state[1] // 3
+    state = records_at(at.state[0], (3 * n,), _FLOAT)
+    q, v, out = state[:n], state[n : 2 * n], state[2 * n :]
+    poses_of(q, v, pose)
+    spins = 6 * pose.shape[0]
+    states = spins + data.spins.shape[0]
+    forces(t, pose, v[spins:states], v[states:], data, wrench, out[spins:states], out[states:], memory)
+    loads_of(pose, wrench, out)

@@ -39,6 +39,7 @@ from simrail.vehicle.engines.records import (
 from simrail.vehicle.model import SeriesDamper, Suspension, Tabled, VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
+
 class ForceData(NamedTuple):
     """Constants of `forces`: arrays of the records of `simrail.vehicle.engines.records`.
 
@@ -129,9 +130,15 @@ def pack(
     return ForceData(
         bodies=np.array([(body.inertia_kgm2, body.mass_kg) for body in model.bodies], BODY),
         springs=_springs(model, gravity_mps2),
-        series=np.array([(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series], SERIES),
+        series=np.array(
+            [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series], SERIES
+        ),
         turns=np.array(
-            [(index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad) for e in model.rotations], TURN
+            [
+                (index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad)
+                for e in model.rotations
+            ],
+            TURN,
         ),
         stops=stops,
         laws=laws,
@@ -221,7 +228,9 @@ def _traction(model: VehicleModel, profile: SpeedProfile, drive: str) -> tuple[R
     return traction, spins
 
 
-def _ends(model: VehicleModel, element: Suspension | SeriesDamper | Tabled) -> tuple[int, int, FloatArray, FloatArray]:
+def _ends(
+    model: VehicleModel, element: Suspension | SeriesDamper | Tabled
+) -> tuple[int, int, FloatArray, FloatArray]:
     """Inner and outer body of an element, and its arm on each."""
     inner, outer = model.body(element.inner), model.body(element.outer)
     return (

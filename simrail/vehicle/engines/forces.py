@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.contact import Motion, RailHere, wheel_force
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
 from simrail.vehicle.engines.force_data import ForceData, Memory
@@ -25,7 +25,7 @@ from simrail.vehicle.engines.suspension_forces import (
 from simrail.vehicle.engines.traction_forces import driver, traction_forces
 
 
-@njit_borrowed
+@njit_inner
 def axle_forces(
     t: float,
     axle: Record,
@@ -48,13 +48,13 @@ def axle_forces(
     s, y, z, metre = find_on_track(data.track, options, b, memo.s_m, frame)
     memo.s_m = s
     # Rates of the axle against the track frame, which moves along and turns with the curvatures.
-    vx, vy, vz = rotated_back(frame, b.vx, b.vy, b.vz)
-    wx, _, wz = rotated_back(frame, b.wx, b.wy, b.wz)
+    vx, vy, vz = rotated_back(frame.rotation, b.vx, b.vy, b.vz)
+    wx, _, wz = rotated_back(frame.rotation, b.wx, b.wy, b.wz)
     speed = vx / metre
     y_dot, z_dot = vy + speed * frame.k1 * z, vz - speed * frame.k1 * y
     phi_dot, psi_dot = wx - speed * frame.k1, wz - speed * frame.k3
     # ZYX angles of the axle in the track frame, from C^T A.
-    turn = relative(frame, b)
+    turn = relative(frame.rotation, b.rotation)
     phi, psi = np.arctan2(turn.zy, turn.zz), np.arctan2(turn.yx, turn.xx)
     # The axle's own axis in global components.
     ex, ey, ez = b.rotation[0, 1], b.rotation[1, 1], b.rotation[2, 1]
@@ -81,8 +81,8 @@ def axle_forces(
         # Before 0 the vehicle is still being set down on its rails: where it then stands counts.
         if contact.flag < 0 and memo.derailed == 0 and t >= 0.0:
             memo.derailed, memo.derailed_s_m = 1, s
-        gx, gy, gz = rotated(frame, contact.fx, contact.fy, contact.fz)
-        mx, my, mz = rotated(frame, contact.mx, contact.my, contact.mz)
+        gx, gy, gz = rotated(frame.rotation, contact.fx, contact.fy, contact.fz)
+        mx, my, mz = rotated(frame.rotation, contact.mx, contact.my, contact.mz)
         # The bearing passes everything on to the axle but the moment about its own axis.
         about = mx * ex + my * ey + mz * ez
         torque[k] += about

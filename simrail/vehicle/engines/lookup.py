@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import njit_borrowed
+from simrail.core.jit import njit_inner
 from simrail.vehicle.contact.cubic import slope, value
 from simrail.vehicle.engines.records import Record, RecordArray, rotated_back
 
@@ -17,7 +17,7 @@ _SAME_PLACE = 1e-12
 """Of s: a step so small is rounding."""
 
 
-@njit_borrowed
+@njit_inner
 def track_at(track: RecordArray, options: Record, s: float, frame: Record) -> None:
     """Track frame and rails at s into ``frame``, from the C2 splines of the laid track."""
     i = int((s - options.grid_start_m) / options.grid_step_m)
@@ -50,14 +50,14 @@ def track_at(track: RecordArray, options: Record, s: float, frame: Record) -> No
     frame.stretch = 1.0 / cp
 
 
-@njit_borrowed
+@njit_inner
 def place_in(frame: Record, body: Record) -> tuple[float, float, float, float]:
     """Place x, y, z of a body in the track frame, and the length there of a metre of s: -dx/ds."""
-    x, y, z = rotated_back(frame, body.x - frame.x, body.y - frame.y, body.z - frame.z)
+    x, y, z = rotated_back(frame.rotation, body.x - frame.x, body.y - frame.y, body.z - frame.z)
     return x, y, z, frame.stretch - frame.k3 * y + frame.k2 * z
 
 
-@njit_borrowed
+@njit_inner
 def find_on_track(
     track: RecordArray, options: Record, body: Record, s: float, frame: Record
 ) -> tuple[float, float, float, float]:
@@ -76,7 +76,7 @@ def find_on_track(
     return s, y, z, metre
 
 
-@njit_borrowed
+@njit_inner
 def driven(t: float, drive: RecordArray, memo: Record) -> tuple[float, float]:
     """Position and speed that the profile asks for at t; the memo remembers the piece."""
     i = memo.piece

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from simrail.core.jit import njit_borrowed
+from simrail.core.jit import FloatArray, njit_inner
 
 RecordArray = npt.NDArray[np.void]
 """Array of records, one per body, element, wheel, ...; C-contiguous."""
@@ -110,7 +110,7 @@ AXLE_MEMO = _record("s_m derailed_s_m load_left_n load_right_n", derailed=_INDEX
 
 
 class Relative(NamedTuple):
-    """C^T A of two rotation matrices: ``xz`` is the x axis of C times the z axis of A, and so on."""
+    """C^T R of two rotation matrices: ``xz`` is the x axis of C times the z axis of R, and so on."""
 
     xx: float
     xy: float
@@ -123,10 +123,9 @@ class Relative(NamedTuple):
     zz: float
 
 
-@njit_borrowed
-def rotated(a: Record, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A v: a vector in the axes of a body or of the track, in global ones."""
-    r = a.rotation
+@njit_inner
+def rotated(r: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """R v: a vector in the axes of a body or of the track, in global ones."""
     return (
         r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
         r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
@@ -134,10 +133,9 @@ def rotated(a: Record, x: float, y: float, z: float) -> tuple[float, float, floa
     )
 
 
-@njit_borrowed
-def rotated_back(a: Record, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A^T v: a global vector in the axes of a body or of the track."""
-    r = a.rotation
+@njit_inner
+def rotated_back(r: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """R^T v: a global vector in the axes of a body or of the track."""
     return (
         r[0, 0] * x + r[1, 0] * y + r[2, 0] * z,
         r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
@@ -145,17 +143,16 @@ def rotated_back(a: Record, x: float, y: float, z: float) -> tuple[float, float,
     )
 
 
-@njit_borrowed
-def relative(c: Record, a: Record) -> Relative:
-    """C^T A: the axes of ``a`` seen in those of ``c``."""
-    r = a.rotation
+@njit_inner
+def relative(c: FloatArray, r: FloatArray) -> Relative:
+    """C^T R: the axes of a body with rotation R seen in those of one with rotation C."""
     xx, yx, zx = rotated_back(c, r[0, 0], r[1, 0], r[2, 0])
     xy, yy, zy = rotated_back(c, r[0, 1], r[1, 1], r[2, 1])
     xz, yz, zz = rotated_back(c, r[0, 2], r[1, 2], r[2, 2])
     return Relative(xx, xy, xz, yx, yy, yz, zx, zy, zz)
 
 
-@njit_borrowed
+@njit_inner
 def push(w: Record, rx: float, ry: float, rz: float, fx: float, fy: float, fz: float) -> None:
     """Add a force that acts at r from the centre of gravity to a wrench: F, r x F."""
     w.fx += fx

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.engines.force_data import ForceData, Memory
 from simrail.vehicle.engines.forces import forces
 from simrail.vehicle.engines.records import RecordArray, rotated, rotated_back
@@ -28,7 +28,7 @@ BODY = STATE.itemsize // 8
 """Numbers of a body in the state."""
 
 
-@njit_borrowed
+@njit_inner
 def pose_of(state: RecordArray, pose: RecordArray) -> None:
     """Position, velocity, rotation matrix and global angular rate of each body."""
     for b in range(state.shape[0]):
@@ -40,10 +40,10 @@ def pose_of(state: RecordArray, pose: RecordArray) -> None:
         r[0, 0], r[0, 1], r[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
         r[1, 0], r[1, 1], r[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
         r[2, 0], r[2, 1], r[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-        place.wx, place.wy, place.wz = rotated(place, body.p, body.q, body.r)
+        place.wx, place.wy, place.wz = rotated(place.rotation, body.p, body.q, body.r)
 
 
-@njit_borrowed
+@njit_inner
 def body_rates(
     state: RecordArray, bodies: RecordArray, pose: RecordArray, wrench: RecordArray, slope: RecordArray
 ) -> None:
@@ -62,14 +62,14 @@ def body_rates(
         rate.q2 = 0.5 * (w * q + z * p - x * r)
         rate.q3 = 0.5 * (w * r + x * q - y * p)
         # Euler: I w' = M - w x I w, principal axes.
-        mx, my, mz = rotated_back(pose[b], push.mx, push.my, push.mz)
+        mx, my, mz = rotated_back(pose[b].rotation, push.mx, push.my, push.mz)
         ix, iy, iz = inertia[0], inertia[1], inertia[2]
         rate.p = (mx - (iz - iy) * q * r) / ix
         rate.q = (my - (ix - iz) * r * p) / iy
         rate.r = (mz - (iy - ix) * p * q) / iz
 
 
-@njit_borrowed
+@njit_inner
 def normalise(state: RecordArray) -> None:
     """Make every quaternion one of length 1 again."""
     for b in range(state.shape[0]):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.cubic import value
 from simrail.vehicle.engines.lookup import driven, find_on_track, place_in, track_at
 from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
@@ -37,33 +37,32 @@ class Between(NamedTuple):
     z_rate: float
 
 
-@njit_borrowed
-def between(element: Record, a: Record, b: Record) -> Between:
-    """Attachment points of an element: ``a`` and ``b`` are the poses of its inner and outer body."""
-    arm = element.inner_arm
-    ax, ay, az = rotated(a, arm[0], arm[1], arm[2])
-    arm = element.outer_arm
-    bx, by, bz = rotated(b, arm[0], arm[1], arm[2])
+@njit_inner
+def between(inner_arm: FloatArray, outer_arm: FloatArray, a: Record, b: Record) -> Between:
+    """Attachment points of an element, from its arms on the bodies and the poses of these."""
+    ax, ay, az = rotated(a.rotation, inner_arm[0], inner_arm[1], inner_arm[2])
+    bx, by, bz = rotated(b.rotation, outer_arm[0], outer_arm[1], outer_arm[2])
     # A point of a body moves with v + w x r.
     ex = b.vx + b.wy * bz - b.wz * by - a.vx - a.wy * az + a.wz * ay
     ey = b.vy + b.wz * bx - b.wx * bz - a.vy - a.wz * ax + a.wx * az
     ez = b.vz + b.wx * by - b.wy * bx - a.vz - a.wx * ay + a.wy * ax
-    x, y, z = rotated_back(a, b.x + bx - a.x - ax, b.y + by - a.y - ay, b.z + bz - a.z - az)
-    x_rate, y_rate, z_rate = rotated_back(a, ex, ey, ez)
+    x, y, z = rotated_back(a.rotation, b.x + bx - a.x - ax, b.y + by - a.y - ay, b.z + bz - a.z - az)
+    x_rate, y_rate, z_rate = rotated_back(a.rotation, ex, ey, ez)
     return Between(ax, ay, az, bx, by, bz, x, y, z, x_rate, y_rate, z_rate)
 
 
-@njit_borrowed
-def pull(
-    element: Record, pose: RecordArray, wrench: RecordArray, p: Between, fx: float, fy: float, fz: float
-) -> None:
-    """Pull the two bodies of an element together with a force in the inner body's axes."""
-    gx, gy, gz = rotated(pose[element.inner], fx, fy, fz)
-    push(wrench[element.inner], p.ax, p.ay, p.az, gx, gy, gz)
-    push(wrench[element.outer], p.bx, p.by, p.bz, -gx, -gy, -gz)
+@njit_inner
+def pull(p: Between, a: Record, wa: Record, wb: Record, fx: float, fy: float, fz: float) -> None:
+    """Pull the two bodies of an element together with a force in the inner body's axes.
+
+    ``a`` is the inner body's pose, ``wa`` and ``wb`` are the wrenches on the inner and the outer body.
+    """
+    gx, gy, gz = rotated(a.rotation, fx, fy, fz)
+    push(wa, p.ax, p.ay, p.az, gx, gy, gz)
+    push(wb, p.bx, p.by, p.bz, -gx, -gy, -gz)
 
 
-@njit_borrowed
+@njit_inner
 def along(axis: int, x: float, y: float, z: float) -> float:
     """One of three components."""
     if axis == 0:
@@ -71,14 +70,13 @@ def along(axis: int, x: float, y: float, z: float) -> float:
     return y if axis == 1 else z
 
 
-@njit_borrowed
-def pull_along(element: Record, pose: RecordArray, wrench: RecordArray, p: Between, force: float) -> None:
-    """`pull` along the axis of a one-axis element."""
-    axis = element.axis
+@njit_inner
+def pull_along(p: Between, axis: int, a: Record, wa: Record, wb: Record, force: float) -> None:
+    """`pull` along one axis."""
     fx = force if axis == 0 else 0.0
     fy = force if axis == 1 else 0.0
     fz = force if axis == 2 else 0.0
-    pull(element, pose, wrench, p, fx, fy, fz)
+    pull(p, a, wa, wb, fx, fy, fz)
 
 
 @njit_borrowed
@@ -86,12 +84,13 @@ def spring_forces(springs: RecordArray, pose: RecordArray, wrench: RecordArray) 
     """Add every linear spring and damper: F = k (deflection less that at rest) + c rate, along each axis."""
     for m in range(springs.shape[0]):
         spring = springs[m]
-        p = between(spring, pose[spring.inner], pose[spring.outer])
+        a, b = pose[spring.inner], pose[spring.outer]
+        p = between(spring.inner_arm, spring.outer_arm, a, b)
         k, c = spring.stiffness, spring.damping
         fx = k[0] * p.x + c[0] * p.x_rate
         fy = k[1] * p.y + c[1] * p.y_rate
         fz = k[2] * (p.z - spring.sag_m) + c[2] * p.z_rate
-        pull(spring, pose, wrench, p, fx, fy, fz)
+        pull(p, a, wrench[spring.inner], wrench[spring.outer], fx, fy, fz)
 
 
 @njit_borrowed
@@ -101,10 +100,11 @@ def series_forces(
     """Add dampers in series with a spring. Their force (N) is the inner state: F' = k (v - F / c)."""
     for m in range(series.shape[0]):
         damper = series[m]
-        p = between(damper, pose[damper.inner], pose[damper.outer])
+        a, b = pose[damper.inner], pose[damper.outer]
+        p = between(damper.inner_arm, damper.outer_arm, a, b)
         speed = along(damper.axis, p.x_rate, p.y_rate, p.z_rate)
         force_rate[m] = damper.stiffness * (speed - force[m] / damper.damping)
-        pull_along(damper, pose, wrench, p, force[m])
+        pull_along(p, damper.axis, a, wrench[damper.inner], wrench[damper.outer], force[m])
 
 
 @njit_borrowed
@@ -115,7 +115,8 @@ def stop_forces(stops: RecordArray, laws: RecordArray, pose: RecordArray, wrench
     """
     for m in range(stops.shape[0]):
         stop = stops[m]
-        p = between(stop, pose[stop.inner], pose[stop.outer])
+        a, b = pose[stop.inner], pose[stop.outer]
+        p = between(stop.inner_arm, stop.outer_arm, a, b)
         if stop.over_rate:
             x = along(stop.axis, p.x_rate, p.y_rate, p.z_rate)
         else:
@@ -125,7 +126,8 @@ def stop_forces(stops: RecordArray, laws: RecordArray, pose: RecordArray, wrench
         while row < last and size >= laws[row + 1].start:
             row += 1
         force = value(laws[row].cubic, size - laws[row].start)
-        pull_along(stop, pose, wrench, p, force if x > 0.0 else -force)
+        force = force if x > 0.0 else -force
+        pull_along(p, stop.axis, a, wrench[stop.inner], wrench[stop.outer], force)
 
 
 @njit_borrowed
@@ -137,11 +139,11 @@ def turn_forces(turns: RecordArray, pose: RecordArray, wrench: RecordArray) -> N
     for m in range(turns.shape[0]):
         turn = turns[m]
         a, b, wa, wb = pose[turn.inner], pose[turn.outer], wrench[turn.inner], wrench[turn.outer]
-        angle = relative(a, b)
-        x_rate, y_rate, z_rate = rotated_back(a, b.wx - a.wx, b.wy - a.wy, b.wz - a.wz)
+        angle = relative(a.rotation, b.rotation)
+        x_rate, y_rate, z_rate = rotated_back(a.rotation, b.wx - a.wx, b.wy - a.wy, b.wz - a.wz)
         k, c = turn.stiffness, turn.damping
         mx, my, mz = rotated(
-            a,
+            a.rotation,
             k[0] * 0.5 * (angle.zy - angle.yz) + c[0] * x_rate,
             k[1] * 0.5 * (angle.xz - angle.zx) + c[1] * y_rate,
             k[2] * 0.5 * (angle.yx - angle.xy) + c[2] * z_rate,
@@ -154,7 +156,7 @@ def turn_forces(turns: RecordArray, pose: RecordArray, wrench: RecordArray) -> N
         wb.mz -= mz
 
 
-@njit_borrowed
+@njit_inner
 def guide_force(
     t: float,
     guide: Record,
@@ -184,17 +186,17 @@ def guide_force(
     behind, speed, along_force = 0.0, wanted, 0.0
     if wheels_drive:
         memo.s_m, y, z, metre = find_on_track(track, options, b, memo.s_m, frame)
-        vx, vy, vz = rotated_back(frame, b.vx, b.vy, b.vz)
+        vx, vy, vz = rotated_back(frame.rotation, b.vx, b.vy, b.vz)
         behind, speed = place - memo.s_m, vx / metre
     else:
         memo.s_m = place
         track_at(track, options, place, frame)
         x, y, z, metre = place_in(frame, b)
-        vx, vy, vz = rotated_back(frame, b.vx, b.vy, b.vz)
+        vx, vy, vz = rotated_back(frame.rotation, b.vx, b.vy, b.vz)
         along_force = -guide.stiffness * x - guide.damping * (vx - speed * metre)
     # Small relative rotation: the antisymmetric part of C^T A; rates against the moving track frame.
-    angle = relative(frame, b)
-    wx, wy, wz = rotated_back(frame, b.wx, b.wy, b.wz)
+    angle = relative(frame.rotation, b.rotation)
+    wx, wy, wz = rotated_back(frame.rotation, b.wx, b.wy, b.wz)
     pitch = -guide.pitch_stiffness * 0.5 * (angle.xz - angle.zx) - guide.pitch_damping * (
         wy - speed * frame.k2
     )
@@ -211,8 +213,8 @@ def guide_force(
         roll = -guide.roll_stiffness * 0.5 * (angle.zy - angle.yz) - guide.roll_damping * (
             wx - speed * frame.k1
         )
-    gx, gy, gz = rotated(frame, along_force, side, up)
-    mx, my, mz = rotated(frame, roll, pitch, yaw)
+    gx, gy, gz = rotated(frame.rotation, along_force, side, up)
+    mx, my, mz = rotated(frame.rotation, roll, pitch, yaw)
     push(w, 0.0, 0.0, 0.0, gx, gy, gz)
     w.mx += mx
     w.my += my

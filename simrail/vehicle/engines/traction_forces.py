@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.engines.records import Record, RecordArray
 
 _ROUNDING_MPS = 1e-3
@@ -60,7 +60,7 @@ def driver(behind: float, wanted: float, speed: float, traction: Record) -> tupl
     return 0.0, asked + (brake - asked) * still
 
 
-@njit_borrowed
+@njit_inner
 def traction_forces(
     efforts: tuple[float, float],
     traction: Record,
@@ -87,9 +87,7 @@ def traction_forces(
         # Slide protection: 1 / (1 + (creepage/limit)^4).
         share = 1.0
         if limit > 0.0:
-            v = (
-                axle.vx * axle.rotation[0, 0] + axle.vy * axle.rotation[1, 0] + axle.vz * axle.rotation[2, 0]
-            )
+            v = axle.vx * axle.rotation[0, 0] + axle.vy * axle.rotation[1, 0] + axle.vz * axle.rotation[2, 0]
             slide = (rate[k] * radius - v) / (limit * np.sqrt(v * v + _SLIDE_SPEED_MPS * _SLIDE_SPEED_MPS))
             share = 1.0 / (1.0 + slide * slide * slide * slide)
         # Motor: the effort, less where its power ends: F / (1 + (F w r/P)^4)^(1/4).
