@@ -101,7 +101,8 @@ def saturation(q: float, law: float, adhesion: float, slip: float) -> float:
         return 0.5 * (adhesion + slip)
     e = 0.25 * np.pi * q
     a = adhesion * e
-    return (a / (1.0 + a * a) + np.arctan(slip * e)) * 2.0 / (np.pi * q)
+    part: float = (a / (1.0 + a * a) + np.arctan(slip * e)) * 2.0 / (np.pi * q)
+    return part
 
 
 @njit_borrowed
@@ -111,4 +112,5 @@ def fallen(friction: float, floor: float, decay: float, sliding_x: float, slidin
         return friction
     w0 = _SLIDING_ROUND_MPS
     w = np.sqrt(sliding_x * sliding_x + sliding_y * sliding_y + w0 * w0) - w0
-    return friction * ((1.0 - floor) * np.exp(-decay * w) + floor)
+    sliding: float = friction * ((1.0 - floor) * np.exp(-decay * w) + floor)
+    return sliding

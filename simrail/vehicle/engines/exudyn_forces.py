@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
@@ -81,8 +80,7 @@ def loads_of(pose: RecordArray, wrench: RecordArray, out: FloatArray) -> None:
         out[j + 3], out[j + 4], out[j + 5] = mx, -my, -mz
 
 
-@intrinsic
-def records_at(_typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
+def _records_at(_typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
     """Array of records, C-contiguous, at an address: numba's `carray`, compiled in no time.
 
     The caller must keep what lies there. ``shape`` is a tuple, ``dtype`` a numpy dtype.
@@ -92,7 +90,8 @@ def records_at(_typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
     def lower(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         made = context.make_array(array)(context, builder)
         size = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(dtype.dtype)))
-        sizes, strides = cgutils.unpack_tuple(builder, args[1]), [size]
+        sizes = [builder.extract_value(args[1], i) for i in range(len(shape))]
+        strides = [size]
         for n in reversed(sizes[1:]):
             strides.insert(0, builder.mul(strides[0], n))
         data = builder.inttoptr(args[0], made.data.type)
@@ -100,6 +99,10 @@ def records_at(_typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
         return made._getvalue()
 
     return array(address, shape, dtype), lower
+
+
+records_at: Any = intrinsic(_records_at)
+"""`_records_at`, as a kernel calls it: ``records_at(address, shape, dtype)``."""
 
 
 _PLACES = np.dtype(

@@ -160,5 +160,5 @@ def march(
             rows[row, k] = state[k]
         for a in range(memory.axle_memos.shape[0]):
             if memory.axle_memos[a].derailed:
-                return row
-    return rows.shape[0]
+                return int(row)
+    return int(rows.shape[0])

@@ -139,21 +139,20 @@ def turn_forces(turns: RecordArray, pose: RecordArray, wrench: RecordArray) -> N
     for m in range(turns.shape[0]):
         turn = turns[m]
         a, b, wa, wb = pose[turn.inner], pose[turn.outer], wrench[turn.inner], wrench[turn.outer]
-        angle = relative(a.rotation, b.rotation)
-        x_rate, y_rate, z_rate = rotated_back(a.rotation, b.wx - a.wx, b.wy - a.wy, b.wz - a.wz)
-        k, c = turn.stiffness, turn.damping
-        mx, my, mz = rotated(
-            a.rotation,
-            k[0] * 0.5 * (angle.zy - angle.yz) + c[0] * x_rate,
-            k[1] * 0.5 * (angle.xz - angle.zx) + c[1] * y_rate,
-            k[2] * 0.5 * (angle.yx - angle.xy) + c[2] * z_rate,
-        )
-        wa.mx += mx
-        wa.my += my
-        wa.mz += mz
-        wb.mx -= mx
-        wb.my -= my
-        wb.mz -= mz
+        A, B = a.rotation, b.rotation
+        for k in range(3):
+            q, u = (k + 1) % 3, (k + 2) % 3
+            angle = 0.0
+            for n in range(3):
+                angle += 0.5 * (A[n, u] * B[n, q] - A[n, q] * B[n, u])
+            rate = A[0, k] * (b.wx - a.wx) + A[1, k] * (b.wy - a.wy) + A[2, k] * (b.wz - a.wz)
+            moment = turn.stiffness[k] * angle + turn.damping[k] * rate
+            wa.mx += A[0, k] * moment
+            wa.my += A[1, k] * moment
+            wa.mz += A[2, k] * moment
+            wb.mx -= A[0, k] * moment
+            wb.my -= A[1, k] * moment
+            wb.mz -= A[2, k] * moment
 
 
 @njit_inner
