@@ -16,32 +16,10 @@ from numba.np.arrayobj import populate_array
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.contact_geometry import CONST, PATCH
+from simrail.vehicle.engines import records
 from simrail.vehicle.engines.force_data import ForceData, Memory
 from simrail.vehicle.engines.forces import forces
-from simrail.vehicle.engines.records import (
-    AXLE,
-    AXLE_MEMO,
-    BODY,
-    DRIVE,
-    FRAME,
-    GUIDE,
-    GUIDE_MEMO,
-    LAW,
-    OPTIONS,
-    POSE,
-    SERIES,
-    SPIN,
-    SPRING,
-    STOP,
-    TRACK,
-    TRACTION,
-    TURN,
-    WHEEL,
-    WRENCH,
-    RecordArray,
-    rotated,
-    rotated_back,
-)
+from simrail.vehicle.engines.records import RecordArray, rotated, rotated_back
 
 _FLOAT = np.dtype("f8")
 
@@ -129,7 +107,7 @@ class Arguments:
     def __init__(self, size: int, data: ForceData, memory: Memory) -> None:
         self.state = np.zeros(3 * size)
         bodies = len(data.bodies)
-        parts = [self.state, *data, *memory, np.zeros(bodies, POSE), np.zeros(bodies, WRENCH)]
+        parts = [self.state, *data, *memory, np.zeros(bodies, records.POSE), np.zeros(bodies, records.WRENCH)]
         self._parts = [np.ascontiguousarray(part) for part in parts]
         rows = [(part.ctypes.data, *part.shape, *(1,) * (3 - part.ndim)) for part in self._parts]
         self.places = np.array([tuple(rows)], _PLACES)
@@ -143,30 +121,30 @@ def generalized_forces(t: float, places: RecordArray) -> None:
     """
     at = places[0]
     data = ForceData(
-        records_at(at.bodies[0], (at.bodies[1],), BODY),
-        records_at(at.springs[0], (at.springs[1],), SPRING),
-        records_at(at.series[0], (at.series[1],), SERIES),
-        records_at(at.turns[0], (at.turns[1],), TURN),
-        records_at(at.stops[0], (at.stops[1],), STOP),
-        records_at(at.laws[0], (at.laws[1],), LAW),
-        records_at(at.wheels[0], (at.wheels[1],), WHEEL),
-        records_at(at.spins[0], (at.spins[1],), SPIN),
-        records_at(at.axles[0], (at.axles[1],), AXLE),
-        records_at(at.guide[0], (1,), GUIDE),
-        records_at(at.traction[0], (1,), TRACTION),
-        records_at(at.options[0], (1,), OPTIONS),
-        records_at(at.drive[0], (at.drive[1],), DRIVE),
-        records_at(at.track[0], (at.track[1],), TRACK),
+        records_at(at.bodies[0], (at.bodies[1],), records.BODY),
+        records_at(at.springs[0], (at.springs[1],), records.SPRING),
+        records_at(at.series[0], (at.series[1],), records.SERIES),
+        records_at(at.turns[0], (at.turns[1],), records.TURN),
+        records_at(at.stops[0], (at.stops[1],), records.STOP),
+        records_at(at.laws[0], (at.laws[1],), records.LAW),
+        records_at(at.wheels[0], (at.wheels[1],), records.WHEEL),
+        records_at(at.spins[0], (at.spins[1],), records.SPIN),
+        records_at(at.axles[0], (at.axles[1],), records.AXLE),
+        records_at(at.guide[0], (1,), records.GUIDE),
+        records_at(at.traction[0], (1,), records.TRACTION),
+        records_at(at.options[0], (1,), records.OPTIONS),
+        records_at(at.drive[0], (at.drive[1],), records.DRIVE),
+        records_at(at.track[0], (at.track[1],), records.TRACK),
         records_at(at.patches[0], (at.patches[1], at.patches[2], at.patches[3]), PATCH),
         records_at(at.const[0], (at.const[1],), CONST),
     )
     memory = Memory(
-        records_at(at.guide_memo[0], (1,), GUIDE_MEMO),
-        records_at(at.axle_memos[0], (at.axle_memos[1],), AXLE_MEMO),
-        records_at(at.frame[0], (1,), FRAME),
+        records_at(at.guide_memo[0], (1,), records.GUIDE_MEMO),
+        records_at(at.axle_memos[0], (at.axle_memos[1],), records.AXLE_MEMO),
+        records_at(at.frame[0], (1,), records.FRAME),
     )
-    pose = records_at(at.pose[0], (at.pose[1],), POSE)
-    wrench = records_at(at.wrench[0], (at.wrench[1],), WRENCH)
+    pose = records_at(at.pose[0], (at.pose[1],), records.POSE)
+    wrench = records_at(at.wrench[0], (at.wrench[1],), records.WRENCH)
     n = at.state[1] // 3
     state = records_at(at.state[0], (3 * n,), _FLOAT)
     q, v, out = state[:n], state[n : 2 * n], state[2 * n :]

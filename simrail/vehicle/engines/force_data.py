@@ -6,6 +6,7 @@ cache does not notice when a global of another module changes.
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -16,26 +17,8 @@ from simrail.core.jit import FloatArray
 from simrail.track.laid_track import LaidTrack
 from simrail.vehicle.contact.contact_geometry import CONST
 from simrail.vehicle.contact.contact_tables import contacts_of, rest_drops_m
-from simrail.vehicle.engines.records import (
-    AXLE,
-    AXLE_MEMO,
-    BODY,
-    DRIVE,
-    FRAME,
-    GUIDE,
-    GUIDE_MEMO,
-    LAW,
-    OPTIONS,
-    SERIES,
-    SPIN,
-    SPRING,
-    STOP,
-    TRACK,
-    TRACTION,
-    TURN,
-    WHEEL,
-    RecordArray,
-)
+from simrail.vehicle.engines import records
+from simrail.vehicle.engines.records import RecordArray
 from simrail.vehicle.model import SeriesDamper, Suspension, Tabled, VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -91,7 +74,9 @@ class Memory(NamedTuple):
 
 def memory_of(axles: int) -> Memory:
     """A `Memory` of nothing."""
-    return Memory(np.zeros(1, GUIDE_MEMO), np.zeros(axles, AXLE_MEMO), np.zeros(1, FRAME))
+    return Memory(
+        np.zeros(1, records.GUIDE_MEMO), np.zeros(axles, records.AXLE_MEMO), np.zeros(1, records.FRAME)
+    )
 
 
 def states_of(data: ForceData) -> int:
@@ -128,28 +113,29 @@ def pack(
     stops, laws = _stops(model)
     traction, spins = _traction(model, profile, drive)
     return ForceData(
-        bodies=np.array([(body.inertia_kgm2, body.mass_kg) for body in model.bodies], BODY),
+        bodies=np.array([(body.inertia_kgm2, body.mass_kg) for body in model.bodies], records.BODY),
         springs=_springs(model, gravity_mps2),
         series=np.array(
-            [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series], SERIES
+            [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series],
+            records.SERIES,
         ),
         turns=np.array(
             [
                 (index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad)
                 for e in model.rotations
             ],
-            TURN,
+            records.TURN,
         ),
         stops=stops,
         laws=laws,
-        wheels=np.array(wheels, WHEEL),
+        wheels=np.array(wheels, records.WHEEL),
         spins=spins,
-        axles=np.array([(index(a), i) for a, i in zip(model.axle_names, first, strict=True)], AXLE),
+        axles=np.array([(index(a), i) for a, i in zip(model.axle_names, first, strict=True)], records.AXLE),
         guide=_guide(model, gravity_mps2),
         traction=traction,
         options=_options(model, track, gravity_mps2),
-        drive=np.array([(start, cubic) for start, cubic in zip(times, cubics, strict=False)], DRIVE),
-        track=track.table.reshape(len(track.table), -1).view(TRACK)[:, 0],
+        drive=np.array([(start, cubic) for start, cubic in zip(times, cubics, strict=False)], records.DRIVE),
+        track=track.table.reshape(len(track.table), -1).view(records.TRACK)[:, 0],
         patches=np.stack([table.patches for table in contacts.tables]),
         const=np.array([table.const for table in contacts.tables], CONST),
     )
@@ -157,7 +143,7 @@ def pack(
 
 def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
     """Springs; at rest one is already shortened by what it carries."""
-    springs = np.zeros(len(model.suspensions), SPRING)
+    springs = np.zeros(len(model.suspensions), records.SPRING)
     preload = model.preload_n(gravity_mps2)
     for i, (spring, force) in enumerate(zip(model.suspensions, preload, strict=True)):
         sag = force / spring.stiffness_npm[2] if spring.stiffness_npm[2] > 0.0 else 0.0
@@ -166,34 +152,17 @@ def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
 
 
 def _guide(model: VehicleModel, gravity_mps2: float) -> RecordArray:
-    guide = model.guide
-    held = model.body(guide.body)
-    body = model.body_names.index(guide.body)
-    drop = rest_drops_m(model, gravity_mps2=gravity_mps2)[body]
-    row = (
-        body,
-        held.position_m[0],
-        guide.stiffness_npm,
-        guide.damping_nspm,
-        guide.pitch_stiffness_nmprad,
-        guide.pitch_damping_nmsprad,
-        guide.yaw_stiffness_nmprad,
-        guide.yaw_damping_nmsprad,
-        guide.lateral_stiffness_npm,
-        guide.lateral_damping_nspm,
-        guide.vertical_stiffness_npm,
-        guide.vertical_damping_nspm,
-        guide.roll_stiffness_nmprad,
-        guide.roll_damping_nmsprad,
-        held.position_m[2] + drop,
-        model.guide_load_n(gravity_mps2),
-    )
-    return np.array([row], GUIDE)
+    held = model.body(model.guide.body)
+    body = model.body_names.index(held.name)
+    height_m = held.position_m[2] + rest_drops_m(model, gravity_mps2=gravity_mps2)[body]
+    _, *springs = astuple(model.guide)  # in the order of GUIDE
+    row = (body, held.position_m[0], *springs, height_m, model.guide_load_n(gravity_mps2))
+    return np.array([row], records.GUIDE)
 
 
 def _traction(model: VehicleModel, profile: SpeedProfile, drive: str) -> tuple[RecordArray, RecordArray]:
     """The driver and his means, all zero if the guide itself drives, and the spins."""
-    traction, spins = np.zeros(1, TRACTION), np.zeros(len(model.spin_inertia_kgm2), SPIN)
+    traction, spins = np.zeros(1, records.TRACTION), np.zeros(len(model.spin_inertia_kgm2), records.SPIN)
     spins["inertia"] = list(model.spin_inertia_kgm2.values())
     if drive == "guide":
         return traction, spins
@@ -252,26 +221,14 @@ def _stops(model: VehicleModel) -> tuple[RecordArray, RecordArray]:
         over_rate = element.over == "speed_mps"
         stops.append((*_ends(model, element), element.axis, over_rate, len(laws), len(x)))
         laws += zip(x, [*curve.c.T, np.array([0.0, 0.0, last, force[-1]])], strict=True)
-    return np.array(stops, STOP), np.array(laws, LAW)
+    return np.array(stops, records.STOP), np.array(laws, records.LAW)
 
 
 def _options(model: VehicleModel, track: LaidTrack, gravity_mps2: float) -> RecordArray:
-    options = np.zeros(1, OPTIONS)
-    options["gravity"], options["gyroscopic"] = gravity_mps2, model.gyroscopic
-    options["grid_start_m"], options["grid_step_m"] = track.table_start_m, track.table_step_m
-    linear = model.wheel_rail.linear
-    if linear is not None:
-        for name, number in (
-            ("linear_contact", 1),
-            ("f11", linear.f11_n),
-            ("f22", linear.f22_n),
-            ("f23", linear.f23_nm),
-            ("f33", linear.f33_nm2),
-            ("conicity", linear.conicity),
-            ("vertical_stiffness", linear.vertical_stiffness_npm),
-            ("vertical_damping", linear.vertical_damping_nspm),
-            ("gravitational_stiffness", 0.5 * linear.gravitational_stiffness_npm),
-            ("gravitational_yaw_stiffness", 0.5 * linear.gravitational_yaw_stiffness_nmprad),
-        ):
-            options[name] = number
-    return options
+    linear = np.zeros(9)
+    if model.wheel_rail.linear is not None:
+        linear[:] = astuple(model.wheel_rail.linear)  # in the order of OPTIONS
+        linear[7:] *= 0.5  # the gravitational stiffnesses are a wheelset's
+    switches = model.gyroscopic, model.wheel_rail.linear is not None
+    row = (*switches, gravity_mps2, track.table_start_m, track.table_step_m, *linear)
+    return np.array([row], records.OPTIONS)
