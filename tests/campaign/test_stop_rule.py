@@ -342,7 +342,8 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     )
     (noting_file.parent / "noting.py").write_text(FLAKY)
     settings = ["monte_carlo.sensor_draws=12", stop(5.0, estimator="ekf", least=4)]
-    words = ["run", str(noting_file), *(word for one in settings for word in ("--set", one))]
+    words = ["run", str(noting_file), "--workers", "1"]
+    words += [word for one in settings for word in ("--set", one)]
     assert call([*words, "--out", "results/whole"]) == DONE
     assert "stop rule reached after 4 of 12 draws of the sensors" in " ".join(capsys.readouterr().out.split())
     (here / "broken").touch()
