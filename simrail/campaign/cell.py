@@ -19,7 +19,7 @@ import pandas as pd
 
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check
-from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
 from simrail.ride.truth import Truth
@@ -189,7 +189,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
 
 
 def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
-    """Measure a cell: its sensors on its ride."""
+    """Measure a cell, its sensors on its ride, and run its odometry."""
     resolved = parts.resolve(cell)
     recording = measure(
         truth,
@@ -200,13 +200,15 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         magnetometer=resolved.magnetometer,
         rail_sensor=resolved.rail_sensor,
         rails=None if resolved.rail_sensor is None else parts.rails(cell),
-        odometry="truth" if cell.spec.odometry == "truth" else "encoder",
+        odometry=TRUTH if cell.spec.odometry == TRUTH else None,
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,
         earth_rate=resolved.earth_rate,
         temperature=resolved.temperature,
     )
-    return with_odometry(recording, cell.spec.odometry)
+    if resolved.odometry is None:
+        return recording
+    return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
 
 
 def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellResult:
@@ -259,13 +261,14 @@ def _reason_of(error: Exception) -> str:
 
 
 def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> _Recorded:
-    """Record one cell and score its odometry."""
+    """Record one cell and score its odometry, if it has one."""
     with tally.timed("measure"):
         recording = record_cell(cell, truth, parts)
     with tally.timed("score"):
         reference = reference_of(truth_at_imu(truth, recording), recording)
-        figures = score_odometry(recording, reference, **_wanted(cell))
-        tally.add(cell, f"odometry:{recording.odometry_source}", figures)
+        if recording.odometry is not None:
+            figures = score_odometry(recording, reference, **_wanted(cell))
+            tally.add(cell, f"odometry:{recording.odometry_source}", figures)
     return _Recorded(cell, recording, reference)
 
 

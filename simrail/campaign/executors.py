@@ -189,8 +189,8 @@ class _Cluster:
         self._log_level = self._log.level
         self._log.setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
         try:
-            # As untyped as dask's methods are.
-            self._client: Any = distributed.Client(address, timeout=_WAIT_S, set_as_default=False)
+            client: Any = distributed.Client  # its methods have no types
+            self._client = client(address, timeout=_WAIT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             self._log.setLevel(self._log_level)
             raise InputError(

@@ -128,7 +128,8 @@ def pack(parts: Parts) -> bytes:
     InputError
         If an estimator cannot be sent to another process.
     """
-    for name, estimator in parts.estimators(0).items():
+    estimators = {**parts.estimators(0), **parts.odometries()}
+    for name, estimator in estimators.items():
         try:
             pickle.dumps(estimator)
         except Exception as error:
@@ -138,7 +139,7 @@ def pack(parts: Parts) -> bytes:
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
             ) from error
-    sources = sources_of(list(parts.estimators(0).values()))
+    sources = sources_of(list(estimators.values()))
     return pickle.dumps((score_code_hash(), sources, pickle.dumps(parts)))
 
 

@@ -70,13 +70,6 @@ def _judge_imu(resolved: ResolvedCell) -> None:
 def _judge_encoder(resolved: ResolvedCell) -> None:
     cell, encoder, vehicle = resolved.cell, resolved.encoder, resolved.ride.vehicle
     if encoder is None:
-        if cell.spec.odometry != "truth":
-            raise InputError(
-                "the odometry needs an encoder",
-                field="odometry",
-                value=cell.spec.odometry,
-                remedy='add an [encoder], or set odometry = "truth" for an ablation',
-            )
         return
     sides = {name.partition(".")[2] for name in vehicle.wheel_names}
     places = [f"{where}.{side}" for where in ("leading", "trailing") for side in sorted(sides)]

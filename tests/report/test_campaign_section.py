@@ -22,7 +22,6 @@ from simrail.report.campaign.rails import rails_figures
 from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
 from simrail.report.pages.page import TABLES, write_report
 from simrail.report.tables.methods import MethodStyle, method_styles
-from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.statistics import compare
 from simrail.scoring.table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
@@ -170,7 +169,7 @@ def made_up() -> Scenario:
 
 @pytest.fixture(scope="module")
 def styles(made_up: Scenario) -> list[MethodStyle]:
-    return list(method_styles(methods(made_up)).values())
+    return list(method_styles(made_up).values())
 
 
 @pytest.fixture(scope="module")

@@ -121,7 +121,7 @@ def write_report(
         Results of another scenario of the same publication, one of `SETS_BESIDE`.
     """
     all_cases = cases(scores, cells)
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     paper = _beside_paper(scenario, all_cases, styles, examples, beside)
     campaign = campaign_view(scenario, scores, cells, styles, examples, manifest, band=band_of_all(all_cases))
     if campaign is not None:
@@ -211,7 +211,7 @@ def _ride(
     for style in drawn:
         twin = by_name.get(style.twin)
         if style.compensated and twin:
-            title = f"{style.label.removesuffix(' compensated')}, with and without compensation"
+            title = f"{style.kind}, with and without compensation"
             comparisons.append(
                 (title, Markup(attitude_figure(example, [style, twin], what=f"{title}, {name}")))
             )
@@ -229,7 +229,7 @@ def _ride(
         else nothing,
         comparisons=comparisons,
         errors=Markup(error_figure(example, drawn)) if drawn else nothing,
-        odometry=Markup(odometry_figure(example)),
+        odometry=nothing if example.recording.odometry is None else Markup(odometry_figure(example)),
         rms=Markup(rms_figure(case, attitude_methods(styles))) if case else nothing,
         curves=Markup(curves_figure(case, attitude_methods(styles))) if case else nothing,
         geometry=geometry,

@@ -15,7 +15,7 @@ import pytest
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
 from simrail.core.errors import InputError
-from simrail.report import write_report
+from simrail.report.pages.page import write_report
 from simrail.report.papers.briales_2021.figures import spread_of
 from simrail.report.papers.briales_2021.method_claims import method_claims
 from simrail.report.papers.briales_2021.printed import TABLE_3, TIME_CONSTANTS_S
@@ -220,7 +220,7 @@ def view_of(names: tuple[str, ...], draws: int = 2) -> PaperView:
     scenario, result = campaign(names, draws)
     listed = methods(scenario)
     view = paper_view(
-        cases(result.scores, result.cells), listed, list(method_styles(listed).values()), result.examples
+        cases(result.scores, result.cells), listed, list(method_styles(scenario).values()), result.examples
     )
     assert view is not None
     return view
