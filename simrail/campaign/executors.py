@@ -176,7 +176,7 @@ class _Cluster:
 
     def __init__(self, address: str) -> None:
         try:
-            from distributed import Client
+            import distributed
         except ImportError:
             raise InputError(
                 "a cluster needs dask, which is not installed",
@@ -189,7 +189,8 @@ class _Cluster:
         self._log_level = self._log.level
         self._log.setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
         try:
-            self._client = Client(address, timeout=_WAIT_S, set_as_default=False)
+            client: Any = distributed.Client  # its methods have no types
+            self._client = client(address, timeout=_WAIT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             self._log.setLevel(self._log_level)
             raise InputError(
@@ -210,7 +211,7 @@ class _Cluster:
     def _judge_workers(self) -> None:
         """Refuse a cluster without workers, or one whose workers run another simrail."""
         begun = time.perf_counter()
-        while not self._threads():
+        while not self._client.nthreads():
             if time.perf_counter() - begun > _WAIT_S:
                 raise InputError(
                     "the dask scheduler has no workers",
@@ -236,9 +237,6 @@ class _Cluster:
                 value=others[0],
                 remedy="install the same simrail on every machine",
             )
-
-    def _threads(self) -> int:
-        return sum(self._client.nthreads().values())
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.

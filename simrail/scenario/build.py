@@ -76,6 +76,8 @@ class ResolvedCell:
         Rotation of the Earth; None for an Earth at rest.
     temperature : Temperature, optional
         Temperature of the IMU; None for that of its calibration.
+    odometry : Estimator, optional
+        The odometry that is run on the recording; None where there is none to be run.
     bands : tuple of Band
         Wavelength bands that rail geometry is scored in.
     """
@@ -90,6 +92,7 @@ class ResolvedCell:
     odometry: Estimator | None
     earth_rate: EarthRate | None
     temperature: Temperature | None
+    odometry: Estimator | None
     bands: tuple[Band, ...]
 
 
@@ -160,6 +163,7 @@ class Parts:
             earth_rate=None
             if earth is None
             else EarthRate(radians(earth.latitude_deg), radians(earth.x_axis_deg)),
+            odometry=self.odometry(cell),
             temperature=None
             if temperature is None
             else Temperature(temperature.start_c, temperature.ambient_c, temperature.time_constant_s),
@@ -231,6 +235,19 @@ class Parts:
                 self._nouns[kind, name] = make(part, Path(name).stem)
         noun: _Noun = self._nouns[kind, name]
         return noun
+
+    def odometry(self, cell: Cell) -> Estimator | None:
+        """Odometry of a cell; None where there is none to be run (`odometry_estimator`)."""
+        name = cell.spec.odometry
+        if ("odometry", name) not in self._nouns:
+            self._nouns["odometry", name] = odometry_estimator(self.scenario, name)
+        odometry: Estimator | None = self._nouns["odometry", name]
+        return odometry
+
+    def odometries(self) -> dict[str, Estimator]:
+        """Odometries of the cells asked for so far, by the names that the scenario gives them."""
+        nouns = self._nouns.items()
+        return {name: noun for (kind, name), noun in nouns if kind == "odometry" and noun is not None}
 
     def tunings(self, sample: int) -> dict[str, str]:
         """How each estimator of a sample is tuned, by its name in the tables."""

@@ -134,18 +134,18 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
 
 def _judge_score(scenario: Scenario) -> None:
     score = scenario.spec.score
-    for name, words, known in (
+    for name, words, possible in (
         ("windows", score.windows, (*WINDOWS, CURVE_PREFIX + "*")),
         ("metrics", score.metrics, METRICS),
     ):
         for i, word in enumerate(words or ()):
             of_one_curve = name == "windows" and word.startswith(CURVE_PREFIX)
-            if word not in known and not of_one_curve:
+            if word not in possible and not of_one_curve:
                 raise InputError(
                     f"is not one of the {name}",
                     field=f"score.{name}[{i}]",
                     value=word,
-                    limit="one of " + ", ".join(known),
+                    limit="one of " + ", ".join(possible),
                 )
 
 

@@ -28,8 +28,8 @@ Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
 
 CASES = ["ride.speed_kmh=[30, 50]"]
-DRAWS = 14
-STAGES = (3, 5, 8, 12, 14)
+DRAWS = 10
+STAGES = (3, 5, 8, 10)
 
 
 def stop(width: float, *, estimator: str = "ekf_compensated", least: int = 3, quantity: str = "roll") -> str:
@@ -166,11 +166,9 @@ def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
 
 
 @pytest.fixture(scope="module")
-def all_draws(short: Short, tmp_path_factory: pytest.TempPathFactory) -> CampaignResult:
+def all_draws(short: Short, module_rides: None) -> CampaignResult:
     """The campaign without a rule: 2 cases of `DRAWS` draws of the sensors."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SIMRAIL_RIDES", str(tmp_path_factory.mktemp("rides")))
-        return run_campaign(short(*CASES, f"monte_carlo.sensor_draws={DRAWS}"), workers=1)
+    return run_campaign(short(*CASES, f"monte_carlo.sensor_draws={DRAWS}"), workers=1)
 
 
 def widths_of(found: CampaignResult) -> dict[int, float]:
@@ -200,20 +198,19 @@ def rows_of(found: CampaignResult, draws: int) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("workers", "batch_cells", "draws"), [(1, None, 8), (1, 1, 8), (2, 3, 8), (2, None, 8), (1, 5, 12)]
+    ("workers", "batch_cells"),
+    [(1, 1), (2, 3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 5), (2, None)))],
 )
 def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
     workers: int,
     batch_cells: int | None,
-    draws: int,
     all_draws: CampaignResult,
-    rides: Path,
     short: Short,
     assert_same: Same,
 ) -> None:
     """Exactly the rows that the campaign without a rule has for these draws, under the same numbers."""
-    width = width_for(all_draws, draws)
-    scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width))
+    draws = 8
+    scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width_for(all_draws, draws)))
     found = run_campaign(scenario, workers=workers, batch_cells=batch_cells)
     assert found.stopped is not None and found.stopped.reached
     assert (found.stopped.draws, found.stopped.of) == (draws, DRAWS)
@@ -226,7 +223,6 @@ def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
 
 def test_order_of_rides_and_what_is_finished_already_do_not_count(
     all_draws: CampaignResult,
-    rides: Path,
     short: Short,
     tmp_path: Path,
     assert_same: Same,
@@ -245,10 +241,10 @@ def test_order_of_rides_and_what_is_finished_already_do_not_count(
 
 
 def test_interrupted_within_a_round_it_goes_on_to_the_same(
-    all_draws: CampaignResult, rides: Path, short: Short, tmp_path: Path, assert_same: Same
+    all_draws: CampaignResult, short: Short, tmp_path: Path, assert_same: Same
 ) -> None:
     scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width_for(all_draws, 8)))
-    for ended_after in (1, 4, 7):
+    for ended_after in (1, 4):
         kept, real = Checkpoint(tmp_path / f"kept_{ended_after}"), Checkpoint.add
         count = 0
 
@@ -270,7 +266,7 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
 
 
 def test_progress_counts_the_cells_of_a_round(
-    all_draws: CampaignResult, rides: Path, short: Short, tmp_path: Path
+    all_draws: CampaignResult, short: Short, tmp_path: Path
 ) -> None:
     class Counting(Watcher):
         def __init__(self) -> None:
@@ -291,7 +287,7 @@ def test_progress_counts_the_cells_of_a_round(
 
 
 def test_not_reached_after_all_draws_names_the_widest_case(
-    all_draws: CampaignResult, rides: Path, short: Short, assert_same: Same
+    all_draws: CampaignResult, short: Short, assert_same: Same
 ) -> None:
     width = 0.5 * min(widths_of(all_draws).values())
     found = run_campaign(short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width)), workers=1)
@@ -301,14 +297,14 @@ def test_not_reached_after_all_draws_names_the_widest_case(
     assert f"not reached after all {DRAWS} draws of the sensors" in words and "ride.speed_kmh = " in words
 
 
-def test_a_figure_that_an_estimator_never_gives_is_not_reached(rides: Path, short: Short) -> None:
+def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: None, short: Short) -> None:
     settings = ["monte_carlo.sensor_draws=3", stop(1.0, estimator="design_angles", quantity="gyro_bias")]
     found = run_campaign(short(*settings), workers=1)
     assert found.stopped is not None and found.stopped.width is None
     assert "unknown for want of values" in found.stopped.words
 
 
-def test_one_cell_alone_asks_no_rule(rides: Path, short: Short) -> None:
+def test_one_cell_alone_asks_no_rule(module_rides: None, short: Short) -> None:
     found = run_campaign(short("monte_carlo.sensor_draws=9", stop(9.0)), only=8)
     assert found.stopped is None and list(found.cells["cell"]) == [8]
 
@@ -346,7 +342,8 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     )
     (noting_file.parent / "noting.py").write_text(FLAKY)
     settings = ["monte_carlo.sensor_draws=12", stop(5.0, estimator="ekf", least=4)]
-    words = ["run", str(noting_file), *(word for one in settings for word in ("--set", one))]
+    words = ["run", str(noting_file), "--workers", "1"]
+    words += [word for one in settings for word in ("--set", one)]
     assert call([*words, "--out", "results/whole"]) == DONE
     assert "stop rule reached after 4 of 12 draws of the sensors" in " ".join(capsys.readouterr().out.split())
     (here / "broken").touch()
