@@ -70,8 +70,6 @@ class ResolvedCell:
         The IMU.
     encoder, magnetometer, rail_sensor : EncoderSpec, MagnetometerSpec, RailSensorSpec, optional
         The other sensors; None where the scenario has none.
-    odometry : Estimator, optional
-        Makes the odometry of the recording; None where there is none, or the true one.
     earth_rate : EarthRate, optional
         Rotation of the Earth; None for an Earth at rest.
     temperature : Temperature, optional
@@ -89,7 +87,6 @@ class ResolvedCell:
     encoder: EncoderSpec | None
     magnetometer: MagnetometerSpec | None
     rail_sensor: RailSensorSpec | None
-    odometry: Estimator | None
     earth_rate: EarthRate | None
     temperature: Temperature | None
     odometry: Estimator | None
@@ -108,7 +105,6 @@ class Parts:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self._nouns: dict[tuple[str, str], Any] = {}
-        self._odometries: dict[str, Estimator | None] = {}
         self._estimators: dict[int, dict[str, Estimator]] = {}
         self._tunings: dict[int, dict[str, str]] = {}
         self._resolved: dict[tuple[int, ...], ResolvedCell] = {}
@@ -159,7 +155,6 @@ class Parts:
             # Steel stands where the seed of the track puts it.
             magnetometer=None if spec.magnetometer is None else spec.magnetometer.spec(cell.ride_seed),
             rail_sensor=None if spec.rail_sensor is None else spec.rail_sensor.spec(),
-            odometry=self._odometry(spec.odometry),
             earth_rate=None
             if earth is None
             else EarthRate(radians(earth.latitude_deg), radians(earth.x_axis_deg)),
@@ -214,15 +209,6 @@ class Parts:
     def grade(self, cell: Cell) -> ImuGrade:
         """IMU grade of a cell."""
         return self._noun("imu", ImuFile, cell.imu.grade, f"imu[{cell.imu_index}].grade", ImuFile.grade)
-
-    def _odometry(self, name: str) -> Estimator | None:
-        if name not in self._odometries:
-            self._odometries[name] = odometry_estimator(self.scenario, name)
-        return self._odometries[name]
-
-    def odometries(self) -> dict[str, Estimator]:
-        """Odometries of the cells resolved so far, by the names that the scenario gives them."""
-        return {name: made for name, made in self._odometries.items() if made is not None}
 
     def _noun(
         self, kind: str, model: type[_Part], name: str, field: str, make: Callable[[_Part, str], _Noun]
