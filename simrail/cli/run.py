@@ -59,7 +59,7 @@ def run(
     if plan:
         return _plan(scenario, seed, settings or [], many=yes)
 
-    from simrail.cli.progress_bar import ProgressWatcher
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.score_tables import print_cell, print_scores
     from simrail.results import run as run_scenario
     from simrail.results import run_cell
@@ -109,8 +109,8 @@ def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> in
 
     read = load_scenario(name, overrides=settings, seed=seed)
     with Console(stderr=True).status("rehearsing"):
-        told = forecast(read, many=many)
-    print_forecast(Console(), read, told, cores=os.cpu_count() or 1)
+        costs = forecast(read, many=many)
+    print_forecast(Console(), read, costs, cores=os.cpu_count() or 1)
     return DONE
 
 

@@ -266,7 +266,7 @@ def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
 
 def _wrong_type(kind: str, value: Any) -> _Message:
     limit = _TYPES[kind]
-    remedy = None
+    remedy: str | None = None
     if kind == "string_type":
         remedy = "write it in quotes"
     elif kind == "tuple_type" and isinstance(value, str) and any(letter.isalpha() for letter in value):

@@ -70,4 +70,5 @@ def _shares(spec: ScenarioFile, names: list[str]) -> FloatArray:
     points = qmc.Sobol(len(names), scramble=False, bits=SOBOL_BITS).random(n)
     digits = np.round(points * 2**SOBOL_BITS).astype(np.int64)
     shifts = [int(stream(spec.seed, "sample", name).integers(2**SOBOL_BITS)) for name in names]
-    return ((digits ^ np.array(shifts)) + 0.5) / 2.0**SOBOL_BITS
+    points = ((digits ^ np.array(shifts)) + 0.5) / 2.0**SOBOL_BITS
+    return points
