@@ -31,7 +31,7 @@ from simrail.estimators.tuning.identify import Identification, identify
 from simrail.estimators.tuning.tune import objective_of, tune
 from simrail.recording.recording import Recording
 from simrail.ride.ride import simulate
-from simrail.scenario.build import Parts, bands_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -129,7 +129,7 @@ def tune_scenario(
     tuned_estimator = estimator_named(scenario, parts, estimator)
     chosen = chosen_cells(scenario, rides, imu, draws=draws)
     if band is not None:
-        chosen_settings["band"] = _band(chosen[0], band, step_m=step_m)
+        chosen_settings["band"] = _band(parts.resolve(chosen[0]).bands, band, step_m=step_m)
     tunables = tunables_of(tuned_estimator, chosen_settings, method=method)
     recordings, references = _rides(chosen, parts, watcher, within_m=within_m, step_m=step_m)
     rails = references if method == "kom" else None
@@ -289,16 +289,16 @@ def reference_of(
     return parts.rails(cell).irregularities(place)
 
 
-def _band(cell: Cell, name: str, *, step_m: float) -> Band:
-    bands = {band.name: band for band in bands_of(cell)}
-    if name not in bands:
-        raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(bands))
-    coarsest = bands[name].shortest_m / SAMPLES_PER_WAVE
+def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
+    by_name = {band.name: band for band in bands}
+    if name not in by_name:
+        raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(by_name))
+    coarsest = by_name[name].shortest_m / SAMPLES_PER_WAVE
     if step_m > coarsest:
         raise InputError(
             f"is too coarse for the band {name}", field="--step", value=step_m, limit=f"<= {coarsest:g} m"
         )
-    return bands[name]
+    return by_name[name]
 
 
 def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:

@@ -59,7 +59,7 @@ def run(
     if plan:
         return _plan(scenario, seed, settings or [], many=yes)
 
-    from simrail.campaign.progress import ProgressWatcher
+    from simrail.cli.progress_bar import ProgressWatcher
     from simrail.cli.score_tables import print_cell, print_scores
     from simrail.results import run as run_scenario
     from simrail.results import run_cell
@@ -108,9 +108,9 @@ def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> in
     from simrail.scenario.scenario import load_scenario
 
     read = load_scenario(name, overrides=settings, seed=seed)
-    with Console(stderr=True).status("rehearsing"):
-        costs = forecast(read, many=many)
-    print_forecast(Console(), read, costs, cores=os.cpu_count() or 1)
+    with Console(stderr=True).status("running one cell"):
+        expected = forecast(read, many=many)
+    print_forecast(Console(), expected, cores=os.cpu_count() or 1)
     return DONE
 
 

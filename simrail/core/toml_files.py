@@ -176,14 +176,14 @@ def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None
 
 
 @contextmanager
-def blame(file: object, field: str) -> Iterator[None]:
+def blame(file: object, field: str = "") -> Iterator[None]:
     """Say in which file and field an `InputError` arose, where it does not say so itself."""
     try:
         yield
     except InputError as error:
         if error.file is None:
             error.file = file
-            error.field = f"{field}.{error.field}" if error.field else field
+            error.field = ".".join(part for part in (field, error.field) if part) or None
         raise
 
 

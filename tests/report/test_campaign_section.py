@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import _in_two, box_figure, curvature_figure
 from simrail.report.campaign.heat import _short, heat_figure, side_of

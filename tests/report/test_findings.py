@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.estimation.estimate import Estimate
 from simrail.report.tables.methods import method_styles

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.estimation.estimate import Estimate
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.figures.style import fitting_columns, legend_above, look, panels

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import Figures, cases, of_cell
 from simrail.report.tables.tables import error_table

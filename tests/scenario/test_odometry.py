@@ -139,7 +139,7 @@ def test_without_an_encoder_an_estimator_that_needs_no_odometry_runs(tmp_path: P
     assert {"e0", "odometry:curve_matched"} == set(with_encoder.scores["estimator"])
     keys = ["quantity", "reference", "window", "metric"]
     a, b = (
-        table.astype({key: str for key in keys})
+        table.astype(dict.fromkeys(keys, str))
         .query("estimator == 'e0' and metric != 'us_per_sample'")
         .set_index(keys)["value"]
         for table in (with_encoder.scores, without.scores)
@@ -192,7 +192,7 @@ def test_an_odometry_of_ones_own_is_used_by_the_filters(own: Path) -> None:
     axis = '["encoder", "./mine.py:Mine"]'
     result = run_campaign(scenario_of("AttitudeEkf", "Vqf", odometry=axis, folder=own), workers=2)
     assert not result.failures
-    by_odometry = {name: rows for name, rows in result.scores.groupby("odometry", observed=True)}
+    by_odometry = dict(list(result.scores.groupby("odometry", observed=True)))
     assert set(by_odometry) == {"encoder", "./mine.py:Mine"}
 
     def rms(odometry: str, estimator: str, quantity: str) -> float:

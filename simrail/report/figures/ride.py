@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO
 from simrail.recording.recording import odometry_of
 from simrail.report.figures.decimate import Bins

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.recording.recording import Recording
 from simrail.report.figures.ride import direction_of
 

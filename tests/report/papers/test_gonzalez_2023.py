@@ -22,7 +22,7 @@ from simrail.estimators.tuning.space import (
 )
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.seeds import stream
 from simrail.recording.sheets.imu_file import load_grade
