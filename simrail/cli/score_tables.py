@@ -95,17 +95,17 @@ def _case(
         style="bold",
     )
     shown = rows[(rows["status"] == OK) & rows["metric"].isin(("rms", "sd", "us_per_sample"))]
-    found = cases(shown, members)
-    if not found:
+    of_cases = cases(shown, members)
+    if not of_cases:
         return Group(title)
-    case = found[0]
+    case = of_cases[0]
     notes: list[str] = []
     parts: list[RenderableType] = [title]
     mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
     if mapping:
         band = judged_band(case)
-        told = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
-        parts += [Text(told), _rails(console, case, mapping, band)]
+        heading = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
+        parts += [Text(heading), _rails(console, case, mapping, band)]
         notes += _lost_rails(case, mapping, band)
     attitude = [s for s in attitude_methods(styles) if case.get(s.name, "roll", "rms").draws]
     if attitude:
@@ -145,16 +145,16 @@ def _attitude(console: Console, case: Figures, styles: list[MethodStyle], beside
             columns.append((quantity, reference, window))
     lines = []
     for style in styles:
-        found = [case.get(style.name, q, "rms", window=w, reference=r) for q, r, w in columns]
+        errors = [case.get(style.name, q, "rms", window=w, reference=r) for q, r, w in columns]
         time = "" if beside_rails else _time(case, style)
-        lines.append((style, [f"{one.value:.3f}" if one.draws else "-" for one in found], time))
+        lines.append((style, [f"{one.value:.3f}" if one.draws else "-" for one in errors], time))
     heads = [f"{q}\n{w}" + ("\nvs\ndesign" if r == "design" else "") for q, r, w in columns]
     return _table(console, heads, lines)
 
 
 def _time(case: Figures, style: MethodStyle) -> str:
-    found = case.get(style.name, "roll", "us_per_sample")
-    return f"{found.value:.2f}" if found.draws else "-"
+    time = case.get(style.name, "roll", "us_per_sample")
+    return f"{time.value:.2f}" if time.draws else "-"
 
 
 def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, list[str], str]]) -> Table:
@@ -195,5 +195,5 @@ def _lost_attitude(case: Figures, styles: list[MethodStyle]) -> list[str]:
     beaten = [
         s.name for s in styles if s.uses_imu and case.get(s.name, "roll", "rms", window="curve").value > least
     ]
-    told = f"{floor.name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
-    return [told] if beaten else []
+    note = f"{floor.name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
+    return [note] if beaten else []

@@ -117,8 +117,8 @@ def tune(
     """Search an estimator's parameters on rides of a scenario; interrupted, the same command goes on."""
     from rich.console import Console
 
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.tune import tune_scenario, unfinished
-    from simrail.cli.progress_bar import ProgressWatcher
     from simrail.core.errors import InputError
     from simrail.scenario.scenario import load_scenario
 

@@ -244,8 +244,8 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
         expected = str(context.get("expected", ""))
         words = expected.replace("'", "").replace(" or ", ", ").split(", ")
         near = difflib.get_close_matches(str(fault["input"]), words, n=1)
-        remedy = f"did you mean {near[0]}?" if near else None
-        return _Message("is not one of the possible values", f"one of {expected}", remedy)
+        guess = f"did you mean {near[0]}?" if near else None
+        return _Message("is not one of the possible values", f"one of {expected}", guess)
     if kind in ("too_short", "too_long"):
         return _Message("has the wrong number of items", fault["msg"].split(" after ")[0])
     return {
@@ -266,7 +266,7 @@ def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
 
 def _wrong_type(kind: str, value: Any) -> _Message:
     limit = _TYPES[kind]
-    remedy = None
+    remedy: str | None = None
     if kind == "string_type":
         remedy = "write it in quotes"
     elif kind == "tuple_type" and isinstance(value, str) and any(letter.isalpha() for letter in value):

@@ -75,7 +75,7 @@ def test_interrupted_it_goes_on(
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("simrail.cli.progress_bar.ProgressWatcher.search_goes", interrupt)
+        patch.setattr("simrail.campaign.progress.ProgressWatcher.search_goes", interrupt)
         capsys.readouterr()
         assert call(words) == INTERRUPTED
     assert "best so far is in other.unfinished.toml" in capsys.readouterr().out

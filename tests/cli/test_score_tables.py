@@ -21,6 +21,7 @@ seed = 1
 track = "scale_track"
 vehicle = "scale_vehicle"
 engine = "kinematic"
+odometry = "truth"
 [monte_carlo]
 sensor_draws = 2
 [encoder]
