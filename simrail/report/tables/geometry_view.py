@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from markupsafe import Markup
-
 from simrail.campaign.example import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.report.figures.geometry import bands_figure, rails_figure, stretch_of, stretch_words
 from simrail.report.tables.geometry_bands import BAND, JUDGED, judged_band, waves_words
 from simrail.report.tables.geometry_tables import indicator_table, is_zero
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Figures
+from simrail.report.tables.pivot import Case
 from simrail.report.tables.tables import Table
 from simrail.report.words.sentences import listed
 from simrail.track.bands import BANDS, Band, why_not
@@ -33,14 +31,14 @@ MOST_DRAWN = 3
 class GeometryView:
     """Rail geometry of one ride as the template needs it."""
 
-    figures: list[tuple[str, Markup]]
+    figures: list[tuple[str, str]]
     indicators: Table | None
     indicators_text: str
 
 
 def geometry_view(
     example: CellResult,
-    case: Figures | None,
+    case: Case | None,
     styles: Sequence[MethodStyle],
     *,
     limits: Mapping[str, Limits],
@@ -52,7 +50,7 @@ def geometry_view(
     ----------
     example : CellResult
         The ride.
-    case : Figures, optional
+    case : Case, optional
         Its scores; they say in which band it is judged.
     styles : sequence of MethodStyle
         The scenario's methods.
@@ -101,7 +99,7 @@ def geometry_view(
         )
         figures.append((text, bands_figure(case, styles, known=known)))
     indicators, text = _indicators(example, first, limits)
-    return GeometryView([(caption, Markup(svg)) for caption, svg in figures if svg], indicators, text)
+    return GeometryView([(caption, svg) for caption, svg in figures if svg], indicators, text)
 
 
 def with_rails(example: CellResult, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
