@@ -190,18 +190,18 @@ def test_captions_say_how_long_a_stretch_is(ran: Ran) -> None:
 
 def test_no_figure_of_rails_leaves_the_track(ran: Ran) -> None:
     view = geometry_view(ran.example, ran.cases[0], ran.styles, limits={}, known=ran.known)
-    assert view is not None and len(view.figures) == 3
-    captions = [caption for caption, _ in view.figures]
+    assert view is not None and len(view["rails"]) == 2
+    captions = [stretch for _, stretch, _ in view["rails"]]
     assert "all 88 m of the ride, unfiltered" in captions[0]
     assert "35 m in the middle of the ride in wavelengths of 0.3\u20137 m (paper)" in captions[1]
     drawings = ran.paper["drawings"]
     assert len(drawings) == 2
-    for _, svg in [*view.figures[:2], *drawings]:
+    for *_, svg in [*view["rails"], *drawings]:
         places = places_of(str(svg))
         assert max(places) > 30.0
         assert min(places) > -20.0 and max(places) < 90.0
     assert "60 m in the middle of the ride out" in drawings[0][0]
-    assert "0.3\u20137 m" in str(view.figures[2][1]), "the panels of the bands tell wavelengths"
+    assert "0.3\u20137 m" in view["bands"], "the panels of the bands tell wavelengths"
 
 
 def test_a_stretch_that_is_too_long_would_be_seen(ran: Ran) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -64,7 +65,7 @@ def campaign_section(data: PageData) -> list[Section]:
             )
             for row in tables.worst.to_dict("records")
         ],
-        "drawings": _drawings(data, axes),
+        **_drawings(data, axes),
     }
 
     def write_beside(folder: Path) -> None:
@@ -74,8 +75,8 @@ def campaign_section(data: PageData) -> list[Section]:
     return [Section("campaign", "The campaign as a whole", template, shown, write_beside)]
 
 
-def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> list[tuple[str, str]]:
-    """Caption and figure: maps of the roll error over axes, its spread along each, and over curvature."""
+def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
+    """Maps of the roll error over axes, its spread along each, and over curvature; "" where there is none."""
     styles = sorted(data.attitude_styles, key=lambda style: bool(style.baseline))[:MOST_METHODS]
     muted = {style.label for style in styles if style.baseline}
     roll, curves = (draws_of(data.scores, data.cells, axes, window=w) for w in ("whole", EVERY_CURVE))
@@ -86,42 +87,29 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> list[tuple[str, s
 
     def heat(draws: pd.DataFrame, across: Side, down: Side, what: str) -> str:
         by_method = {style.label: draws[draws["estimator"] == style.name] for style in styles}
-        return heat_maps(by_method, across, down, unit="\u00b0", what=what, muted=muted)
+        return heat_maps(by_method, across, down, unit="\u00b0", what=f"Roll error by {what}", muted=muted)
 
-    drawings: list[tuple[str, str]] = []
-    down = _curve_side(curves, data.examples)
-    if len(down.keys) > 1:
-        text = (
-            "Rms roll error in each curve of the line (radius, positive to the left), mean over all "
-            "other axes and draws. An error that grows with the speed, and most in sharp curves, is of "
-            "the acceleration that a method takes for gravity."
-        )
-        across = side_of(speed or fine[0])
-        drawings.append((text, heat(curves, across, down, "Roll error over speed and curve radius")))
-    across = side_of(speed, direction) if speed and direction else side_of(speed or fine[0])
-    arrows = " Arrows: direction of travel." if direction else ""
-    for axis in fine:
-        if axis.column not in across.columns:
-            text = (
-                f"Rms roll error over the whole ride, by {_name(across.title)} and {_name(axis.title)}; "
-                f"mean over all other axes and draws.{arrows}"
-            )
-            drawings.append((text, heat(roll, across, side_of(axis), f"Roll error by {axis.title}")))
-    text = (
-        "How the rms roll error over the whole ride spreads over all cells with a value of an axis: box "
-        "from 25 to 75 %, white line at the median, strokes from 5 to 95 %."
-    )
-    what = "Spread of the roll error along every axis"
-    drawings.append((text, box_figure(roll, styles, axes[:MOST_BOXES], what=what)))
-    text = (
-        "Mean roll error where the track has a curvature, in single rides. A line through zero that "
-        "rises or falls is an error that the track itself causes; a level one is a bias."
-    )
+    down, speeds = _curve_side(curves, data.examples), side_of(speed or fine[0])
+    across = side_of(speed, direction) if speed and direction else speeds
     unlike = {example.cell.get("speed_kmh"): example for example in reversed(data.examples)}
     rides = list(reversed(unlike.values()))
     words = [_words_of(example, axes) for example in rides]
-    drawings.append((text, curvature_figure(rides, styles, words=words, what="Roll error against curvature")))
-    return [(caption, svg) for caption, svg in drawings if svg]
+    many = len(down.keys) > 1
+    return {
+        "curves": heat(curves, speeds, down, "speed and curve radius") if many else "",
+        "maps": [
+            (
+                _name(across.title),
+                _name(axis.title),
+                heat(roll, across, side_of(axis), f"Roll by {axis.title}"),
+            )
+            for axis in fine
+            if axis.column not in across.columns
+        ],
+        "arrows": direction is not None,
+        "spread": box_figure(roll, styles, axes[:MOST_BOXES], what="Spread of the roll error by axis"),
+        "curvature": curvature_figure(rides, styles, words=words, what="Roll error against curvature"),
+    }
 
 
 def _curve_side(curves: pd.DataFrame, examples: Sequence[CellResult]) -> Side:

@@ -57,7 +57,7 @@ def section(data: PageData) -> list[Section]:
         "beside_design": _beside_design(rides),
         "misprints": _misprints(rides),
         **_terms(drawn),
-        "drawings": _drawings(rides, looks, drawn),
+        **_drawings(rides, looks, drawn),
     }
     return [Section("paper", f"Beside {PAPER.heading}", "papers/briales_2021/section.html.j2", shown)]
 
@@ -138,55 +138,39 @@ def _wrong_sign_deg(examples: Sequence[CellResult]) -> float:
 
 def _drawings(
     rides: Rides, looks: Mapping[str, MethodStyle], examples: Sequence[CellResult]
-) -> list[tuple[str, str]]:
-    """Our versions of Figs. 11 to 22, each with its caption."""
-    drawings: list[tuple[str, str]] = []
+) -> dict[str, Any]:
+    """Our versions of Figs. 11 to 22; "" or empty where rides or methods are missing."""
 
     def drawn(*parts: str) -> list[MethodStyle]:
         styles = [looks[part] for part in parts if part in looks]
         return [style for style in styles if all(style.name in e.estimates for e in examples)]
 
     shown = drawn(*(part for part in PAPER.parts if not part.endswith("_printed")))
-    if shown:
-        text = (
-            "As Fig. 12: rms difference to the design angles of each method on each ride, on a "
-            "logarithmic axis; hollow: baselines and methods that do not know the track. Strokes: one "
-            "standard deviation between draws of the sensors, where there are several."
-        )
-        drawings.append((text, rides_figure(rides.cases, shown)))
     main = next((e for e in examples if e.recording.name == TERMS_RIDE), next(iter(examples), None))
-    first = drawn("ekf_per_step", "gda_paper", "vqf_magnetometer")
-    if main and first:
-        text = (
-            f"As Fig. 11, ride {main.recording.name}: EKF and GDA with the paper's settings, and a "
-            "general-purpose filter with magnetometer, which stands in for the commercial one."
-        )
-        drawings.append((text, attitude_figure(main, first, what=text)))
-    pairs = [
-        pair
-        for parts in (("gda", "gda_uncompensated"), ("ekf", "sabatini"))
-        if len(pair := drawn(*parts)) == 2
-    ]
+    first, repeated = drawn("ekf_per_step", "gda_paper", "vqf_magnetometer"), drawn(*_REPEATED)
+    pairs = [drawn(*parts) for parts in (("gda", "gda_uncompensated"), ("ekf", "sabatini"))]
+    pairs = [pair for pair in pairs if len(pair) == 2]
     forward = [e for e in examples if direction_of(e) > 0]
     by_speed = {is_fast(e.cell): e for e in reversed(forward)}
-    one_of_each = [by_speed[fast] for fast in (False, True) if fast in by_speed]
-    if pairs and one_of_each:
-        text = (
-            "As Figs. 13 and 14: roll with and without compensation, slow and fast. What the "
-            "uncompensated filters miss is the lateral acceleration of the curves, which grows with the "
-            "square of speed."
-        )
-        drawings.append((text, compensation_figure(one_of_each, pairs)))
-    repeated = drawn(*_REPEATED)
+    slow_and_fast = [by_speed[fast] for fast in (False, True) if fast in by_speed]
     groups = {
-        "As Figs. 15 and 16, slow forward rides.": [e for e in forward if not is_fast(e.cell)],
-        "As Figs. 17 and 18, slow rides in both directions.": [e for e in examples if not is_fast(e.cell)],
-        "As Figs. 19 and 20, forward rides, slow and fast.": forward,
-        "As Figs. 21 and 22, all rides.": list(examples),
+        "As Figs. 15 and 16, slow forward rides": [e for e in forward if not is_fast(e.cell)],
+        "As Figs. 17 and 18, slow rides in both directions": [e for e in examples if not is_fast(e.cell)],
+        "As Figs. 19 and 20, forward rides, slow and fast": forward,
+        "As Figs. 21 and 22, all rides": list(examples),
     }
-    for text, group in groups.items():
-        if len(group) > 1 and repeated:
-            spreads = "; ".join(f"{s.label} {degrees(spread_of(group, s.name))}" for s in repeated)
-            text += f" Estimated roll; dashed: design. Spread of the error between these rides: {spreads}."
-            drawings.append((text, repeatability_figure(group, repeated, what=text)))
-    return drawings
+    return {
+        "main_ride": main.recording.name if main else "",
+        "each_ride": rides_figure(rides.cases, shown) if shown else "",
+        "attitude": attitude_figure(main, first, what="Attitude, as Fig. 11") if main and first else "",
+        "compensation": compensation_figure(slow_and_fast, pairs) if pairs and slow_and_fast else "",
+        "repeats": [
+            (
+                words,
+                {style.label: spread_of(group, style.name) for style in repeated},
+                repeatability_figure(group, repeated, what=f"Estimated roll. {words}"),
+            )
+            for words, group in groups.items()
+            if len(group) > 1 and repeated
+        ],
+    }

@@ -95,6 +95,7 @@ def _apart(tunings: Mapping[str, Tuning]) -> list[str]:
     widest = int(np.argmax(decades))
     return [
         f"{', '.join(PAPER.label(part) for part in same)}: their values lie up to {decades[widest]:.1f} "
-        f"decades apart ({NAMES[widest]}), at least {decades.min():.1f}. Identified is meant of one search and "
-        "about the place where it ended; what differs so between parts of one ride is no property of the vehicle."
+        f"decades apart ({NAMES[widest]}), at least {decades.min():.1f}. Identified is meant of one search "
+        "and about the place where it ended; what differs so between parts of one ride is no property of the "
+        "vehicle."
     ]
