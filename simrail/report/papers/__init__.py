@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from simrail.report.pages.section import PageData, Section
-from simrail.report.papers.briales_2021.section import section as briales_2021
-from simrail.report.papers.gonzalez_2023.section import section as gonzalez_2023
+from simrail.report.papers.briales_2021 import section as briales
+from simrail.report.papers.gonzalez_2023 import section as gonzalez
 
 SECTIONS: dict[str, Callable[[PageData], list[Section]]] = {
-    "briales_2021": briales_2021,
-    "gonzalez_2023": gonzalez_2023,
+    "briales_2021": briales.section,
+    "gonzalez_2023": gonzalez.section,
 }
 """By the scenario's key ``paper``, what makes the section beside it."""

@@ -205,14 +205,14 @@ def some_rides(names: tuple[str, ...], draws: int) -> Scenario:
 
 
 @lru_cache
-def campaign(names: tuple[str, ...], draws: int = 2) -> tuple[Scenario, CampaignResult]:
+def campaign(names: tuple[str, ...], draws: int = 1) -> tuple[Scenario, CampaignResult]:
     """Run it."""
     scenario = some_rides(names, draws)
     return scenario, run_campaign(scenario)
 
 
 @lru_cache
-def view_of(names: tuple[str, ...], draws: int = 2) -> SimpleNamespace:
+def view_of(names: tuple[str, ...], draws: int = 1) -> SimpleNamespace:
     """What the section of a campaign shows."""
     scenario, result = campaign(names, draws)
     (made,) = section(PageData(scenario, result.scores, result.cells, result.examples, {}))
