@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.estimation.estimate import Estimate
 from simrail.report.pages.page import write_report

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.estimation.estimate import Estimate
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.figures.style import fitting_columns, legend_above, look, panels
@@ -34,7 +34,6 @@ from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import degrees, significant, unbroken
 from simrail.results import describe
 from simrail.scenario.build import bands_by_name
-from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.track.bands import BANDS, Band, margin_m
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
@@ -97,7 +96,7 @@ class Ran:
     def __init__(self, scenario: Scenario, result: Any, page: str) -> None:
         self.scenario, self.page = scenario, page
         self.cases = cases(result.scores, result.cells)
-        self.styles = list(method_styles(methods(scenario)).values())
+        self.styles = list(method_styles(scenario).values())
         self.example: CellResult = result.examples[0]
         self.known = bands_by_name(scenario.spec)
         self.data = PageData(scenario, result.scores, result.cells, result.examples, {})
@@ -413,7 +412,7 @@ def test_methods_are_alike_only_if_every_figure_is(
 ) -> None:
     one = example()
     states = one.estimates["ekf_compensated"].states
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     styles = [*styles, *(replace(styles[0], name=name, label=name, twin="") for name in ("b", "c", "d"))]
     for factor, groups in ((1.005, [["ekf_compensated", "b"], ["c"], ["d"]]), (1.02, [["ekf_compensated"]])):
         error = np.deg2rad(0.1) * (factor - 1.0)
@@ -437,8 +436,8 @@ def test_many_methods_are_told_together(
     tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
 ) -> None:
     one = example()
-    style = method_styles(methods(scenario))["ekf_compensated"]
-    design = method_styles(methods(scenario))["design_angles"]
+    style = method_styles(scenario)["ekf_compensated"]
+    design = method_styles(scenario)["design_angles"]
     names = ["m1", "m2", "m3", "m4"]
     estimates = {"design_angles": one.estimates["design_angles"]}
     for k, name in enumerate(names):

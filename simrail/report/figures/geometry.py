@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray
 from simrail.report.figures.ride import over_distance

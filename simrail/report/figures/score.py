@@ -88,5 +88,6 @@ def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
 
 
 def _row_label(style: MethodStyle) -> str:
-    is_told = not style.baseline or "uncompensated" in style.label
+    # What the label says already is not said again.
+    is_told = not style.baseline or style.baseline in style.label
     return style.label if is_told else f"{style.label}  (baseline)"

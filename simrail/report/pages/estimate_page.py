@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.core.resample import GAPS
 from simrail.estimation.estimate import Estimate
-from simrail.recording.recording import Recording
-from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves
+from simrail.recording.recording import Recording, odometry_of
+from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves, place_of
 from simrail.report.figures.ride import imu_figure, speed_figure
 from simrail.report.pages.frame import page_text
 from simrail.report.words.sentences import recording_facts
@@ -39,8 +39,8 @@ def write_estimate_page(
         Time that it took.
     """
     # Where there is no truth, the odometry says where the figures of the ride are drawn.
-    ride = CellResult({}, recording, recording.odometry, {})
-    moving, innovations = moves(recording), estimate.innovations
+    ride = CellResult({}, recording, odometry_of(recording), {}) if moves(recording) else None
+    innovations = estimate.innovations
     has_attitude = any(name in estimate.states for name in ATTITUDE)
     text = page_text(
         "pages/estimate.html.j2",
@@ -51,8 +51,8 @@ def write_estimate_page(
         tiles=_tiles(recording, estimate, us_per_sample),
         facts=ride_facts(recording),
         attitude=estimated_attitude_figure(recording, estimate, label=label) if has_attitude else "",
-        speed=speed_figure(ride) if moving else "",
-        imu=imu_figure(ride) if moving else "",
+        speed=speed_figure(ride) if ride else "",
+        imu=imu_figure(ride) if ride else "",
         innovations=innovation_figure(recording, estimate)
         if innovations is not None and len(innovations) > 1
         else "",
@@ -63,36 +63,40 @@ def write_estimate_page(
 
 def ride_facts(recording: Recording) -> list[str]:
     """What there is to know of a recording, one line each."""
-    position = recording.odometry["position_m"].to_numpy()
-    time = recording.imu.index.to_numpy()
-    speed = 3.6 * float(np.abs(recording.odometry["speed_mps"].to_numpy()).max())
+    position, time = place_of(recording), recording.imu.index.to_numpy()
     lost = "no gaps"
     if recording.gaps is not None and len(recording.gaps):
         missing = int(recording.gaps["missing"].sum())
         lost = f"{missing} of them lost and interpolated, in {len(recording.gaps)} gaps"
     track = recording.track
+    named = f"track '{track.name}'{' (synthetic)' if track.synthetic else ''}"
+    way = f"from s = {position[0]:.1f} m of {named}"
+    if recording.odometry is not None:
+        speed = 3.6 * float(np.abs(recording.odometry["speed_mps"].to_numpy()).max())
+        way = f"from s = {position[0]:.1f} to {position[-1]:.1f} m of {named}, at most {speed:.1f} km/h"
     return [
-        f"{len(time)} samples in {time[-1] - time[0]:.1f} s; {lost}",
-        f"from s = {position[0]:.1f} to {position[-1]:.1f} m of track '{track.name}'"
-        f"{' (synthetic)' if track.synthetic else ''}, at most {speed:.1f} km/h",
+        f"{len(time)} samples at {recording.imu_sheet.rate_hz:g} Hz, {time[-1] - time[0]:.1f} s; {lost}",
+        way,
         *recording_facts(recording),
     ]
 
 
 def design_difference_deg(recording: Recording, estimate: Estimate, angle: str) -> float:
-    """RMS difference of an estimated angle to the design track's, in degrees; it is no error."""
-    frame = recording.track.frame_extended(recording.odometry["position_m"].to_numpy())
+    """RMS difference of an estimated angle to the design's at the odometry's place, deg; it is no error."""
+    frame = recording.track.frame_extended(odometry_of(recording)["position_m"].to_numpy())
     difference = estimate.states[angle].to_numpy(dtype=np.float64) - getattr(frame, angle)
     wrapped = (difference + np.pi) % (2.0 * np.pi) - np.pi
     return float(np.rad2deg(np.sqrt(np.mean(wrapped**2))))
 
 
 def _tiles(recording: Recording, estimate: Estimate, us_per_sample: float) -> list[tuple[str, str, str]]:
-    position = recording.odometry["position_m"].to_numpy()
-    way = float(abs(position[-1] - position[0]))
-    tiles = [("way", f"{way:.0f} m", f"in {recording.imu.index[-1] - recording.imu.index[0]:.0f} s")]
+    duration = f"{recording.imu.index[-1] - recording.imu.index[0]:.0f} s"
+    position = place_of(recording)
+    tiles = [("way", f"{abs(position[-1] - position[0]):.0f} m", f"in {duration}")]
+    if recording.odometry is None:
+        tiles = [("duration", duration, "no odometry tells the way")]
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in estimate.states:
+        if angle in estimate.states and recording.odometry is not None:
             word = angle.removesuffix("_rad")
             difference = design_difference_deg(recording, estimate, angle)
             tiles.append(

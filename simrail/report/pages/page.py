@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
-from simrail.campaign.stored_results import FormerResults
+from simrail.campaign.cell import CellResult
+from simrail.campaign.stored_results import StoredResults
 from simrail.report.campaign.section import campaign_section
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
 from simrail.report.pages.frame import page_text
@@ -44,7 +44,7 @@ def write_report(
     cells: pd.DataFrame,
     examples: Sequence[CellResult],
     manifest: Mapping[str, Any],
-    beside: FormerResults | None = None,
+    beside: StoredResults | None = None,
 ) -> None:
     """Write the report of a campaign; where it has axes, its tables into a folder beside it as well.
 
@@ -159,7 +159,8 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
 
 
 def _odometry(data: PageData) -> list[Section]:
-    return [_section("odometry", "Odometry", odometry=odometry_table(data.cases[:MOST_TABLES]))]
+    table = odometry_table(data.cases[:MOST_TABLES])
+    return [_section("odometry", "Odometry", odometry=table)] if table.rows else []
 
 
 def _words(data: PageData) -> list[Section]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.attitude import attitude_figure, error_figure
 from simrail.report.figures.ride import direction_of, imu_figure, odometry_figure, speed_figure
 from simrail.report.figures.score import curves_figure, rms_figure
@@ -55,7 +55,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
     for style in drawn:
         twin = next((other for other in drawn if other.name == style.twin), None)
         if style.compensated and twin:
-            title = f"{style.label.removesuffix(' compensated')}, with and without compensation"
+            title = f"{style.kind}, with and without compensation"
             comparisons.append((title, attitude_figure(example, [style, twin], what=f"{title}, {name}")))
     of_scores: dict[str, Any] = {"tiles": [], "findings": [], "rms": "", "curves": ""}
     if case:
@@ -78,7 +78,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "attitude": attitude_figure(example, first or drawn, what=f"Attitude, {name}") if drawn else "",
         "comparisons": comparisons,
         "errors": error_figure(example, drawn) if drawn else "",
-        "odometry": odometry_figure(example),
+        "odometry": "" if example.recording.odometry is None else odometry_figure(example),
         "geometry": geometry,
         "left_out": len(left_out),
         "rides_left_out": 0,

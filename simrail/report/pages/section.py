@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from simrail.campaign.example import CellResult
-from simrail.campaign.stored_results import FormerResults
+from simrail.campaign.cell import CellResult
+from simrail.campaign.stored_results import StoredResults
 from simrail.report.tables.geometry_bands import band_of_all
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, cases
@@ -37,7 +37,7 @@ class PageData:
         Rides to draw, first draw of each.
     manifest : mapping
         What the campaign noted of itself: command, versions, times; plain values.
-    beside : FormerResults, optional
+    beside : StoredResults, optional
         Results of another scenario of the same publication.
     """
 
@@ -46,7 +46,7 @@ class PageData:
     cells: pd.DataFrame
     examples: Sequence[CellResult]
     manifest: Mapping[str, Any]
-    beside: FormerResults | None = None
+    beside: StoredResults | None = None
 
     @cached_property
     def cases(self) -> list[Case]:
@@ -61,7 +61,7 @@ class PageData:
     @cached_property
     def styles(self) -> list[MethodStyle]:
         """How they look."""
-        return list(method_styles(self.methods).values())
+        return list(method_styles(self.scenario).values())
 
     @property
     def attitude_styles(self) -> list[MethodStyle]:

@@ -27,6 +27,7 @@ from jinja2 import Environment, StrictUndefined
 
 from simrail.core.toml_files import Part
 from simrail.report.words.sentences import FILTERS
+from simrail.scenario.cells import Method
 
 Verdict = Literal["reproduced", "beaten", "not reproduced", "not asked"]
 
@@ -89,6 +90,14 @@ class Paper(Part):
     limits: dict[str, float]
     words: dict[str, str]
     claims: tuple[Statement, ...]
+
+    def names(self, methods: Sequence[Method]) -> dict[str, str]:
+        """By part, the first method that plays it, as the scenario says (``stands_for``)."""
+        names: dict[str, str] = {}
+        for method in methods:
+            if method.part.stands_for in self.parts:
+                names.setdefault(str(method.part.stands_for), method.name)
+        return names
 
     def label(self, part: str) -> str:
         """How a part is called."""

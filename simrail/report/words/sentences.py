@@ -84,12 +84,14 @@ def axis_words(name: str, value: object) -> str:
 def recording_facts(recording: Recording) -> list[str]:
     """IMU and odometry of a recording, a line each."""
     x, y, z = recording.mount_position_m
-    source = recording.odometry_source
+    odometry = "no odometry: where the train is, no method knows"
+    if recording.odometry is not None:
+        ablation = " (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""
+        odometry = f"position and speed from the odometry '{recording.odometry_source}'{ablation}"
     return [
         f"IMU {recording.imu_sheet.grade} at {recording.imu_sheet.rate_hz:g} Hz on '{recording.mount_body}', "
         f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
-        f"position and speed from the odometry '{source}'"
-        + (" (an ablation: a train has no such thing)" if source == "truth" else ""),
+        odometry,
     ]
 
 

@@ -23,7 +23,7 @@ from simrail.estimators.tuning.space import (
 )
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.seeds import stream
 from simrail.recording.sheets.imu_file import load_grade
@@ -31,7 +31,7 @@ from simrail.report.pages.page import write_report
 from simrail.report.pages.section import PageData
 from simrail.report.papers.claim import Claim, judged
 from simrail.report.papers.gonzalez_2023.judges import JUDGES, Evidence, Peak, errata_note
-from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, part_of, rows_of
+from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, rows_of
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, section
 from simrail.report.papers.gonzalez_2023.tunings import by_part, notes, status_table, tunings_of
 from simrail.report.tables.geometry_bands import QUANTITIES
@@ -41,9 +41,8 @@ from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import significant
 from simrail.results import describe
-from simrail.scenario.cells import Method, methods
+from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
-from simrail.scenario.tables import EstimatorPart
 from simrail.track.bands import BANDS
 from simrail.track.quality import Limits
 
@@ -55,68 +54,33 @@ def style(name: str, *, baseline: str = "") -> MethodStyle:
 # ---- parts -------------------------------------------------------------------------------------
 
 
-def method(name: str, kind: str = "TrajectorySmoother", **options: object) -> Method:
-    return Method(name, "default", EstimatorPart(name=name, method=kind, options=options), 0)
-
-
 SEARCHED = ["cml", "kom", "kom_start", "kom_end", "cml_noise", "kom_rides", "cml_held"]
 """Parts that a searched tuning plays, in the order of the table."""
 
 
-@pytest.mark.parametrize(
-    ("one", "part"),
-    [
-        (method("smoother"), "hand"),
-        (method("smoother", smoothed=False), "filter"),
-        (method("x", printed=True), "printed"),
-        (method("x", printed=True, smoothed=False), ""),
-        (method("a_cml", tuning="a.toml"), "cml"),
-        (method("a_cml_noise", tuning="a.toml"), "cml_noise"),
-        (method("a_cml_held", tuning="a.toml"), "cml_held"),
-        (method("a_kom", tuning="a.toml"), "kom"),
-        (method("a_kom_start", tuning="a.toml"), "kom_start"),
-        (method("a_kom_end", tuning="a.toml"), "kom_end"),
-        (method("a_kom_rides", tuning="a.toml"), "kom_rides"),
-        (method("a_cml", tuning="a.toml", smoothed=False), ""),
-        (method("a_cml"), "hand"),
-        (method("x", tuning="tunings/scale_by_hand.toml"), "hand"),
-        (method("x", tuning="tunings/scale_by_hand.toml", rail_sensor=False), "blind"),
-        (method("x", tuning="tunings/handy.toml"), ""),
-        (method("zero", "ZeroTrack"), "zero"),
-        (method("cml", "AttitudeEkf"), ""),
-    ],
-)
-def test_parts_follow_from_class_options_and_words(one: Method, part: str) -> None:
-    assert part_of(one) == part
+def test_parts_are_those_that_the_scenario_names() -> None:
+    """The first method that stands for a part plays it; what stands for another row plays none."""
+    cell = methods(load_scenario("metro_geometry"))[0]
+    ran = [
+        replace(cell, name=name, part=cell.part.model_copy(update={"stands_for": part}))
+        for name, part in (("a", None), ("b", "cml"), ("c", "cml"), ("d", "no_such_row"))
+    ]
+    assert PAPER.names(ran) == {"cml": "b"}
 
 
 def test_the_shipped_scenario_plays_them() -> None:
-    assert [part_of(m) for m in methods(load_scenario("metro_geometry"))] == [
-        "hand",
-        "cml",
-        "cml_noise",
-        "cml_held",
-        "kom",
-        "kom_start",
-        "kom_end",
-        "filter",
-        "printed",
-        "",
-        "zero",
-    ]
+    missing = {"blind", "kom_rides"}
+    assert set(PAPER.names(methods(load_scenario("metro_geometry")))) == set(PAPER.parts) - missing
 
 
 def test_on_the_scale_track_the_paper_is_set_beside_the_smoother_that_sees_the_rails() -> None:
     scenario = load_scenario("scale_track")
     assert scenario.spec.paper == "gonzalez_2023" and "paper" in scenario.spec.geometry.own_bands
-    parts = {}
-    for one in methods(scenario):
-        parts.setdefault(part_of(one), one.name)
+    parts = PAPER.names(methods(scenario))
     assert parts == {
         "hand": "smoother",
         "blind": "smoother_camera_free",
         **{part: f"smoother_{part}" for part in SEARCHED},
-        "": "design_angles",
         "zero": "zero_track",
     }
 
@@ -132,7 +96,7 @@ def test_their_tunings_are_what_their_names_say(name: str, searched: list[str], 
     """Where each search looked, what it was judged by and on which signals: read from the files."""
     scenario = load_scenario(name)
     ran = methods(scenario)
-    found = by_part({part_of(m): m.name for m in ran}, tunings_of(ran, scenario.folder))
+    found = by_part(PAPER.names(ran), tunings_of(ran, scenario.folder))
     assert list(found) == searched
     searches = {part: tuning.search for part, tuning in found.items()}
     for part, search in searches.items():
@@ -459,19 +423,23 @@ own_bands = { paper = [3.0, 70.0] }
 sd_mm = 0.01
 [[estimator]]
 name = "smoother"
+stands_for = "hand"
 method = "TrajectorySmoother"
 [[estimator]]
 name = "smoother_cml"
+stands_for = "cml"
 method = "TrajectorySmoother"
 [estimator.options]
 tuning = "tuned.toml"
 [[estimator]]
 name = "printed"
+stands_for = "printed"
 method = "TrajectorySmoother"
 [estimator.options]
 printed = true
 [[estimator]]
 name = "zero_track"
+stands_for = "zero"
 method = "ZeroTrack"
 """
 

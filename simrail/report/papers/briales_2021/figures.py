@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
 from simrail.report.figures.attitude import angle_error
 from simrail.report.figures.decimate import Bins

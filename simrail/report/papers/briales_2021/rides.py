@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from simrail.core.errors import InputError
-from simrail.estimation.estimate import estimator_class
 from simrail.report.papers.claim import read_paper
 from simrail.report.tables.pivot import Case
 from simrail.scenario.cells import Method
@@ -21,45 +18,6 @@ QUANTITIES = ("roll", "pitch", "yaw")
 
 GENERAL_PURPOSE = ("vqf_magnetometer", "vqf", "imufusion", "sabatini", "yuan", "gda_uncompensated")
 """Parts that do not know the track."""
-
-
-def part_of(method: Method) -> str:
-    """Part that a method plays, by its class and options; "" if none."""
-    kind, options = method.part.method, _options(method)
-    if kind == "DesignAngles":
-        return "design"
-    if kind == "Vqf" and not options["compensated"]:
-        return "vqf_magnetometer" if options["magnetometer"] else "vqf"
-    if kind == "Imufusion" and not options["compensated"]:
-        return "imufusion"
-    if kind == "AttitudeGda":
-        return _filter("gda", options, {"recommended": "gda", "paper": "gda_paper"})
-    if kind == "AttitudeEkf":
-        reading = f"ekf_{options['process_noise']}"
-        return _filter("ekf", options, {"recommended": "ekf", "paper_final": reading})
-    return ""
-
-
-def _filter(name: str, options: dict[str, Any], tunings: dict[str, str]) -> str:
-    tuning = options["tuning"]
-    if options.get("doubt"):
-        return "yuan" if not options["compensated"] else ""
-    if not options["compensated"]:
-        plain = "sabatini" if name == "ekf" else "gda_uncompensated"
-        return plain if tuning == "recommended" else ""
-    if options["printed"]:
-        return f"{name}_printed" if tuning == "recommended" else ""
-    return tunings.get(tuning, "")
-
-
-def _options(method: Method) -> dict[str, Any]:
-    """Options of a method, its class's defaults included."""
-    try:
-        known = estimator_class(method.part.method)
-    except InputError:
-        return dict(method.part.options)
-    defaults = {entry.name: entry.default for entry in dataclasses.fields(known)}  # type: ignore[arg-type]
-    return defaults | dict(method.part.options)
 
 
 @dataclass(frozen=True)
@@ -137,8 +95,4 @@ def rides_of(all_cases: Sequence[Case], methods: Sequence[Method]) -> Rides:
     first: dict[str, Case] = {}
     for case in sorted(all_cases, key=lambda case: case.labels["imu"] == "ideal"):
         first.setdefault(case.labels["ride"], case)
-    names: dict[str, str] = {}
-    for method in methods:
-        names.setdefault(part_of(method), method.name)
-    names.pop("", None)
-    return Rides(list(first.values()), names)
+    return Rides(list(first.values()), PAPER.names(methods))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.attitude import attitude_figure
 from simrail.report.figures.ride import direction_of
 from simrail.report.pages.section import PageData, Section

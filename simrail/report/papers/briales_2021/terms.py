@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
 from simrail.report.papers.briales_2021.rides import PAPER, is_fast
 from simrail.report.tables.tables import NONE, Cell, Row, Table

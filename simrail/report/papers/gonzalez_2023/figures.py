@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.papers.gonzalez_2023.parts import PAPER, Rows
 from simrail.report.tables.geometry_view import with_rails

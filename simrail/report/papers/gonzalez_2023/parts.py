@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -30,30 +29,6 @@ FILTERED = tuple(quantity for quantity, filtered in COLUMNS if filtered)
 def column_words(comma: str = ", ") -> list[str]:
     """`COLUMNS` in words: ``cross-level, filtered``."""
     return [f"{QUANTITIES[q]}{comma}{'filtered' if filtered else 'unfiltered'}" for q, filtered in COLUMNS]
-
-
-def part_of(method: Method) -> str:
-    """Part that a method plays, by its class, its options and the words of its name; "" if none."""
-    if method.part.method == "ZeroTrack":
-        return "zero"
-    if method.part.method != "TrajectorySmoother":
-        return ""
-    options, words = method.part.options, method.name.split("_")
-    printed, smoothed = bool(options.get("printed", False)), bool(options.get("smoothed", True))
-    by_hand = "hand" in Path(str(options.get("tuning", ""))).stem.split("_")
-    if by_hand and smoothed and not printed and not options.get("rail_sensor", True):
-        return "blind"
-    if by_hand or ("tuning" not in options and "hyperparameters" not in options):
-        if printed:
-            return "printed" if smoothed else ""
-        return "hand" if smoothed else "filter"
-    if printed or not smoothed:
-        return ""
-    if "cml" in words:
-        return "cml_noise" if NOISE in words else "cml_held" if "held" in words else "cml"
-    if "kom" in words:
-        return next((f"kom_{word}" for word in ("start", "end", "rides") if word in words), "kom")
-    return ""
 
 
 @dataclass(frozen=True)
@@ -111,10 +86,7 @@ class Rows:
 
 def rows_of(all_cases: Sequence[Case], methods: Sequence[Method], *, band: str) -> Rows | None:
     """Find the first case of a real IMU with rail geometry; None if there is none."""
-    names: dict[str, str] = {}
-    for method in methods:
-        names.setdefault(part_of(method), method.name)
-    names.pop("", None)
+    names = PAPER.names(methods)
     real = [case for case in all_cases if case.labels["imu"] != "ideal"]
     plain = [case for case in real if not _is_noisy(case)]
     for case in [*plain, *all_cases]:

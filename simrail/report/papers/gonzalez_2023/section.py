@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.geometry import lines_of
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers.claim import judged

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from simrail.core.errors import InputError
+from simrail.estimation.user_modules import class_named
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning.file import Tuning
 from simrail.estimators.tuning.space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER
 from simrail.report.papers.gonzalez_2023.parts import PAPER
 from simrail.report.tables.tables import Cell, Row, Table
-from simrail.scenario.build_estimator import class_named, construct
+from simrail.scenario.build_estimator import construct
 from simrail.scenario.cells import Method
 
 EDGES = (LOWER, UPPER, CONSTRAINT)
