@@ -200,6 +200,10 @@ class TrajectorySmoother:
         if self.tuning is not None and given:
             raise InputError("a file and values cannot both be given", field="tuning")
 
+    needs = ("odometry",)
+    label = "trajectory smoother"
+    cites = ("Gonzalez-Carbajal et al. 2023",)
+
     @property
     def causal(self) -> bool:
         """The filter is causal, the smoother is not."""

@@ -13,7 +13,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Future
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
@@ -28,7 +28,7 @@ _WAIT_S = 20.0
 """How long a cluster may take to answer."""
 
 
-class Crew(Protocol):
+class Executor(Protocol):
     """Runs functions, here or elsewhere."""
 
     here: bool
@@ -62,12 +62,12 @@ def lost(error: BaseException) -> bool:
 
 
 def broken(error: BaseException | None) -> bool:
-    """Whether a worker took the whole crew with it, and nobody knows which batch killed it."""
+    """Whether a worker took all the others with it, and nobody knows which batch killed it."""
     return isinstance(error, BrokenExecutor)
 
 
 @contextmanager
-def crew_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator[Crew]:
+def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator[Executor]:
     """Who runs a campaign.
 
     Parameters
@@ -94,19 +94,19 @@ def crew_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator
         )
     if workers is None:
         workers = 1 if cells <= FEW_CELLS else _cores()
-    crew: Crew
+    executor: Executor
     if cluster is not None:
-        crew = _Cluster(cluster)
+        executor = _Cluster(cluster)
     else:
-        crew = _Here() if min(workers, cells) <= 1 else _Processes(min(workers, cells))
+        executor = _Here() if min(workers, cells) <= 1 else _Processes(min(workers, cells))
     try:
-        yield crew
+        yield executor
     finally:
-        crew.close()
+        executor.close()
 
 
 class _Here:
-    """This process."""
+    """The process itself, without others."""
 
     here = True
 
@@ -204,7 +204,7 @@ class _Cluster:
         except BaseException:
             self.close()
             raise
-        self._pool: Executor = self._client.get_executor(pure=False)
+        self._pool: Any = self._client.get_executor(pure=False)
         self._busy: set[str] = set()
 
     def _judge_workers(self) -> None:

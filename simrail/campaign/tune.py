@@ -28,7 +28,7 @@ from simrail.estimators.tuning.space import SearchSpace
 from simrail.estimators.tuning.tune import tune
 from simrail.recording.recording import Recording
 from simrail.ride.ride import simulate
-from simrail.scenario.build import Parts, bands_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import EstimatorPart, Scenario
@@ -126,7 +126,7 @@ def tune_scenario(
     parts = Parts(scenario)
     smoother = smoother_of(scenario, parts, estimator)
     chosen = chosen_cells(scenario, rides, imu, draws=draws)
-    wanted = None if band is None else _band(chosen[0], band, step_m=step_m)
+    wanted = None if band is None else _band(parts.resolve(chosen[0]).bands, band, step_m=step_m)
     recordings, references = [], []
     with interruptible() as check:
         for number, cell in enumerate(chosen, start=1):
@@ -282,8 +282,8 @@ def reference_of(
     return parts.rails(cell).irregularities(place)
 
 
-def _band(cell: Cell, name: str, *, step_m: float) -> Band:
-    known = {band.name: band for band in bands_of(cell)}
+def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
+    known = {band.name: band for band in bands}
     if name not in known:
         raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(known))
     coarsest = known[name].shortest_m / SAMPLES_PER_WAVE

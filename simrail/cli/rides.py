@@ -68,7 +68,7 @@ def estimate(
     for fact in ride_facts(done.recording):
         print(fact)
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in done.estimate.states:
+        if angle in done.estimate.states and done.recording.odometry is not None:
             rms = design_difference_deg(done.recording, done.estimate, angle)
             print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
     print("there is no truth beside a recording, hence no scores")

@@ -16,7 +16,6 @@ from simrail.report.tables.methods import MethodStyle, attitude_methods, method_
 from simrail.report.tables.pivot import Figures, cases
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
-from simrail.scenario.cells import methods
 from simrail.scoring.table import OK
 from simrail.track.bands import Band
 
@@ -43,7 +42,7 @@ def print_scores(console: Console, results: Results) -> None:
     """Print the tables of every case, ride by ride and IMU by IMU: means over all draws."""
     campaign = results.campaign
     scores, cells = campaign.scores, campaign.cells
-    styles = list(method_styles(methods(results.scenario)).values())
+    styles = list(method_styles(results.scenario).values())
     bands = bands_by_name(results.scenario.spec)
     for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
         if number == MOST_GROUPS:
@@ -167,7 +166,7 @@ def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, li
         table.add_column(head, justify="right", no_wrap=True)
     for style, numbers, time in lines:
         table.add_row(
-            f"{style.name}{' *' if style.baseline else ''}",
+            f"{style.name}{' *' if style.baseline else ' (ablation)' if style.ablation else ''}",
             *numbers,
             *([time] if timed else []),
             style="dim" if style.baseline else None,

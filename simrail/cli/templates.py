@@ -1,7 +1,7 @@
 """Templates: ``simrail new estimator NAME`` writes one file that works, to be changed into one's own.
 
-An estimator is written from the template here; a track, vehicle, IMU or scenario is a copy of a
-shipped file, so the template is always one that runs. A ride has its data beside it
+An estimator and an odometry are written from the templates here; a track, vehicle, IMU or scenario is a copy
+of a shipped file, so the template is always one that runs. A ride has its data beside it
 (`simrail.cli.template_ride`).
 """
 
@@ -20,7 +20,7 @@ SHIPPED = {
     "vehicle": ("metro_irw_bogie", 'vehicle = "./{file}"', "look at it: simrail vehicle {path}\n"),
     "imu": ("lord_3dm_gx4_25", 'grade = "./{file}" in an [[imu]]', "look at it: simrail imu {path}\n"),
 }
-KINDS = ("estimator", *SHIPPED, "scenario", "ride")
+KINDS = ("estimator", "odometry", *SHIPPED, "scenario", "ride")
 
 _ESTIMATOR = Template('''"""$Class: what it is for, in one line.
 
@@ -61,6 +61,8 @@ class $Class:
     time_constant_s: float = 5.0
 
     causal = True  # the estimate at a time uses nothing recorded later; check_estimator tests it
+    needs = ()  # ("odometry",) if it must know where the train is
+    role = "method"  # or "baseline", "general_purpose", "ablation": how tables mark it
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw from a recording and nothing else."""
@@ -87,13 +89,72 @@ class $Class:
 ''')
 
 
+_ODOMETRY = Template('''"""$Class: what it is for, in one line.
+
+Then what it is not for, and the source of its equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
+
+
+@dataclass(frozen=True)
+class $Class:
+    """Counts pulses: way, and its first and second difference over a window.
+
+    Attributes
+    ----------
+    window_s : float
+        Length of the window.
+    """
+
+    window_s: float = 1.0
+
+    causal = True  # the answer at a time uses nothing recorded later; check_odometry tests it
+    needs = ("encoder",)
+    uses_imu = False
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate position, speed and acceleration along the track at the times of the IMU."""
+        sheet, times = recording.encoder_sheet, recording.imu.index.to_numpy()
+        pulse = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
+        read_at = recording.encoder.index.to_numpy()
+        counts = recording.encoder["pulse_count"].to_numpy()
+
+        def way(at: np.ndarray) -> np.ndarray:
+            """Way at the last reading before each time."""
+            last = np.searchsorted(read_at, at, side="right") - 1
+            return pulse * (counts[np.maximum(last, 0)] - counts[0])
+
+        now, before, long_before = (way(times - k * self.window_s) for k in (0.0, 1.0, 2.0))
+        speed = (now - before) / self.window_s
+        acceleration = (now - 2.0 * before + long_before) / self.window_s**2
+        scale = sheet.radius_relative_sd  # how well the radius of the wheel is known
+        states = pd.DataFrame(index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD], dtype=float)
+        states["position_m"] = recording.start_position_m + now
+        states["speed_mps"], states["acceleration_mps2"] = speed, acceleration
+        states["position_sd_m"] = np.hypot(scale * now, pulse)
+        states["speed_sd_mps"] = np.hypot(scale * speed, pulse / self.window_s)
+        states["acceleration_sd_mps2"] = np.hypot(scale * acceleration, 2.0 * pulse / self.window_s**2)
+        return Estimate(states=states, mount=recording.mount)
+''')
+
+
 def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path, str]:
     """Write a template.
 
     Parameters
     ----------
     kind : str
-        ``estimator``, ``track``, ``vehicle``, ``imu``, ``scenario`` or ``ride``.
+        ``estimator``, ``odometry``, ``track``, ``vehicle``, ``imu``, ``scenario`` or ``ride``.
     name : str
         Name of the part: a word of letters, digits and ``_``, e.g. ``my_filter``.
     folder : Path, optional
@@ -128,7 +189,7 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
         )
     if not folder.is_dir():
         raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
-    path = folder / f"{name}.{'py' if kind == 'estimator' else 'toml'}"
+    path = folder / f"{name}.{'py' if kind in ('estimator', 'odometry') else 'toml'}"
     data = folder / f"{name}.csv" if kind == "ride" else None
     for file in (path, data):
         if file is not None and file.exists():
@@ -141,8 +202,8 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
         text, logged = ride_template(name)
         data.write_text(logged, encoding="utf-8")
         next_step = f"its data: {label(data)}\ntry it: simrail estimate {label(path)} --estimator AttitudeEkf"
-    elif kind == "estimator":
-        text, next_step = _estimator(name, path)
+    elif kind in ("estimator", "odometry"):
+        text, next_step = _of_class(kind, name, path)
     elif kind == "scenario":
         text, next_step = _copy("scenario", "quick_kinematic", name), f"run it: simrail run {label(path)}"
     else:
@@ -154,8 +215,13 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     return path, next_step
 
 
-def _estimator(name: str, path: Path) -> tuple[str, str]:
+def _of_class(kind: str, name: str, path: Path) -> tuple[str, str]:
     class_name = "".join(word[:1].upper() + word[1:] for word in name.split("_") if word)
+    if kind == "odometry":
+        return _ODOMETRY.substitute(Class=class_name), (
+            f'use it in a scenario beside it: odometry = "./{path.name}:{class_name}"\n'
+            f"or try it at once: simrail run quick_kinematic --set 'odometry=\"{label(path)}:{class_name}\"'"
+        )
     text = _ESTIMATOR.substitute(Class=class_name)
     next_step = (
         f'use it in a scenario beside it:\n\n    [[estimator]]\n    name = "{name}"\n'

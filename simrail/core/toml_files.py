@@ -50,6 +50,27 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
+def existing_file(name: str, folder: Path | None, *, also: Path | None = None) -> Path:
+    """A file by its path, seen from a folder (that of the scenario), from here, or from one more folder.
+
+    Raises
+    ------
+    InputError
+        If there is none; the message names the nearest file in the folders of ``also``.
+    """
+    for candidate in (*([folder / name] if folder else []), Path(name), *([also / name] if also else [])):
+        if candidate.is_file():
+            return candidate
+    shown = [path.relative_to(also).as_posix() for path in sorted(also.glob("*/*.toml"))] if also else []
+    near = difflib.get_close_matches(name, shown, n=1)
+    raise InputError(
+        "no such file",
+        value=name,
+        remedy="mend the path; it is seen from the scenario's folder"
+        + (f" (shipped: {near[0]})" if near else ""),
+    )
+
+
 def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
     """Find a file: a path as given, a path in a folder (that of the scenario), or a shipped name.
 
@@ -165,14 +186,14 @@ def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None
 
 
 @contextmanager
-def blame(file: object, field: str) -> Iterator[None]:
+def blame(file: object, field: str = "") -> Iterator[None]:
     """Say in which file and field an `InputError` arose, where it does not say so itself."""
     try:
         yield
     except InputError as error:
         if error.file is None:
             error.file = file
-            error.field = f"{field}.{error.field}" if error.field else field
+            error.field = ".".join(part for part in (field, error.field) if part) or None
         raise
 
 

@@ -25,13 +25,14 @@ def pulse_way_m(sheet: EncoderSheet) -> float:
     return 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
 
 
-def counted_way_m(encoder: pd.DataFrame, sheet: EncoderSheet) -> pd.Series:
+def counted_way_m(encoder: pd.DataFrame, sheet: EncoderSheet) -> pd.Series[float]:
     """Way since the first reading, m, signed: whole counts times `pulse_way_m`."""
     counts = encoder["pulse_count"] - encoder["pulse_count"].iloc[0]
-    return (counts * pulse_way_m(sheet)).rename("way_m")
+    way: pd.Series[float] = (counts * pulse_way_m(sheet)).rename("way_m")
+    return way
 
 
-def speed_by_counting(encoder: pd.DataFrame, sheet: EncoderSheet, *, readings: int = 1) -> pd.Series:
+def speed_by_counting(encoder: pd.DataFrame, sheet: EncoderSheet, *, readings: int = 1) -> pd.Series[float]:
     """Speed from the counts of an interval.
 
     Parameters
@@ -66,7 +67,9 @@ def speed_by_counting(encoder: pd.DataFrame, sheet: EncoderSheet, *, readings: i
     return pd.Series(speed, index=encoder.index, name="speed_mps")
 
 
-def speed_by_period(encoder: pd.DataFrame, sheet: EncoderSheet, *, still_s: float = STILL_S) -> pd.Series:
+def speed_by_period(
+    encoder: pd.DataFrame, sheet: EncoderSheet, *, still_s: float = STILL_S
+) -> pd.Series[float]:
     """Speed from the times of edges.
 
     At a reading with a new edge: the way from the last edge known at an earlier reading to the new one,

@@ -22,7 +22,7 @@ from math import prod
 from typing import Any
 
 from simrail.scenario.axes import Scalar, axes_of, drawn, expand
-from simrail.scenario.samples import sample_count, samples_of
+from simrail.scenario.distributions import sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 

@@ -175,12 +175,15 @@ def score_odometry(
     """Score the recording's odometry: position, speed and relative distance, as `score` does.
 
     The estimator's name for it in the score table is ``odometry:<source>``. The relative distance
-    is the position error gained since the start over the true distance run in the whole ride.
+    is the position error gained since the start over the true distance run in the whole ride. A recording
+    without odometry has no rows.
     """
+    states = recording.odometry
+    if states is None:
+        return table_of([])
     against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
     chosen, keep = chosen_windows(against.windows, windows), kept_metrics(metrics)
     rows: list[Row] = []
-    states = recording.odometry
     if recording.odometry_source == "truth":
         states = states[list(ODOMETRY)]  # its sds are zero, of which nothing can be scored
     for series in _other_series(states, against.motion):

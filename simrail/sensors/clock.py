@@ -101,7 +101,8 @@ def _interpolator(half: int) -> FloatArray:
     x = np.arange(-half, half + 2)[None, :] - np.linspace(0.0, 1.0, SHIFTS + 1)[:, None]
     window = np.i0(signal.kaiser_beta(SINC_DB) * np.sqrt(np.clip(1.0 - (x / half) ** 2, 0.0, None)))
     table = np.sinc(x) * window * (np.abs(x) <= half)
-    return table / np.sum(table, axis=1, keepdims=True)
+    weights: FloatArray = table / np.sum(table, axis=1, keepdims=True)
+    return weights
 
 
 @njit

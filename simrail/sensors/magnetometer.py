@@ -215,4 +215,5 @@ def check_magnetometer(spec: MagnetometerSpec) -> None:
 
 def _into(angles: FloatArray, vectors: FloatArray) -> FloatArray:
     """Vectors (n, 3) on the axes of a frame with these angles (n, 3) in the frame that they are given in."""
-    return np.einsum("nji,nj->ni", rotation_matrix(angles), vectors)
+    turned: FloatArray = np.einsum("nji,nj->ni", rotation_matrix(angles), vectors)
+    return turned

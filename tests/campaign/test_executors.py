@@ -21,11 +21,12 @@ import pytest
 
 from simrail.campaign import campaign, executors
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Unfinished
-from simrail.campaign.executors import FEW_CELLS, crew_of
-from simrail.campaign.job import prepare
+from simrail.campaign.checkpoint import Checkpoint
+from simrail.campaign.executors import FEW_CELLS, executor_of
 from simrail.campaign.result import CampaignResult, gather
+from simrail.campaign.worker import pack
 from simrail.core.errors import InputError
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.table import OK
 
@@ -149,9 +150,9 @@ def test_killed_workers_lose_nothing(
 
     thread = threading.Thread(target=kill)
     thread.start()
-    kept = Unfinished(tmp_path / "kept")
+    kept = Checkpoint(tmp_path / "kept")
     try:
-        found = run_campaign(scenario, workers=2, batch_cells=2, kept=kept)
+        found = run_campaign(scenario, workers=2, batch_cells=2, checkpoint=kept)
     finally:
         finished.set()
         thread.join()
@@ -199,12 +200,12 @@ def test_a_cell_that_kills_its_worker_fails_and_its_fellows_do_not(tmp_path: Pat
     assert len(lost) == 2 * len(failed)  # a row for each of the two estimators
 
 
-def test_few_cells_stay_in_this_process_and_one_crew_is_chosen() -> None:
-    with crew_of(None, None, cells=FEW_CELLS) as crew:
-        assert executors.here and crew.workers() == 1
-    with crew_of(8, None, cells=1) as crew:
-        assert executors.here
-    with pytest.raises(InputError, match="has its own workers"), crew_of(2, "tcp://127.0.0.1:1", cells=9):
+def test_few_cells_stay_in_this_process_and_one_executor_is_chosen() -> None:
+    with executor_of(None, None, cells=FEW_CELLS) as executor:
+        assert executor.here and executor.workers() == 1
+    with executor_of(8, None, cells=1) as executor:
+        assert executor.here
+    with pytest.raises(InputError, match="has its own workers"), executor_of(2, "tcp://127.0.0.1:1", cells=9):
         pass
 
 
@@ -216,24 +217,24 @@ def test_estimators_that_cannot_be_sent_are_refused_by_name(tmp_path: Path, noti
         "    def estimate(self, recording):\n        raise ValueError\n"
     )
     with pytest.raises(InputError, match="'noting'"):
-        prepare(load_scenario(noting_file))
+        run_campaign(load_scenario(noting_file))
 
 
 def test_a_result_is_the_same_from_kept_batches_alone(
     alone: CampaignResult, rides: Path, short: Callable[..., Scenario], tmp_path: Path, assert_same: Same
 ) -> None:
-    job, kept = prepare(short(*AXES)), Unfinished(tmp_path / "kept")
-    run_campaign(job, kept=kept, batch_cells=5)
-    assert_same(alone.scores, gather(job, kept).scores)
+    plan, kept = judge_scenario(short(*AXES)), Checkpoint(tmp_path / "kept")
+    run_campaign(plan, checkpoint=kept, batch_cells=5)
+    assert_same(alone.scores, gather(plan, pack(plan.parts), kept).scores)
 
 
 def test_a_worker_that_is_replaced_is_no_news() -> None:
     """loky tells of it in a warning, with a path and advice that do not concern the user."""
     program = (
         "import warnings\n"
-        "from simrail.campaign.executors import crew_of\n"
-        "with crew_of(2, None, cells=9) as crew:\n"
-        "    assert executors.submit(abs, -3).result() == 3\n"
+        "from simrail.campaign.executors import executor_of\n"
+        "with executor_of(2, None, cells=9) as executor:\n"
+        "    assert executor.submit(abs, -3).result() == 3\n"
         "    warnings.warn('A worker stopped while some jobs were given to the executor.', UserWarning)\n"
         "    warnings.warn('something else', UserWarning)\n"
     )

@@ -19,7 +19,7 @@ from simrail.campaign.export import TRUTH_STEM, export
 from simrail.cli.main import BAD_INPUT, DONE, call
 from simrail.core.columns import ENCODER, IMU, MOTION, ODOMETRY, ODOMETRY_SD
 from simrail.core.toml_files import shipped
-from simrail.recording.files.ride_reader import read_ride
+from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.recording import Recording
 from simrail.ride.ride import simulate
 from simrail.scenario.build import Parts

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.cli.main import DONE, INTERRUPTED
 from simrail.scenario.scenario import load_scenario
 
@@ -99,7 +99,7 @@ def run_with_kills(
         folders = list((folder / "results").glob(".mine.unfinished-*"))
         # Killed as it ended, it has left whole results; the next session then begins anew.
         whole = not folders and (folder / "results" / "mine" / "scores.parquet").exists()
-        kept = cells if whole else len(Unfinished(folders[0]).cells()) if folders else 0
+        kept = cells if whole else len(Checkpoint(folders[0]).cells()) if folders else 0
         assert asked - (kept - before) <= in_session * WORKERS * BATCH_CELLS
         before = 0 if whole else kept
 

@@ -7,6 +7,7 @@ of each signal; `simrail.recording.files.ride_reader` reads the data.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -84,13 +85,13 @@ class EncoderSignalPart(SignalPart):
         What the train knows of it.
     reverse : bool
         True if the logger counts up while the train runs towards smaller s.
-    radius_relative_sd : float
-        Relative standard deviation of the rolling radius about the sheet's, for the odometry.
+    radius_relative_sd : float, optional
+        That of the sheet, where the sheet does not say it.
     """
 
     sheet: EncoderSheet
     reverse: bool = False
-    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
+    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
 
     @classmethod
     def signal(cls) -> Signal:
@@ -112,6 +113,13 @@ class EncoderSignalPart(SignalPart):
                 remedy="give the radius in metres",
             )
         return value
+
+    @property
+    def known(self) -> EncoderSheet:
+        """What the train knows of it, all told."""
+        if self.radius_relative_sd is None:
+            return self.sheet
+        return replace(self.sheet, radius_relative_sd=self.radius_relative_sd)
 
 
 class MagnetometerSignalPart(VectorPart):
@@ -250,7 +258,8 @@ class RideFile(Part):
     longest_gap_s : float
         Longest gap in a signal that is bridged by a straight line.
     imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
-        Its signals. Without an odometry it is made from encoder or odometer.
+        Its signals. Without an odometry it is made from encoder or odometer
+        (`simrail.estimation.choose_odometry.read_ride`); without those as well, nobody knows where it is.
     """
 
     name: str = Field(min_length=1, max_length=200)
@@ -267,16 +276,9 @@ class RideFile(Part):
     gaps: GapsPart | None = None
 
     @model_validator(mode="after")
-    def _knows_where_it_is(self) -> Self:
+    def _one_way(self) -> Self:
         if self.encoder is not None and self.odometer is not None:
             raise InputError(
                 "says twice how far the train went", field="odometer", remedy="remove [odometer] or [encoder]"
-            )
-        if self.encoder is None and self.odometer is None and self.odometry is None:
-            raise InputError(
-                "a ride needs to know where it is",
-                field="encoder",
-                limit="[encoder], [odometer] or [odometry]",
-                remedy="add the table of the one that was recorded",
             )
         return self

@@ -22,11 +22,11 @@ from simrail.estimators.tuning.space import (
 )
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.seeds import stream
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.report import write_report
+from simrail.report.pages.page import write_report
 from simrail.report.papers.claim import Claim
 from simrail.report.papers.gonzalez_2023.claims import Peak, claims, errata_note
 from simrail.report.papers.gonzalez_2023.parts import Rows, part_of, rows_of
@@ -530,7 +530,7 @@ def test_the_section_holds_printed_and_own_rows(ran: tuple[Scenario, object, Pat
     scenario, result, _ = ran
     scores, cell_table = result.scores, result.cells  # type: ignore[attr-defined]
     all_cases = cases(scores, cell_table)
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     view = paper_view(all_cases, methods(scenario), styles, result.examples)  # type: ignore[attr-defined]
     assert isinstance(view, PaperView)
     labels = [row.label for row in view.table.rows]
@@ -570,7 +570,7 @@ def test_the_interval_by_draws_is_of_the_filtered_rails_alone(
     view = paper_view(
         all_cases,
         methods(scenario),
-        list(method_styles(methods(scenario)).values()),
+        list(method_styles(scenario).values()),
         [replace(example, estimates={**example.estimates, "smoother": drawn})],
     )
     assert isinstance(view, PaperView)
@@ -598,7 +598,7 @@ def test_the_own_ride_is_told_by_the_scores_of_that_ride(ran: tuple[Scenario, ob
     view = paper_view(
         [doubled, *others],
         methods(scenario),
-        list(method_styles(methods(scenario)).values()),
+        list(method_styles(scenario).values()),
         result.examples,  # type: ignore[attr-defined]
         tunings={"smoother_cml": replace(found, search=search)},
         scenario=scenario,
