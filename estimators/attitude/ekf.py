@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from filterpy.kalman import ExtendedKalmanFilter
 from simrail.estimators.attitude.compensation import design_frame, gravity_force, start_frame
 from simrail.estimators.attitude.kernel import attitude_ekf
 from simrail.estimators.attitude.noise import (
@@ -33,7 +32,7 @@ from simrail.track.design import TrackFrame
 
 
 class _Arrays(NamedTuple):
-    """What both backends take; shapes as in `simrail.estimators.attitude.kernel.attitude_ekf`."""
+    """What the kernel takes; shapes as in `simrail.estimators.attitude.kernel.attitude_ekf`."""
 
     rate: FloatArray
     force: FloatArray
@@ -62,8 +61,6 @@ class AttitudeEkf:
         Subtract the gyro's mean over the rests so far.
     printed : bool
         Compensate as paper 000 prints it (`simrail.estimators.attitude.compensation.track_acceleration`).
-    backend : str
-        ``"compiled"``, or ``"filterpy"``: slow, short, the reference.
     gyro_intensity_rad2ps : float, optional
         Process noise in place of the tuning's, rad2/s (rad2 if read per step).
     accel_sd_mps2 : float, optional
@@ -83,7 +80,6 @@ class AttitudeEkf:
     process_noise: str = "intensity"
     rest_bias: bool = True
     printed: bool = False
-    backend: str = "compiled"
     gyro_intensity_rad2ps: float | None = None
     accel_sd_mps2: float | None = None
     doubt: float = 0.0
@@ -107,10 +103,6 @@ class AttitudeEkf:
 
     def __post_init__(self) -> None:
         check_tuning(self.tuning, self.process_noise)
-        if self.backend not in BACKENDS:
-            raise InputError(
-                "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
-            )
         for name in (
             "gyro_intensity_rad2ps",
             "accel_sd_mps2",
@@ -131,7 +123,7 @@ class AttitudeEkf:
         arrays, considered = self._arrays(recording)
         n = arrays.rate.shape[0]
         states, covariance, innovations = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 4))
-        BACKENDS[self.backend](*arrays, states, covariance, innovations)
+        attitude_ekf(*arrays, states, covariance, innovations)
         for axis in range(3):
             covariance[:, axis, axis] += considered[:, axis]
         sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
@@ -175,61 +167,3 @@ class AttitudeEkf:
         if self.accel_sd_mps2 is not None:
             noise = noise._replace(force=np.full_like(noise.force, self.accel_sd_mps2**2))
         return noise
-
-
-class _EulerEkf(ExtendedKalmanFilter):
-    """filterpy's EKF with the attitude's own state prediction."""
-
-    def predict_x(self, u: FloatArray) -> None:
-        """Add the step u of the Euler angles."""
-        self.x: FloatArray = self.x + u
-
-
-def _filterpy_ekf(
-    rate: FloatArray,
-    force: FloatArray,
-    process: FloatArray,
-    noise: FloatArray,
-    start: FloatArray,
-    start_variance: FloatArray,
-    step_s: float,
-    gravity: float,
-    states: FloatArray,
-    covariance: FloatArray,
-    innovations: FloatArray,
-) -> None:
-    """The same filter by filterpy: block update, Joseph form; arguments as in the kernel."""
-
-    def predicted_force(x: FloatArray) -> FloatArray:
-        roll, pitch, _ = x
-        return gravity * np.array(
-            [-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch)]
-        )
-
-    def force_jacobian(x: FloatArray) -> FloatArray:
-        (sr, sp, _), (cr, cp, _) = np.sin(x), np.cos(x)
-        return gravity * np.array([[0.0, -cp, 0.0], [cr * cp, -sr * sp, 0.0], [-sr * cp, -cr * sp, 0.0]])
-
-    ekf = _EulerEkf(dim_x=3, dim_z=3)
-    ekf.x, ekf.P = start.copy(), np.diag(start_variance)
-    for k in range(rate.shape[0]):
-        if k > 0:
-            (sr, sp, _), (cr, cp, _) = np.sin(ekf.x), np.cos(ekf.x)
-            x, y, z = rate[k]
-            u, w = y * cr - z * sr, y * sr + z * cr
-            jacobian = np.array(
-                [[u * sp / cp, w / cp**2, 0.0], [-w, 0.0, 0.0], [u / cp, w * sp / cp**2, 0.0]]
-            )
-            ekf.F = np.eye(3) + step_s * jacobian
-            ekf.Q = process[k] * np.eye(3)
-            ekf.predict(step_s * np.array([x + w * sp / cp, u, w / cp]))
-        yaw, yaw_variance = ekf.x[2], ekf.P[2, 2]
-        ekf.update(force[k], force_jacobian, predicted_force, R=np.diag(noise[k]))
-        # Gravity says nothing of heading: its gain is zero, so its value and variance stay (Schmidt).
-        ekf.x[2], ekf.P[2, 2] = yaw, yaw_variance
-        states[k], covariance[k] = ekf.x, ekf.P
-        innovations[k, :3], innovations[k, 3] = ekf.y, ekf.y @ ekf.SI @ ekf.y
-
-
-BACKENDS = {"compiled": attitude_ekf, "filterpy": _filterpy_ekf}
-"""Loops that can run the filter, by name; all take the arguments of the kernel."""

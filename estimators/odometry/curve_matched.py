@@ -40,8 +40,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from simrail.estimators.kalman import smooth
-from simrail.estimators.odometry.kernel import SCALE, STATES, UPDATES, YAW, S, curve_matched
+from simrail.estimators.kalman import fixed_interval, room_for_history
+from simrail.estimators.odometry.kernel import SCALE, STATES, UPDATES, YAW, LineModel, S, Steps, curve_matched
 from simrail.estimators.odometry.trace import RATE_HZ, STILL_SD_MPS, Trace, at_imu_times
 
 from simrail.core.columns import ACCEL, GYRO
@@ -169,36 +169,15 @@ class CurveMatchedOdometry:
         pulse = 2.0 * math.pi * wheel.wheel_radius_m / wheel.pulses_per_revolution
         grid, table = line_table(recording.track)
         x, p = self._start(recording, pulse)
-        states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
-        acceleration, flags = np.empty(n), np.empty((n, 2))
-        m = n if self.smoothed else 0
-        kept = (
-            np.empty((m, STATES)),
-            np.empty((m, STATES, STATES)),
-            np.empty((m, STATES, STATES)),
-            np.empty((m, UPDATES, STATES)),
-            np.empty((m, UPDATES, STATES)),
-            np.empty((m, 2 * UPDATES)),
-        )
-        curve_matched(
-            block / sheet.rate_hz,
-            signals,
-            counts,
-            self._model(recording, pulse),
-            recording.gravity_mps2,
-            grid,
-            table,
-            x,
-            p,
-            states,
-            covariance,
-            acceleration,
-            flags,
-            *kept,
-        )
+        steps = Steps(np.empty((n, STATES)), np.empty((n, STATES, STATES)), np.empty(n), np.empty((n, 2)))
+        past = room_for_history(n if self.smoothed else 0, STATES, UPDATES)
+        model = self._model(recording, pulse)
+        dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
+        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, past)
         if self.smoothed:
-            smooth(*kept, states, covariance)
-        return Trace(ends, states, covariance, acceleration, flags[:, 0] > 0.0, flags[:, 1] > 0.0)
+            fixed_interval(past, steps.states, steps.covariance)
+        slips, rests = steps.flags.T > 0.0
+        return Trace(ends, steps.states, steps.covariance, steps.acceleration, slips, rests)
 
     def wheel_scale(self, recording: Recording) -> tuple[float, float]:
         """Relative error of the nominal wheel radius found at the end of the ride, and its sd.
@@ -208,29 +187,26 @@ class CurveMatchedOdometry:
         trace = self.trace(recording)
         return float(trace.states[-1, SCALE]), float(np.sqrt(trace.covariance[-1, SCALE, SCALE]))
 
-    def _model(self, recording: Recording, pulse: float) -> FloatArray:
+    def _model(self, recording: Recording, pulse: float) -> LineModel:
         sheet = recording.imu_sheet
-        drift = sheet.gyro_bias_instability_radps
-        return np.array(
-            [
-                pulse,
-                _STILL_S,
-                self.gate,
-                self.wheel_walk_m,
-                self.tread_sd,
-                self.tread_length_m,
-                sheet.accel_noise_mpsqrts**2 + self.force_m2ps3,
-                self.unsteady_s05,
-                self.push_walk_m2ps5,
-                sheet.gyro_noise_radpsqrts**2 + 1e-12,
-                # Of a Markov process that wanders by its bias instability within some 300 s.
-                2.0 * drift**2 / 300.0 + 1e-16,
-                sheet.gyro_scale_error / math.sqrt(3.0),
-                self.sway_sd_rad,
-                self.sway_length_m,
-                self.lag_walk_m,
-                self.heading_sd_rad,
-            ]
+        return LineModel(
+            pulse_m=pulse,
+            still_s=_STILL_S,
+            gate=self.gate,
+            wheel_walk_m=self.wheel_walk_m,
+            tread_sd=self.tread_sd,
+            tread_length_m=self.tread_length_m,
+            force_m2ps3=sheet.accel_noise_mpsqrts**2 + self.force_m2ps3,
+            unsteady_s05=self.unsteady_s05,
+            push_walk_m2ps5=self.push_walk_m2ps5,
+            gyro_rad2ps=sheet.gyro_noise_radpsqrts**2 + 1e-12,
+            # Of a Markov process that wanders by its bias instability within some 300 s.
+            drift_walk_rad2ps3=2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
+            gyro_scale=sheet.gyro_scale_error / math.sqrt(3.0),
+            sway_sd_rad=self.sway_sd_rad,
+            sway_length_m=self.sway_length_m,
+            lag_walk_m=self.lag_walk_m,
+            heading_sd_rad=self.heading_sd_rad,
         )
 
     def _start(self, recording: Recording, pulse: float) -> tuple[FloatArray, FloatArray]:

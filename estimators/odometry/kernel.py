@@ -6,7 +6,10 @@ noise is chosen, stands in `simrail.estimators.odometry.curve_matched`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from simrail.estimators.kalman import History, congruence, remember, update
 
 from simrail.core.jit import FloatArray, njit
 
@@ -14,28 +17,88 @@ STATES = 13
 S, V, WAY, SCALE, TREAD, TURN, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG = range(STATES)
 
 UPDATES = 3
-"""Scalar updates of a step at most: wheel, heading, rest."""
+WHEEL, HEADING, REST = range(UPDATES)
+"""Scalar updates of a step at most."""
 
-MODEL = (
-    "pulse_m",
-    "still_s",
-    "gate",
-    "wheel_walk_m",
-    "tread_sd",
-    "tread_length_m",
-    "force_m2ps3",
-    "unsteady_s05",
-    "push_walk_m2ps5",
-    "gyro_rad2ps",
-    "drift_walk_rad2ps3",
-    "gyro_scale",
-    "sway_sd_rad",
-    "sway_length_m",
-    "lag_walk_m",
-    "heading_sd_rad",
-)
-"""What `curve_matched` takes as its `model`, in this order; see
-`simrail.estimators.odometry.curve_matched`."""
+DIRECTION_SPEED_MPS = 0.2
+"""Below this a train that comes to rest sways to and fro: that is no change of direction."""
+
+START_JERK_MPS3 = 0.5
+"""Jerk with which a train leaves, as service traction does."""
+
+STEADY_S, WHEEL_SPEED_SHARE = 0.5, 0.1
+"""Time constant of the steady effort; share of the newest reading in the smoothed speed of the wheel. Chosen
+so that both forget a vibration of some Hz."""
+
+START_S, AGREE_S = 2.0, 0.5
+"""For so long after a start the wheel is believed; for so long it must agree before it is believed again."""
+
+AGREE_SDS, AGREE_SHARE = 3.0, 0.005
+"""It agrees within so many standard deviations of the speed and this share of the speed."""
+
+REST_VARIANCE = 1e-8
+"""(m/s)^2: of the speed of a train that stands."""
+
+NARROWEST = 0.1
+"""Least width, in pulses, of the interval in which an edge that was just passed says the wheel is."""
+
+SCALE_FACTOR_S = 10.0
+"""s: a gyro's error of scale is taken for white over so long; a curve lasts as long at line speed."""
+
+
+class LineModel(NamedTuple):
+    """Noise and constants of the filter; `simrail.estimators.odometry.curve_matched` says where from.
+
+    Attributes
+    ----------
+    pulse_m, still_s, gate : float
+        Way of a pulse; longest time without one that is no rest; innovations of the wheel beyond so many
+        standard deviations are slip.
+    wheel_walk_m, tread_sd, tread_length_m : float
+        Random walk of `way` (m2 per m), and the Markov process `tread` in distance.
+    force_m2ps3, unsteady_s05 : float
+        Intensity of what disturbs the accelerometer, and its density per effort, per sqrt(Hz).
+    push_walk_m2ps5, gyro_rad2ps, drift_walk_rad2ps3, gyro_scale : float
+        Random walk of `push`; white noise, drift and relative scale error of the gyro.
+    sway_sd_rad, sway_length_m, lag_walk_m, heading_sd_rad : float
+        Markov process `sway` in distance; random walk of `lag` (m2 per m); white part of the heading.
+    """
+
+    pulse_m: float
+    still_s: float
+    gate: float
+    wheel_walk_m: float
+    tread_sd: float
+    tread_length_m: float
+    force_m2ps3: float
+    unsteady_s05: float
+    push_walk_m2ps5: float
+    gyro_rad2ps: float
+    drift_walk_rad2ps3: float
+    gyro_scale: float
+    sway_sd_rad: float
+    sway_length_m: float
+    lag_walk_m: float
+    heading_sd_rad: float
+
+
+class Steps(NamedTuple):
+    """What the filter finds at each of n steps.
+
+    Attributes
+    ----------
+    states, covariance : ndarray (n, 13), (n, 13, 13)
+        Filtered.
+    acceleration : ndarray (n,)
+        Acceleration along the track over the step, unfiltered.
+    flags : ndarray (n, 2)
+        1 where the wheel is not believed; 1 where the train stands.
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    acceleration: FloatArray
+    flags: FloatArray
 
 
 @njit
@@ -59,7 +122,7 @@ def predict(
     lean: FloatArray,
     signal: FloatArray,
     dt: float,
-    model: FloatArray,
+    model: LineModel,
     gravity: float,
     steady: float,
 ) -> tuple[float, float]:
@@ -70,16 +133,19 @@ def predict(
     and the way that the wheel shows per metre.
     """
     n = x.shape[0]
+    # Heading rate of a body in the design's cant and slope; the effort less what squat and slope feign.
     turn = (signal[0] * np.sin(here[2]) + signal[1] * np.cos(here[2])) / np.cos(here[3])
     level = np.cos(lean[3])
     share = 1.0 / (1.0 + x[SQUAT])
     effort = (signal[2] - x[PUSH]) * share
     acceleration = level * (effort + gravity * np.sin(lean[3]))
+    # Way of the train, and of its wheel (`rolls` per metre); what is Markov in distance forgets.
     half = 0.5 * dt * dt
     way = dt * x[V] + half * acceleration
     run = abs(way)
     rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here[1]
-    wears, sways = np.exp(-run / model[5]), np.exp(-run / model[13])
+    wears, sways = np.exp(-run / model.tread_length_m), np.exp(-run / model.sway_length_m)
+    # F, the derivative of all that follows by the state.
     f[:, :] = 0.0
     for i in range(n):
         f[i, i] = 1.0
@@ -97,6 +163,7 @@ def predict(
     f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * here[1]
     f[TREAD, TREAD], f[SWAY, SWAY] = wears, sways
     f[YAW, DRIFT] = -dt
+    # The state itself.
     x[S] += way
     x[V] += dt * acceleration
     x[WAY] += rolls * way
@@ -104,63 +171,50 @@ def predict(
     x[YAW] += dt * (turn - x[DRIFT])
     x[SWAY] *= sways
 
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                if f[i, k] != 0.0:
-                    total += f[i, k] * p[k, j]
-            work[i, j] = total
-    for i in range(n):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(n):
-                if f[j, k] != 0.0:
-                    total += work[i, k] * f[j, k]
-            p[i, j] = total
-            p[j, i] = total
-
+    congruence(f, p, work)
     # What disturbs the accelerometer moves speed and position, and with them the way of the wheel.
-    q = model[6] + (model[7] * steady) ** 2
+    q = model.force_m2ps3 + (model.unsteady_s05 * steady) ** 2
     for i in (S, WAY):
         for j in (S, WAY):
             p[i, j] += q * dt**3 / 3.0
         p[i, V] += q * dt * dt / 2.0
         p[V, i] = p[i, V]
     p[V, V] += q * dt
-    p[WAY, WAY] += model[3] * run
-    p[TREAD, TREAD] += model[4] ** 2 * (1.0 - wears * wears)
-    p[PUSH, PUSH] += model[8] * dt
-    p[YAW, YAW] += model[9] * dt + (model[11] * turn) ** 2 * dt * 10.0
-    p[DRIFT, DRIFT] += model[10] * dt
-    p[SWAY, SWAY] += model[12] ** 2 * (1.0 - sways * sways)
-    p[LAG, LAG] += model[14] * run
+    p[WAY, WAY] += model.wheel_walk_m * run
+    p[TREAD, TREAD] += model.tread_sd**2 * (1.0 - wears * wears)
+    p[PUSH, PUSH] += model.push_walk_m2ps5 * dt
+    p[YAW, YAW] += model.gyro_rad2ps * dt + (model.gyro_scale * turn) ** 2 * dt * SCALE_FACTOR_S
+    p[DRIFT, DRIFT] += model.drift_walk_rad2ps3 * dt
+    p[SWAY, SWAY] += model.sway_sd_rad**2 * (1.0 - sways * sways)
+    p[LAG, LAG] += model.lag_walk_m * run
     return acceleration, rolls
 
 
 @njit
-def update(
-    x: FloatArray, p: FloatArray, h: FloatArray, error: float, variance: float, gain: FloatArray
-) -> float:
-    """Scalar Kalman update in place; writes the gain and returns the innovation's variance."""
-    n = x.shape[0]
-    s = variance
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            if h[j] != 0.0:
-                total += p[i, j] * h[j]
-        gain[i] = total
-    for i in range(n):
-        s += h[i] * gain[i]
-    for i in range(n):
-        x[i] += gain[i] * error / s
-        for j in range(i + 1):
-            p[i, j] -= gain[i] * gain[j] / s
-            p[j, i] = p[i, j]
-    for i in range(n):
-        gain[i] /= s
-    return s
+def wheel_reading(
+    change: float, measured: float, x: FloatArray, p: FloatArray, pulse: float, dt: float
+) -> tuple[float, float]:
+    """Error of the wheel's way by its count, and the width of the interval that the count leaves.
+
+    A count says between which two edges the wheel stands; an edge that has just been passed says more at low
+    speed; and without a pulse the wheel is at most at the edge (then the error is 0 inside).
+    """
+    error = measured - x[WAY]
+    if abs(change) == 1.0:
+        width = min(pulse, max(NARROWEST * pulse, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
+        return error - 0.5 * change * (pulse - width), width
+    if change == 0.0:
+        return np.sign(error) * max(abs(error) - 0.5 * pulse, 0.0), pulse
+    return error, pulse
+
+
+@njit
+def start_anew(x: FloatArray, p: FloatArray, f: FloatArray, measured: float, pulse: float) -> None:
+    """Forget the wheel's way, which says nothing while the wheel slips: it is what the wheel reads."""
+    for i in range(x.shape[0]):
+        p[i, WAY] = p[WAY, i] = f[WAY, i] = 0.0
+    p[WAY, WAY] = pulse * pulse / 12.0
+    x[WAY] = measured
 
 
 @njit
@@ -168,22 +222,14 @@ def curve_matched(
     dt: float,
     signals: FloatArray,
     count: FloatArray,
-    model: FloatArray,
+    model: LineModel,
     gravity: float,
     grid: FloatArray,
     table: FloatArray,
     x: FloatArray,
     p: FloatArray,
-    states: FloatArray,
-    covariance: FloatArray,
-    acceleration: FloatArray,
-    flags: FloatArray,
-    before: FloatArray,
-    before_covariance: FloatArray,
-    transition: FloatArray,
-    rows: FloatArray,
-    gains: FloatArray,
-    scaled: FloatArray,
+    steps: Steps,
+    past: History,
 ) -> None:
     """Run the filter over n steps.
 
@@ -196,110 +242,84 @@ def curve_matched(
         ends here, body axes.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
-    model : ndarray (16,)
-        See `MODEL`.
+    model : LineModel
+        Noise.
     gravity : float
         m/s2.
     grid, table : ndarray (2,), (m, 4)
         First place and places per metre of the design's table: heading, its slope, roll, pitch.
     x, p : ndarray (13,), (13, 13)
         State and covariance at the start; replaced by the last ones.
-    states, covariance : ndarray (n, 13), (n, 13, 13), output
-        Filtered.
-    acceleration : ndarray (n,), output
-        Acceleration along the track over the step, unfiltered.
-    flags : ndarray (n, 2), output
-        1 where the wheel is not believed; 1 where the train stands.
-    before, before_covariance, transition : ndarray (n, 13), (n, 13, 13), (n, 13, 13), output
-        Predicted state and covariance, and F of the step, for `simrail.estimators.kalman`;
-        of no rows where no smoother follows.
-    rows, gains : ndarray (n, 3, 13), output
-        Row of the Jacobian and gain of each scalar update.
-    scaled : ndarray (n, 6), output
-        Innovation over its variance of each update, then one over its variance; 0 for one not made.
+    steps : Steps, output
+        Of n rows.
+    past : History, output
+        For `simrail.estimators.kalman.fixed_interval`; of no rows where no smoother follows.
     """
     n = x.shape[0]
-    keep = before.shape[0] > 0
-    f, work = np.zeros((n, n)), np.zeros((n, n))
+    f, work, v = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     h, gain = np.zeros((UPDATES, n)), np.zeros(n)
     line, lean = np.zeros(5), np.zeros(5)
     error, variance, wanted = np.zeros(UPDATES), np.zeros(UPDATES), np.zeros(UPDATES)
-    pulse, still, gate = model[0], model[1], model[2]
-    h[0, WAY] = 1.0
-    h[1, YAW], h[1, SWAY] = 1.0, -1.0
-    h[2, V] = 1.0
+    pulse = model.pulse_m
+    h[WHEEL, WAY] = h[HEADING, YAW] = h[REST, V] = 1.0
+    h[HEADING, SWAY] = -1.0
+    variance[HEADING], variance[REST] = model.heading_sd_rad**2, REST_VARIANCE
     direction = idle = moving = agreed = wheel_speed = steady = 0.0
     resting, slipping = True, False
     for k in range(signals.shape[0]):
         line_at(grid, table, x[S], line)
         line_at(grid, table, x[S] - x[LEAD], lean)
-        steady += dt / 0.5 * (signals[k, 2] - x[PUSH] - steady)
-        acceleration[k], rolls = predict(x, p, f, work, line, lean, signals[k], dt, model, gravity, steady)
+        steady += dt / STEADY_S * (signals[k, 2] - x[PUSH] - steady)
+        steps.acceleration[k], rolls = predict(
+            x, p, f, work, line, lean, signals[k], dt, model, gravity, steady
+        )
 
-        # The wheel. Its count says between which two edges it stands; an edge that has just been
-        # passed says more at low speed.
+        # The wheel: where it stands, and since when it rests or rolls.
         change = count[k] - count[k - 1] if k > 0 else 0.0
         measured = (count[k] - count[0]) * pulse
-        wheel_speed += 0.1 * (change * pulse / dt - wheel_speed)
+        wheel_speed += WHEEL_SPEED_SHARE * (change * pulse / dt - wheel_speed)
         idle += dt
         moving += dt
-        # A train that comes to rest sways to and fro: that is no change of direction.
-        if abs(x[V]) > 0.2 or direction == 0.0:
+        if abs(x[V]) > DIRECTION_SPEED_MPS or direction == 0.0:
             direction = np.sign(x[V])
         if change != 0.0:
             idle = 0.0
             if resting:
-                # It left less than a pulse ago, with a jerk of some 0.5 m/s3, held to be standing.
-                p[V, V] += (0.5 * np.cbrt(0.5 * 36.0 * pulse * pulse)) ** 2
+                # It left less than a pulse q ago, held to be standing: from rest with jerk j it is as fast
+                # as (36 j q^2)^(1/3)/2 by then.
+                p[V, V] += (0.5 * np.cbrt(START_JERK_MPS3 * 36.0 * pulse * pulse)) ** 2
                 moving = 0.0
             resting = False
-        width = pulse
-        error[0] = measured - x[WAY]
-        if abs(change) == 1.0:
-            width = min(pulse, max(0.1 * pulse, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
-            error[0] -= 0.5 * change * (pulse - width)
-        elif change == 0.0:
-            # No pulse: the wheel is at most at the edge.
-            beyond = abs(error[0]) - 0.5 * pulse
-            error[0] = np.sign(error[0]) * max(beyond, 0.0)
-        variance[0] = width * width / 12.0
-        wanted[0] = 1.0 if change != 0.0 or error[0] != 0.0 else 0.0
+        error[WHEEL], width = wheel_reading(change, measured, x, p, pulse, dt)
+        variance[WHEEL] = width * width / 12.0
+
+        # Slip: the innovation gives it away, and it ends when wheel and filter agree on the speed again.
         if slipping:
             off = abs(wheel_speed - x[V] * rolls)
-            agreed = agreed + dt if off < 3.0 * np.sqrt(p[V, V]) + 0.005 * abs(x[V]) else 0.0
-            slipping = agreed <= 0.5
-        elif moving > 2.0 and error[0] * error[0] > gate * gate * (p[WAY, WAY] + variance[0]):
-            slipping = True
-            agreed = 0.0
+            agrees = off < AGREE_SDS * np.sqrt(p[V, V]) + AGREE_SHARE * abs(x[V])
+            agreed = agreed + dt if agrees else 0.0
+            slipping = agreed <= AGREE_S
+        elif moving > START_S and error[WHEEL] ** 2 > model.gate**2 * (p[WAY, WAY] + variance[WHEEL]):
+            slipping, agreed = True, 0.0
         if slipping:
-            # The way that the wheel makes says nothing: it starts anew from what it reads.
-            wanted[0] = 0.0
-            for i in range(n):
-                p[i, WAY] = p[WAY, i] = f[WAY, i] = 0.0
-            p[WAY, WAY] = pulse * pulse / 12.0
-            x[WAY] = measured
-        if keep:
-            before[k], before_covariance[k], transition[k] = x, p, f
+            start_anew(x, p, f, measured, pulse)
+        resting = resting or (idle > model.still_s and abs(x[V]) * idle < 2.0 * pulse)
+        wanted[WHEEL] = not slipping and (change != 0.0 or error[WHEEL] != 0.0)
+        wanted[HEADING], wanted[REST] = 1.0, resting
+        if past.states.shape[0] > 0:
+            past.states[k], past.covariances[k], past.transitions[k] = x, p, f
 
-        resting = resting or (idle > still and abs(x[V]) * idle < 2.0 * pulse)
-        wanted[1], wanted[2] = 1.0, 1.0 if resting else 0.0
-        variance[1], variance[2] = model[15] ** 2, 1e-8
         for m in range(UPDATES):
-            rows_m = h[m]
-            if m == 1:
-                # The heading: that of the design where the body points, and its sway about that.
+            if m == HEADING:
+                # That of the design where the body points, and its sway about that.
                 line_at(grid, table, x[S] - direction * x[LAG], line)
-                rows_m[S], rows_m[LAG] = -line[1], direction * line[1]
-                error[1] = line[0] - x[YAW] + x[SWAY]
-            elif m == 2:
-                error[2] = -x[V]
-            s = 0.0
+                h[HEADING, S], h[HEADING, LAG] = -line[1], direction * line[1]
+                error[HEADING] = line[0] - x[YAW] + x[SWAY]
+            elif m == REST:
+                error[REST] = -x[V]
             if wanted[m] > 0.0:
-                s = update(x, p, rows_m, error[m], variance[m], gain)
-            if keep:
-                rows[k, m], gains[k, m] = rows_m, gain
-                scaled[k, m] = error[m] / s if s > 0.0 else 0.0
-                scaled[k, UPDATES + m] = 1.0 / s if s > 0.0 else 0.0
-        states[k], covariance[k] = x, p
-        flags[k, 0] = 1.0 if slipping else 0.0
-        flags[k, 1] = 1.0 if resting else 0.0
+                s = update(x, p, h[m], error[m], variance[m], gain, v)
+                if past.states.shape[0] > 0:
+                    remember(past, k, m, h[m], gain, error[m], s)
+        steps.states[k], steps.covariance[k] = x, p
+        steps.flags[k, 0], steps.flags[k, 1] = slipping, resting

@@ -8,7 +8,7 @@ What is drawn is what `simrail.estimators.trajectory.track_geometry` has in its 
 it hangs together:
 
 * the smoother's error: from the joint posterior of all samples
-(`simrail.estimators.trajectory.kernel_draws`);
+(`simrail.estimators.trajectory.kernel_back`);
 * the accelerometer's turn-on bias, taken for roll, and that of the package: one number each, uniform;
 * the rail sensor's noise: white;
 * the odometry's error of position: one normal number per draw times its sd at each place, as if it were of
@@ -24,8 +24,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
-from simrail.estimators.trajectory.kernel_draws import trajectory_error
+from simrail.estimators.trajectory.kernel_back import trajectory_error
 from simrail.estimators.trajectory.kernel_equations import ROLL, ROWS, STATES, Y, Z
+from simrail.estimators.trajectory.kernel_filter import Past
 from simrail.estimators.trajectory.model import Model, dense_process
 from simrail.estimators.trajectory.over_space import over_space
 from simrail.estimators.trajectory.track_geometry import Sight, slopes
@@ -58,23 +59,15 @@ def stream_of(recording: Recording, draw: int, term: str) -> np.random.Generator
     return stream(ROOT, "rail draws", recording.name, recording.mount, *first.tolist(), draw, term)
 
 
-def state_errors(
-    model: Model,
-    gains: FloatArray,
-    scaled: FloatArray,
-    states: FloatArray,
-    covariance: FloatArray,
-    streams: Sequence[np.random.Generator],
-) -> FloatArray:
+def state_errors(model: Model, past: Past, streams: Sequence[np.random.Generator]) -> FloatArray:
     """Draws of the smoothing error of the states `FELT`.
 
     Parameters
     ----------
     model : Model
         What the filter had.
-    gains, scaled, states, covariance : ndarray
-        What it left behind, before the way back replaces it; shapes as in
-        `simrail.estimators.trajectory.kernel_draws.trajectory_error`.
+    past : Past
+        What it left behind, before the way back replaces it.
     streams : sequence of numpy.random.Generator
         One for each of m draws.
 
@@ -83,16 +76,14 @@ def state_errors(
     ndarray (m, n, 3)
         rad and m.
     """
-    n = len(states)
-    root = np.array([np.linalg.cholesky(dense_process(q)) for q in model.process])
-    start_sd, noise_sd = np.sqrt(model.start_variance), np.sqrt(model.noise)
-    steady = (model.track, model.slips, model.kinds, root, noise_sd, start_sd, model.step_s, model.gravity)
-    found, errors, innovations = np.empty((len(streams), n, 3)), np.empty((n, STATES)), np.empty((n, ROWS))
+    n = len(past.states)
+    roots = np.array([np.linalg.cholesky(dense_process(q)) for q in model.process])
+    drawn, errors, innovations = np.empty((len(streams), n, 3)), np.empty((n, STATES)), np.empty((n, ROWS))
     for draw, rng in enumerate(streams):
         normals = rng.standard_normal((n, STATES + ROWS))
-        trajectory_error(*steady, gains, scaled, states, covariance, normals, innovations, errors)
-        found[draw] = errors[:, FELT]
-    return found
+        trajectory_error(model, past, roots, np.sqrt(model.noise), normals, innovations, errors)
+        drawn[draw] = errors[:, FELT]
+    return drawn
 
 
 def geometry_draws(

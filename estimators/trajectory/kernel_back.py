@@ -1,233 +1,176 @@
-"""Compiled backward pass of the trajectory smoother: modified Bryson-Frazier, without any inverse.
+"""Compiled ways back of the trajectory smoother: smoothed states and covariances, and draws of their error.
 
-It uses what `simrail.estimators.trajectory.kernel_filter.trajectory_filter` left behind and replaces it, in
-place: a ride of an hour then needs no second copy of its covariances. It equals the Rauch-Tung-Striebel
-smoother because the transition is linear.
+Both are `simrail.estimators.kalman.fixed_interval` and `joint_draw` for a model with structure. They use what
+`simrail.estimators.trajectory.kernel_filter.trajectory_filter` left behind; the smoother replaces it, in
+place: a ride of an hour then needs no second copy of its covariances. Random numbers come from outside.
+
+Not here: the geometry of the rails that follows from a draw (`simrail.estimators.trajectory.draws`).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from simrail.estimators.kalman import chain, chain_back, chain_information, withdraw, withdraw_information
 from simrail.estimators.trajectory.kernel_equations import (
-    PITCH,
-    PITCH_RATE,
-    ROLL,
-    ROLL_RATE,
+    BLOCKS,
+    INTO,
+    ORIGIN,
     ROWS,
     STATES,
-    YAW,
-    YAW_RATE,
-    Y,
-    Z,
-    measured,
-    misprint,
+    WIDTH,
+    constant_rows,
+    linearise,
+    shares,
+    unpack,
 )
-from simrail.estimators.trajectory.kernel_filter import WIDTH, mirror
+from simrail.estimators.trajectory.kernel_filter import Past
+from simrail.estimators.trajectory.model import Model
 
 from simrail.core.jit import FloatArray, njit, njit_borrowed
 
 
 @njit_borrowed
-def jacobian_rows(x: FloatArray, j: FloatArray, rows: FloatArray) -> None:
-    """Whole rows (8, 16) from `measured`'s part; what is always zero or one must stand there already."""
-    rows[0, PITCH], rows[0, YAW_RATE] = -x[YAW_RATE], -x[PITCH]
-    rows[1, ROLL], rows[1, YAW_RATE] = x[YAW_RATE], x[ROLL]
-    rows[2, ROLL], rows[2, PITCH_RATE] = -x[PITCH_RATE], -x[ROLL]
-    rows[3, PITCH], rows[3, YAW] = j[0, 0], j[0, 1]
-    rows[4, ROLL], rows[4, YAW] = j[1, 0], j[1, 1]
-    rows[5, ROLL], rows[5, PITCH] = j[2, 0], j[2, 1]
-    for r in range(3):
-        for i in range(6):
-            rows[3 + r, Y + i] = j[r, 2 + i]
+def packed_product(packed: FloatArray, k: int, lam: FloatArray, out: FloatArray) -> None:
+    """Out (12,) = P lam, with P row k of ``packed`` (n, 78)."""
+    for i in range(STATES):
+        out[i] = 0.0
+    at = 0
+    for i in range(STATES):
+        out[i] += packed[k, at] * lam[i]
+        at += 1
+        for c in range(i + 1, STATES):
+            out[i] += packed[k, at] * lam[c]
+            out[c] += packed[k, at] * lam[i]
+            at += 1
 
 
 @njit_borrowed
-def still_rows(rows: FloatArray) -> None:
-    """What is always one in the rows (8, 16) of the Jacobian, which are zero before."""
-    rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = rows[6, Y] = rows[7, Z] = 1.0
+def row_times(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Out (16,) = a B with a row a (12,) and a matrix B (12, 16).
 
-
-@njit_borrowed
-def linearise(
-    x: FloatArray,
-    track: FloatArray,
-    slips: FloatArray,
-    k: int,
-    gravity: float,
-    g: FloatArray,
-    j: FloatArray,
-    rows: FloatArray,
-) -> None:
-    """Rows (8, 16) of the Jacobian in state x at sample k, as the filter had them; ``g`` and ``j``: work."""
-    measured(x, track, k, gravity, g, j)
-    if slips.shape[0] > 0:
-        misprint(x, track, slips, k, j)
-    jacobian_rows(x, j, rows)
-
-
-@njit_borrowed
-def transpose_predict(lam: FloatArray, dt: float) -> None:
-    """Lam <- F' lam in place."""
-    half = 0.5 * dt * dt
-    for a in range(0, 6, 2):
-        lam[a + 1] += dt * lam[a]
-    for a in range(6, 12, 3):
-        lam[a + 2] += dt * lam[a + 1] + half * lam[a]
-        lam[a + 1] += dt * lam[a]
-
-
-@njit_borrowed
-def information_predict(info: FloatArray, dt: float) -> None:
-    """Lam <- F' Lam F in place."""
-    half = 0.5 * dt * dt
-    width = info.shape[1]
-    for a in range(0, 6, 2):
-        for i in range(width):
-            info[a + 1, i] += dt * info[a, i]
-    for a in range(6, 12, 3):
-        for i in range(width):
-            info[a + 2, i] += dt * info[a + 1, i] + half * info[a, i]
-        for i in range(width):
-            info[a + 1, i] += dt * info[a, i]
-    for i in range(12):
-        info[i, 1] += dt * info[i, 0]
-        info[i, 3] += dt * info[i, 2]
-        info[i, 5] += dt * info[i, 4]
-        info[i, 8] += dt * info[i, 7] + half * info[i, 6]
-        info[i, 7] += dt * info[i, 6]
-        info[i, 11] += dt * info[i, 10] + half * info[i, 9]
-        info[i, 10] += dt * info[i, 9]
-    mirror(info)
-
-
-@njit_borrowed
-def combine(a: FloatArray, start: int, b: FloatArray, out: FloatArray, to: int) -> None:
-    """Row a' B into ``out`` from ``to``, with the twelve numbers of ``a`` from ``start``.
-
-    Written out, with all strides known, so that the compiler keeps the sums in vector registers.
+    Written out, so that the compiler keeps the sums in vector registers.
     """
-    a0, a1, a2, a3 = a[start], a[start + 1], a[start + 2], a[start + 3]
-    a4, a5, a6, a7 = a[start + 4], a[start + 5], a[start + 6], a[start + 7]
-    a8, a9, a10, a11 = a[start + 8], a[start + 9], a[start + 10], a[start + 11]
-    for i in range(WIDTH):
-        out[to + i] = (
-            a0 * b[i]
-            + a1 * b[WIDTH + i]
-            + a2 * b[2 * WIDTH + i]
-            + a3 * b[3 * WIDTH + i]
-            + a4 * b[4 * WIDTH + i]
-            + a5 * b[5 * WIDTH + i]
-            + a6 * b[6 * WIDTH + i]
-            + a7 * b[7 * WIDTH + i]
-            + a8 * b[8 * WIDTH + i]
-            + a9 * b[9 * WIDTH + i]
-            + a10 * b[10 * WIDTH + i]
-            + a11 * b[11 * WIDTH + i]
+    a0, a1, a2, a3, a4, a5 = a[0], a[1], a[2], a[3], a[4], a[5]
+    a6, a7, a8, a9, a10, a11 = a[6], a[7], a[8], a[9], a[10], a[11]
+    for c in range(WIDTH):
+        out[c] = (
+            a0 * b[0, c]
+            + a1 * b[1, c]
+            + a2 * b[2, c]
+            + a3 * b[3, c]
+            + a4 * b[4, c]
+            + a5 * b[5, c]
+            + a6 * b[6, c]
+            + a7 * b[7, c]
+            + a8 * b[8, c]
+            + a9 * b[9, c]
+            + a10 * b[10, c]
+            + a11 * b[11, c]
         )
-
-
-@njit_borrowed
-def give_back(info: FloatArray, h: FloatArray, gain: FloatArray, inverse: float, v: FloatArray) -> None:
-    """Lam <- (I - h K') Lam (I - K h') + h h'/s in place, as Lam - h w' - w h'."""
-    width = v.shape[0]
-    combine(gain, 0, info, v, 0)
-    square = inverse
-    for c in range(12):
-        square += gain[c] * v[c]
-    for i in range(width):
-        v[i] -= 0.5 * square * h[i]
-    for r in range(12):
-        a, b = h[r], v[r]
-        for i in range(width):
-            info[r * WIDTH + i] -= a * v[i] + b * h[i]
 
 
 @njit_borrowed
 def shrink(
     info: FloatArray, p: FloatArray, work: FloatArray, v: FloatArray, packed: FloatArray, k: int
 ) -> None:
-    """Row k of ``packed`` becomes P - P Lam P."""
-    for o in range(0, 12 * WIDTH, WIDTH):
-        combine(info, o, p, work, o)
+    """Row k of ``packed``, which is P, becomes P - P Lam P."""
+    unpack(packed, k, p)
+    for i in range(STATES):
+        row_times(info[i], p, work[i])
     at = 0
-    for r in range(12):
-        combine(p, r * WIDTH, work, v, 0)
-        for c in range(r, 12):
+    for i in range(STATES):
+        row_times(p[i], work, v)
+        for c in range(i, STATES):
             packed[k, at] -= v[c]
             at += 1
 
 
-@njit_borrowed
-def unpack(packed: FloatArray, k: int, p: FloatArray) -> None:
-    """Row k of ``packed`` (n, 78) as a full matrix."""
-    at = 0
-    for i in range(12):
-        for c in range(i, 12):
-            p[i * WIDTH + c] = packed[k, at]
-            p[c * WIDTH + i] = packed[k, at]
-            at += 1
+@njit
+def trajectory_back(model: Model, past: Past, with_covariance: bool) -> None:
+    """Turn predicted states and covariances into smoothed ones, in place.
+
+    `simrail.estimators.kalman.fixed_interval` has the equations. The Jacobian is made again, which is cheaper
+    than to fetch it. Without covariances those of ``past`` stay as they are, predicted.
+    """
+    lam, v, out, g = np.zeros(STATES), np.zeros(WIDTH), np.zeros(STATES), np.zeros(ROWS)
+    rows, info = np.zeros((ROWS, WIDTH)), np.zeros((STATES, WIDTH))
+    p, work = np.zeros((STATES, WIDTH)), np.zeros((STATES, WIDTH))
+    share = shares(model.step_s)
+    constant_rows(rows)
+    for k in range(past.states.shape[0] - 1, -1, -1):
+        linearise(past.states[k], model.track, model.slips, k, model.gravity, g, rows)
+        for m in range(ROWS - 1, -1, -1):
+            withdraw(lam, rows[m], past.gains[k, m], past.scaled[k, m, 0])
+            if with_covariance:
+                row_times(past.gains[k, m], info, v)
+                withdraw_information(info, rows[m], past.gains[k, m], past.scaled[k, m, 1], v)
+        packed_product(past.covariance, k, lam, out)
+        if with_covariance:
+            shrink(info, p, work, v, past.covariance, k)
+            chain_information(info, INTO, ORIGIN, share)
+        for i in range(STATES):
+            past.states[k, i] -= out[i]
+        chain_back(lam, INTO, ORIGIN, share)
 
 
 @njit
-def trajectory_back(
-    track: FloatArray,
-    slips: FloatArray,
-    step_s: float,
-    gravity: float,
-    gains: FloatArray,
-    scaled: FloatArray,
-    states: FloatArray,
-    covariance: FloatArray,
-    with_covariance: bool,
+def trajectory_error(
+    model: Model,
+    past: Past,
+    roots: FloatArray,
+    noise_sd: FloatArray,
+    normals: FloatArray,
+    innovations: FloatArray,
+    errors: FloatArray,
 ) -> None:
-    """Turn predicted states and covariances into smoothed ones.
+    """One draw of truth minus smoothed state, at all samples; ``past`` is not changed.
 
-    Backwards through the updates of each sample, m = 8..1, and then through F:
-
-        lam <- lam - J_m' (K_m' lam + e_m/s_m),   Lam <- (I - J_m' K_m') Lam (I - K_m J_m) + J_m' J_m/s_m
-        x = x^- - P^- lam,                        P = P^- - P^- Lam P^-
-        lam <- F' lam,                            Lam <- F' Lam F
+    `simrail.estimators.kalman.joint_draw` has the equations. The gains are at hand, so that a draw is two
+    recursions of twelve numbers, without covariance.
 
     Parameters
     ----------
-    track, slips, step_s, gravity
-        As the filter had them: the Jacobian is made again, which is cheaper than to fetch it.
-    gains, scaled : ndarray (n, 8, 12), (n, 8, 2)
-        From the filter.
-    states, covariance : ndarray (n, 12), (n, 78), in and out
-        The filter's ``before`` and ``before_covariance``; replaced by the smoothed ones.
-    with_covariance : bool
-        False leaves ``covariance`` as it is, the predicted one.
+    model, past
+        What the filter had, and what it left behind.
+    roots : ndarray (c, 12, 12)
+        Lower triangular, root root' = Q, of the blocks of
+        `simrail.estimators.trajectory.model.process_noise`.
+    noise_sd : ndarray (c, 8)
+        Standard deviations of the measurements, virtual ones among them.
+    normals : ndarray (n, 20)
+        Independent standard normal numbers: of start or process, and of the measurements.
+    innovations : ndarray (n, 8), work
+    errors : ndarray (n, 12), out
     """
-    lam, v, out = np.zeros(STATES), np.zeros(WIDTH), np.zeros(STATES)
-    g, j, rows = np.zeros(6), np.zeros((3, 8)), np.zeros((ROWS, WIDTH))
-    info, p, work = np.zeros(STATES * WIDTH), np.zeros(STATES * WIDTH), np.zeros(STATES * WIDTH)
-    square = info.reshape((STATES, WIDTH))
-    still_rows(rows)
-    for k in range(states.shape[0] - 1, -1, -1):
-        x = states[k]
-        linearise(x, track, slips, k, gravity, g, j, rows)
+    e, lam, out, g = np.empty(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(ROWS)
+    rows = np.zeros((ROWS, WIDTH))
+    share = shares(model.step_s)
+    constant_rows(rows)
+    for i in range(STATES):
+        e[i] = np.sqrt(model.start_variance[i]) * normals[0, i]
+    n = past.states.shape[0]
+    for k in range(n):
+        kind = model.kinds[k]
+        if k > 0:
+            chain(e, INTO, ORIGIN, share)
+            for first, end in BLOCKS:
+                for i in range(first, end):
+                    for c in range(first, i + 1):
+                        e[i] += roots[kind, i, c] * normals[k, c]
+        errors[k] = e
+        linearise(past.states[k], model.track, model.slips, k, model.gravity, g, rows)
+        for m in range(ROWS):
+            v = noise_sd[kind, m] * normals[k, STATES + m]
+            for i in range(STATES):
+                v += rows[m, i] * e[i]
+            for i in range(STATES):
+                e[i] -= past.gains[k, m, i] * v
+            innovations[k, m] = v * past.scaled[k, m, 1]
+    for k in range(n - 1, -1, -1):
+        linearise(past.states[k], model.track, model.slips, k, model.gravity, g, rows)
         for m in range(ROWS - 1, -1, -1):
-            dot = scaled[k, m, 0]
-            for i in range(STATES):
-                dot += gains[k, m, i] * lam[i]
-            for i in range(STATES):
-                lam[i] -= rows[m, i] * dot
-            if with_covariance:
-                give_back(info, rows[m], gains[k, m], scaled[k, m, 1], v)
-        out[:] = 0.0
-        at = 0
+            withdraw(lam, rows[m], past.gains[k, m], innovations[k, m])
+        packed_product(past.covariance, k, lam, out)
         for i in range(STATES):
-            out[i] += covariance[k, at] * lam[i]
-            at += 1
-            for c in range(i + 1, STATES):
-                out[i] += covariance[k, at] * lam[c]
-                out[c] += covariance[k, at] * lam[i]
-                at += 1
-        if with_covariance:
-            unpack(covariance, k, p)
-            shrink(info, p, work, v, covariance, k)
-            information_predict(square, step_s)
-        for i in range(STATES):
-            states[k, i] -= out[i]
-        transpose_predict(lam, step_s)
+            errors[k, i] += out[i]
+        chain_back(lam, INTO, ORIGIN, share)

@@ -1,11 +1,8 @@
 """Compiled filter of the trajectory smoother: an extended Kalman filter of twelve states.
 
 Gonzalez-Carbajal et al. 2023 (paper 001), section 3, with the errata of EQUATIONS 1.3. Arrays in, arrays out.
-What makes it fast is its structure: the transition is block upper triangular, so that the prediction is a few
-sums of rows and columns; the noise of the eight measurements is independent, so that they are taken one by
-one, each with the few entries that its row of the Jacobian has (35 of 96); and there is no inverse. The
-covariance has rows of `WIDTH` numbers of which the last four are always zero: loops of sixteen fill the
-vector registers.
+The algebra is that of `simrail.estimators.kalman`; the structure of the model makes it fast: the transition
+is a few chains of integrators, and a row of the Jacobian has few entries (35 of 96).
 
 Not here: the equations (`simrail.estimators.trajectory.kernel_equations`) and the way back
 (`simrail.estimators.trajectory.kernel_back`).
@@ -13,261 +10,195 @@ Not here: the equations (`simrail.estimators.trajectory.kernel_equations`) and t
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
 import numpy as np
+from simrail.estimators.kalman import chain, chain_covariance, condition, log_density, mirror
 from simrail.estimators.trajectory.kernel_equations import (
-    PITCH,
-    PITCH_RATE,
-    ROLL,
-    ROLL_RATE,
+    ANGLE_COLUMNS,
+    BLOCKS,
+    INTO,
+    ORIGIN,
+    PACKED,
+    RATE_COLUMNS,
     ROWS,
     STATES,
-    YAW,
-    YAW_RATE,
+    WIDTH,
     YD,
     YDD,
     ZD,
     ZDD,
     Y,
     Z,
-    measured,
-    misprint,
+    constant_rows,
+    linearise,
+    pack,
+    shares,
 )
+from simrail.estimators.trajectory.model import Model
 
-from simrail.core.jit import FloatArray, IntArray, njit, njit_borrowed
-
-PACKED = STATES * (STATES + 1) // 2
-"""Entries of a covariance's upper triangle, row by row."""
-
-WIDTH = 16
-"""Length of a row of the covariance in the loops."""
+from simrail.core.jit import FloatArray, njit, njit_borrowed, njit_inline
 
 
-@njit_borrowed
-def mirror(p: FloatArray) -> None:
-    """Lower triangle from the upper one.
+class Past(NamedTuple):
+    """What the filter leaves behind for the way back, of n samples; of no rows if nothing follows.
 
-    Rounding leaves a part that is not symmetric, which no update ever takes away and every prediction lets
-    grow: without this the filter breaks down after some hundred thousand samples.
+    Attributes
+    ----------
+    states, covariance : ndarray (n, 12), (n, 78)
+        Predicted states, and their covariances' upper triangles row by row.
+    gains, scaled : ndarray (n, 8, 12), (n, 8, 2)
+        K, and (e/s, 1/s) of each scalar update.
     """
-    for i in range(12):
-        for c in range(i + 1, 12):
-            p[c, i] = p[i, c]
+
+    states: FloatArray
+    covariance: FloatArray
+    gains: FloatArray
+    scaled: FloatArray
+
+
+class Filtered(NamedTuple):
+    """What the filter finds at each of n samples; an array of no rows is not wanted and not written.
+
+    Attributes
+    ----------
+    states, covariance : ndarray (n, 12), (n, 78)
+        Filtered, and packed as in `Past`.
+    innovations : ndarray (n, 7)
+        Measured minus predicted rates and forces, and the normalised innovation squared of these six.
+    likelihoods : ndarray (n,)
+        Log-likelihood of each sample given those before it.
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    innovations: FloatArray
+    likelihoods: FloatArray
+
+
+def room_for_past(n: int) -> Past:
+    """Arrays of n rows."""
+    shapes = (n, STATES), (n, PACKED), (n, ROWS, STATES), (n, ROWS, 2)
+    return Past(*(np.empty(shape) for shape in shapes))
+
+
+def room_for_filtered(*, states: int = 0, innovations: int = 0, likelihoods: int = 0) -> Filtered:
+    """Arrays of as many rows as are wanted of each."""
+    shapes = (states, STATES), (states, PACKED), (innovations, ROWS - 1), (likelihoods,)
+    return Filtered(*(np.empty(shape) for shape in shapes))
 
 
 @njit_borrowed
-def predict(x: FloatArray, p: FloatArray, q: FloatArray, kind: int, dt: float) -> None:
-    """X <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is row ``kind`` of ``q`` (c, 21)."""
-    half = 0.5 * dt * dt
-    width = p.shape[1]
-    for a in range(0, 6, 2):
-        x[a] += dt * x[a + 1]
-        for i in range(width):
-            p[a, i] += dt * p[a + 1, i]
-    for a in range(6, 12, 3):
-        x[a] += dt * x[a + 1] + half * x[a + 2]
-        x[a + 1] += dt * x[a + 2]
-        for i in range(width):
-            p[a, i] += dt * p[a + 1, i] + half * p[a + 2, i]
-        for i in range(width):
-            p[a + 1, i] += dt * p[a + 2, i]
-    for i in range(12):
-        p[i, 0] += dt * p[i, 1]
-        p[i, 2] += dt * p[i, 3]
-        p[i, 4] += dt * p[i, 5]
-        p[i, 6] += dt * p[i, 7] + half * p[i, 8]
-        p[i, 7] += dt * p[i, 8]
-        p[i, 9] += dt * p[i, 10] + half * p[i, 11]
-        p[i, 10] += dt * p[i, 11]
-    for block in range(3):
-        a, b = 2 * block, 3 * block
-        p[a, a] += q[kind, b]
-        p[a, a + 1] += q[kind, b + 1]
-        p[a + 1, a + 1] += q[kind, b + 2]
-    for block in range(2):
-        a, b = 6 + 3 * block, 9 + 6 * block
-        p[a, a] += q[kind, b]
-        p[a, a + 1] += q[kind, b + 1]
-        p[a, a + 2] += q[kind, b + 2]
-        p[a + 1, a + 1] += q[kind, b + 3]
-        p[a + 1, a + 2] += q[kind, b + 4]
-        p[a + 2, a + 2] += q[kind, b + 5]
+def predict(x: FloatArray, p: FloatArray, process: FloatArray, kind: int, dt: float) -> None:
+    """X <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is row ``kind`` of ``process`` (c, 21)."""
+    share = shares(dt)
+    chain(x, INTO, ORIGIN, share)
+    chain_covariance(p, INTO, ORIGIN, share)
+    at = 0
+    for first, end in BLOCKS:
+        for i in range(first, end):
+            for c in range(i, end):
+                p[i, c] += process[kind, at]
+                at += 1
     mirror(p)
 
 
-@njit_borrowed
-def take(
-    p: FloatArray, v: FloatArray, dx: FloatArray, error: float, inverse: float, gain: FloatArray
-) -> None:
-    """Scalar update: K = v/s, dx += K e, P -= K v', with v = P h and ``inverse`` = 1/s."""
-    width = p.shape[1]
-    for i in range(12):
-        k = v[i] * inverse
-        gain[i] = k
-        dx[i] += k * error
-        for c in range(width):
-            p[i, c] -= k * v[c]
+@njit_inline
+def across(p: FloatArray, rows: FloatArray, m: int, dx: FloatArray, v: FloatArray) -> tuple[float, float]:
+    """V (16,) = P h' for row m of the Jacobian by the entries that it has; returns h v and h dx."""
+    if m < 3:
+        a, b, c = RATE_COLUMNS[m, 0], RATE_COLUMNS[m, 1], RATE_COLUMNS[m, 2]
+        ha, hb, hc = rows[m, a], rows[m, b], rows[m, c]
+        for i in range(WIDTH):
+            v[i] = ha * p[a, i] + hb * p[b, i] + hc * p[c, i]
+        return ha * v[a] + hb * v[b] + hc * v[c], ha * dx[a] + hb * dx[b] + hc * dx[c]
+    if m < 6:
+        a, b = ANGLE_COLUMNS[m - 3, 0], ANGLE_COLUMNS[m - 3, 1]
+        ha, hb, hy, hyd, hydd = rows[m, a], rows[m, b], rows[m, Y], rows[m, YD], rows[m, YDD]
+        hz, hzd, hzdd = rows[m, Z], rows[m, ZD], rows[m, ZDD]
+        for i in range(WIDTH):
+            v[i] = (
+                ha * p[a, i]
+                + hb * p[b, i]
+                + hy * p[Y, i]
+                + hyd * p[YD, i]
+                + hydd * p[YDD, i]
+                + hz * p[Z, i]
+                + hzd * p[ZD, i]
+                + hzdd * p[ZDD, i]
+            )
+        spread = ha * v[a] + hb * v[b] + hy * v[Y] + hyd * v[YD] + hydd * v[YDD]
+        moved = ha * dx[a] + hb * dx[b] + hy * dx[Y] + hyd * dx[YD] + hydd * dx[YDD]
+        spread += hz * v[Z] + hzd * v[ZD] + hzdd * v[ZDD]
+        return spread, moved + hz * dx[Z] + hzd * dx[ZD] + hzdd * dx[ZDD]
+    a = Y if m == 6 else Z
+    for i in range(WIDTH):
+        v[i] = p[a, i]
+    return v[a], dx[a]
 
 
 @njit
-def trajectory_filter(
-    signals: FloatArray,
-    track: FloatArray,
-    slips: FloatArray,
-    kinds: IntArray,
-    process: FloatArray,
-    noise: FloatArray,
-    virtual: FloatArray,
-    start: FloatArray,
-    start_variance: FloatArray,
-    step_s: float,
-    gravity: float,
-    before: FloatArray,
-    before_covariance: FloatArray,
-    gains: FloatArray,
-    scaled: FloatArray,
-    after: FloatArray,
-    after_covariance: FloatArray,
-    innovations: FloatArray,
-    likelihoods: FloatArray,
-) -> float:
-    """Run the filter; an output of no rows is not wanted and not written.
+def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
+    """Run the filter; fills ``past`` and ``out``.
 
     With J_m the rows of the Jacobian at the predicted state x and dx = 0 at first, for m = 1..8:
 
         e = z_m - g_m(x) - J_m dx,   s = J_m P J_m' + U_m,   K = P J_m'/s
-        dx += K e,   P -= K s K',   log-likelihood -= (e^2/s + ln 2 pi s)/2
+        dx += K e,   P -= K s K',    log-likelihood -= (e^2/s + ln 2 pi s)/2
 
     which is the update with all eight at once.
-
-    Parameters
-    ----------
-    signals : ndarray (n, 6)
-        Angular rate less its bias, rad/s, and specific force, m/s2, body axes.
-    track : ndarray (n, 15)
-        `TERMS`.
-    slips : ndarray (n, 3) or (0, 3)
-        See `misprint`; of no rows for the corrected equations.
-    kinds : ndarray of int (n,)
-        Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
-    process : ndarray (c, 21)
-        Upper triangles of the five blocks of Q, row by row.
-    noise : ndarray (c, 8)
-        Variances U of the measurements.
-    virtual : ndarray (2,)
-        Virtual positions y and z, m.
-    start, start_variance : ndarray (12,)
-        State before the first update, and its variances.
-    step_s, gravity : float
-        Sample interval, s, and gravity, m/s2.
-    before, before_covariance : ndarray (n, 12), (n, 78), out
-        Predicted states, and their covariances' upper triangles row by row.
-    gains, scaled : ndarray (n, 8, 12), (n, 8, 2), out
-        K, and (e/s, 1/s) of each scalar update.
-    after, after_covariance : ndarray (n, 12), (n, 78), out
-        Filtered.
-    innovations : ndarray (n, 7), out
-        Measured minus predicted rates and forces, and the normalised innovation squared of these six.
-    likelihoods : ndarray (n,), out
-        Log-likelihood of each sample given those before it.
 
     Returns
     -------
     float
         Log-likelihood of all measurements, the virtual ones among them.
     """
-    n = signals.shape[0]
+    # Named once, before the loop: numba counts references wherever an array is taken out of a tuple.
+    signals, track, slips, kinds, process, noise, virtual, start, variance, step_s, gravity = model
+    before, before_covariance, gains, scaled = past
+    after, after_covariance, innovations, likelihoods = out
     x, p = start.copy(), np.zeros((STATES, WIDTH))
     v, dx, gain = np.zeros(WIDTH), np.zeros(STATES), np.zeros(STATES)
-    g, j = np.zeros(6), np.zeros((3, 8))
+    residual, rows = np.zeros(ROWS), np.zeros((ROWS, WIDTH))
     nis = likelihood = 0.0
-    first, second = (PITCH, ROLL, ROLL), (YAW, YAW, PITCH)
+    constant_rows(rows)
     for i in range(STATES):
-        p[i, i] = start_variance[i]
-    for k in range(n):
+        p[i, i] = variance[i]
+    for k in range(signals.shape[0]):
         kind = kinds[k]
         if k > 0:
             predict(x, p, process, kind, step_s)
         if before.shape[0] > 0:
             before[k] = x
             pack(p, before_covariance, k)
-        measured(x, track, k, gravity, g, j)
-        if slips.shape[0] > 0:
-            misprint(x, track, slips, k, j)
+        linearise(x, track, slips, k, gravity, residual, rows)
+        for m in range(6):
+            residual[m] = signals[k, m] - residual[m]
+        residual[6], residual[7] = virtual[0] - residual[6], virtual[1] - residual[7]
         dx[:] = 0.0
-        nis = 0.0
         squares, product = 0.0, 1.0
         for m in range(ROWS):
-            if m == 0:
-                a0, a1, a2, b0, b1, b2 = ROLL_RATE, PITCH, YAW_RATE, 1.0, -x[YAW_RATE], -x[PITCH]
-            elif m == 1:
-                a0, a1, a2, b0, b1, b2 = PITCH_RATE, ROLL, YAW_RATE, 1.0, x[YAW_RATE], x[ROLL]
-            elif m == 2:
-                a0, a1, a2, b0, b1, b2 = YAW_RATE, ROLL, PITCH_RATE, 1.0, -x[PITCH_RATE], -x[ROLL]
-            if m < 3:
-                for i in range(WIDTH):
-                    v[i] = b0 * p[a0, i] + b1 * p[a1, i] + b2 * p[a2, i]
-                spread = b0 * v[a0] + b1 * v[a1] + b2 * v[a2]
-                error = signals[k, m] - g[m] - b0 * dx[a0] - b1 * dx[a1] - b2 * dx[a2]
-            elif m < 6:
-                r = m - 3
-                a0, a1 = first[r], second[r]
-                j0, j1, j2, j3 = j[r, 0], j[r, 1], j[r, 2], j[r, 3]
-                j4, j5, j6, j7 = j[r, 4], j[r, 5], j[r, 6], j[r, 7]
-                for i in range(WIDTH):
-                    v[i] = (
-                        j0 * p[a0, i]
-                        + j1 * p[a1, i]
-                        + j2 * p[Y, i]
-                        + j3 * p[YD, i]
-                        + j4 * p[YDD, i]
-                        + j5 * p[Z, i]
-                        + j6 * p[ZD, i]
-                        + j7 * p[ZDD, i]
-                    )
-                spread = j0 * v[a0] + j1 * v[a1] + j2 * v[Y] + j3 * v[YD] + j4 * v[YDD]
-                spread += j5 * v[Z] + j6 * v[ZD] + j7 * v[ZDD]
-                error = signals[k, m] - g[m] - j0 * dx[a0] - j1 * dx[a1] - j2 * dx[Y] - j3 * dx[YD]
-                error -= j4 * dx[YDD] + j5 * dx[Z] + j6 * dx[ZD] + j7 * dx[ZDD]
-            else:
-                a0 = Y if m == 6 else Z
-                for i in range(WIDTH):
-                    v[i] = p[a0, i]
-                spread = v[a0]
-                error = virtual[m - 6] - x[a0] - dx[a0]
-            s = spread + noise[kind, m]
+            spread, moved = across(p, rows, m, dx, v)
+            error, s = residual[m] - moved, spread + noise[kind, m]
             inverse = 1.0 / s
+            condition(dx, p, v, error, inverse, gain)
             squares += error * error * inverse
             product *= s
             if m == 5:
                 nis = squares
-            take(p, v, dx, error, inverse, gain)
             if gains.shape[0] > 0:
                 for i in range(STATES):
                     gains[k, m, i] = gain[i]
                 scaled[k, m, 0], scaled[k, m, 1] = error * inverse, inverse
         for i in range(STATES):
             x[i] += dx[i]
-        of_sample = -0.5 * (squares + math.log(product) + ROWS * math.log(2.0 * math.pi))
+        of_sample = log_density(squares, product, ROWS)
         likelihood += of_sample
         if likelihoods.shape[0] > 0:
             likelihoods[k] = of_sample
         if innovations.shape[0] > 0:
-            for i in range(6):
-                innovations[k, i] = signals[k, i] - g[i]
-            innovations[k, 6] = nis
+            innovations[k, :6], innovations[k, 6] = residual[:6], nis
         if after.shape[0] > 0:
             after[k] = x
             pack(p, after_covariance, k)
     return likelihood
-
-
-@njit_borrowed
-def pack(p: FloatArray, packed: FloatArray, k: int) -> None:
-    """Upper triangle of P, row by row, into row k of ``packed`` (n, 78)."""
-    at = 0
-    for i in range(12):
-        for c in range(i, 12):
-            packed[k, at] = p[i, c]
-            at += 1

@@ -7,8 +7,8 @@ The state is
 
 with the angles of the body in the global frame, its place (0, y, z) in the design track frame, ' for d/dt.
 
-Not here: the loops (`simrail.estimators.trajectory.kernel_filter`), the same filter by filterpy
-(`simrail.estimators.trajectory.reference`), the noise (`simrail.estimators.trajectory.noise`).
+Not here: the loops (`simrail.estimators.trajectory.kernel_filter`), and the noise
+(`simrail.estimators.trajectory.noise`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from simrail.estimators.attitude.compensation import design_frame, track_motion
 from simrail.estimators.attitude.rest_bias import rest_bias
-from simrail.estimators.trajectory.kernel_equations import STATES
+from simrail.estimators.trajectory.kernel_equations import BLOCKS, STATES
 from simrail.estimators.trajectory.noise import Hyperparameters
 
 from simrail.core.columns import ACCEL, GYRO
@@ -31,8 +31,29 @@ from simrail.track.frame import TrackFrame
 
 
 class Model(NamedTuple):
-    """What the filter takes, in its order; shapes as in
-    `simrail.estimators.trajectory.kernel_filter.trajectory_filter`.
+    """What the filter takes of a ride of n samples.
+
+    Attributes
+    ----------
+    signals : ndarray (n, 6)
+        Angular rate less its bias, rad/s, and specific force, m/s2, body axes.
+    track : ndarray (n, 15)
+        `simrail.estimators.trajectory.kernel_equations.TERMS`.
+    slips : ndarray (n, 3) or (0, 3)
+        See `simrail.estimators.trajectory.kernel_equations.linearise`; of no rows for the corrected
+        equations.
+    kinds : ndarray of int (n,)
+        Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
+    process : ndarray (c, 21)
+        Upper triangles of the five blocks of Q, row by row.
+    noise : ndarray (c, 8)
+        Variances U of the measurements.
+    virtual : ndarray (2,)
+        Virtual positions y and z, m.
+    start, start_variance : ndarray (12,)
+        State before the first update, and its variances.
+    step_s, gravity : float
+        Sample interval, s, and gravity, m/s2.
     """
 
     signals: FloatArray
@@ -46,30 +67,6 @@ class Model(NamedTuple):
     start_variance: FloatArray
     step_s: float
     gravity: float
-
-
-class Found(NamedTuple):
-    """What a backend finds; n samples.
-
-    Attributes
-    ----------
-    states : ndarray (n, 12)
-        Smoothed or filtered.
-    covariance : ndarray (n, 78) or (0, 78)
-        Upper triangles of their covariances, row by row; of no rows if not wanted.
-    innovations : ndarray (n, 7)
-        Measured minus predicted rates and forces, and their normalised innovation squared.
-    log_likelihood : float
-        Of all measurements, the virtual ones among them.
-    errors : ndarray (m, n, 3), optional
-        Draws of truth minus smoothed roll, y and z (`simrail.estimators.trajectory.draws`).
-    """
-
-    states: FloatArray
-    covariance: FloatArray
-    innovations: FloatArray
-    log_likelihood: float
-    errors: FloatArray | None = None
 
 
 def transition(step_s: float) -> FloatArray:
@@ -225,18 +222,17 @@ def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) ->
 
 
 def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
-    """See `simrail.estimators.trajectory.kernel_equations.misprint`."""
+    """Paper 001's misprints, (n, 3); see `simrail.estimators.trajectory.kernel_equations.linearise`."""
     _, v, h = frame.rates.T
     return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
 
 
 def dense_process(process: FloatArray) -> FloatArray:
-    """Q (12, 12) of the upper triangles of its blocks."""
-    blocks, at = [], 0
-    for size in (2, 2, 2, 3, 3):
-        block = np.zeros((size, size))
-        count = size * (size + 1) // 2
-        block[np.triu_indices(size)] = process[at : at + count]
-        blocks.append(block + np.triu(block, 1).T)
+    """Q (12, 12) of the upper triangles (21,) of its blocks."""
+    q, at = np.zeros((STATES, STATES)), 0
+    for first, end in BLOCKS:
+        upper = np.triu_indices(end - first)
+        block, count = q[first:end, first:end], len(upper[0])
+        block[upper] = block.T[upper] = process[at : at + count]
         at += count
-    return np.asarray(block_diag(*blocks))
+    return q

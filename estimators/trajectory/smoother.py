@@ -24,17 +24,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
 from simrail.estimators.trajectory.kernel_back import trajectory_back
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES
-from simrail.estimators.trajectory.kernel_filter import PACKED, trajectory_filter
-from simrail.estimators.trajectory.model import Found, Model, model_of
+from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
+from simrail.estimators.trajectory.kernel_filter import room_for_filtered, room_for_past, trajectory_filter
+from simrail.estimators.trajectory.model import Model, model_of
 from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.trajectory.reference import filterpy_backend
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 from simrail.estimators.tuning.file import Tuning
 
@@ -51,6 +50,31 @@ from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.estimation.tunable import Tunable
 from simrail.recording.recording import Recording
+
+
+class Trajectory(NamedTuple):
+    """All that is estimated of n samples.
+
+    Attributes
+    ----------
+    states : ndarray (n, 12)
+        Smoothed or filtered.
+    covariance : ndarray (n, 78) or (0, 78)
+        Upper triangles of their covariances, row by row; of no rows if not wanted.
+    innovations : ndarray (n, 7)
+        Measured minus predicted rates and forces, and their normalised innovation squared.
+    log_likelihood : float
+        Of all measurements, the virtual ones among them.
+    errors : ndarray (m, n, 3), optional
+        Draws of truth minus smoothed roll, y and z (`simrail.estimators.trajectory.draws`).
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    innovations: FloatArray
+    log_likelihood: float
+    errors: FloatArray | None = None
+
 
 OUTPUT = (0, 2, 4, 6, 9)
 """States of the estimate among the twelve: roll, pitch, yaw, y, z."""
@@ -96,8 +120,6 @@ class TrajectorySmoother:
         more, g roll^2/2 would else pass for a motion along Z.
     printed : bool
         The equations as paper 001 prints them (EQUATIONS 1.3), to show what it costs.
-    backend : str
-        ``"compiled"``, or ``"filterpy"``: slow, readable, the reference.
     with_covariance : bool
         False leaves out covariances and standard deviations, which take more than half of the time.
     sensor_bias : bool
@@ -110,8 +132,8 @@ class TrajectorySmoother:
         False makes the geometry without a rail sensor, though the recording has one: to show what it gives.
     draws : int
         How often to draw what the rails may be from the posterior (`simrail.estimators.trajectory.draws`):
-        their standard deviation in a band of wavelengths follows from that alone. 0 for none; only smoothed,
-        with the compiled backend and a geometry.
+        their standard deviation in a band of wavelengths follows from that alone. 0 for none; only smoothed
+        and with a geometry.
     start_sd_rad, start_yaw_sd_rad : float
         Standard deviation of roll and pitch, and of yaw, about the design track's at the start.
     """
@@ -124,7 +146,6 @@ class TrajectorySmoother:
     second_order: bool = True
     passes: int = 1
     printed: bool = False
-    backend: str = "compiled"
     with_covariance: bool = True
     sensor_bias: bool = True
     geometry_step_m: float = 0.25
@@ -134,10 +155,6 @@ class TrajectorySmoother:
     start_yaw_sd_rad: float = math.radians(0.3)
 
     def __post_init__(self) -> None:
-        if self.backend not in BACKENDS:
-            raise InputError(
-                "no such backend", field="backend", value=self.backend, limit="one of " + ", ".join(BACKENDS)
-            )
         for name, kinds in (
             ("hyperparameters", Hyperparameters),
             ("curve_hyperparameters", Hyperparameters | None),
@@ -173,12 +190,12 @@ class TrajectorySmoother:
             raise InputError(
                 "is no number of draws", field="draws", value=self.draws, limit=f"0 to {MOST_DRAWS}"
             )
-        if self.draws and not (self.smoothed and self.backend == "compiled" and self.geometry_step_m):
+        if self.draws and not (self.smoothed and self.geometry_step_m):
             raise InputError(
                 "cannot be",
                 field="draws",
                 value=self.draws,
-                limit="0 unless smoothed, with the compiled backend and a geometry",
+                limit="0 unless smoothed and with a geometry",
             )
         given = self.hyperparameters != Hyperparameters() or self.curve_hyperparameters is not None
         if self.tuning is not None and given:
@@ -223,13 +240,13 @@ class TrajectorySmoother:
 
     def _trajectory(self, recording: Recording) -> tuple[Estimate, FloatArray | None]:
         """Without the geometry; the trace is let go before that is made, since it is large."""
-        found = self.trace(recording)
+        trace = self.trace(recording)
         index = recording.imu.index
         names = [*ATTITUDE, *RELATIVE_POSITION]
-        columns = [found.states[:, list(OUTPUT)]]
+        columns = [trace.states[:, list(OUTPUT)]]
         covariance = None
         if self.with_covariance:
-            covariance = block(found.covariance, OUTPUT)
+            covariance = block(trace.covariance, OUTPUT)
             # Uniform within their bounds.
             covariance[:, [0, 1], [0, 1]] += sum(bound**2 for bound in self._tilts(recording)) / 3.0
             columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
@@ -237,21 +254,21 @@ class TrajectorySmoother:
         estimate = Estimate(
             states=pd.DataFrame(np.hstack(columns), index=index, columns=names),
             mount=recording.mount,
-            innovations=pd.DataFrame(found.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
+            innovations=pd.DataFrame(trace.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
             covariance=covariance,
             covariance_of=(*ATTITUDE, *RELATIVE_POSITION) if self.with_covariance else (),
         )
-        return estimate, found.errors
+        return estimate, trace.errors
 
-    def trace(self, recording: Recording) -> Found:
+    def trace(self, recording: Recording) -> Trajectory:
         """All twelve states with their covariances, the innovations, and the log-likelihood."""
-        run, around = BACKENDS[self.backend], None
+        around = None
         for _ in range(self.passes - 1):
             model = self.model(recording, around=around)
-            around = run(model, smoothed=True, with_covariance=False).states
+            around = run_model(model, smoothed=True, with_covariance=False).states
         model = self.model(recording, around=around)
         streams = [stream_of(recording, draw, "trajectory") for draw in range(self.draws)]
-        return run(model, smoothed=self.smoothed, with_covariance=self.with_covariance, streams=streams)
+        return run_model(model, smoothed=self.smoothed, with_covariance=self.with_covariance, streams=streams)
 
     def log_likelihood(self, recording: Recording) -> float:
         """Log-likelihood of the recording by prediction-error decomposition."""
@@ -264,7 +281,7 @@ class TrajectorySmoother:
         return tunables_of_smoother(self, settings)
 
     def model(self, recording: Recording, *, around: FloatArray | None = None) -> Model:
-        """What the backends take of a recording; `around` is the states (n, 12) of a pass before."""
+        """What the kernels take of a recording; `around` is the states (n, 12) of a pass before."""
         rates, place = [START_RATE_SD] * 3, START_PLACE_SD
         angles = [self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad]
         pairs = [sd for pair in zip(angles, rates, strict=True) for sd in pair]
@@ -290,32 +307,29 @@ def block(packed: FloatArray, states: tuple[int, ...]) -> FloatArray:
 
 def log_likelihood(model: Model) -> float:
     """Log-likelihood alone: nothing is kept."""
-    none = np.empty((0, STATES)), np.empty((0, PACKED))
-    updates = np.empty((0, ROWS, STATES)), np.empty((0, ROWS, 2))
-    return trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), np.empty(0))
+    return trajectory_filter(model, room_for_past(0), room_for_filtered())
 
 
-def compiled_backend(
+def likelihoods(model: Model) -> FloatArray:
+    """Log-likelihood (n,) of each sample given those before it."""
+    out = room_for_filtered(likelihoods=len(model.signals))
+    trajectory_filter(model, room_for_past(0), out)
+    return out.likelihoods
+
+
+def run_model(
     model: Model, *, smoothed: bool, with_covariance: bool, streams: Sequence[np.random.Generator] = ()
-) -> Found:
+) -> Trajectory:
     """Filter and smoother by the kernels; one draw of the smoother's error for each of the streams."""
     n = len(model.signals)
-    none = np.empty((0, STATES)), np.empty((0, PACKED))
-    kept = np.empty((n, STATES)), np.empty((n, PACKED))
-    m = n if smoothed else 0
-    updates = np.empty((m, ROWS, STATES)), np.empty((m, ROWS, 2))
-    innovations = np.empty((n, 7))
-    before, after = (kept, none) if smoothed else (none, kept)
-    likelihood = trajectory_filter(*model, *before, *updates, *after, innovations, np.empty(0))
-    errors = None
+    past = room_for_past(n if smoothed else 0)
+    out = room_for_filtered(states=0 if smoothed else n, innovations=n)
+    likelihood, errors = trajectory_filter(model, past, out), None
+    if smoothed and streams:
+        errors = state_errors(model, past, streams)
     if smoothed:
-        if streams:
-            errors = state_errors(model, *updates, *kept, streams)
-        trajectory_back(
-            model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance
-        )
-    return Found(kept[0], kept[1] if with_covariance else none[1], innovations, likelihood, errors)
-
-
-BACKENDS = {"compiled": compiled_backend, "filterpy": filterpy_backend}
-"""Who can run it, by name."""
+        trajectory_back(model, past, with_covariance)
+    states, covariance = past[:2] if smoothed else out[:2]
+    return Trajectory(
+        states, covariance if with_covariance else covariance[:0], out.innovations, likelihood, errors
+    )

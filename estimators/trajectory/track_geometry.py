@@ -197,18 +197,18 @@ def _covariance(estimate: Estimate) -> FloatArray | None:
     names = ("roll_rad", *RELATIVE_POSITION)
     if estimate.covariance is not None and set(names) <= set(estimate.covariance_of):
         at = [estimate.covariance_of.index(name) for name in names]
-        return estimate.covariance[:, at][:, :, at]
+        return np.asarray(estimate.covariance[:, at][:, :, at])
     sds = ("roll_sd_rad", "lateral_sd_m", "vertical_sd_m")
     if not set(sds) <= set(estimate.states.columns):
         return None
     squares = np.square(estimate.states[list(sds)].to_numpy(dtype=np.float64))
-    return squares[:, :, None] * np.eye(3)
+    return np.asarray(squares[:, :, None] * np.eye(3))
 
 
 def _variance(arms: FloatArray, covariance: FloatArray) -> FloatArray:
     """Variance (n, 4) of the irregularities."""
     slope = slopes(arms)
-    return np.einsum("nij,njk,nik->ni", slope, covariance, slope)
+    return np.asarray(np.einsum("nij,njk,nik->ni", slope, covariance, slope))
 
 
 def slopes(arms: FloatArray) -> FloatArray:
@@ -233,4 +233,4 @@ def displaced(position: FloatArray, lines: FloatArray, sd: FloatArray) -> FloatA
     roots, weights = np.polynomial.hermite_e.hermegauss(5)
     between = CubicSpline(position, lines)
     moved = [between(np.clip(position + root * sd, position[0], position[-1])) for root in roots]
-    return np.einsum("k,knm->nm", weights / weights.sum(), np.square(np.array(moved) - lines))
+    return np.asarray(np.einsum("k,knm->nm", weights / weights.sum(), np.square(np.array(moved) - lines)))

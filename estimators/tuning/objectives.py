@@ -23,11 +23,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES
-from simrail.estimators.trajectory.kernel_filter import PACKED, trajectory_filter
 from simrail.estimators.trajectory.model import Model, kinds_of, with_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.trajectory.smoother import OUTPUT, TrajectorySmoother, compiled_backend
+from simrail.estimators.trajectory.smoother import OUTPUT, TrajectorySmoother, likelihoods, run_model
 from simrail.estimators.trajectory.track_geometry import track_geometry
 from simrail.estimators.tuning.space import SearchSpace
 
@@ -81,15 +79,6 @@ class Likelihood:
         return sum(int(counts.sum()) for counts in self.counts)
 
 
-def likelihoods(model: Model) -> FloatArray:
-    """Log-likelihood (n,) of each sample given those before it."""
-    none = np.empty((0, STATES)), np.empty((0, PACKED))
-    updates = np.empty((0, ROWS, STATES)), np.empty((0, ROWS, 2))
-    each = np.empty(len(model.signals))
-    trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), each)
-    return each
-
-
 @dataclass(frozen=True)
 class KnownOutput:
     """Sum of the RMS errors of alignment, vertical profile and cross-level, mm: what KOM minimises (Eq. 18).
@@ -132,7 +121,7 @@ class KnownOutput:
         self, recording: Recording, model: Model, reference: pd.DataFrame, parameters: Hyperparameters
     ) -> FloatArray:
         """Estimate less reference at the places that count, (p, 3)."""
-        trace = compiled_backend(with_noise(model, parameters), smoothed=True, with_covariance=False)
+        trace = run_model(with_noise(model, parameters), smoothed=True, with_covariance=False)
         names = [*ATTITUDE, *RELATIVE_POSITION]
         states = pd.DataFrame(trace.states[:, list(OUTPUT)], index=recording.imu.index, columns=names)
         if not np.isfinite(trace.states).all():

@@ -81,6 +81,16 @@ def njit_inner(function: _Function) -> _Function:
     return cast("_Function", numba.njit(**_INNER)(function))
 
 
+def njit_inline(function: _Function) -> _Function:
+    """`njit_borrowed` for a function that the compiler puts in the place of its call.
+
+    LLVM leaves most calls as they are. Where the arrays' shapes are known in the caller, the loops become
+    straight lines there: the update of the trajectory filter takes 0.45 in place of 0.68 us for a sample.
+    Only where that is measured: putting everything in place makes the same filter slower (0.51 us).
+    """
+    return cast("_Function", numba.njit(forceinline=True, **_BORROWED)(function))
+
+
 class _Announcer(event.Listener):
     """Says on stderr, once per module, that its kernels are being compiled; one in the cache is not."""
 

@@ -115,6 +115,12 @@ def option_files(estimator: Estimator) -> dict[str, str]:
     return {name: repr(value) for name, value in values.items() if hasattr(value, "from_file")}
 
 
+REMOVED = {
+    "backend": "remove it: kernels alone run; their filterpy twins are in the tests (tests/estimators/twins)"
+}
+"""Options that estimators once had, and what to do about each in a scenario of that time."""
+
+
 def construct(
     known_class: type[Estimator], options: dict[str, Any], *, folder: Path | None = None
 ) -> Estimator:
@@ -139,7 +145,7 @@ def construct(
                 field=name,
                 value=value,
                 limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
-                remedy=f"did you mean {near[0]}?" if near else "remove it",
+                remedy=REMOVED.get(name) or (f"did you mean {near[0]}?" if near else "remove it"),
             )
         values[name] = _option(types.get(name, Any), name, value, folder)
     try:

@@ -401,6 +401,17 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
             "did you mean compensated?",
         ],
     ),
+    "an option that went": (
+        "compensated = true",
+        'backend = "filterpy"',
+        [
+            "estimator[0].options.backend",
+            "no such option",
+            "'filterpy'",
+            "one of accel_sd_mps2",
+            "remove it: kernels alone run; their filterpy twins are in the tests",
+        ],
+    ),
     "an option of the wrong type": (
         "compensated = true",
         'compensated = "yes"',

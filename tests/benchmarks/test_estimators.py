@@ -17,16 +17,16 @@ import imufusion
 import numpy as np
 import pytest
 from simrail.estimators.attitude.compensation import gravity_force, track_acceleration
-from simrail.estimators.attitude.ekf import BACKENDS, AttitudeEkf
+from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
-from simrail.estimators.attitude.kernel import attitude_gda
+from simrail.estimators.attitude.kernel import attitude_ekf, attitude_gda
 from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
 from simrail.estimators.trajectory.kernel_back import trajectory_back
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES
-from simrail.estimators.trajectory.kernel_filter import PACKED, trajectory_filter
+from simrail.estimators.trajectory.kernel_filter import room_for_filtered, room_for_past, trajectory_filter
 from simrail.estimators.trajectory.model import Model
-from simrail.estimators.trajectory.reference import filterpy_backend
-from simrail.estimators.trajectory.smoother import TrajectorySmoother, compiled_backend, log_likelihood
+from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likelihood, run_model
+from twins.attitude import filterpy_ekf
+from twins.trajectory import filterpy_smoother
 from vqf import VQF
 
 from simrail.estimation.choose_odometry import with_odometry
@@ -65,7 +65,7 @@ def ride() -> Recording:
 
 @lru_cache
 def ekf_arguments(n: int | None = None) -> tuple:
-    """What both backends of the EKF take, outputs included."""
+    """What kernel and twin of the EKF take, outputs included."""
     arrays, _ = AttitudeEkf()._arrays(ride())
     rate, force, process, noise, *rest = arrays
     rows = len(rate[:n])
@@ -105,7 +105,7 @@ def report(benchmark: Callable, function: Callable[[], object], samples: int, **
 
 def filterpy_us() -> float:
     arguments = ekf_arguments(SLOW)
-    return best_us(lambda: BACKENDS["filterpy"](*arguments), SLOW, rounds=2)
+    return best_us(lambda: filterpy_ekf(*arguments), SLOW, rounds=2)
 
 
 def vqf_us() -> float:
@@ -141,10 +141,9 @@ def gda_arguments() -> tuple:
 
 def test_ekf_kernel(benchmark: Callable) -> None:
     arguments = ekf_arguments()
-    kernel = BACKENDS["compiled"]
     us = report(
         benchmark,
-        lambda: kernel(*arguments),
+        lambda: attitude_ekf(*arguments),
         len(arguments[0]),
         ratio_to_filterpy=filterpy_us(),
         ratio_to_vqf=vqf_us(),
@@ -190,15 +189,11 @@ def trajectory_model() -> Model:
 def run_trajectory(model: Model, *, with_covariance: bool) -> Callable[[], None]:
     """Filter and smoother on arrays that are there, as for the other kernels."""
     n = len(model.signals)
-    none = np.empty((0, STATES)), np.empty((0, PACKED))
-    kept = np.empty((n, STATES)), np.empty((n, PACKED))
-    updates, innovations = (np.empty((n, ROWS, STATES)), np.empty((n, ROWS, 2))), np.empty((n, 7))
+    past, out = room_for_past(n), room_for_filtered(innovations=n)
 
     def run() -> None:
-        trajectory_filter(*model, *kept, *updates, *none, innovations, np.empty(0))
-        trajectory_back(
-            model.track, model.slips, model.step_s, model.gravity, *updates, *kept, with_covariance
-        )
+        trajectory_filter(model, past, out)
+        trajectory_back(model, past, with_covariance)
 
     return run
 
@@ -207,7 +202,7 @@ def run_trajectory(model: Model, *, with_covariance: bool) -> Callable[[], None]
 def trajectory_filterpy_us(smoothed: bool) -> float:
     model = trajectory_model()
     few = model._replace(signals=model.signals[:SLOW])
-    run = lambda: filterpy_backend(few, smoothed=smoothed, with_covariance=smoothed)  # noqa: E731
+    run = lambda: filterpy_smoother(few, smoothed=smoothed, with_covariance=smoothed)  # noqa: E731
     return best_us(run, SLOW, rounds=3)
 
 
@@ -258,7 +253,7 @@ def test_trajectory_time_is_linear_in_the_ride() -> None:
         kinds=np.tile(model.kinds, 4),
     )
     times = [
-        best_us(lambda m=m: compiled_backend(m, smoothed=True, with_covariance=True), len(m.signals))
+        best_us(lambda m=m: run_model(m, smoothed=True, with_covariance=True), len(m.signals))
         for m in (model, long)
     ]
     assert times[1] < 1.5 * times[0]

@@ -7,19 +7,21 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from simrail.estimators.kalman import smooth
+from simrail.estimators.kalman import fixed_interval, room_for_history
 from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, line_table
 from simrail.estimators.odometry.kernel import (
     DRIFT,
     LAG,
     LEAD,
-    MODEL,
     STATES,
     SWAY,
     TREAD,
+    UPDATES,
     WAY,
     YAW,
+    LineModel,
     S,
+    Steps,
     V,
     curve_matched,
     line_at,
@@ -271,14 +273,6 @@ def test_bad_options_and_missing_encoder_are_named():
         CurveMatchedOdometry().estimate(replace(recording, encoder=None, encoder_sheet=None))
 
 
-def model_array() -> np.ndarray:
-    model = np.full(len(MODEL), 1e-6)
-    values = {"pulse_m": 1.8e-3, "tread_length_m": 40.0, "sway_length_m": 4.0, "gate": 7.0, "still_s": 0.5}
-    for name, value in values.items():
-        model[MODEL.index(name)] = value
-    return model
-
-
 def test_transition_is_the_derivative_of_the_step():
     """F against central differences of the state after a step, in a curve, at speed."""
     x = np.array([470.0, 15.0, 460.0, 0.01, 1e-3, -0.7, 0.02, 0.1, 0.8, 0.3, 5e-4, 1e-3, 1.5])
@@ -287,7 +281,8 @@ def test_transition_is_the_derivative_of_the_step():
     table[:, 3] = 1e-4 * np.arange(200)  # a vertical curve
     here = np.array([-0.4, -0.004, 0.05, 0.01, 0.0])
     signal = np.array([0.01, -0.06, 0.9])
-    model = model_array()
+    model = LineModel(*[1e-6] * len(LineModel._fields))
+    model = model._replace(pulse_m=1.8e-3, tread_length_m=40.0, sway_length_m=4.0, gate=7.0, still_s=0.5)
 
     def step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         x, f, lean = x.copy(), np.zeros((STATES, STATES)), np.zeros(5)
@@ -324,15 +319,15 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     x[YAW] = np.interp(x[S], grid[0] + np.arange(len(table)) / grid[1], table[:, 0])
     p[V, V] = 0.1
     n = STATES
-    out = [np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), np.empty((steps, 2))]
-    kept = [np.empty((steps, *shape)) for shape in ((n,), (n, n), (n, n), (3, n), (3, n), (6,))]
+    out = Steps(np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), np.empty((steps, 2)))
+    past = room_for_history(steps, n, UPDATES)
     curve_matched(
         0.02, imu[:, 1:4].copy(), counts[read], method._model(recording, pulse), 9.81,
-        grid, table, x, p, *out, *kept,
+        grid, table, x, p, out, past,
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
-    smooth(*kept, smoothed, covariance)
-    return (*out[:2], *kept[:3], smoothed, covariance)
+    fixed_interval(past, smoothed, covariance)
+    return (*out[:2], *past[:3], smoothed, covariance)
 
 
 def test_smoother_equals_rauch_tung_striebel():

@@ -14,10 +14,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import sympy as sp
-from simrail.estimators.trajectory.kernel_back import jacobian_rows
-from simrail.estimators.trajectory.kernel_equations import TERMS, measured, misprint
+from simrail.estimators.trajectory.kernel_equations import TERMS, constant_rows, linearise
 from simrail.estimators.trajectory.model import beyond_first_order, jacobian_slips, track_terms
-from simrail.estimators.trajectory.reference import measured as measured_by_vectors
+from twins.trajectory import measured as measured_by_vectors
 
 t, s, g, small = sp.symbols("t s g small", real=True)
 STATE = sp.symbols("roll roll_rate pitch pitch_rate yaw yaw_rate y yd ydd z zd zdd", real=True)
@@ -65,13 +64,12 @@ def derived() -> tuple[sp.Matrix, sp.Matrix]:
 
 def kernel_in_symbols() -> tuple[sp.Matrix, sp.Matrix]:
     x, track = np.array(STATE, dtype=object), np.array([TRACK], dtype=object)
-    value, j = np.zeros(6, dtype=object), np.zeros((3, 8), dtype=object)
-    measured.py_func(x, track, 0, g, value, j)
-    rows = np.zeros((8, 16), dtype=object)
-    rows[0, 1] = rows[1, 3] = rows[2, 5] = rows[6, 6] = rows[7, 9] = 1
-    jacobian_rows.py_func(x, j, rows)
+    value, rows = np.zeros(8, dtype=object), np.zeros((8, 16), dtype=object)
+    constant_rows.py_func(rows)
+    rows[rows == 1.0] = 1  # sympy tells a float from an integer
+    linearise.py_func(x, track, np.empty((0, 3)), 0, g, value, rows)
     assert not rows[:, 12:].any()
-    return sp.Matrix([*value, x[6], x[9]]), sp.Matrix(rows[:, :12])
+    return sp.Matrix(value), sp.Matrix(rows[:, :12])
 
 
 def test_kernel_measures_what_is_derived_exactly() -> None:
@@ -89,12 +87,13 @@ def somewhere() -> tuple[np.ndarray, np.ndarray]:
     return 0.3 * rng.standard_normal(12), rng.standard_normal(15)
 
 
-def kernel_at(x: np.ndarray, track: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    value, j, rows = np.zeros(6), np.zeros((3, 8)), np.zeros((8, 16))
-    rows[0, 1] = rows[1, 3] = rows[2, 5] = rows[6, 6] = rows[7, 9] = 1.0
-    measured(x, track[None], 0, 9.81, value, j)
-    jacobian_rows(x, j, rows)
-    return np.array([*value, x[6], x[9]]), rows[:, :12]
+def kernel_at(
+    x: np.ndarray, track: np.ndarray, slips: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    value, rows = np.zeros(8), np.zeros((8, 16))
+    constant_rows(rows)
+    linearise(x, track[None], np.empty((0, 3)) if slips is None else slips[None], 0, 9.81, value, rows)
+    return value, rows[:, :12]
 
 
 def test_jacobian_equals_finite_differences(somewhere: tuple[np.ndarray, np.ndarray]) -> None:
@@ -228,12 +227,9 @@ def test_printed_is_what_paper_001_prints(somewhere: tuple[np.ndarray, np.ndarra
     for k in range(len(TIMES)):
         at = (speed[k], push[k], *frame().rates[k], frame().second[k, 2], 9.81)
         value, jacobian = function(x, terms[k, :3], at)
-        j, ours, rows = np.zeros((3, 8)), np.zeros(6), np.zeros((8, 16))
-        measured(x, terms, k, 9.81, ours, j)
-        misprint(x, terms, slips, k, j)
-        jacobian_rows(x, j, rows)
-        np.testing.assert_allclose(ours[3:], value.ravel(), rtol=0, atol=1e-12)
-        np.testing.assert_allclose(rows[3:6, :12], jacobian, rtol=0, atol=1e-12)
+        ours, rows = kernel_at(x, terms[k], slips[k])
+        np.testing.assert_allclose(ours[3:6], value.ravel(), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rows[3:6], jacobian, rtol=0, atol=1e-12)
         _, by_vectors = measured_by_vectors(x, terms[k], 9.81, slips[k])
         np.testing.assert_allclose(by_vectors[3:6], jacobian, rtol=0, atol=1e-12)
         _, right = kernel_at(x, track_terms(recording(), frame())[k])

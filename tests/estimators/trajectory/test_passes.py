@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import twins.trajectory
 from simrail.estimators.trajectory.model import beyond_first_order
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
@@ -75,11 +76,11 @@ def test_first_order_takes_a_roll_for_a_motion_along_z(rolling: tuple[Recording,
     assert np.abs(third - twice).max() < 1e-3 * amplitude
 
 
-def test_both_backends_pass_alike(rolling: tuple[Recording, pd.DataFrame]) -> None:
+def test_passes_equal_filterpys(rolling: tuple[Recording, pd.DataFrame]) -> None:
     recording = rolling[0]
     short = replace(recording, imu=recording.imu.iloc[:1000], odometry=recording.odometry.iloc[:1000])
     ours = TrajectorySmoother(hyperparameters=QUIET, passes=2)
-    compiled, readable = ours.trace(short), replace(ours, backend="filterpy").trace(short)
+    compiled, readable = ours.trace(short), twins.trajectory.trace(ours, short)
     np.testing.assert_allclose(compiled.states, readable.states, rtol=0, atol=1e-7)
     assert not np.allclose(compiled.states, replace(ours, passes=1).trace(short).states, rtol=0, atol=1e-6)
 

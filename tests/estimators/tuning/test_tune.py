@@ -22,7 +22,6 @@ from scipy.stats import chi2
 from simrail.estimators.trajectory.kernel_equations import STATES, TERMS
 from simrail.estimators.trajectory.model import Model, kinds_of, packed_process, process_noise, transition
 from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.trajectory.reference import measured
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning import tune as generic
 from simrail.estimators.tuning.cube import Cube
@@ -31,6 +30,7 @@ from simrail.estimators.tuning.identify import CONSTRAINT, FLAT, HELD, IDENTIFIE
 from simrail.estimators.tuning.objectives import Likelihood, SmootherTuning, likelihoods
 from simrail.estimators.tuning.search import least
 from simrail.estimators.tuning.space import NAMES, SearchSpace
+from twins.trajectory import measured
 
 from simrail.core.errors import InputError
 from simrail.core.seeds import stream
@@ -163,9 +163,9 @@ def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytes
     def spoilt(model: Model) -> np.ndarray:
         right = likelihoods(model)
         # Of each sample, sum of e^2/s over the IMU's rows; those of the virtual positions are negligible.
-        from simrail.estimators.trajectory.smoother import compiled_backend
+        from simrail.estimators.trajectory.smoother import run_model
 
-        nis = compiled_backend(model, smoothed=False, with_covariance=False).innovations[:, 6]
+        nis = run_model(model, smoothed=False, with_covariance=False).innovations[:, 6]
         return {"no_log": -0.5 * nis, "sign": -right, "no_rows": 0.0 * right}[fault]
 
     monkeypatch.setattr(simrail.estimators.tuning.objectives, "likelihoods", spoilt)

@@ -7,15 +7,15 @@ covariance as a whole matrix.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, rts_smoother
-from simrail.estimators.trajectory.kernel_equations import STATES
-from simrail.estimators.trajectory.kernel_filter import PACKED
-from simrail.estimators.trajectory.model import Found, Model, dense_process, transition
+from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
+from simrail.estimators.trajectory.model import Model, dense_process, transition
+from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother
 
 from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
 
 
 def _cross(a: FloatArray) -> FloatArray:
@@ -62,13 +62,8 @@ def measured(
     return value, j
 
 
-def filterpy_backend(
-    model: Model, *, smoothed: bool, with_covariance: bool, streams: Sequence[np.random.Generator] = ()
-) -> Found:
-    """The same estimate by filterpy: block update in Joseph's form, and the Rauch-Tung-Striebel smoother.
-
-    It makes no draws, and is given no streams.
-    """
+def filterpy_smoother(model: Model, *, smoothed: bool, with_covariance: bool) -> Trajectory:
+    """The same estimate by filterpy: block update in Joseph's form, and the Rauch-Tung-Striebel smoother."""
     n = len(model.signals)
     f = transition(model.step_s)
     upper = np.triu_indices(STATES)
@@ -95,4 +90,14 @@ def filterpy_backend(
         steps = [noises[kind][0] for kind in model.kinds[1:n]]
         states, covariances, _, _ = rts_smoother(states, covariances, [f] * n, [*steps, steps[-1]])
     packed = covariances[:, *upper] if with_covariance else np.empty((0, PACKED))
-    return Found(states, packed, innovations, float(likelihood))
+    return Trajectory(states, packed, innovations, float(likelihood))
+
+
+def trace(smoother: TrajectorySmoother, recording: Recording) -> Trajectory:
+    """`TrajectorySmoother.trace` by filterpy, pass by pass."""
+    around = None
+    for _ in range(smoother.passes - 1):
+        model = smoother.model(recording, around=around)
+        around = filterpy_smoother(model, smoothed=True, with_covariance=False).states
+    model = smoother.model(recording, around=around)
+    return filterpy_smoother(model, smoothed=smoother.smoothed, with_covariance=smoother.with_covariance)

@@ -1,0 +1,79 @@
+"""The filters by filterpy beside their kernels, on twelve seconds of a ride: what to read first, run.
+
+    python tests/estimators/twins
+
+filterpy's filters are a few lines of matrices: `attitude.py` and `trajectory.py` here. The kernels make the
+same numbers; this prints how far apart they are, and the time that each takes for a sample.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from attitude import filterpy_ekf
+from simrail.estimators.attitude.ekf import AttitudeEkf
+from simrail.estimators.attitude.kernel import attitude_ekf
+from simrail.estimators.trajectory.smoother import TrajectorySmoother
+from trajectory import trace
+
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import kinematic_truth
+from simrail.ride.truth import Mount
+from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.measure import measure
+from simrail.track.file import track_by_name
+from simrail.vehicle.speed_profile import SpeedProfile
+
+SAMPLES = 3000
+
+
+def ride() -> Recording:
+    """The first samples of a train that leaves, as a small IMU and an encoder record it."""
+    recording = measure(
+        kinematic_truth(track_by_name("condequinto_olivar"), SpeedProfile(10.0, 100.0, 10.0, rest_s=4.0)),
+        name="lesson",
+        mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("wheel"),
+        seed=1,
+        draw=0,
+    )
+    few = slice(0, SAMPLES)
+    return replace(recording, imu=recording.imu.iloc[few], odometry=recording.odometry.iloc[few])
+
+
+def beside(name: str, ours: Callable[[], FloatArray], theirs: Callable[[], FloatArray]) -> None:
+    """Print the largest difference of the states, and microseconds per sample."""
+    ours()  # compiles
+    states, us = [], []
+    for run in (ours, theirs):
+        start = time.perf_counter()
+        states.append(run())
+        us.append(1e6 * (time.perf_counter() - start) / SAMPLES)
+    apart = np.abs(states[0] - states[1]).max()
+    print(f"{name:20s} apart by {apart:.1e}; kernel {us[0]:.2f} us, filterpy {us[1]:.0f} us per sample")
+
+
+def main() -> None:
+    """Run each of them both ways."""
+    recording = ride()
+    arrays, _ = AttitudeEkf()._arrays(recording)
+
+    def attitude(run: Callable[..., None]) -> FloatArray:
+        states, covariance = np.empty((SAMPLES, 3)), np.empty((SAMPLES, 3, 3))
+        run(*arrays, states, covariance, np.empty((SAMPLES, 4)))
+        return states
+
+    beside("attitude EKF", lambda: attitude(attitude_ekf), lambda: attitude(filterpy_ekf))
+    for name, smoothed in (("trajectory filter", False), ("trajectory smoother", True)):
+        method = TrajectorySmoother(smoothed=smoothed)
+        beside(name, lambda m=method: m.trace(recording).states, lambda m=method: trace(m, recording).states)
+
+
+if __name__ == "__main__":
+    main()
