@@ -142,15 +142,18 @@ def trajectory_error(
     innovations : ndarray (n, 8), work
     errors : ndarray (n, 12), out
     """
+    # Named once, before the loops, as in the filter.
+    track, slips, kinds, gravity = model.track, model.slips, model.kinds, model.gravity
+    states, covariance, gains, scaled = past
     e, lam, out, g = np.empty(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(ROWS)
     rows = np.zeros((ROWS, WIDTH))
     share = shares(model.step_s)
     constant_rows(rows)
     for i in range(STATES):
         e[i] = np.sqrt(model.start_variance[i]) * normals[0, i]
-    n = past.states.shape[0]
+    n = states.shape[0]
     for k in range(n):
-        kind = model.kinds[k]
+        kind = kinds[k]
         if k > 0:
             chain(e, INTO, ORIGIN, share)
             for first, end in BLOCKS:
@@ -158,19 +161,19 @@ def trajectory_error(
                     for c in range(first, i + 1):
                         e[i] += roots[kind, i, c] * normals[k, c]
         errors[k] = e
-        linearise(past.states[k], model.track, model.slips, k, model.gravity, g, rows)
+        linearise(states[k], track, slips, k, gravity, g, rows)
         for m in range(ROWS):
             v = noise_sd[kind, m] * normals[k, STATES + m]
             for i in range(STATES):
                 v += rows[m, i] * e[i]
             for i in range(STATES):
-                e[i] -= past.gains[k, m, i] * v
-            innovations[k, m] = v * past.scaled[k, m, 1]
+                e[i] -= gains[k, m, i] * v
+            innovations[k, m] = v * scaled[k, m, 1]
     for k in range(n - 1, -1, -1):
-        linearise(past.states[k], model.track, model.slips, k, model.gravity, g, rows)
+        linearise(states[k], track, slips, k, gravity, g, rows)
         for m in range(ROWS - 1, -1, -1):
-            withdraw(lam, rows[m], past.gains[k, m], innovations[k, m])
-        packed_product(past.covariance, k, lam, out)
+            withdraw(lam, rows[m], gains[k, m], innovations[k, m])
+        packed_product(covariance, k, lam, out)
         for i in range(STATES):
             errors[k, i] += out[i]
         chain_back(lam, INTO, ORIGIN, share)
