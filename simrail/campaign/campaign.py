@@ -49,7 +49,8 @@ _PACKAGES = ("numpy", "scipy", "pandas", "numba", "exudyn")
 
 def key_of(plan: Plan) -> str:
     """Hash of all that decides the scores of a plan: scenario, parts, estimators, code and versions."""
-    files = {inspect.getsourcefile(type(estimator)) for estimator in plan.estimators.values()}
+    methods = (*plan.estimators.values(), *plan.parts.odometries().values())
+    files = {inspect.getsourcefile(type(method)) for method in methods}
     decides = {
         "name": plan.scenario.name,
         "plan": plan.content_hash,

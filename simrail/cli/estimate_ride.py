@@ -67,9 +67,9 @@ def estimate_ride(
             remedy="choose another folder with --out",
         )
     with blame("--estimator", method):
-        known = class_named(method, None)
+        estimator_class = class_named(method, None)
     with blame("--set", method):
-        estimator = construct(known, override({}, settings))
+        estimator = construct(estimator_class, override({}, settings))
     recording = read_ride(ride)
     if recording.odometry is None and "odometry" in description_of(estimator).needs:
         raise InputError(

@@ -26,7 +26,7 @@ def export(
 
     from simrail.campaign.export import export as export_scenario
     from simrail.campaign.export import format_of
-    from simrail.cli.progress_bar import ProgressWatcher
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.scenario.scenario import load_scenario
 
     chosen, read = format_of(form), load_scenario(scenario, overrides=settings or [], seed=seed)

@@ -60,11 +60,13 @@ def motion_times(recording: Recording) -> FloatArray:
     """
     if recording.encoder is not None:
         moves = _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64))
-        return _times(recording.encoder)[moves]
+        moving: FloatArray = _times(recording.encoder)[moves]
+        return moving
     way = recording.odometer if recording.odometry is None else recording.odometry
     if way is None:
         return _times(recording.imu)
-    return _times(way)[np.abs(way["speed_mps"].to_numpy()) > STILL_MPS]
+    moving = _times(way)[np.abs(way["speed_mps"].to_numpy()) > STILL_MPS]
+    return moving
 
 
 def _times(frame: pd.DataFrame) -> FloatArray:

@@ -31,9 +31,7 @@ CHANNELS = ("lateral", "vertical", "roll", "pitch", "yaw")
 def harmonic(amplitude: float, *, frequency_hz: float, phase_rad: float = 0.0) -> Channel:
     """A channel that swings in time: amplitude * sin(2 pi f t + phase)."""
 
-    def channel(
-        t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def channel(t: FloatArray, *_: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         omega = 2.0 * np.pi * frequency_hz
         angle = omega * t + phase_rad
         swing = amplitude * np.sin(angle)
@@ -46,7 +44,7 @@ def along(function: Callable[[FloatArray, int], FloatArray]) -> Channel:
     """A channel that depends on the place: function(s, order) gives the order-th derivative by s."""
 
     def channel(
-        t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray
+        _t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         first, second = function(s, 1), function(s, 2)
         return function(s, 0), first * v, second * v**2 + first * a

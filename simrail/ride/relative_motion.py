@@ -14,7 +14,7 @@ import pandas as pd
 
 from simrail.core.columns import ACCEL, ATTITUDE, ODOMETRY, RELATIVE_POSITION, VELOCITY
 from simrail.core.jit import FloatArray
-from simrail.ride.truth import rotation_matrix
+from simrail.core.rotation import rotation_matrix
 from simrail.track.design import TrackDesign
 
 
@@ -85,8 +85,8 @@ def acceleration_terms(
     alpha = speed_rate[:, None] * frame.k + square[:, None] * frame.dk
 
     def turning(arm: FloatArray) -> FloatArray:
-        found: FloatArray = np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
-        return found
+        acceleration: FloatArray = np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+        return acceleration
 
     beside = motion[list(RELATIVE_POSITION)].to_numpy(dtype=np.float64)
     r = np.column_stack([np.zeros(len(beside)), beside])
@@ -104,5 +104,5 @@ def below(signal: FloatArray, *, frequency_hz: float, rate_hz: float) -> FloatAr
     """
     spectrum = np.fft.rfft(signal, axis=0)
     spectrum[np.fft.rfftfreq(len(signal), 1.0 / rate_hz) > frequency_hz] = 0.0
-    found: FloatArray = np.fft.irfft(spectrum, n=len(signal), axis=0)
-    return found
+    slow: FloatArray = np.fft.irfft(spectrum, n=len(signal), axis=0)
+    return slow

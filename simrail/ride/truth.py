@@ -212,7 +212,8 @@ class Truth:
 
 
 def _rotate(rotation: FloatArray, vectors: FloatArray) -> FloatArray:
-    return np.einsum("nij,nj->ni", rotation, vectors)
+    rotated: FloatArray = np.einsum("nij,nj->ni", rotation, vectors)
+    return rotated
 
 
 def _track_rotation(frame: TrackFrame) -> FloatArray:

@@ -32,11 +32,11 @@ from simrail.vehicle.model import (
     SeriesDamper,
     Suspension,
     Tabled,
+    Traction,
     VehicleModel,
     Wheel,
     WheelRail,
 )
-from simrail.vehicle.traction import Traction
 
 
 class VehicleFile(Part):

@@ -30,8 +30,9 @@ from simrail.track.elements import Straight
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
 from simrail.vehicle.contact.contact_tables import rest_drops_m
-from simrail.vehicle.engines.force_data import ForceData, pack, states_of
+from simrail.vehicle.engines.force_data import ForceData, memory_of, pack, states_of
 from simrail.vehicle.engines.forces import forces
+from simrail.vehicle.engines.records import DRIVE, POSE, WRENCH
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -135,31 +136,32 @@ class RunningVehicle:
         motion = state[6 * b : 12 * b].reshape(b, 6)
         turn = Rotation.from_rotvec(places[:, 3:]).as_matrix()
         rotation = turn if base is None else turn @ base
-        pose = np.empty((b, 18))
-        pose[:, :3] = self._nominal + places[:, :3]
-        pose[:, 3:6] = motion[:, :3]
-        pose[:, 3] += speed_mps
-        pose[:, 6:15] = rotation.reshape(b, 9)
-        pose[:, 15:] = motion[:, 3:]
-        wrench, torque, inner = np.zeros((b, 6)), np.zeros(spins), np.zeros(self.inner_states)
-        axles = self.data.axles
-        memo, work = np.zeros(2 + 5 * len(axles)), np.zeros(34)
-        memo[2::5] = self._nominal[axles[:, 0].astype(int), 0]
-        data = self.data._replace(drive=np.array([[0.0, 0.0, 0.0, speed_mps, _MIDDLE_M]]))
+        pose, wrench = np.zeros(b, POSE), np.zeros(b, WRENCH)
+        rows = pose.view(np.float64).reshape(b, -1)  # in the order of POSE's fields
+        rows[:, :3] = self._nominal + places[:, :3]
+        rows[:, 3:6] = motion[:, :3]
+        rows[:, 3] += speed_mps
+        rows[:, 6:15] = rotation.reshape(b, 9)
+        rows[:, 15:] = motion[:, 3:]
+        torque, inner = np.zeros(spins), np.zeros(self.inner_states)
+        memory = memory_of(len(self.data.axles))
+        memory.axle_memos["s_m"] = self._nominal[self.data.axles["body"], 0]
+        drive = np.array([(0.0, (0.0, 0.0, speed_mps, _MIDDLE_M))], DRIVE)
         spin = np.ascontiguousarray(state[12 * b : 12 * b + spins])
         zeta = np.ascontiguousarray(state[12 * b + spins :])
-        forces(0.0, pose, spin, zeta, *data, wrench, torque, inner, memo, work)
+        forces(0.0, pose, spin, zeta, self.data._replace(drive=drive), wrench, torque, inner, memory)
+        loads = wrench.view(np.float64).reshape(b, -1)
         # Euler, in the body's axes: I w' = M - w x I w.
-        moment = np.einsum("bji,bj->bi", rotation, wrench[:, 3:])
+        moment = np.einsum("bji,bj->bi", rotation, loads[:, 3:])
         omega = np.einsum("bji,bj->bi", rotation, motion[:, 3:])
         # The cross product by columns: np.cross takes a third of the time of everything here.
         turned = self._inertia * omega
         gyro = omega[:, [1, 2, 0]] * turned[:, [2, 0, 1]] - omega[:, [2, 0, 1]] * turned[:, [1, 2, 0]]
         slope = (moment - gyro) / self._inertia
         out = np.empty((b, 6))
-        out[:, :3] = wrench[:, :3] / self._mass[:, None]
+        out[:, :3] = loads[:, :3] / self._mass[:, None]
         out[:, 3:] = np.einsum("bij,bj->bi", rotation, slope)
-        return np.concatenate([motion.ravel(), out.ravel(), torque / self.data.spins[:, 0], inner])
+        return np.concatenate([motion.ravel(), out.ravel(), torque / self.data.spins["inertia"], inner])
 
     def equilibrium(self, speed_mps: float, *, start: FloatArray | None = None) -> FloatArray:
         """State (n,) of steady running at a speed, by Newton's method.
@@ -226,7 +228,7 @@ class RunningVehicle:
         bodies : tuple of int
             Their numbers.
         """
-        axles = set(self.data.axles[:, 0].astype(int))
+        axles = set(self.data.axles["body"])
         free = tuple(i for i in range(self.bodies) if i not in axles)
         first = np.concatenate([np.arange(6 * i, 6 * i + 6) for i in free]) if free else np.zeros(0, int)
         creep = 12 * self.bodies + len(self.data.spins) + 4 * len(self.model.wheels)

@@ -12,7 +12,7 @@ import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.vehicle.contact.contact import ContactTable
+from simrail.vehicle.contact.contact_geometry import ContactTable
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.wheelset import WheelsetAtRest, conicity, contact_state, push_sideways
 from simrail.vehicle.linear import running_vehicle
@@ -128,7 +128,7 @@ def study_vehicle(
     progress : callable, optional
         See `Progress`.
     """
-    say = progress or (lambda what, share: None)
+    say = progress or (lambda _what, _share: None)
     say("preparing", 0.0)
     vehicle = running_vehicle(model, gravity_mps2=gravity_mps2)
     standstill = standstill_modes(vehicle)

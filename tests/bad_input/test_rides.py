@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from simrail.cli.main import BAD_INPUT, call
-from simrail.cli.template_ride import ride_template
+from simrail.cli.templates import ride_template
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.files.ride_writer import write_ride

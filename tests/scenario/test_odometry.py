@@ -192,7 +192,7 @@ def test_an_odometry_of_ones_own_is_used_by_the_filters(own: Path) -> None:
     axis = '["encoder", "./mine.py:Mine"]'
     result = run_campaign(scenario_of("AttitudeEkf", "Vqf", odometry=axis, folder=own), workers=2)
     assert not result.failures
-    by_odometry = {name: rows for name, rows in result.scores.groupby("odometry", observed=True)}
+    by_odometry = dict(list(result.scores.groupby("odometry", observed=True)))
     assert set(by_odometry) == {"encoder", "./mine.py:Mine"}
 
     def rms(odometry: str, estimator: str, quantity: str) -> float:

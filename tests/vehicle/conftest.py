@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from simrail.vehicle.contact.contact import build_contact, wheel_force
+from simrail.vehicle.contact.contact import Motion, RailHere, wheel_force
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.hertz import kalker_coefficients
 from simrail.vehicle.contact.profiles import rail_60e1, s1002
 from simrail.vehicle.contact.wheelset import contact_state
 
-ARGUMENTS = ("side", "y", "z", "phi", "psi", "y_rail", "z_rail", "V", "v_x", "y_dot", "z_dot", "phi_dot")
-ARGUMENTS += ("psi_dot", "W", "kappa_h", "dy_rail", "dz_rail")
+RAIL = {"y_rail": "y", "z_rail": "z", "dy_rail": "dy", "dz_rail": "dz", "friction": "friction"}
 
 
 def fastsim(xi_x, xi_y, spin, *, a, b, normal, friction, modulus, strips=50):
@@ -64,13 +64,13 @@ def table(load=53e3, **options):
 
 def call(contact, zeta=None, **state):
     """Flag, forces and creep rates at a state; what is not given is 0 (side: left)."""
-    values = dict.fromkeys(ARGUMENTS, 0.0) | {"side": 1.0} | state
-    zeta = np.zeros(4) if zeta is None else np.array(zeta, dtype=float)
-    rate, out = np.full(4, np.nan), np.full(8, np.nan)
-    friction = values.pop("friction", contact.const[5])
-    arguments = (*(float(values[a]) for a in ARGUMENTS), float(friction))
-    flag = wheel_force(contact.coef, contact.const, *arguments, zeta, rate, out)
-    return flag, out, rate
+    values = {"y": 0.0, "z": 0.0, "side": 1.0, "friction": contact.const["friction"]} | state
+    values = {name: float(value) for name, value in values.items()}
+    side, zeta = values.pop("side"), np.zeros(4) if zeta is None else np.array(zeta, dtype=float)
+    rail = RailHere(**{RAIL[name]: values.pop(name) for name in list(values) if name in RAIL})
+    rate = np.full(4, np.nan)
+    flag, *out = wheel_force(contact.patches, contact.const, side, Motion(**values), rail, zeta, rate)
+    return flag, np.array(out), rate
 
 
 def settle(contact, **state):

@@ -197,7 +197,15 @@ def test_coasting_gains_no_energy():
     for segment in engine.run(80.0, segment_s=5.0):
         now = segment.time_s[-1]
         if now > 24.0:
-            engine.data.guide[2:8] = 0.0  # nothing drives or holds the vehicle any more
+            for name in (
+                "stiffness",
+                "damping",
+                "pitch_stiffness",
+                "pitch_damping",
+                "yaw_stiffness",
+                "yaw_damping",
+            ):
+                engine.data.guide[name] = 0.0  # nothing drives or holds the vehicle any more
         if now > 35.0:
             stations.append(energy())
     energies, places = np.array(stations).T

@@ -5,7 +5,6 @@ import pytest
 from scipy.optimize import brentq
 
 from simrail.vehicle.contact.contact import static_height
-from simrail.vehicle.contact.contact_geometry import COLUMNS
 from simrail.vehicle.contact.creep_laws import LAWS, CreepLaw
 from simrail.vehicle.contact.wheelset import contact_state
 
@@ -66,10 +65,8 @@ def settle_vertical(kernel, contact, state):
 
 def peak_pressure(contact, u, normal):
     """3 N/(2 pi a b), the semi-axes from the table."""
-    i = int((u - contact.const[0]) * contact.const[1])
-    x = u - contact.const[0] - i / contact.const[1]
-    a, b = (np.polyval(contact.coef[0, i, COLUMNS.index(f"semi_axis_{n}")], x) for n in ("along", "across"))
-    approach = (normal / contact.const[4]) ** (2.0 / 3.0)
+    a, b = (np.polyval(*contact.piece(f"semi_axis_{n}", u)) for n in ("along", "across"))
+    approach = (normal / contact.const["hertz_npm15"]) ** (2.0 / 3.0)
     return 1.5 * normal / (np.pi * a * b * approach)
 
 

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from simrail.vehicle.contact.contact import build_contact, static_height
-from simrail.vehicle.contact.contact_geometry import COLUMNS
+from simrail.vehicle.contact.contact import static_height
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
 from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1
 from simrail.vehicle.contact.wheelset import contact_state
@@ -30,7 +30,7 @@ def test_linear_creep_is_kalkers_for_the_hertz_ellipse_of_a_cone_on_an_arc(kerne
     ellipse = hertz_ellipse(0.5 * cd / radius, 0.5 / 0.3)
     a, b = (float(x) * normal ** (1.0 / 3.0) for x in (ellipse.a, ellipse.b))
     c11, c22, c23, c33 = (float(c) for c in kalker_coefficients(np.array(a / b)))
-    assert contact.const[4] * (60e-6 * cd) ** 1.5 == pytest.approx(normal, rel=1e-12)
+    assert contact.const["hertz_npm15"] * (60e-6 * cd) ** 1.5 == pytest.approx(normal, rel=1e-12)
 
     def linear(force):
         """The force before the cubic saturation, from the one after it."""
@@ -87,8 +87,7 @@ def test_saturated_force_in_steady_rolling_is_exact(kernel, V):
     T = np.array([out[0], cd * (out[1] + sd * normal) + sd * (out[2] - cd * normal)])
     assert np.hypot(*T) == pytest.approx(0.3 * normal, rel=1e-5)
     d = 60e-6 * cd
-    i = int((1e-3 - contact.const[0]) * contact.const[1])
-    f = {n: contact.coef[0, i, COLUMNS.index(n), 3] for n in ("f11", "f22", "f23")}
+    f = {n: contact.piece(n, 1e-3)[0][3] for n in ("f11", "f22", "f23")}
     radius, W = found["radius_m"], base["W"]
     slip = np.array([V - W * radius, -W * 0.01 * radius * cd])
     spin_per_v = -sd * W / V

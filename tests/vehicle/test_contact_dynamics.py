@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from simrail.core.jit import njit
-from simrail.vehicle.contact.contact import build_contact, static_height, wheel_force
+from simrail.vehicle.contact.contact import Motion, RailHere, static_height, wheel_force
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.creep_laws import CreepLaw
 from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1, s1002
 from simrail.vehicle.contact.wheelset import conicity, contact_state, push_sideways
@@ -40,7 +41,7 @@ def rails(s, fade_m, waves, out):
 
 
 @njit
-def rates(s, V, x, dx, coef, const, par, waves, rail, wheel):
+def rates(s, V, x, dx, patches, const, par, waves, rail):
     fade = rails(s, par[11], waves, rail)
     y, z, phi, psi, yf, zf = x[0], x[1], x[2], x[3], x[4], x[5]
     v = x[6:14]
@@ -59,17 +60,16 @@ def rates(s, V, x, dx, coef, const, par, waves, rail, wheel):
     tx = 0.0
     for n in range(2):
         side = 1.0 - 2.0 * n
-        flag = wheel_force(
-            coef, const, side, y, z, phi, psi, rail[2 * n], rail[2 * n + 1], V, V * (1.0 - kappa * y),
-            v[0], v[1], v[2], v[3], v[6 + n], kappa, rail[4 + 2 * n], rail[5 + 2 * n], const[5],
-            x[14 + 4 * n : 18 + 4 * n], dx[14 + 4 * n : 18 + 4 * n], wheel,
-        )  # fmt: skip
-        rail[8] = max(rail[8], flag)
-        fy += wheel[1]
-        fz += wheel[2]
-        mx += wheel[3]
-        mz += wheel[5]
-        torque = -psi * wheel[3] + wheel[4] + phi * wheel[5]
+        motion = Motion(y, z, phi, psi, V, V * (1.0 - kappa * y), v[0], v[1], v[2], v[3], v[6 + n], kappa)
+        here = RailHere(const.friction, rail[2 * n], rail[2 * n + 1], rail[4 + 2 * n], rail[5 + 2 * n])
+        creep, creep_rate = x[14 + 4 * n : 18 + 4 * n], dx[14 + 4 * n : 18 + 4 * n]
+        wheel = wheel_force(patches, const, side, motion, here, creep, creep_rate)
+        rail[8] = max(rail[8], wheel.flag)
+        fy += wheel.fy
+        fz += wheel.fz
+        mx += wheel.mx
+        mz += wheel.mz
+        torque = -psi * wheel.mx + wheel.my + phi * wheel.mz
         dx[6 + 6 + n] = torque / 60.0
         tx += torque / 60.0
     if rigid > 0.0:
@@ -86,11 +86,11 @@ def rates(s, V, x, dx, coef, const, par, waves, rail, wheel):
 
 
 @njit
-def ride(x, h, steps, every, speeds, coef, const, par, waves):
+def ride(x, h, steps, every, speeds, patches, const, par, waves):
     # speeds: V at start, acceleration, time at which it ends. RK4 with V(t) given.
     n = x.size
     k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    rail, wheel = np.zeros(9), np.zeros(8)
+    rail = np.zeros(9)
     out = np.zeros((steps // every, 6))
     s = 0.0
     V0, a, turn = speeds[0], speeds[1], speeds[2]
@@ -99,14 +99,14 @@ def ride(x, h, steps, every, speeds, coef, const, par, waves):
         Va = V0 + a * min(t, turn)
         Vb = V0 + a * min(t + 0.5 * h, turn)
         Vc = V0 + a * min(t + h, turn)
-        rates(s, Va, x, k1, coef, const, par, waves, rail, wheel)
+        rates(s, Va, x, k1, patches, const, par, waves, rail)
         if i % every == 0:
             j = i // every
             out[j] = k1[6], k1[7], x[0], s, Va, rail[8]
         sb, sc = s + 0.25 * h * (Va + Vb), s + h * (Va + 4.0 * Vb + Vc) / 6.0
-        rates(sb, Vb, x + 0.5 * h * k1, k2, coef, const, par, waves, rail, wheel)
-        rates(sb, Vb, x + 0.5 * h * k2, k3, coef, const, par, waves, rail, wheel)
-        rates(sc, Vc, x + h * k3, k4, coef, const, par, waves, rail, wheel)
+        rates(sb, Vb, x + 0.5 * h * k1, k2, patches, const, par, waves, rail)
+        rates(sb, Vb, x + 0.5 * h * k2, k3, patches, const, par, waves, rail)
+        rates(sc, Vc, x + h * k3, k4, patches, const, par, waves, rail)
         for j in range(n):
             x[j] += h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
         s = sc
@@ -119,7 +119,7 @@ def start(contact, V, kz, y=0.0):
     x[1] = static_height(contact)
     x[4] = y
     x[5] = x[1] - FRAME_KG * 9.81 / kz
-    x[12:14] = V / contact.const[3]
+    x[12:14] = V / contact.const["wheel_radius_m"]
     return x
 
 
@@ -143,7 +143,7 @@ def run(contact, *, seconds, h, V, amplitude=0.0, lengths=(), y=0.0, outward=0.0
     x[6] = push
     steps = round(seconds / h)
     return ride(
-        x, h, steps, round(every_s / h), np.array([V, acceleration, turn]), contact.coef, contact.const,
+        x, h, steps, round(every_s / h), np.array([V, acceleration, turn]), contact.patches, contact.const,
         par, waves,
     )  # fmt: skip
 
@@ -236,7 +236,7 @@ def cone(conicity_of_wheel):
     slope = float(np.diff(rest.radius_left_m - rest.radius_right_m)[0] / (4.0 * step))
     roll = float(np.diff(rest.roll_rad)[0] / (2.0 * step))
     at = contact_state(contact, 1.0, y_m=0.0, z_m=static_height(contact))["tread"]
-    return contact, slope, contact.const[2] + at["abscissa_m"], at["radius_m"], roll
+    return contact, slope, contact.const["tape_circle_half_m"] + at["abscissa_m"], at["radius_m"], roll
 
 
 def klingel(conicity_of_wheel):

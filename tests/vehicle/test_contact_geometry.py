@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simrail.core.errors import InputError
-from simrail.vehicle.contact.contact import static_height, wheel_force
+from simrail.vehicle.contact.contact import static_height
 from simrail.vehicle.contact.contact_geometry import COLUMNS, CONSTANTS, build_contact
 from simrail.vehicle.contact.contact_pair import ContactPair, incline
 from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1, s1002, wheel_depth
@@ -25,7 +25,7 @@ def table(load=53e3, **options):
 
 
 def column(contact, patch, name, u, derivative=0):
-    first, per_m = contact.const[:2]
+    first, per_m = contact.const["first_shift_m"], contact.const["intervals_per_m"]
     i = ((u - first) * per_m).astype(int)
     x = u - first - i / per_m
     c = contact.coef[patch, i, COLUMNS.index(name)].T
@@ -36,14 +36,15 @@ def column(contact, patch, name, u, derivative=0):
 
 def test_constants_are_named_and_arrays_contiguous():
     contact = table()
-    assert contact.const.shape == (len(CONSTANTS),)
+    assert contact.const.dtype.names == CONSTANTS
+    assert contact.patches.dtype.names == COLUMNS
     assert contact.coef.shape[2] == len(COLUMNS)
     assert contact.coef.flags.c_contiguous
-    assert contact.coef.dtype == contact.const.dtype == np.float64
+    assert contact.coef.dtype == np.float64
     assert contact.split_m == pytest.approx(-0.036, abs=2e-4)
-    assert contact.const[CONSTANTS.index("derailed_shift_m")] == pytest.approx(0.0124, abs=2e-4)
+    assert contact.const["derailed_shift_m"] == pytest.approx(0.0124, abs=2e-4)
     # The Hertz constant at full scale, by its published size, and eps at this load.
-    assert contact.const[CONSTANTS.index("hertz_npm15")] == pytest.approx(9.5e10, rel=5e-3)
+    assert contact.const["hertz_npm15"] == pytest.approx(9.5e10, rel=5e-3)
     assert contact.smoothing_m == pytest.approx(14.9e-6, rel=0.01)
 
 
@@ -133,14 +134,10 @@ def test_yaw_term_equals_the_silhouette_of_a_wheel_that_is_really_turned(u):
     assert radius[at[1]] * np.sin(angle[at[0], 0]) == pytest.approx(radius[at[1]] * psi * slope, rel=0.05)
 
 
-def test_static_height_carries_the_load():
+def test_static_height_carries_the_load(kernel):
     for load in (10e3, 53e3, 110e3):
         contact = table(load)
-        out = np.zeros(8)
-        wheel_force(
-            contact.coef, contact.const, 1.0, 0.0, static_height(contact), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, contact.const[5], np.zeros(4), np.zeros(4), out,
-        )  # fmt: skip
+        _, out, _ = kernel.call(contact, z=static_height(contact))
         assert out[2] == pytest.approx(load, rel=1e-9)
 
 
@@ -152,7 +149,9 @@ def test_gauge_and_rail_deviation_only_shift_the_table():
         a, b = column(narrow, 0, name, u), column(wide, 0, name, u + 3e-3)
         assert np.allclose(a, b, rtol=2e-4, atol=3e-8)
     # The flange is met 3 mm later, and so is the derailment.
-    assert wide.const[13] == pytest.approx(narrow.const[13] + 3e-3, abs=1.1e-4)
+    assert wide.const["derailed_shift_m"] == pytest.approx(
+        narrow.const["derailed_shift_m"] + 3e-3, abs=1.1e-4
+    )
     # The same by a deviation of the rail, on both sides.
     for side in (1.0, -1.0):
         moved = contact_state(narrow, side, y_m=1e-3, z_m=-3e-4, y_rail_m=side * 3e-3)["tread"]

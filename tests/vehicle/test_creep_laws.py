@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from simrail.core.errors import InputError
-from simrail.vehicle.contact.contact import build_contact, wheel_force
+from simrail.vehicle.contact.contact import Motion, RailHere, wheel_force
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.creep_laws import CreepLaw, fallen, saturation
 from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
 from simrail.vehicle.contact.profiles import conical_wheel, rail_60e1
@@ -83,21 +84,19 @@ def roll(law, creepage, *, V=15.0, friction=0.3):
     at_rest = contact_state(contact, 1.0, y_m=1e-3, z_m=0.0)["tread"]
     z = at_rest["penetration_m"] - 60e-6
     found = contact_state(contact, 1.0, y_m=1e-3, z_m=z)["tread"]
-    zeta, rate, out = np.zeros(4), np.zeros(4), np.zeros(8)
+    zeta, rate = np.zeros(4), np.zeros(4)
     W = V / found["radius_m"]
     for _ in range(4000):
-        wheel_force(
-            contact.coef, contact.const, 1.0, 1e-3, z, 0.0, 0.0, 0.0, 0.0, V, V * (1.0 + creepage), 0.0, 0.0,
-            0.0, 0.0, W, 0.0, 0.0, 0.0, friction, zeta, rate, out,
-        )  # fmt: skip
+        motion = Motion(1e-3, z, V=V, v_x=V * (1.0 + creepage), W=W)
+        out = wheel_force(contact.patches, contact.const, 1.0, motion, RailHere(friction), zeta, rate)
         zeta += 3e-4 * rate
     assert np.abs(rate).max() < 1e-8
-    normal = out[6]
+    normal = out.normal
     cosine = 1.0 / np.hypot(1.0, found["slope"])
     ellipse = hertz_ellipse(0.5 * cosine / found["radius_m"], 0.5 / 0.3)
     a, b = (float(x) * normal ** (1.0 / 3.0) for x in (ellipse.a, ellipse.b))
     c11 = float(kalker_coefficients(np.array(a / b))[0])
-    return -out[0] / (friction * normal), -out[0] / (82e9 * a * b * c11 * creepage)
+    return -out.fx / (friction * normal), -out.fx / (82e9 * a * b * c11 * creepage)
 
 
 @pytest.mark.parametrize("name", ["she", "polach"])

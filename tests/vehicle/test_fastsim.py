@@ -8,7 +8,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from simrail.core.errors import InputError
-from simrail.vehicle.contact.contact import build_contact, static_height, wheel_force
+from simrail.vehicle.contact.contact import static_height
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.creep_laws import CreepLaw
 from simrail.vehicle.contact.fastsim import fastsim
 from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
@@ -185,20 +186,18 @@ def cylinder_on_an_arc():
     [(1e-3, 0.0, 0.0), (0.0, -1e-3, 0.0), (0.0, 0.0, 0.5), (0.0, -7e-4, 0.6), (1e-3, 5e-4, -0.4)],
 )
 def test_a_rolling_wheel_has_the_forces_and_moment_of_a_dense_grid(
-    dense_fastsim, direction, xi_x, xi_y, spin
+    kernel, dense_fastsim, direction, xi_x, xi_y, spin
 ):
     """Steady rolling, each way: Fx, Fy within 0.02 mu N of the oracle, the moment within 0.02 mu N a."""
     contact, arc, z, at = cylinder_on_an_arc()
     V = direction * SPEED
     # Seen from its own front, a wheel that runs backward slips and spins the other way about.
     forward, twist = direction * xi_x, direction * spin
-    zeta, rate, out = np.array([forward, xi_y, 0.0, 0.0]), np.zeros(4), np.zeros(8)
     kappa = twist * SPEED / V
-    wheel_force(
-        contact.coef, contact.const, 1.0, 0.0, z, 0.0, 0.0, 0.0, 0.0, V,
-        V + SPEED * forward + kappa * V * at, SPEED * xi_y, 0.0, 0.0, 0.0, V / RADIUS, kappa, 0.0, 0.0,
-        0.3, zeta, rate, out,
-    )  # fmt: skip
+    motion = {"v_x": V + SPEED * forward + kappa * V * at, "y_dot": SPEED * xi_y, "kappa_h": kappa}
+    _, out, rate = kernel.call(
+        contact, [forward, xi_y, 0.0, 0.0], z=z, V=V, W=V / RADIUS, friction=0.3, **motion
+    )
     normal = out[6]
     assert np.abs(rate).max() < 1e-9
     ellipse = hertz_ellipse(0.5 / RADIUS, 0.5 / arc)
@@ -213,7 +212,7 @@ def test_a_rolling_wheel_has_the_forces_and_moment_of_a_dense_grid(
     assert moment / (0.3 * normal * a) == pytest.approx(expected[2] / a, abs=0.02)
 
 
-def test_nothing_to_hold_is_no_force_and_never_nan():
+def test_nothing_to_hold_is_no_force_and_never_nan(kernel):
     """Zero creep, a wheel that barely touches or hangs, and rest, where spin has no share."""
     assert fastsim(0.0, 0.0, 0.0, 0.0, 1.0) == (0.0, 0.0, 0.0, 0.0)
     contact = build_contact(s1002(), rail_60e1(), static_load_n=53e3, creep_law=CreepLaw("fastsim"))
@@ -222,18 +221,11 @@ def test_nothing_to_hold_is_no_force_and_never_nan():
     for lift in (-1e-15, -1e-12, -1e-9, 0.0, 1e-9, 1e-4):
         for V in (0.0, 1e-9, 20.0, -20.0):
             for zeta in (np.zeros(4), np.full(4, 1e-2)):
-                rate, out = np.full(4, np.nan), np.full(8, np.nan)
-                wheel_force(
-                    contact.coef, contact.const, 1.0, 0.0, top + lift, 0.0, 0.0, 0.0, 0.0, V, V, 0.0, 0.0,
-                    0.0, 0.0, V / 0.46, 0.0, 0.0, 0.0, 0.3, zeta, rate, out,
-                )  # fmt: skip
+                motion = {"V": V, "v_x": V, "W": V / 0.46}
+                _, out, rate = kernel.call(contact, zeta, z=top + lift, friction=0.3, **motion)
                 assert np.isfinite(out).all() and np.isfinite(rate).all()
                 assert np.hypot(out[0], out[1]) <= 0.35 * out[6]
-    z, out = static_height(contact), np.zeros(8)
-    wheel_force(
-        contact.coef, contact.const, 1.0, 0.0, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-        0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.3, np.zeros(4), np.zeros(4), out,
-    )  # fmt: skip
+    _, out, _ = kernel.call(contact, z=static_height(contact), psi_dot=2.0, friction=0.3)
     lateral = out[1] + np.sqrt(out[6] ** 2 - out[2] ** 2)
     assert abs(lateral) < 1e-6 * out[6]
 

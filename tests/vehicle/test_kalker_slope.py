@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simrail.vehicle.contact.contact import build_contact, wheel_force
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.hertz import hertz_ellipse
 from simrail.vehicle.contact.profiles import RailProfile, conical_wheel
 from simrail.vehicle.contact.wheelset import contact_state
@@ -37,7 +37,7 @@ def head(radius_m):
 
 
 @pytest.mark.parametrize("ratio, c11, c22, c23, c33", TABLE)
-def test_small_creep_forces_are_the_tables(ratio, c11, c22, c23, c33):
+def test_small_creep_forces_are_the_tables(kernel, ratio, c11, c22, c23, c33):
     # A cylinder on an arc: its own spin is nothing, and the arc's radius sets a/b.
     def away(radius):
         ellipse = hertz_ellipse(0.5 / RADIUS, 0.5 / radius)
@@ -53,11 +53,10 @@ def test_small_creep_forces_are_the_tables(ratio, c11, c22, c23, c33):
 
     def force(xi_x=0.0, xi_y=0.0, spin=0.0):
         """Steady rolling: the states are the creepages. Spin by the track's curvature."""
-        zeta, rate, out = np.array([xi_x, xi_y, 0.0, 0.0]), np.zeros(4), np.zeros(8)
-        wheel_force(
-            contact.coef, contact.const, 1.0, 0.0, z, 0.0, 0.0, 0.0, 0.0, V, V * (1.0 + xi_x + spin * at),
-            V * xi_y, 0.0, 0.0, 0.0, V / RADIUS, spin, 0.0, 0.0, FRICTION, zeta, rate, out,
-        )  # fmt: skip
+        motion = {"V": V, "v_x": V * (1.0 + xi_x + spin * at), "y_dot": V * xi_y, "kappa_h": spin}
+        _, out, rate = kernel.call(
+            contact, [xi_x, xi_y, 0.0, 0.0], z=z, W=V / RADIUS, friction=FRICTION, **motion
+        )
         assert np.abs(rate).max() < 1e-9
         # Moment about the normal through the contact (lever: the force along the track).
         return out[0], out[1], out[5] + at * out[0], out[6]

@@ -15,6 +15,7 @@ from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.wheelset import rolling_radius_difference
+from simrail.vehicle.engines.records import GUIDE, SPRING
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle, state_matrix
 from simrail.vehicle.model import Body, Guide, Suspension, VehicleModel, Wheel, WheelRail
@@ -221,9 +222,7 @@ def test_free_wheelset_has_the_wavelength_of_klingel(inclination, least):
 def test_a_spinning_body_obeys_euler():
     """Free of forces, w' is that of the body's Euler equations, whatever its attitude."""
     vehicle = running_vehicle(on_springs())
-    free = replace(
-        vehicle, data=vehicle.data._replace(springs=np.zeros((0, 17)), guide=0 * vehicle.data.guide)
-    )
+    free = replace(vehicle, data=vehicle.data._replace(springs=np.zeros(0, SPRING), guide=np.zeros(1, GUIDE)))
     state = np.zeros(free.size)
     state[9:12] = 0.3, -0.2, 0.5  # turn of the body, in the track's axes
     omega = np.array([1.0, 2.0, -0.7])

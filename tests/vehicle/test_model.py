@@ -10,29 +10,40 @@ from simrail.core.toml_files import judge, load, parse_toml, shipped
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
-from simrail.vehicle.contact.contact_geometry import CONSTANTS
+from simrail.vehicle.contact.contact import Motion, RailHere
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
-from simrail.vehicle.engines.force_data import pack, states_of
+from simrail.vehicle.engines.force_data import memory_of, pack, states_of
 from simrail.vehicle.engines.forces import forces
+from simrail.vehicle.engines.records import LAW, POSE, SERIES, SPRING, STOP, TURN, WRENCH
 from simrail.vehicle.engines.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
 
+def flat(records):
+    """Records as rows of floats, the same memory."""
+    return records.view(np.float64).reshape(len(records), -1)
+
+
+def two(record):
+    """Two records of zeros."""
+    return np.zeros(2, record)
+
+
 def poses(seed=0, turn=0.3):
-    """Two bodies anywhere, moving and turning anyhow: rows of `pose`."""
+    """Two bodies anywhere, moving and turning anyhow."""
     rng = np.random.default_rng(seed)
     rows = rng.normal(size=(2, 18))
     for row in rows:
         row[6:15] = Turn.from_rotvec(turn * rng.normal(size=3)).as_matrix().ravel()
-    return rows
+    return rows.view(POSE)[:, 0]
 
 
 def still():
-    rows = np.zeros((2, 18))
-    rows[:, 6:15] = np.eye(3).ravel()
-    return rows
+    pose = two(POSE)
+    pose["rotation"] = np.eye(3)
+    return pose
 
 
 def data_of(name):
@@ -42,30 +53,31 @@ def data_of(name):
     return model, pack(model, laid, SpeedProfile(100.0, 200.0, 10.0), gravity_mps2=9.81)
 
 
-ENDS = [0.0, 1.0, 0.3, -0.2, 0.5, -0.4, 0.1, 0.7]
-LAW = np.array([[0.0, 0.0, 5e3, 0.0, 0.0], [0.1, 0.0, 0.0, 1e3, 50.0]])
+ARMS = (0.3, -0.2, 0.5), (-0.4, 0.1, 0.7)
+ENDS = (0, 1, *ARMS)
+AT_CENTRES = (0, 1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+PIECES = np.array([(0.0, (0.0, 5e3, 0.0, 0.0)), (0.1, (0.0, 0.0, 1e3, 50.0))], LAW)
 ELEMENTS = {
     "series": lambda pose, w: series_forces(
-        np.array([[*ENDS, 1.0, 1e6, 2e4]]), pose, np.array([777.0]), w, np.zeros(1)
+        np.array([(*ENDS, 1, 1e6, 2e4)], SERIES), pose, np.array([777.0]), w, np.zeros(1)
     ),
-    "stop": lambda pose, w: stop_forces(np.array([[*ENDS, 2.0, 0.0, 0.0, 2.0]]), LAW, pose, w),
-    "rate law": lambda pose, w: stop_forces(np.array([[*ENDS, 0.0, 1.0, 0.0, 2.0]]), LAW, pose, w),
-    "rotation": lambda pose, w: turn_forces(np.array([[0.0, 1.0, 1e3, 2e3, 3e3, 10.0, 20.0, 30.0]]), pose, w),
+    "stop": lambda pose, w: stop_forces(np.array([(*ENDS, 2, 0, 0, 2)], STOP), PIECES, pose, w),
+    "rate law": lambda pose, w: stop_forces(np.array([(*ENDS, 0, 1, 0, 2)], STOP), PIECES, pose, w),
+    "rotation": lambda pose, w: turn_forces(
+        np.array([(0, 1, (1e3, 2e3, 3e3), (10.0, 20.0, 30.0))], TURN), pose, w
+    ),
 }
-
-
-def spring(stiffness, damping):
-    return np.array([[*ENDS, *stiffness, *damping, 0.0, 0.0, 0.0]])
 
 
 @pytest.mark.parametrize("name", ELEMENTS)
 def test_action_is_reaction(name):
     """Forces cancel; moments cancel about either attachment, up to the stretch times the force."""
-    pose, wrench = poses(), np.zeros((2, 6))
-    ELEMENTS[name](pose, wrench)
+    pose, wrenches = poses(), two(WRENCH)
+    ELEMENTS[name](pose, wrenches)
+    wrench = flat(wrenches)
     assert np.abs(wrench).max() > 1.0
     np.testing.assert_allclose(wrench[0, :3], -wrench[1, :3], rtol=1e-12)
-    inner, outer = pose[0, 6:15].reshape(3, 3) @ ENDS[2:5], pose[1, 6:15].reshape(3, 3) @ ENDS[5:8]
+    inner, outer = (turn @ arm for turn, arm in zip(pose["rotation"], ARMS, strict=True))
     free = [wrench[k, 3:] - np.cross(arm, wrench[k, :3]) for k, arm in ((0, inner), (1, outer))]
     if name == "rotation":
         np.testing.assert_allclose(wrench[0, 3:], -wrench[1, 3:], rtol=1e-12)
@@ -78,13 +90,14 @@ def test_one_axis_elements_share_the_springs_kinematics(axis):
     """A stop with a linear law is a spring, and with one over the rate a damper, in any pose."""
     for seed in range(5):
         pose = poses(seed)
-        for rate, law in ((0.0, 1e3), (1.0, 1e3)):
-            one, other = np.zeros((2, 6)), np.zeros((2, 6))
-            linear = np.array([[0.0, 0.0, 0.0, law, 0.0]])
-            stop_forces(np.array([[*ENDS, float(axis), rate, 0.0, 1.0]]), linear, pose, one)
-            only = np.where(np.arange(3) == axis, law, 0.0)
-            spring_forces(spring(*((np.zeros(3), only) if rate else (only, np.zeros(3)))), pose, other)
-            np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-9)
+        for rate in (0, 1):
+            one, other = two(WRENCH), two(WRENCH)
+            linear = np.array([(0.0, (0.0, 0.0, 1e3, 0.0))], LAW)
+            stop_forces(np.array([(*ENDS, axis, rate, 0, 1)], STOP), linear, pose, one)
+            only = np.where(np.arange(3) == axis, 1e3, 0.0)
+            factors = (np.zeros(3), only) if rate else (only, np.zeros(3))
+            spring_forces(np.array([(*ENDS, *factors, 0.0)], SPRING), pose, other)
+            np.testing.assert_allclose(flat(one), flat(other), rtol=1e-10, atol=1e-9)
 
 
 def test_series_damper_has_the_impedance_of_its_chain():
@@ -92,15 +105,15 @@ def test_series_damper_has_the_impedance_of_its_chain():
     k, c, step = 6e6, 2e4, 1e-5
     for w in (20.0, 300.0, 2000.0):
         force, rate, pose = np.zeros(1), np.zeros(1), still()
-        row = np.array([[0.0, 1.0, *np.zeros(6), 1.0, k, c]])
+        row = np.array([(*AT_CENTRES, 1, k, c)], SERIES)
         expected = k * c * 1j * w / (k + c * 1j * w)
         force[0] = expected.real  # the steady state at t = 0 of a stretch cos(w t)
         for i in range(2000):
             rates = []
             for at, shift in ((0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)):
-                pose[1, 4] = -w * np.sin(w * (i + at) * step)
+                pose["vy"][1] = -w * np.sin(w * (i + at) * step)
                 trial = force + shift * step * (rates[-1] if rates else 0.0)
-                series_forces(row, pose, trial, np.zeros((2, 6)), rate)
+                series_forces(row, pose, trial, two(WRENCH), rate)
                 rates.append(rate.copy())
             force = force + step / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
         steady = (expected * np.exp(1j * w * 2000 * step)).real
@@ -109,9 +122,10 @@ def test_series_damper_has_the_impedance_of_its_chain():
 
 def test_anti_roll_bar_is_a_moment_by_angle():
     """940 kN m/rad and 10 mrad give 9.4 kN m about X, and nothing else."""
-    pose, wrench = still(), np.zeros((2, 6))
-    pose[1, 6:15] = Turn.from_rotvec([0.010, 0.0, 0.0]).as_matrix().ravel()
-    turn_forces(np.array([[0.0, 1.0, 940e3, 0.0, 0.0, 0.0, 0.0, 0.0]]), pose, wrench)
+    pose, wrenches = still(), two(WRENCH)
+    pose["rotation"][1] = Turn.from_rotvec([0.010, 0.0, 0.0]).as_matrix()
+    turn_forces(np.array([(0, 1, (940e3, 0.0, 0.0), (0.0, 0.0, 0.0))], TURN), pose, wrenches)
+    wrench = flat(wrenches)
     np.testing.assert_allclose(wrench[0], [0, 0, 0, 9400.0, 0, 0], rtol=2e-5, atol=1e-9)
     np.testing.assert_allclose(wrench[1], -wrench[0])
 
@@ -120,13 +134,13 @@ def test_lateral_bump_stop_goes_through_its_published_points():
     """Manchester's table, odd in the deflection, continuous with its slope."""
     _, data = data_of("manchester_1")
     row = data.stops[:1].copy()
-    row[0, :8] = 0.0, 1.0, *np.zeros(6)
+    row["inner"], row["outer"], row["inner_arm"], row["outer_arm"] = AT_CENTRES
 
     def force(y):
-        pose, wrench = still(), np.zeros((2, 6))
-        pose[1, 1] = y
+        pose, wrench = still(), two(WRENCH)
+        pose["y"][1] = y
         stop_forces(row, data.laws, pose, wrench)
-        return wrench[0, 1]
+        return wrench["fy"][0]
 
     for y, expected in ((0.02, 0.0), (0.025, 0.0), (0.03, 600.0), (0.05, 11580.0), (0.065, 230e3)):
         assert force(y) == pytest.approx(expected, abs=1e-6)
@@ -147,19 +161,16 @@ def test_states_are_creep_states_then_series_dampers():
 
 def evaluate(data, spin, rates):
     """Wrench on the first body of a vehicle at rest in its place, with a spin and an angular rate."""
-    pose = np.zeros((len(data.bodies), 18))
-    pose[:, 6:15] = np.eye(3).ravel()
+    pose = np.zeros(len(data.bodies), POSE)
+    pose["rotation"] = np.eye(3)
     # High over the rails: no contact.
-    pose[:, 0], pose[:, 2] = 100.0, 5.0
-    pose[0, 15:] = rates
-    wrench, memo = np.zeros((len(pose), 6)), np.zeros(2 + 5 * len(data.axles))
-    memo[2::5] = 100.0
-    states = np.zeros(states_of(data))
-    forces(
-        0.0, pose, np.full(len(data.spins), spin), states, *data, wrench, np.zeros(len(data.spins)),
-        states.copy(), memo, np.zeros(34),
-    )  # fmt: skip
-    return wrench[0]
+    pose["x"], pose["z"] = 100.0, 5.0
+    pose["wx"][0], pose["wy"][0], pose["wz"][0] = rates
+    wrench, memory = np.zeros(len(pose), WRENCH), memory_of(len(data.axles))
+    memory.axle_memos["s_m"] = 100.0
+    states, torque = np.zeros(states_of(data)), np.zeros(len(data.spins))
+    forces(0.0, pose, np.full(len(torque), spin), states, data, wrench, torque, states.copy(), memory)
+    return np.array(wrench[0].tolist())
 
 
 @pytest.mark.parametrize("name", ["irw_axle", "two_axle_wagon"])
@@ -170,9 +181,9 @@ def test_gyroscopic_moment_and_its_switch(name):
     moment = (evaluate(data, 100.0, rates) - evaluate(data, 0.0, rates))[3:]
     inertia = sum(model.spin_inertia_kgm2.values()) / len(model.axle_names)
     np.testing.assert_allclose(moment, -np.cross(rates, [0.0, inertia * 100.0, 0.0]), rtol=1e-9)
-    switches = data.switches.copy()
-    switches[0] = 0.0
-    off = data._replace(switches=switches)
+    options = data.options.copy()
+    options["gyroscopic"] = 0
+    off = data._replace(options=options)
     np.testing.assert_array_equal(evaluate(off, 100.0, rates), evaluate(off, 0.0, rates))
     assert replace(model, gyroscopic=False).gyroscopic is False
 
@@ -190,18 +201,16 @@ def test_wheelset_masses_add_up_to_the_source():
 def test_prescribed_contact_has_its_gravitational_stiffness():
     """A wheelset at rest, 1 mm off and turned by 2 mrad: -k y and -k psi, both wheels together."""
     model, data = data_of("suspended_wheelset")
-    switches = data.switches.copy()
-    switches[9:11] = 0.5 * 4e5, 0.5 * -7e3
+    options = data.options.copy()
+    options["gravitational_stiffness"], options["gravitational_yaw_stiffness"] = 0.5 * 4e5, 0.5 * -7e3
     force = moment = vertical = 0.0
     for side in (1.0, -1.0):
-        out = np.zeros(8)
-        flag = linear_wheel_force(
-            switches, data.const[0], data.wheels[0, 5], side, 1e-3, 0.0, 0.0, 2e-3,
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-            0.0, 0.0, 0.0, np.zeros(4), np.zeros(4), out,
-        )  # fmt: skip
-        assert flag == 1
-        force, moment, vertical = force + out[1], moment + out[5], vertical + out[2]
+        motion, load = Motion(1e-3, 0.0, psi=2e-3), data.wheels["load_n"][0]
+        out = linear_wheel_force(
+            options[0], data.const[0], load, side, motion, RailHere(0.0), np.zeros(4), np.zeros(4)
+        )
+        assert out.flag == 1
+        force, moment, vertical = force + out.fy, moment + out.mz, vertical + out.fz
     assert force == pytest.approx(-4e5 * 1e-3)
     assert moment == pytest.approx(7e3 * 2e-3)
     assert vertical == pytest.approx(np.sum(model.wheel_load_n(9.81)))
@@ -215,6 +224,5 @@ def test_creep_law_of_the_file_reaches_the_contact():
         contacts_of(judge(VehicleFile, parse_toml(one, file="v"), file="v").model("v")).tables[0].const
         for one in (text, chosen)
     )
-    law, slip = CONSTANTS.index("creep_law"), CONSTANTS.index("polach_slip")
-    assert (plain[law], polach[law]) == (0.0, 1.0)
-    assert polach[slip] == 0.4
+    assert (plain["creep_law"], polach["creep_law"]) == (0.0, 1.0)
+    assert polach["polach_slip"] == 0.4

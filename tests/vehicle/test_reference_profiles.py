@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
-from simrail.vehicle.contact.contact import build_contact
+from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.contact_pair import ContactPair, incline
 from simrail.vehicle.contact.profiles import wheel_depth
 from simrail.vehicle.contact.reference_profiles import GAUGE_M, en15302_rail_a, en15302_wheel

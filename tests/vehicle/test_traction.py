@@ -21,10 +21,11 @@ from simrail.track.rail_condition import RailCondition
 from simrail.vehicle.contact.hertz import hertz_ellipse, kalker_coefficients
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
 from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.records import TRACTION
 from simrail.vehicle.engines.traction_forces import driver
 from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.model import Traction
 from simrail.vehicle.speed_profile import SpeedProfile
-from simrail.vehicle.traction import Traction
 
 SMOOTH = Irregularity("none", fade_m=0.0)
 ALL = (("axle.left", 0.5), ("axle.right", 0.5))
@@ -242,12 +243,13 @@ def test_brakes_hold_on_a_gradient():
 
 def test_driver_never_reverses_and_never_races():
     """Past his stop he brakes; far behind he asks for the catch-up speed and no more."""
-    traction = np.array([1.0, 1.0, 10e3, 300e3, 12e3, 60e3, 0.5, 0.5, 0.0, 5e-3, 0.02])
+    traction = np.array([(1, 1.0, 10e3, 300e3, 12e3, 60e3, 0.5, 0.5, 0.0, 5e-3, 0.02)], TRACTION)[0]
     assert driver(-30.0, 0.0, 0.0, traction)[0] < 1.0
     assert driver(-30.0, 0.0, 0.0, traction)[1] == pytest.approx(12e3)
     assert driver(500.0, 10.0, 10.5, traction)[0] == pytest.approx(0.0, abs=1.0)
     assert driver(500.0, 10.0, 10.6, traction)[1] > 1e3
-    backward = traction * np.where(np.arange(11) == 1, -1.0, 1.0)
+    backward = traction.copy()
+    backward["direction"] = -1.0
     for behind, wanted, speed in ((1.0, 5.0, 4.9), (-1.0, 5.0, 5.2), (0.0, 0.0, 0.01)):
         assert driver(-behind, -wanted, -speed, backward) == driver(behind, wanted, speed, traction)
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from simrail.core.errors import InputError
@@ -64,7 +65,11 @@ CONSTANTS = (
     "friction_decay_spm",
     "windup_onset",
 )
-"""What `ContactTable.const` holds, in its order."""
+"""What `ContactTable.const` holds."""
+PATCH = np.dtype([(name, "f8", (4,)) for name in COLUMNS], align=True)
+"""A patch over one interval of the table: its cubics by name."""
+CONST = np.dtype([(name, "f8") for name in CONSTANTS], align=True)
+"""Type of `ContactTable.const`."""
 
 _FULL_SCALE_RADIUS_M = 0.46
 """Grids and lengths below are those of a wheel of this radius and scale with the wheel's."""
@@ -98,8 +103,8 @@ class ContactTable:
         those of the contact on the wheel; all in m. f11, f22, f23, f33 are linear creep
         coefficients, to be multiplied by d, d, d^1.5, d^2 of the normal approach d; the ellipse's semi-axes
         (m) go with d^0.5.
-    const : ndarray, shape (21,)
-        See `CONSTANTS`.
+    const : record
+        Of type `CONST`, e.g. ``const["friction"]``.
     static_load_n : float
         Wheel load for which the smoothing is made.
     smoothing_m : float
@@ -110,10 +115,21 @@ class ContactTable:
 
     name: str
     coef: FloatArray
-    const: FloatArray
+    const: np.void
     static_load_n: float
     smoothing_m: float
     split_m: float | None
+
+    @property
+    def patches(self) -> npt.NDArray[np.void]:
+        """``coef`` as records `PATCH` (2, n), for the kernel."""
+        return self.coef.reshape(*self.coef.shape[:2], -1).view(PATCH)[..., 0]
+
+    def piece(self, column: str, shift_m: float) -> tuple[FloatArray, float]:
+        """Cubic (4,) of a column of the tread's patch at a shift, and the place in it."""
+        first, per_m = self.const["first_shift_m"], self.const["intervals_per_m"]
+        i = int((shift_m - first) * per_m)
+        return self.coef[0, i, COLUMNS.index(column)], float(shift_m - first - i / per_m)
 
 
 def build_contact(
@@ -258,7 +274,7 @@ def build_contact(
     return ContactTable(
         name=f"{wheel.name} on {rail.name} {lean}, gauge {gauge_m * 1e3:.1f} mm",
         coef=np.ascontiguousarray(coef),
-        const=np.array([values[name] for name in CONSTANTS]),
+        const=np.array([tuple(values[name] for name in CONSTANTS)], dtype=CONST)[0],
         static_load_n=static_load_n,
         smoothing_m=eps,
         split_m=split_at,

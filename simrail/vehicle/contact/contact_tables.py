@@ -14,7 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from simrail.core.jit import FloatArray
-from simrail.vehicle.contact.contact import ContactTable, build_contact, static_height
+from simrail.vehicle.contact.contact import static_height
+from simrail.vehicle.contact.contact_geometry import ContactTable, build_contact
 from simrail.vehicle.contact.profile_files import profiles_digest, profiles_of
 from simrail.vehicle.model import VehicleModel, WheelRail
 
@@ -58,9 +59,9 @@ def contacts_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> WheelCont
 
 @lru_cache(maxsize=64)
 def _built(
-    pair: WheelRail, shape: str, wheel_radius_m: float, load_n: float, grid_load_n: float
+    pair: WheelRail, _shape: str, wheel_radius_m: float, load_n: float, grid_load_n: float
 ) -> ContactTable:
-    """One table. ``shape`` is the digest of the profiles: a file that has changed is another key."""
+    """One table. ``_shape`` is the digest of the profiles: a file that has changed is another key."""
     table = build_contact(
         *profiles_of(pair),
         gauge_m=pair.gauge_m,
@@ -74,7 +75,7 @@ def _built(
         creep_law=pair.creep,
     )
     # Many share it.
-    table.coef.flags.writeable = table.const.flags.writeable = False
+    table.coef.flags.writeable = False
     return table
 
 

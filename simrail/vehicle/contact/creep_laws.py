@@ -29,6 +29,12 @@ from simrail.core.jit import njit_borrowed
 
 LAWS = ("she", "polach", "fastsim")
 """Names of the laws; the kernel knows them by their places here."""
+SHE, FASTSIM = 0.0, 2.0
+"""Places of two of them."""
+_SLIDING_ROUND_MPS = 5e-3
+"""Sliding speed below which the fall of friction is rounded, so that forces stay smooth through rest."""
+_NO_CREEP = 1e-7
+"""Of q: below it Polach's law is its own slope at 0, to rounding."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +95,14 @@ class CreepLaw:
 @njit_borrowed
 def saturation(q: float, law: float, adhesion: float, slip: float) -> float:
     """Force over linear force, from q, the linear force over the friction limit."""
-    if law == 0.0:
+    if law == SHE:
         return 1.0 - q / 3.0 + q * q / 27.0 if q < 3.0 else 1.0 / q
-    if q < 1e-7:
+    if q < _NO_CREEP:
         return 0.5 * (adhesion + slip)
     e = 0.25 * np.pi * q
     a = adhesion * e
-    return (a / (1.0 + a * a) + np.arctan(slip * e)) * 2.0 / (np.pi * q)
+    part: float = (a / (1.0 + a * a) + np.arctan(slip * e)) * 2.0 / (np.pi * q)
+    return part
 
 
 @njit_borrowed
@@ -103,6 +110,7 @@ def fallen(friction: float, floor: float, decay: float, sliding_x: float, slidin
     """Friction coefficient at a sliding speed (its two components, m/s)."""
     if decay == 0.0:
         return friction
-    w0 = 5e-3  # below this the fall is rounded, so that forces stay smooth through rest
+    w0 = _SLIDING_ROUND_MPS
     w = np.sqrt(sliding_x * sliding_x + sliding_y * sliding_y + w0 * w0) - w0
-    return friction * ((1.0 - floor) * np.exp(-decay * w) + floor)
+    sliding: float = friction * ((1.0 - floor) * np.exp(-decay * w) + floor)
+    return sliding

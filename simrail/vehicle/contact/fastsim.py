@@ -30,10 +30,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import njit_borrowed
+from simrail.core.jit import njit_borrowed, njit_inner
 
 
-@njit_borrowed
+@njit_inner
 def _strip(slope_x: float, slope_y: float, turn: float, edge: float) -> tuple[float, float, float]:
     """Sums of tx, ty and X ty over one strip's elements, each taken at its middle.
 

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.vehicle.contact.contact import read_patch, wheel_force
+from simrail.vehicle.contact.contact import Motion, RailHere, WheelForce, read_patch, wheel_force
 from simrail.vehicle.contact.contact_geometry import ContactTable
 
 
@@ -50,20 +50,17 @@ def contact_state(
         ``slope`` (tangent of the contact angle), ``abscissa_m`` and ``radius_m`` of the contact on
         the wheel, and ``normal_n``.
     """
+    motion, rail = Motion(y_m, z_m, roll_rad, yaw_rad), RailHere(0.0, y_rail_m, z_rail_m)
     state = {}
     for patch, name in enumerate(("tread", "flange")):
-        values = np.zeros(4)
-        read_patch(
-            table.coef, table.const, side, patch, y_m, z_m, roll_rad, yaw_rad, y_rail_m, z_rail_m, values
-        )
-        penetration, slope, abscissa, radius = values
-        approach = max(penetration, 0.0) / np.hypot(1.0, slope)
+        touch = read_patch(table.patches, table.const, side, patch, motion, rail)
+        approach = max(touch.penetration, 0.0) / np.hypot(1.0, touch.slope)
         state[name] = {
-            "penetration_m": float(penetration),
-            "slope": float(slope),
-            "abscissa_m": float(abscissa),
-            "radius_m": float(radius),
-            "normal_n": float(table.const[4] * approach**1.5),
+            "penetration_m": touch.penetration,
+            "slope": touch.slope,
+            "abscissa_m": touch.abscissa,
+            "radius_m": touch.radius,
+            "normal_n": float(table.const["hertz_npm15"] * approach**1.5),
         }
     return state
 
@@ -102,22 +99,20 @@ def push_sideways(table: ContactTable, y_m: FloatArray) -> WheelsetAtRest:
         If a displacement lies beyond the flange.
     """
     y = np.atleast_1d(np.asarray(y_m, dtype=float))
-    half, load = table.const[2], table.static_load_n
-    rest, zeta, rate, out = np.empty((5, y.size)), np.zeros(4), np.zeros(4), np.zeros(8)
+    half, load = table.const["tape_circle_half_m"], table.static_load_n
+    patches, rail = table.patches, RailHere(table.const["friction"])
+    rest, zeta, rate = np.empty((5, y.size)), np.zeros(4), np.zeros(4)
 
-    def vertical(side: float, at: float, lift: float, roll: float) -> FloatArray:
-        flag = wheel_force(
-            table.coef, table.const, side, at, lift, roll, 0.0, 0.0, 0.0, 0.0, 0.0,
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, table.const[5], zeta, rate, out,
-        )  # fmt: skip
-        if flag < 0:
+    def vertical(side: float, at: float, lift: float, roll: float) -> WheelForce:
+        force = wheel_force(patches, table.const, side, Motion(at, lift, roll), rail, zeta, rate)
+        if force.flag < 0:
             raise InputError(
                 "the wheelset is off the rails",
                 field="y_m",
                 value=at,
-                limit=f"|y| < {table.const[13]:.4f} m",
+                limit=f"|y| < {table.const['derailed_shift_m']:.4f} m",
             )
-        return out.copy()
+        return force
 
     left, right = 0.0, 0.0  # heights of the two wheels
     for i, at in enumerate(y):
@@ -126,17 +121,18 @@ def push_sideways(table: ContactTable, y_m: FloatArray) -> WheelsetAtRest:
             forces = [vertical(side, at, lift, roll) for side in (1.0, -1.0)]
             # Newton per wheel on penetration, whose load grows with its 1.5th power.
             steps = [
-                f[7] * (1.0 - (load / f[2]) ** (2.0 / 3.0)) if f[2] > 0.0 else f[7] - 1e-5 for f in forces
+                f.penetration * (1.0 - (load / f.fz) ** (2.0 / 3.0)) if f.fz > 0.0 else f.penetration - 1e-5
+                for f in forces
             ]
             left, right = left + np.clip(steps[0], -1e-3, 1e-3), right + np.clip(steps[1], -1e-3, 1e-3)
             if max(abs(steps[0]), abs(steps[1])) < 1e-13:
                 break
         radii = []
         for side in (1.0, -1.0):
-            patches = contact_state(table, side, y_m=at, z_m=lift, roll_rad=roll).values()
-            total = sum(p["normal_n"] for p in patches)
-            radii.append(sum(p["normal_n"] * p["radius_m"] for p in patches) / total)
-        rest[:, i] = lift, roll, radii[0], radii[1], forces[0][1] + forces[1][1]
+            touching = contact_state(table, side, y_m=at, z_m=lift, roll_rad=roll).values()
+            total = sum(p["normal_n"] for p in touching)
+            radii.append(sum(p["normal_n"] * p["radius_m"] for p in touching) / total)
+        rest[:, i] = lift, roll, radii[0], radii[1], forces[0].fy + forces[1].fy
     shape = np.shape(y_m)
     return WheelsetAtRest(y.reshape(shape), *(row.reshape(shape) for row in rest))
 
@@ -168,7 +164,7 @@ def conicity(table: ContactTable, amplitude_m: float) -> float:
     The quarter period is an energy integral: with G the integral of dr from 0, y = a sin(q), it is
     the integral over q of ``a cos(q)/sqrt(2 (G(a) - G(y))/(2 half r0))``, which is smooth.
     """
-    half, radius = table.const[2], table.const[3]
+    half, radius = table.const["tape_circle_half_m"], table.const["wheel_radius_m"]
     y = np.linspace(0.0, amplitude_m, 401)
     difference = rolling_radius_difference(table, y)
     difference -= difference[0]

@@ -17,12 +17,13 @@ from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
     refuse_derailed,
-    start_memo,
+    start_memory,
     start_poses,
     stretches,
     wheel_loads_n,
 )
 from simrail.vehicle.engines.force_data import states_of
+from simrail.vehicle.engines.records import POSE, WRENCH
 from simrail.vehicle.engines.stepper import BODY, march
 
 
@@ -38,16 +39,12 @@ class CompiledEngine:
     def __init__(self, setup: Setup) -> None:
         self.setup, model = setup, setup.model
         self.data = setup.pack()
-        self.memo = start_memo(setup)
-        self._inertia = np.array([[body.mass_kg, *body.inertia_kgm2] for body in model.bodies])
-        self._spin_inertia = self.data.spins[:, 0].copy()
+        self.memory = start_memory(setup)
         self._turned = BODY * len(model.bodies)
         self._first_state = self._turned + 2 * len(self.data.spins)
         self.state = np.zeros(self._first_state + states_of(self.data))
         bodies = len(model.bodies)
-        self._scratch = (
-            np.zeros((3, len(self.state))), np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(34)
-        )  # fmt: skip
+        self._scratch = np.zeros((3, len(self.state))), np.zeros(bodies, POSE), np.zeros(bodies, WRENCH)
         poses = start_poses(setup)
         for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
             body[:3] = position
@@ -86,24 +83,21 @@ class CompiledEngine:
 
     def wheel_loads_n(self) -> FloatArray:
         """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-        return wheel_loads_n(self.memo)
+        return wheel_loads_n(self.memory)
 
     def _bodies(self, states: FloatArray) -> FloatArray:
         """The bodies' part of states (..., n), as (..., b, 13)."""
         return states[..., : self._turned].reshape(*states.shape[:-1], -1, BODY)
 
     def _march(self, first: int, rows: FloatArray) -> int:
-        return march(
-            first, self.setup.step_s, self.state, rows, self._inertia, self._spin_inertia, self.memo,
-            *self._scratch, tuple(self.data),
-        )  # fmt: skip
+        return march(first, self.setup.step_s, self.state, rows, *self._scratch, self.memory, self.data)
 
     def _solve(self, first: int, last: int) -> FloatArray:
         """Integrate from the present state; the state (steps + 1, n) at every step."""
         rows = np.empty((last - first + 1, len(self.state)))
         rows[0] = self.state
         made = self._march(first, rows[1:])
-        refuse_derailed(self.memo, self.setup.model)
+        refuse_derailed(self.memory, self.setup.model)
         if made < last - first or not np.isfinite(self.state).all():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

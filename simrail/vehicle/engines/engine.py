@@ -22,15 +22,12 @@ from simrail.core.jit import FloatArray
 from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.track.laid_track import LaidTrack
 from simrail.vehicle.contact.contact_tables import rest_drops_m
-from simrail.vehicle.engines.force_data import ForceData, pack
+from simrail.vehicle.engines.force_data import ForceData, Memory, memory_of, pack
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
 _DIFFERENCE = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
 _REACH = len(_DIFFERENCE)
-
-_MEMO_HEAD, _MEMO_AXLE = 2, 5
-"""Layout of the memory of `simrail.vehicle.engines.forces.forces`: its head, then five numbers per axle."""
 
 
 class DerailedError(RuntimeError):
@@ -142,28 +139,25 @@ def start_poses(setup: Setup) -> Iterator[tuple[FloatArray, FloatArray]]:
         yield frame.position[0] + middle + rotation @ offset, rotation
 
 
-def start_memo(setup: Setup) -> FloatArray:
+def start_memory(setup: Setup) -> Memory:
     """Memory of the force kernel at the start: every axle looks for its place on the track from here."""
     model, start_m = setup.model, setup.profile.start_m
-    memo = np.zeros(_MEMO_HEAD + _MEMO_AXLE * len(model.axle_names))
-    memo[1] = start_m + model.body(model.guide.body).position_m[0]
-    memo[_MEMO_HEAD::_MEMO_AXLE] = [start_m + model.body(name).position_m[0] for name in model.axle_names]
-    return memo
+    memory = memory_of(len(model.axle_names))
+    memory.guide_memo["s_m"] = start_m + model.body(model.guide.body).position_m[0]
+    memory.axle_memos["s_m"] = [start_m + model.body(name).position_m[0] for name in model.axle_names]
+    return memory
 
 
-def wheel_loads_n(memo: FloatArray) -> FloatArray:
+def wheel_loads_n(memory: Memory) -> FloatArray:
     """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-    axles = memo[_MEMO_HEAD:].reshape(-1, _MEMO_AXLE)
-    return axles[:, 3:5].flatten()
+    return np.column_stack([memory.axle_memos["load_left_n"], memory.axle_memos["load_right_n"]]).ravel()
 
 
-def refuse_derailed(memo: FloatArray, model: VehicleModel) -> None:
+def refuse_derailed(memory: Memory, model: VehicleModel) -> None:
     """Raise `DerailedError` if a wheel has left its rail."""
-    axles = memo[_MEMO_HEAD:].reshape(-1, _MEMO_AXLE)
-    derailed = np.flatnonzero(axles[:, 1])
-    if derailed.size:
-        axle = model.axle_names[int(derailed[0])]
-        raise DerailedError(f"derailed: axle {axle} left the rail at s = {axles[derailed[0], 2]:.1f} m")
+    for axle, memo in zip(model.axle_names, memory.axle_memos, strict=True):
+        if memo["derailed"]:
+            raise DerailedError(f"derailed: axle {axle} left the rail at s = {memo['derailed_s_m']:.1f} m")
 
 
 def stretches(

@@ -26,6 +26,7 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 import exudyn as exu
+import numba
 import numpy as np
 from exudyn.itemInterface import (
     MarkerBodyRigid,
@@ -43,12 +44,12 @@ from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
     refuse_derailed,
-    start_memo,
+    start_memory,
     start_poses,
     stretches,
     wheel_loads_n,
 )
-from simrail.vehicle.engines.exudyn_forces import HALF_TURN, generalized_forces_of, spread
+from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces
 from simrail.vehicle.engines.force_data import states_of
 
 _NOTHING = [0.0]
@@ -71,14 +72,14 @@ class ExudynEngine:
         self._native = data.springs[:0]
         if suspension == "native":
             self._native, data = data.springs, data._replace(springs=data.springs[:0])
-        bodies, axles = len(model.bodies), len(data.axles)
         self._states = states_of(data)
-        self.size = 6 * bodies + len(data.spins) + self._states
-        scratch = (np.zeros((bodies, 18)), np.zeros((bodies, 6)), np.zeros(2 + 5 * axles), np.zeros(34))
-        self._arena, views = spread([np.zeros(3 * self.size), *data, *scratch])
-        self._state, self.memo, self._spins = views[0], views[-2], data.spins[:, 0]
+        self._spins = data.spins["inertia"]
+        self.size = 6 * len(model.bodies) + len(data.spins) + self._states
+        self.memory = start_memory(setup)
+        self._arguments = Arguments(self.size, data, self.memory)
         # Compiled now, so that no clock of a ride counts it.
-        generalized_forces_of.compile("void(float64, float64[::1])")  # type: ignore[attr-defined]
+        compiled = generalized_forces.compile  # type: ignore[attr-defined]
+        compiled((numba.float64, numba.typeof(self._arguments.places)))
         self._build()
 
     def run(self, duration_s: float, *, segment_s: float = 10.0) -> Iterator[Segment]:
@@ -114,7 +115,7 @@ class ExudynEngine:
 
     def wheel_loads_n(self) -> FloatArray:
         """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-        return wheel_loads_n(self.memo)
+        return wheel_loads_n(self.memory)
 
     def _build(self) -> None:
         model = self.setup.model
@@ -138,7 +139,6 @@ class ExudynEngine:
             )
             self._nodes.append(node)
         self._add_springs(objects)
-        self.memo[:] = start_memo(self.setup)
         aux = len(self._spins) + self._states
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
@@ -183,14 +183,14 @@ class ExudynEngine:
                         ),
                     )
                 )
-                for body, arm in ((row[0], row[2:5]), (row[1], row[5:8]))
+                for body, arm in ((row["inner"], row["inner_arm"]), (row["outer"], row["outer_arm"]))
             ]
             self.mbs.AddObject(
                 RigidBodySpringDamper(
                     markerNumbers=markers,
-                    stiffness=np.diag([*row[8:11], 0.0, 0.0, 0.0]),
-                    damping=np.diag([*row[11:14], 0.0, 0.0, 0.0]),
-                    offset=[*row[14:17], 0.0, 0.0, 0.0],
+                    stiffness=np.diag([*row["stiffness"], 0.0, 0.0, 0.0]),
+                    damping=np.diag([*row["damping"], 0.0, 0.0, 0.0]),
+                    offset=[0.0, 0.0, row["sag_m"], 0.0, 0.0, 0.0],
                 )
             )
 
@@ -201,14 +201,15 @@ class ExudynEngine:
         ready arrays is the cheapest plain-Python way found (2 us a call instead of 5).
         """
         n = self.size
-        view = memoryview(self._state.data).cast("B")
+        state = self._arguments.state
+        view = memoryview(state.data).cast("B")
         put = struct.Struct(f"{2 * n}d").pack_into
-        get = self._state[2 * n :].tolist
-        arena, settle = self._arena, self.setup.settle_s
+        get = state[2 * n :].tolist
+        places, settle = self._arguments.places, self.setup.settle_s
 
-        def user_function(mbs: Any, t: float, item: int, q: list[float], v: list[float]) -> list[float]:
+        def user_function(_mbs: Any, t: float, _item: int, q: list[float], v: list[float]) -> list[float]:
             put(view, 0, *q, *v)
-            generalized_forces_of(t - settle, arena)
+            generalized_forces(t - settle, places)
             forces_now: list[float] = get()
             return forces_now
 
@@ -218,7 +219,7 @@ class ExudynEngine:
         """Copies coordinates and rates into the rows of the present solution, step by step."""
         system, step = self.mbs.systemData, self.setup.step_s
 
-        def user_function(mbs: Any, t: float, numbers: Any, factors: Any, configuration: Any) -> list[float]:
+        def user_function(_mbs: Any, t: float, *_others: Any) -> list[float]:
             row = self._rows[round((t - self._rows_start_s) / step)]
             row[0] = system.GetODE2Coordinates()
             row[1] = system.GetODE2Coordinates_t()
@@ -238,7 +239,7 @@ class ExudynEngine:
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
         )
-        refuse_derailed(self.memo, self.setup.model)
+        refuse_derailed(self.memory, self.setup.model)
         if not solved or np.isnan(self._rows).any():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

@@ -2,17 +2,19 @@
 
 Gravity, suspensions, guide, wheel-rail contact and the gyroscopic moment of the wheels, from poses and
 velocities in the global frame. Engines bring their own coordinates and integrate; nothing is
-integrated here. The constants are the arrays of `simrail.vehicle.engines.force_data.ForceData`.
+integrated here. The constants are `simrail.vehicle.engines.force_data.ForceData`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import FloatArray, njit_borrowed
-from simrail.vehicle.contact.contact import wheel_force
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
+from simrail.vehicle.contact.contact import Motion, RailHere, wheel_force
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
+from simrail.vehicle.engines.force_data import ForceData, Memory
 from simrail.vehicle.engines.lookup import find_on_track
+from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
 from simrail.vehicle.engines.suspension_forces import (
     guide_force,
     series_forces,
@@ -20,125 +22,93 @@ from simrail.vehicle.engines.suspension_forces import (
     stop_forces,
     turn_forces,
 )
-from simrail.vehicle.engines.traction_forces import traction_forces
+from simrail.vehicle.engines.traction_forces import driver, traction_forces
 
 
-@njit_borrowed
+@njit_inner
 def axle_forces(
     t: float,
-    axle: FloatArray,
-    wheels: FloatArray,
+    axle: Record,
     spin: FloatArray,
     zeta: FloatArray,
-    spins: FloatArray,
-    switches: FloatArray,
-    grid: FloatArray,
-    table: FloatArray,
-    coef: FloatArray,
-    const: FloatArray,
-    pose: FloatArray,
-    wrench: FloatArray,
+    data: ForceData,
+    pose: RecordArray,
+    wrench: RecordArray,
     torque: FloatArray,
     zeta_rate: FloatArray,
-    memo: FloatArray,
-    f: FloatArray,
-    o: FloatArray,
+    memo: Record,
+    frame: Record,
 ) -> None:
     """Add the contact forces of one axle's two wheels, and their gyroscopic moment.
 
-    ``memo`` (3,): s of the axle at the last call (where the search for s starts), derailed flag, s of
-    the derailment.
+    ``memo`` is an `simrail.vehicle.engines.records.AXLE_MEMO`; its s is where the search for s starts.
     """
-    i, first = int(axle[0]), int(axle[1])
-    b, wr = pose[i], wrench[i]
-    s, y, z = find_on_track(table, grid, b, memo[0], f)
-    memo[0] = s
-    vx = f[3] * b[3] + f[6] * b[4] + f[9] * b[5]
-    vy = f[4] * b[3] + f[7] * b[4] + f[10] * b[5]
-    vz = f[5] * b[3] + f[8] * b[4] + f[11] * b[5]
-    speed = vx / (f[15] - f[14] * y + f[13] * z)
-    y_dot = vy + speed * f[12] * z
-    z_dot = vz - speed * f[12] * y
-    phi_dot = f[3] * b[15] + f[6] * b[16] + f[9] * b[17] - speed * f[12]
-    psi_dot = f[5] * b[15] + f[8] * b[16] + f[11] * b[17] - speed * f[14]
-    # ZYX angles of the axle in the track frame, from C_t^T A.
-    r00 = f[3] * b[6] + f[6] * b[9] + f[9] * b[12]
-    r10 = f[4] * b[6] + f[7] * b[9] + f[10] * b[12]
-    r21 = f[5] * b[7] + f[8] * b[10] + f[11] * b[13]
-    r22 = f[5] * b[8] + f[8] * b[11] + f[11] * b[14]
-    phi, psi = np.arctan2(r21, r22), np.arctan2(r10, r00)
+    options, wheels = data.options[0], data.wheels
+    b, w, first = pose[axle.body], wrench[axle.body], axle.first_wheel
+    s, y, z, metre = find_on_track(data.track, options, b, memo.s_m, frame)
+    memo.s_m = s
+    # Rates of the axle against the track frame, which moves along and turns with the curvatures.
+    vx, vy, vz = rotated_back(frame.rotation, b.vx, b.vy, b.vz)
+    wx, _, wz = rotated_back(frame.rotation, b.wx, b.wy, b.wz)
+    speed = vx / metre
+    y_dot, z_dot = vy + speed * frame.k1 * z, vz - speed * frame.k1 * y
+    phi_dot, psi_dot = wx - speed * frame.k1, wz - speed * frame.k3
+    # ZYX angles of the axle in the track frame, from C^T A.
+    turn = relative(frame.rotation, b.rotation)
+    phi, psi = np.arctan2(turn.zy, turn.zz), np.arctan2(turn.yx, turn.xx)
     # The axle's own axis in global components.
-    ex, ey, ez = b[7], b[10], b[13]
+    ex, ey, ez = b.rotation[0, 1], b.rotation[1, 1], b.rotation[2, 1]
+    together = wheels[first].spin == wheels[first + 1].spin
     for n in range(2):
         wheel = wheels[first + n]
-        k = int(wheel[2])
-        kind = int(wheel[4])
-        rail = 0 if wheel[1] > 0.0 else 2
-        if switches[1] > 0.0:
-            flag = linear_wheel_force(
-                switches, const[kind], wheel[5], wheel[1], y, z - wheel[3], phi, psi,
-                f[16 + rail], f[17 + rail],
-                speed, vx, y_dot, z_dot, phi_dot, psi_dot, spin[k], f[14], f[20 + rail], f[21 + rail],
-                zeta[4 * (first + n) : 4 * (first + n) + 4],
-                zeta_rate[4 * (first + n) : 4 * (first + n) + 4], o,
-            )  # fmt: skip
+        k, const = wheel.spin, data.const[wheel.table]
+        motion = Motion(
+            y, z - wheel.radius_m, phi, psi, speed, vx, y_dot, z_dot, phi_dot, psi_dot, spin[k], frame.k3
+        )
+        if wheel.side > 0:
+            friction = const.friction * frame.friction_left
+            rail = RailHere(friction, frame.y_left, frame.z_left, frame.dy_left, frame.dz_left)
         else:
-            flag = wheel_force(
-                coef[kind], const[kind], wheel[1], y, z - wheel[3], phi, psi, f[16 + rail], f[17 + rail],
-                speed, vx, y_dot, z_dot, phi_dot, psi_dot, spin[k], f[14], f[20 + rail], f[21 + rail],
-                const[kind, 5] * f[24 + rail // 2], zeta[4 * (first + n) : 4 * (first + n) + 4],
-                zeta_rate[4 * (first + n) : 4 * (first + n) + 4], o,
-            )  # fmt: skip
+            friction = const.friction * frame.friction_right
+            rail = RailHere(friction, frame.y_right, frame.z_right, frame.dy_right, frame.dz_right)
+        creep = zeta[4 * (first + n) : 4 * (first + n) + 4]
+        creep_rate = zeta_rate[4 * (first + n) : 4 * (first + n) + 4]
+        side = float(wheel.side)
+        if options.linear_contact:
+            contact = linear_wheel_force(options, const, wheel.load_n, side, motion, rail, creep, creep_rate)
+        else:
+            contact = wheel_force(data.patches[wheel.table], const, side, motion, rail, creep, creep_rate)
         # Before 0 the vehicle is still being set down on its rails: where it then stands counts.
-        if flag < 0 and memo[1] == 0.0 and t >= 0.0:
-            memo[1], memo[2] = 1.0, s
-        gx = f[3] * o[0] + f[4] * o[1] + f[5] * o[2]
-        gy = f[6] * o[0] + f[7] * o[1] + f[8] * o[2]
-        gz = f[9] * o[0] + f[10] * o[1] + f[11] * o[2]
-        mx = f[3] * o[3] + f[4] * o[4] + f[5] * o[5]
-        my = f[6] * o[3] + f[7] * o[4] + f[8] * o[5]
-        mz = f[9] * o[3] + f[10] * o[4] + f[11] * o[5]
+        if contact.flag < 0 and memo.derailed == 0 and t >= 0.0:
+            memo.derailed, memo.derailed_s_m = 1, s
+        gx, gy, gz = rotated(frame.rotation, contact.fx, contact.fy, contact.fz)
+        mx, my, mz = rotated(frame.rotation, contact.mx, contact.my, contact.mz)
         # The bearing passes everything on to the axle but the moment about its own axis.
         about = mx * ex + my * ey + mz * ez
         torque[k] += about
-        # Half of the gyroscopic moment -omega x h goes with each wheel of the spin's inertia.
-        h = switches[0] * spins[k, 0] * spin[k] * (0.5 if wheels[first, 2] == wheels[first + 1, 2] else 1.0)
-        wr[0] += gx
-        wr[1] += gy
-        wr[2] += gz
-        wr[3] += mx - about * ex - h * (b[16] * ez - b[17] * ey)
-        wr[4] += my - about * ey - h * (b[17] * ex - b[15] * ez)
-        wr[5] += mz - about * ez - h * (b[15] * ey - b[16] * ex)
-        memo[3 + n] = o[2]
+        # Gyroscopic moment -omega x h; half of it goes with each wheel if both turn as one.
+        h = options.gyroscopic * data.spins[k].inertia * spin[k] * (0.5 if together else 1.0)
+        push(w, 0.0, 0.0, 0.0, gx, gy, gz)
+        w.mx += mx - about * ex - h * (b.wy * ez - b.wz * ey)
+        w.my += my - about * ey - h * (b.wz * ex - b.wx * ez)
+        w.mz += mz - about * ez - h * (b.wx * ey - b.wy * ex)
+        if n == 0:
+            memo.load_left_n = contact.fz
+        else:
+            memo.load_right_n = contact.fz
 
 
 @njit_borrowed
 def forces(
     t: float,
-    pose: FloatArray,
+    pose: RecordArray,
     spin: FloatArray,
     zeta: FloatArray,
-    bodies: FloatArray,
-    springs: FloatArray,
-    series: FloatArray,
-    turns: FloatArray,
-    stops: FloatArray,
-    laws: FloatArray,
-    wheels: FloatArray,
-    spins: FloatArray,
-    axles: FloatArray,
-    guide: FloatArray,
-    switches: FloatArray,
-    drive: FloatArray,
-    grid: FloatArray,
-    table: FloatArray,
-    coef: FloatArray,
-    const: FloatArray,
-    wrench: FloatArray,
+    data: ForceData,
+    wrench: RecordArray,
     torque: FloatArray,
     zeta_rate: FloatArray,
-    memo: FloatArray,
-    work: FloatArray,
+    memory: Memory,
 ) -> None:
     """All forces at one instant.
 
@@ -146,46 +116,47 @@ def forces(
     ----------
     t : float
         Time, s; before 0 the guide stands at the profile's start.
-    pose : ndarray (b, 18)
-        Per body: position (3), velocity (3), rotation matrix by rows (9), angular rate (3); global.
+    pose : ndarray (b,)
+        Of each body, `simrail.vehicle.engines.records.POSE`.
     spin : ndarray (p,)
         Absolute rate of each spin about its axle, rad/s.
     zeta : ndarray (4 w + d,), or (4 w + d + p,) where the wheels drive
         Creep states of each wheel (see `simrail.vehicle.contact.contact`), then the force of each series
         damper, then the state of each spin's brake (see `simrail.vehicle.engines.traction_forces`).
-    bodies ... const : ndarray
-        `ForceData`.
-    wrench : ndarray (b, 6), output
-        Force and moment about the centre of gravity, global axes.
+    data : ForceData
+        The constants.
+    wrench : ndarray (b,), output
+        Force and moment on each body, `simrail.vehicle.engines.records.WRENCH`.
     torque : ndarray (p,), output
         Moment about the axle of each spin.
     zeta_rate : ndarray, shape of zeta, output
         d(zeta)/dt.
-    memo : ndarray (2 + 5 a,)
-        Memory between calls: profile piece, s of the guide's body; per axle s, derailed flag, s of
-        derailment, and the wheel loads of the last call.
-    work : ndarray (34,)
-        Scratch.
+    memory : Memory
+        What is remembered from call to call.
     """
-    wrench[:] = 0.0
-    torque[:] = 0.0
-    for b in range(bodies.shape[0]):
-        wrench[b, 2] = -bodies[b, 0] * guide[8]
-    f, o = work[:26], work[26:]
-    spring_forces(springs, pose, wrench)
-    creep = 4 * wheels.shape[0]
-    brakes = creep + series.shape[0]
-    series_forces(series, pose, zeta[creep:brakes], wrench, zeta_rate[creep:brakes])
-    turn_forces(turns, pose, wrench)
-    stop_forces(stops, laws, pose, wrench)
-    behind, wanted, speed = guide_force(t, guide, drive, grid, table, pose, wrench, memo, f)
-    if guide[18] > 0.0:
+    options, traction, frame, memo = data.options[0], data.traction[0], memory.frame[0], memory.guide_memo[0]
+    for k in range(torque.shape[0]):
+        torque[k] = 0.0
+    for b in range(data.bodies.shape[0]):
+        w = wrench[b]
+        w.fx = w.fy = w.mx = w.my = w.mz = 0.0
+        w.fz = -data.bodies[b].mass_kg * options.gravity
+    creep = 4 * data.wheels.shape[0]
+    brakes = creep + data.series.shape[0]
+    spring_forces(data.springs, pose, wrench)
+    series_forces(data.series, pose, zeta[creep:brakes], wrench, zeta_rate[creep:brakes])
+    turn_forces(data.turns, pose, wrench)
+    stop_forces(data.stops, data.laws, pose, wrench)
+    wheels_drive = traction.wheels_drive > 0
+    behind, wanted, speed = guide_force(
+        t, data.guide[0], wheels_drive, data.drive, data.track, options, pose, wrench, memo, frame
+    )
+    if wheels_drive:
+        efforts = driver(behind, wanted, speed, traction)
         traction_forces(
-            behind, wanted, speed, guide[18:], spins, pose, spin, zeta[brakes:], wrench, torque,
-            zeta_rate[brakes:],
-        )  # fmt: skip
-    for a in range(axles.shape[0]):
+            efforts, traction, data.spins, pose, spin, zeta[brakes:], wrench, torque, zeta_rate[brakes:]
+        )
+    for a in range(data.axles.shape[0]):
         axle_forces(
-            t, axles[a], wheels, spin, zeta, spins, switches, grid, table, coef, const,
-            pose, wrench, torque, zeta_rate, memo[2 + 5 * a : 7 + 5 * a], f, o,
-        )  # fmt: skip
+            t, data.axles[a], spin, zeta, data, pose, wrench, torque, zeta_rate, memory.axle_memos[a], frame
+        )

@@ -7,86 +7,86 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import njit_inner
+from simrail.vehicle.contact.cubic import slope, value
+from simrail.vehicle.engines.records import Record, RecordArray, rotated_back
+
+_NEWTON_STEPS = 8
+"""Most steps of a search for s; from the last call's s two are enough."""
+_SAME_PLACE = 1e-12
+"""Of s: a step so small is rounding."""
 
 
-@njit_borrowed
-def track_at(table: FloatArray, grid: FloatArray, s: float, f: FloatArray) -> None:
-    """Track frame and rails at s into f (26,), from the C2 splines of the laid track.
-
-    f: position 0-2, rotation (rows) 3-11, k 12-14, stretch of the centreline 1/cos(pitch) 15,
-    rails y_left, z_left, y_right, z_right 16-19, their derivatives by s 20-23, friction factors of the
-    left and right rail 24-25.
-    """
-    at = (s - grid[0]) / grid[1]
-    i = int(at)
+@njit_inner
+def track_at(track: RecordArray, options: Record, s: float, frame: Record) -> None:
+    """Track frame and rails at s into ``frame``, from the C2 splines of the laid track."""
+    i = int((s - options.grid_start_m) / options.grid_step_m)
     if i < 0:
         i = 0
-    elif i >= table.shape[0]:
-        i = table.shape[0] - 1
-    t = s - grid[0] - i * grid[1]
-    c = table[i]
-    for j in range(3):
-        f[j] = ((c[j, 0] * t + c[j, 1]) * t + c[j, 2]) * t + c[j, 3]
-    yaw = ((c[3, 0] * t + c[3, 1]) * t + c[3, 2]) * t + c[3, 3]
-    pitch = ((c[4, 0] * t + c[4, 1]) * t + c[4, 2]) * t + c[4, 3]
-    roll = ((c[5, 0] * t + c[5, 1]) * t + c[5, 2]) * t + c[5, 3]
-    yaw1 = (3.0 * c[3, 0] * t + 2.0 * c[3, 1]) * t + c[3, 2]
-    pitch1 = (3.0 * c[4, 0] * t + 2.0 * c[4, 1]) * t + c[4, 2]
-    roll1 = (3.0 * c[5, 0] * t + 2.0 * c[5, 1]) * t + c[5, 2]
-    for j in range(4):
-        f[16 + j] = ((c[6 + j, 0] * t + c[6 + j, 1]) * t + c[6 + j, 2]) * t + c[6 + j, 3]
-        f[20 + j] = (3.0 * c[6 + j, 0] * t + 2.0 * c[6 + j, 1]) * t + c[6 + j, 2]
-    for j in range(2):
-        f[24 + j] = ((c[10 + j, 0] * t + c[10 + j, 1]) * t + c[10 + j, 2]) * t + c[10 + j, 3]
+    elif i >= track.shape[0]:
+        i = track.shape[0] - 1
+    t = s - options.grid_start_m - i * options.grid_step_m
+    c = track[i]
+    frame.x, frame.y, frame.z = value(c.x, t), value(c.y, t), value(c.z, t)
+    frame.y_left, frame.dy_left = value(c.y_left, t), slope(c.y_left, t)
+    frame.z_left, frame.dz_left = value(c.z_left, t), slope(c.z_left, t)
+    frame.y_right, frame.dy_right = value(c.y_right, t), slope(c.y_right, t)
+    frame.z_right, frame.dz_right = value(c.z_right, t), slope(c.z_right, t)
+    frame.friction_left, frame.friction_right = value(c.friction_left, t), value(c.friction_right, t)
+    # ZYX: rotation = Rz(yaw) Ry(pitch) Rx(roll).
+    yaw, pitch, roll = value(c.yaw, t), value(c.pitch, t), value(c.roll, t)
     cy, sy = np.cos(yaw), np.sin(yaw)
     cp, sp = np.cos(pitch), np.sin(pitch)
     cr, sr = np.cos(roll), np.sin(roll)
-    f[3], f[4], f[5] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    f[6], f[7], f[8] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    f[9], f[10], f[11] = -sp, cp * sr, cp * cr
-    f[12] = roll1 - sp * yaw1
-    f[13] = cr * pitch1 + sr * cp * yaw1
-    f[14] = -sr * pitch1 + cr * cp * yaw1
-    f[15] = 1.0 / cp
+    r = frame.rotation
+    r[0, 0], r[0, 1], r[0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    r[1, 0], r[1, 1], r[1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    r[2, 0], r[2, 1], r[2, 2] = -sp, cp * sr, cp * cr
+    # Curvatures: the frame's angular rate per metre, in its own axes.
+    yaw1, pitch1, roll1 = slope(c.yaw, t), slope(c.pitch, t), slope(c.roll, t)
+    frame.k1 = roll1 - sp * yaw1
+    frame.k2 = cr * pitch1 + sr * cp * yaw1
+    frame.k3 = -sr * pitch1 + cr * cp * yaw1
+    frame.stretch = 1.0 / cp
 
 
-@njit_borrowed
+@njit_inner
+def place_in(frame: Record, body: Record) -> tuple[float, float, float, float]:
+    """Place x, y, z of a body in the track frame, and the length there of a metre of s: -dx/ds."""
+    x, y, z = rotated_back(frame.rotation, body.x - frame.x, body.y - frame.y, body.z - frame.z)
+    return x, y, z, frame.stretch - frame.k3 * y + frame.k2 * z
+
+
+@njit_inner
 def find_on_track(
-    table: FloatArray, grid: FloatArray, b: FloatArray, s: float, f: FloatArray
-) -> tuple[float, float, float]:
-    """Where on the track a body is: s, and its lateral and vertical place in the track frame there.
+    track: RecordArray, options: Record, body: Record, s: float, frame: Record
+) -> tuple[float, float, float, float]:
+    """Where on the track a body is, by Newton's method from ``s`` on: s, y, z, and `place_in`'s metre.
 
-    ``b`` is the pose of the body, ``s`` where to begin; the frame at the place found is left in ``f``.
+    The frame at the place is left in ``frame``.
     """
-    y = z = 0.0
-    for _ in range(8):
-        track_at(table, grid, s, f)
-        dx, dy, dz = b[0] - f[0], b[1] - f[1], b[2] - f[2]
-        x = f[3] * dx + f[6] * dy + f[9] * dz
-        y = f[4] * dx + f[7] * dy + f[10] * dz
-        z = f[5] * dx + f[8] * dy + f[11] * dz
-        stretch = f[15] - f[14] * y + f[13] * z
-        step = x / stretch
-        if abs(step) < 1e-12 * (1.0 + abs(s)):
+    y = z = metre = 0.0
+    for _ in range(_NEWTON_STEPS):
+        track_at(track, options, s, frame)
+        x, y, z, metre = place_in(frame, body)
+        step = x / metre
+        if abs(step) < _SAME_PLACE * (1.0 + abs(s)):
             break
         s += step
-    return s, y, z
+    return s, y, z, metre
 
 
-@njit_borrowed
-def driven(t: float, drive: FloatArray, memo: FloatArray) -> tuple[float, float]:
-    """Position and speed that the profile asks for at t; memo[0] remembers the piece."""
-    n = drive.shape[0]
-    i = int(memo[0])
-    while i > 0 and t < drive[i, 0]:
+@njit_inner
+def driven(t: float, drive: RecordArray, memo: Record) -> tuple[float, float]:
+    """Position and speed that the profile asks for at t; the memo remembers the piece."""
+    i = memo.piece
+    while i > 0 and t < drive[i].start_s:
         i -= 1
-    while i < n - 1 and t >= drive[i + 1, 0]:
+    while i < drive.shape[0] - 1 and t >= drive[i + 1].start_s:
         i += 1
-    memo[0] = i
+    memo.piece = i
     # Before 0 the vehicle settles at rest; the first piece is a rest and its cubic is constant.
-    u = t - drive[i, 0]
+    u = t - drive[i].start_s
     if u < 0.0:
-        return drive[0, 4], 0.0
-    position = ((drive[i, 1] * u + drive[i, 2]) * u + drive[i, 3]) * u + drive[i, 4]
-    return position, (3.0 * drive[i, 1] * u + 2.0 * drive[i, 2]) * u + drive[i, 3]
+        return drive[0].cubic[3], 0.0
+    return value(drive[i].cubic, u), slope(drive[i].cubic, u)

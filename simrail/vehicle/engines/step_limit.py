@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simrail.vehicle.contact.contact import COLUMNS, CONSTANTS, static_height
+from simrail.vehicle.contact.contact import static_height
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.model import VehicleModel
 
@@ -67,14 +67,8 @@ def contact_resonance(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Res
     """
     pair = model.wheel_rail
     table = contacts_of(model, gravity_mps2=gravity_mps2).tables[-1]
-    const = dict(zip(CONSTANTS, table.const, strict=True))
     if pair.linear is None:
-        at = -const["first_shift_m"]
-        i = int(at * const["intervals_per_m"])
-        penetration, f11 = (
-            float(np.polyval(table.coef[0, i, COLUMNS.index(name)], at - i / const["intervals_per_m"]))
-            for name in ("penetration", "f11")
-        )
+        penetration, f11 = (float(np.polyval(*table.piece(name, 0.0))) for name in ("penetration", "f11"))
         approach = penetration - static_height(table)
         vertical, creep = 1.5 * table.static_load_n / approach, f11 * approach
     else:
@@ -84,7 +78,7 @@ def contact_resonance(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Res
     normal = max(2.0 * vertical * max(1.0 / b.mass_kg, half**2 / b.inertia_kgm2[0]) for b in axles)
     tangential = max(
         creep
-        / const["relaxation_length_m"]
+        / table.const["relaxation_length_m"]
         * sum(w.radius_m**2 for w in model.wheels if w.spin == spin)
         / inertia
         for spin, inertia in model.spin_inertia_kgm2.items()

@@ -21,11 +21,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
+from simrail.vehicle.engines.records import Record, RecordArray
+
+_ROUNDING_MPS = 1e-3
+"""Speed within which "never backwards" is rounded: far below any that is scored."""
+_HOLDING_MPS = 0.05
+"""Speed below which the brakes hold, chosen so that a stop ends without a jolt."""
+_BRAKE_LAG_S = 1e-3
+"""Keeps the brake's state within reach of the integrator however fast the wheel turns: two usual steps."""
+_SLIDE_SPEED_MPS = 1.0
+"""The slide protection watches a sliding speed below this, a creepage above it."""
 
 
 @njit_borrowed
-def driver(behind: float, wanted: float, speed: float, traction: FloatArray) -> tuple[float, float]:
+def driver(behind: float, wanted: float, speed: float, traction: Record) -> tuple[float, float]:
     """Tractive and braking effort (N, both >= 0) that the driver asks for.
 
     Parameters
@@ -34,63 +44,66 @@ def driver(behind: float, wanted: float, speed: float, traction: FloatArray) -> 
         How far ahead of the vehicle its place by the profile is, m along the track.
     wanted, speed : float
         Speed of the profile, and of the vehicle, m/s along the track.
-    traction : ndarray (11,)
-        The driver's part of `simrail.vehicle.engines.force_data.ForceData.guide`.
+    traction : record
+        `simrail.vehicle.engines.records.TRACTION`.
     """
-    way, pull, brake = traction[1], traction[2], traction[4]
-    gain, back, chase = traction[5], traction[6], traction[7]
-    rounding, holding = 1e-3, 0.05  # m/s: where "never backwards" is rounded, and below which brakes hold
-    v = way * wanted + chase * np.tanh(back * way * behind / chase)
-    v = 0.5 * (v + np.sqrt(v * v + rounding * rounding))
-    effort = gain * (v - way * speed)
-    still = np.exp(-(v * v + speed * speed) / (holding * holding))
+    way, chase = traction.direction, traction.catch_up
+    limit, brake = traction.tractive_effort, traction.braking_effort
+    # v = way wanted + chase tanh(gain behind / chase), rounded off at 0.
+    v = way * wanted + chase * np.tanh(traction.position_gain * way * behind / chase)
+    v = 0.5 * (v + np.sqrt(v * v + _ROUNDING_MPS * _ROUNDING_MPS))
+    effort = traction.speed_gain * (v - way * speed)
+    still = np.exp(-(v * v + speed * speed) / (_HOLDING_MPS * _HOLDING_MPS))
     if effort > 0.0:
-        return pull * np.tanh(effort / pull), brake * still
+        return limit * np.tanh(effort / limit), brake * still
     asked = brake * np.tanh(-effort / brake)
     return 0.0, asked + (brake - asked) * still
 
 
-@njit_borrowed
+@njit_inner
 def traction_forces(
-    behind: float,
-    wanted: float,
-    speed: float,
-    traction: FloatArray,
-    spins: FloatArray,
-    pose: FloatArray,
-    spin: FloatArray,
+    efforts: tuple[float, float],
+    traction: Record,
+    spins: RecordArray,
+    pose: RecordArray,
+    rate: FloatArray,
     brakes: FloatArray,
-    wrench: FloatArray,
+    wrench: RecordArray,
     torque: FloatArray,
     brakes_rate: FloatArray,
 ) -> None:
     """Add the torques of motors and brakes to the spins, and their reactions to the bodies.
 
-    ``behind``, ``wanted`` and ``speed`` as in `driver`; ``brakes`` (p,) are the states of the brakes and
-    ``brakes_rate`` their derivatives (written); the rest as in `simrail.vehicle.engines.forces.forces`.
+    ``efforts`` as the `driver` asks for; ``brakes`` (p,) are the states of the brakes and ``brakes_rate``
+    their derivatives (written); the rest as in `simrail.vehicle.engines.forces.forces`.
     """
-    pull, brake = driver(behind, wanted, speed, traction)
-    way, power, limit, windup, damping = traction[1], traction[3], traction[8], traction[9], traction[10]
-    tau = 1e-3  # s: keeps the brake's state within reach of the integrator however fast the wheel turns
+    pull, brake = efforts
+    limit = traction.slide_protection
     for k in range(spins.shape[0]):
-        m = spins[k]
-        axle, carrier, radius = pose[int(m[1])], pose[int(m[5])], m[2]
-        ex, ey, ez = axle[7], axle[10], axle[13]
-        rate = spin[k] - carrier[15] * ex - carrier[16] * ey - carrier[17] * ez
-        kept = 1.0
+        spin = spins[k]
+        axle, carrier, radius = pose[spin.axle], pose[spin.carrier], spin.radius_m
+        ex, ey, ez = axle.rotation[0, 1], axle.rotation[1, 1], axle.rotation[2, 1]
+        w = rate[k] - carrier.wx * ex - carrier.wy * ey - carrier.wz * ez
+        # Slide protection: 1 / (1 + (creepage/limit)^4).
+        share = 1.0
         if limit > 0.0:
-            v = axle[3] * axle[6] + axle[4] * axle[9] + axle[5] * axle[12]
-            # Below 1 m/s or so a sliding speed, above it a creepage.
-            slide = (spin[k] * radius - v) / (limit * np.sqrt(v * v + 1.0))
-            kept = 1.0 / (1.0 + slide * slide * slide * slide)
-        spent = pull * rate * radius / power
+            v = axle.vx * axle.rotation[0, 0] + axle.vy * axle.rotation[1, 0] + axle.vz * axle.rotation[2, 0]
+            slide = (rate[k] * radius - v) / (limit * np.sqrt(v * v + _SLIDE_SPEED_MPS * _SLIDE_SPEED_MPS))
+            share = 1.0 / (1.0 + slide * slide * slide * slide)
+        # Motor: the effort, less where its power ends: F / (1 + (F w r/P)^4)^(1/4).
+        spent = pull * w * radius / traction.power
         drive = pull / np.sqrt(np.sqrt(1.0 + spent * spent * spent * spent))
-        slope = (rate - abs(rate) * brakes[k]) / (windup + tau * abs(rate))
+        # Brake: q' = (w - |w| q)/(windup + tau |w|), and Voigt damping of its mounting.
+        slope = (w - abs(w) * brakes[k]) / (traction.windup + _BRAKE_LAG_S * abs(w))
         brakes_rate[k] = slope
-        grip = min(max(brakes[k] + damping * slope, -1.0), 1.0)
-        moment = kept * radius * (way * drive * m[3] - brake * m[4] * grip)
+        grip = min(max(brakes[k] + traction.damping * slope, -1.0), 1.0)
+        moment = (
+            share
+            * radius
+            * (traction.direction * drive * spin.traction_share - brake * spin.braking_share * grip)
+        )
         torque[k] += moment
-        w = wrench[int(m[5])]
-        w[3] -= moment * ex
-        w[4] -= moment * ey
-        w[5] -= moment * ez
+        reaction = wrench[spin.carrier]
+        reaction.mx -= moment * ex
+        reaction.my -= moment * ey
+        reaction.mz -= moment * ez
