@@ -11,6 +11,7 @@ from pydantic import Field
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part, judge, shipped
+from simrail.scenario import check
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
 from simrail.scenario.build import Parts
 from simrail.scenario.build_estimator import estimator_of
@@ -314,3 +315,17 @@ def test_an_empty_magnetometer_table_is_a_clean_field() -> None:
     for text, expected in ((GOOD, None), (GOOD + "\n[magnetometer]\n", MagnetometerSpec())):
         scenario = read_scenario(text, name="mine")
         assert Parts(scenario).resolve(next(cells(scenario))).magnetometer == expected
+
+
+def test_what_is_judged_is_what_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A campaign gets the nouns of a cell that the checks have had; draws of the sensors share them."""
+    judged = []
+    monkeypatch.setattr(check, "judge_ride", lambda resolved: (judged.append(resolved), (1.0, []))[1])
+    scenario = load_scenario("quick_kinematic")
+    parts = check.judge_scenario(scenario).parts
+    first, second = (cell for cell in cells(scenario) if cell.case == 0)
+    assert second.sensor_draw == 1 and parts.resolve(second).cell is second
+    for name in ("ride", "mount", "grade", "encoder", "bands"):
+        noun = getattr(judged[0], name)
+        assert noun is getattr(parts.resolve(first), name) is getattr(parts.resolve(second), name)
+    assert parts.ride(second) is judged[0].ride
