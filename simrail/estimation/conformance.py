@@ -71,19 +71,19 @@ def _run(checks: tuple[Check, ...], estimator: Estimator, recording: Recording) 
     assert not failures, f"{type(estimator).__name__} breaks the contract:\n" + "\n".join(failures)
 
 
-def frozen_dataclass(estimator: Estimator, recording: Recording) -> None:
+def frozen_dataclass(estimator: Estimator, recording: Recording) -> None:  # noqa: ARG001
     """Parameters are the fields of a frozen dataclass, so that a run can be repeated from them."""
     parameters = getattr(type(estimator), "__dataclass_params__", None)
     assert parameters is not None, "is no dataclass"
     assert parameters.frozen, "is a dataclass that is not frozen"
 
 
-def says_whether_causal(estimator: Estimator, recording: Recording) -> None:
+def says_whether_causal(estimator: Estimator, recording: Recording) -> None:  # noqa: ARG001
     """`causal` is there, and is a truth value."""
     assert isinstance(getattr(estimator, "causal", None), bool), "has no `causal` of True or False"
 
 
-def says_what_it_is(estimator: Estimator, recording: Recording) -> None:
+def says_what_it_is(estimator: Estimator, recording: Recording) -> None:  # noqa: ARG001
     """What it says of itself (`simrail.estimation.estimate.Description`) is such as others understand."""
     description_of(estimator)
 

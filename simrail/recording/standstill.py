@@ -1,4 +1,4 @@
-"""When does the train stand? As a logger would find it: from the encoder, where there is one.
+"""When the train stands, as a logger would find it: from the encoder, where there is one.
 
 A count that stays within one of where it was says that the wheel has turned by less than two counts; how
 slowly it still turned, no encoder knows. Therefore the rest that is trusted keeps away from the pulses at
@@ -59,14 +59,12 @@ def motion_times(recording: Recording) -> FloatArray:
     nothing tells of motion, nothing tells of rest: every time.
     """
     if recording.encoder is not None:
-        moves = _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64))
-        moving: FloatArray = _times(recording.encoder)[moves]
-        return moving
+        turned = _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64))
+        return _times(recording.encoder[turned])
     way = recording.odometer if recording.odometry is None else recording.odometry
     if way is None:
         return _times(recording.imu)
-    moving = _times(way)[np.abs(way["speed_mps"].to_numpy()) > STILL_MPS]
-    return moving
+    return _times(way[np.abs(way["speed_mps"].to_numpy()) > STILL_MPS])
 
 
 def _times(frame: pd.DataFrame) -> FloatArray:

@@ -197,8 +197,9 @@ class ImuGrade:
 
     @classmethod
     def from_datasheet(cls, name: str, rate_hz: float, **figures: Any) -> ImuGrade:
-        """Build a grade in the units of data sheets: see
-        `simrail.recording.sheets.datasheet.grade_from_datasheet`.
+        """Build a grade in the units of data sheets.
+
+        See `simrail.recording.sheets.datasheet.grade_from_datasheet`.
         """
         from simrail.recording.sheets.datasheet import grade_from_datasheet
 
