@@ -102,20 +102,7 @@ def measure(
     start_m = float(motion["position_m"].iloc[0])
     counts, sheet = None, None
     if encoder is not None:
-        wheel = truth.wheel_at(encoder.wheel)
-        angle = truth.wheel_angle(wheel)
-        radius = truth.wheel_radius_m[wheel]
-        if encoder.radius == "calibrated":
-            position = motion["position_m"].to_numpy()
-            radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
-        counts = sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw)
-        sheet = EncoderSheet(
-            wheel=wheel,
-            pulses_per_revolution=encoder.counts_per_revolution,
-            wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
-            rate_hz=encoder.rate_hz,
-            radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
-        )
+        counts, sheet = _counted(truth, motion, encoder, seed=seed, draw=draw)
     magnetic = None
     if magnetometer is not None:
         magnetic = sample_magnetometer(
@@ -160,6 +147,25 @@ def measure(
         rail_displacement=seen,
         rail_sensor_sheet=None if rail_sensor is None else RailSensorSheet(rail_sensor.noise_m),
     )
+
+
+def _counted(
+    truth: Truth, motion: pd.DataFrame, encoder: EncoderSpec, *, seed: int, draw: int
+) -> tuple[pd.DataFrame, EncoderSheet]:
+    """Counts of an encoder on a ride, and what the train knows of it."""
+    wheel = truth.wheel_at(encoder.wheel)
+    angle, radius = truth.wheel_angle(wheel), truth.wheel_radius_m[wheel]
+    if encoder.radius == "calibrated":
+        position = motion["position_m"].to_numpy()
+        radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
+    sheet = EncoderSheet(
+        wheel=wheel,
+        pulses_per_revolution=encoder.counts_per_revolution,
+        wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
+        rate_hz=encoder.rate_hz,
+        radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
+    )
+    return sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw), sheet
 
 
 def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:

@@ -24,6 +24,8 @@ engine = "kinematic"
 odometry = "truth"
 [monte_carlo]
 sensor_draws = 2
+[encoder]
+wheel = "wheel"
 [[ride]]
 name = "out"
 start_m = 1.0

@@ -23,6 +23,8 @@ seed = 1
 track = "test_line"
 vehicle = "none"
 engine = "kinematic"
+[encoder]
+wheel = "wheel"
 [monte_carlo]
 sensor_draws = 2
 [[ride]]

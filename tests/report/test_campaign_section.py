@@ -33,6 +33,8 @@ seed = 1
 track = "test_line"
 vehicle = "none"
 engine = "kinematic"
+[encoder]
+wheel = "wheel"
 [monte_carlo]
 track_draws = 10
 sensor_draws = 20

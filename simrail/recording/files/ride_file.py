@@ -8,7 +8,7 @@ of each signal; `simrail.recording.files.ride_reader` reads the data.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -49,6 +49,8 @@ class ImuSignalPart(VectorPart):
         In SI, as simrail writes it.
     """
 
+    signal: ClassVar[Signal] = IMU_SIGNAL
+
     name: str = "imu"
     body: str
     position_m: tuple[float, float, float]
@@ -56,11 +58,6 @@ class ImuSignalPart(VectorPart):
     grade: str | None = None
     datasheet: ImuFile | None = None
     sheet: ImuSheet | None = None
-
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return IMU_SIGNAL
 
     @model_validator(mode="after")
     def _one_sheet(self) -> Self:
@@ -89,14 +86,11 @@ class EncoderSignalPart(SignalPart):
         That of the sheet, where the sheet does not say it.
     """
 
+    signal: ClassVar[Signal] = ENCODER_SIGNAL
+
     sheet: EncoderSheet
     reverse: bool = False
     radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
-
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return ENCODER_SIGNAL
 
     @field_validator("sheet")
     @classmethod
@@ -133,12 +127,9 @@ class MagnetometerSignalPart(VectorPart):
         Its noise, and the Earth's field where the train runs.
     """
 
-    sheet: MagnetometerSheet
+    signal: ClassVar[Signal] = MAGNETOMETER_SIGNAL
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return MAGNETOMETER_SIGNAL
+    sheet: MagnetometerSheet
 
 
 class RailSignalPart(SignalPart):
@@ -152,12 +143,9 @@ class RailSignalPart(SignalPart):
         Its noise.
     """
 
-    sheet: RailSensorSheet
+    signal: ClassVar[Signal] = RAIL_SIGNAL
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return RAIL_SIGNAL
+    sheet: RailSensorSheet
 
     @field_validator("sheet")
     @classmethod
@@ -188,15 +176,12 @@ class OdometerPart(SignalPart):
         Relative standard deviation of its scale.
     """
 
+    signal: ClassVar[Signal] = ODOMETER_SIGNAL
+
     reverse: bool = False
     resolution_m: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
     speed_sd_mps: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
     radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
-
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return ODOMETER_SIGNAL
 
     @model_validator(mode="after")
     def _one_quantity(self) -> Self:
@@ -225,21 +210,15 @@ class OdometrySignalPart(SignalPart):
     its intervals.
     """
 
-    source: str
+    signal: ClassVar[Signal] = ODOMETRY_SIGNAL
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return ODOMETRY_SIGNAL
+    source: str
 
 
 class GapsPart(SignalPart):
     """``[gaps]``: where the IMU's samples had been lost before the file was written."""
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return GAPS_SIGNAL
+    signal: ClassVar[Signal] = GAPS_SIGNAL
 
 
 class RideFile(Part):

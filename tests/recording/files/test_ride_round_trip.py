@@ -194,9 +194,9 @@ def test_every_frame_of_a_recording_is_a_signal():
         form = next(
             p
             for p in SignalPart.__subclasses__() + VectorPart.__subclasses__()
-            if p is not VectorPart and p.signal() is signal
+            if p is not VectorPart and p.signal is signal
         )
-        assert form.signal() is signal
+        assert form.signal is signal
 
 
 def test_a_folder_in_use_is_not_overwritten(recording, tmp_path):
