@@ -75,7 +75,8 @@ class Cube:
         for i in self.searched:
             low, high = self._ends(i, places)
             shares.append((places[i] - low) / (high - low) if high > low else 0.0)
-        return np.clip(np.array(shares), 0.0, 1.0)
+        point: FloatArray = np.clip(np.array(shares), 0.0, 1.0)
+        return point
 
     def limits(self, values: FloatArray) -> FloatArray:
         """Least and greatest value (m, 2) of each searched parameter, the others being as in (n,)."""
