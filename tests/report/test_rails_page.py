@@ -69,6 +69,7 @@ own_bands = { paper = [0.3, 7.0] }
 twist_base_m = 0.3
 [[estimator]]
 name = "smoother"
+stands_for = "hand"
 method = "TrajectorySmoother"
 [estimator.options]
 geometry_step_m = 0.05
@@ -83,6 +84,7 @@ name = "design_angles"
 method = "DesignAngles"
 [[estimator]]
 name = "zero_track"
+stands_for = "zero"
 method = "ZeroTrack"
 [estimator.options]
 step_m = 0.05
