@@ -15,12 +15,12 @@ from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
 from simrail.vehicle.engines.force_data import memory_of, pack, states_of
 from simrail.vehicle.engines.forces import forces
-from simrail.vehicle.engines.records import LAW, POSE, SERIES, SPRING, STOP, ROTATION, WRENCH
+from simrail.vehicle.engines.records import LAW, POSE, ROTATION, SERIES, SPRING, STOP, WRENCH
 from simrail.vehicle.engines.suspension_forces import (
+    rotation_forces,
     series_forces,
     spring_forces,
     stop_forces,
-    rotation_forces,
 )
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile

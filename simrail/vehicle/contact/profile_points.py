@@ -121,7 +121,7 @@ def thinned(y: FloatArray, z: FloatArray, path: Path) -> tuple[FloatArray, Float
             value=len(apart),
             limit=f"at least {_FEWEST_POINTS}, {_LEAST_DISTANCE_M * 1e3:g} mm apart",
         )
-    return y[kept], z[kept]
+    return y[apart], z[apart]
 
 
 def _parse(path: Path, *, kind: int) -> _Points:

@@ -29,7 +29,7 @@ class ForceData(NamedTuple):
     Attributes
     ----------
     bodies, springs, series, rotations, stops, laws, wheels, spins, axles, drive : ndarray of records
-        One record each: `BODY`, `SPRING`, `SERIES`, `ROTATION`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
+        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
     guide, traction, options : ndarray of records (1,)
         `GUIDE`, `TRACTION`, `OPTIONS`.
     track : ndarray of records

@@ -17,10 +17,10 @@ from simrail.vehicle.engines.lookup import find_on_track
 from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
 from simrail.vehicle.engines.suspension_forces import (
     guide_force,
+    rotation_forces,
     series_forces,
     spring_forces,
     stop_forces,
-    rotation_forces,
 )
 from simrail.vehicle.engines.traction_forces import driver, traction_forces
 
