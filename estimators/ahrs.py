@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import imufusion
 import numpy as np
 import pandas as pd
-from simrail.estimators.attitude.compensation import design_frame, gravity_force
+from simrail.estimators.attitude.compensation import gravity_force, start_frame
 from simrail.estimators.attitude.quaternions import to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias
 from vqf import VQF
@@ -43,11 +43,19 @@ class Vqf:
     rest_bias: bool = True
 
     causal = True
+    label = "VQF"
+    cites = ("Laidig and Seel 2023",)
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The magnetometer, if it is asked for."""
-        return ("magnetometer",) if self.magnetometer else ()
+        """The magnetometer, and the odometry for the compensation, if they are asked for."""
+        odometry = ("odometry",) if self.compensated else ()
+        return (*odometry, "magnetometer") if self.magnetometer else odometry
+
+    @property
+    def role(self) -> str:
+        """Under test with compensation; a filter that knows nothing of trains without."""
+        return "method" if self.compensated else "general_purpose"
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw.
@@ -71,7 +79,7 @@ class Vqf:
         gyro = np.ascontiguousarray(gyro - rest_bias(recording, enabled=self.rest_bias).bias)
         force = gravity_force(recording, compensated=self.compensated)
         vqf = VQF(1.0 / recording.imu_sheet.rate_hz)
-        start_yaw = float(design_frame(recording, count=1).yaw_rad[0])
+        start_yaw = float(start_frame(recording).yaw_rad[0])
         if self.magnetometer and recording.magnetometer is not None and sheet is not None:
             field = recording.magnetometer[list(MAGNETIC)].to_numpy(dtype=np.float64)
             # Its level axes are magnetic east and north; ours begin at X.
@@ -111,6 +119,18 @@ class Imufusion:
     rest_bias: bool = True
 
     causal = True
+    label = "imufusion"
+    cites = ("Madgwick, Wilson, Turk, Burridge, Kapatos and Vaidyanathan 2020",)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The odometry, for the compensation."""
+        return ("odometry",) if self.compensated else ()
+
+    @property
+    def role(self) -> str:
+        """Under test with compensation; a filter that knows nothing of trains without."""
+        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gain < np.inf:
@@ -132,7 +152,7 @@ class Imufusion:
             update(rates_degps[k], force_g[k])
             found[k] = quaternion()
         angles = to_euler(found, start_yaw_rad=0.0)
-        angles[:, 2] += float(design_frame(recording, count=1).yaw_rad[0]) - angles[0, 2]
+        angles[:, 2] += float(start_frame(recording).yaw_rad[0]) - angles[0, 2]
         return Estimate(
             states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
             mount=recording.mount,

@@ -22,6 +22,10 @@ class DesignAngles:
     """The attitude of the design track at the odometry's position; the IMU is not used."""
 
     causal = True
+    needs = ("odometry",)
+    uses_imu = False
+    role = "baseline"
+    label = "design angles only"
 
     def estimate(self, recording: Recording) -> Estimate:
         """Look up roll, pitch and yaw of the design track."""
@@ -45,6 +49,10 @@ class ZeroTrack:
 
     step_m: float = 0.25
     causal = False
+    needs = ("odometry",)
+    uses_imu = False
+    role = "baseline"
+    label = "rails as designed"
 
     def estimate(self, recording: Recording) -> Estimate:
         """The body follows the design track, so alignment, vertical profile and cross-level are 0."""

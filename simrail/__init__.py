@@ -5,6 +5,7 @@ The way of the data, and the verbs between the nouns::
     scenario = load_scenario("go20a")       # a TOML file                      -> Scenario
     truth    = simulate(ride)               # a vehicle over a laid track      -> Truth       (cached)
     record   = measure(truth, ...)          # what the logger saw              -> Recording
+    record   = with_odometry(record, "curve_matched")   # where the train is   -> Recording
     result   = AttitudeEkf().estimate(record)                                # -> Estimate
     table    = score(result, truth, record) # one row per figure               -> DataFrame
     results  = run("go20a")                 # all of it, for every cell        -> Results, results/go20a/
@@ -58,7 +59,7 @@ if TYPE_CHECKING:
     from simrail.core.errors import InputError
     from simrail.estimation.choose_odometry import with_odometry
     from simrail.estimation.estimate import Estimate, Estimator
-    from simrail.recording.files.ride_reader import read_ride
+    from simrail.estimation.recorded_ride import read_ride
     from simrail.recording.files.ride_writer import write_ride
     from simrail.recording.recording import Recording
     from simrail.recording.sheets.grades import ImuGrade
@@ -86,7 +87,7 @@ _HOMES = {
     "core.errors": ("InputError",),
     "estimation.choose_odometry": ("with_odometry",),
     "estimation.estimate": ("Estimate", "Estimator"),
-    "recording.files.ride_reader": ("read_ride",),
+    "estimation.recorded_ride": ("read_ride",),
     "recording.files.ride_writer": ("write_ride",),
     "recording.recording": ("Recording",),
     "results": ("Results", "run"),

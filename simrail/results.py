@@ -22,19 +22,19 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import LOG, Start, Unfinished, unfinished_of
-from simrail.campaign.job import Job, prepare
-from simrail.campaign.ledger import STAGES
+from simrail.campaign.campaign import key_of, run_campaign
+from simrail.campaign.cell import STAGES
+from simrail.campaign.checkpoint import LOG, Checkpoint, Start, checkpoint_of
 from simrail.campaign.progress import Watcher
 from simrail.campaign.result import CampaignResult
-from simrail.campaign.stored_results import FormerResults, read_results
+from simrail.campaign.stored_results import StoredResults, read_results
 from simrail.campaign.worker import BatchResult
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label
 from simrail.report.pages.page import SETS_BESIDE, write_report
 from simrail.scenario.cells import cells
+from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.aggregate import aggregate
 
@@ -89,7 +89,7 @@ def run(
     overrides : sequence of str, optional
         Settings ``key=value`` that replace what the file says.
     workers, cluster : int, str, optional
-        Who runs it, see `simrail.campaign.executors.crew_of`.
+        Who runs it, see `simrail.campaign.executors.executor_of`.
     start : {"auto", "resume", "fresh", "retry-failed"}, optional
         Whether to go on with an unfinished run of the same plan: if there is one, in any case, or not; or
         to run the failed cells of finished results again.
@@ -121,22 +121,25 @@ def run(
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
     _judge_folder(folder)
-    other = _former(Path(beside), scenario, folder) if beside is not None else None
-    job = prepare(scenario, many=many)
-    with unfinished_of(folder, job.key, start=start) as kept:
+    other = _other_results(Path(beside), scenario, folder) if beside is not None else None
+    plan = judge_scenario(scenario, many=many)
+    key = key_of(plan)
+    with checkpoint_of(folder, key, start=start) as checkpoint:
         if start == "retry-failed":
-            _keep_good(folder, job, kept)
-        campaign = run_campaign(job, workers=workers, cluster=cluster, kept=kept, watcher=watcher)
+            keep_good(folder, plan, key, checkpoint)
+        campaign = run_campaign(
+            plan, workers=workers, cluster=cluster, checkpoint=checkpoint, watcher=watcher
+        )
         manifest = describe(scenario, campaign)
-        manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": job.key}
+        manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": key}
         if other is not None:
-            said = ("scenario", "scenario_hash", "seed", "started_utc", "git_revision")
-            manifest["beside"] = {name: other.manifest.get(name) for name in said}
+            names = ("scenario", "scenario_hash", "seed", "started_utc", "git_revision")
+            manifest["beside"] = {name: other.manifest.get(name) for name in names}
             manifest["command"] += f" --beside {shlex.quote(label(other.folder))}"
         with draft_of(folder) as draft:
             _write(draft, scenario, campaign, manifest, begun=begun, beside=other)
-            shutil.copyfile(kept.folder / LOG, draft / LOG)
-        kept.remove()
+            shutil.copyfile(checkpoint.folder / LOG, draft / LOG)
+        checkpoint.remove()
     return Results(folder, scenario, campaign, manifest)
 
 
@@ -169,12 +172,12 @@ def run_cell(
     read = load_scenario(scenario, overrides=overrides, seed=seed)
     if out is not None:
         _judge_folder(Path(out))
-    job = prepare(read)
-    if not 0 <= cell < job.plan.cells:
+    plan = judge_scenario(read)
+    if not 0 <= cell < plan.cells:
         raise InputError(
-            "the scenario has no such cell", field="--cell", value=cell, limit=f"0 to {job.plan.cells - 1}"
+            "the scenario has no such cell", field="--cell", value=cell, limit=f"0 to {plan.cells - 1}"
         )
-    campaign = run_campaign(job, only=cell, watcher=watcher)
+    campaign = run_campaign(plan, only=cell, watcher=watcher)
     if out is not None:
         manifest = describe(read, campaign)
         manifest["started_utc"] = started.isoformat(timespec="seconds")
@@ -184,7 +187,7 @@ def run_cell(
     return campaign
 
 
-def _former(folder: Path, scenario: Scenario, out: Path) -> FormerResults:
+def _other_results(folder: Path, scenario: Scenario, out: Path) -> StoredResults:
     """Results to stand beside those of a scenario; of the same publication, or the page has no place."""
     remedy = "run that scenario first, and name the folder of its results"
     if folder.resolve() == out.resolve():
@@ -194,17 +197,17 @@ def _former(folder: Path, scenario: Scenario, out: Path) -> FormerResults:
             value=str(folder),
             remedy=f"{remedy}, or choose another folder with --out",
         )
-    former = read_results(folder, field="--beside", remedy=remedy)
-    paper, other = scenario.spec.paper, former.scenario().spec.paper
-    if paper not in SETS_BESIDE or other != paper:
+    results = read_results(folder, field="--beside", remedy=remedy)
+    paper = scenario.spec.paper
+    if paper not in SETS_BESIDE or results.scenario().spec.paper != paper:
         raise InputError(
-            f"the page of {scenario.name} has no place for results of {former.manifest['scenario']}",
+            f"the page of {scenario.name} has no place for results of {results.manifest['scenario']}",
             field="--beside",
             value=str(folder),
             limit=f"two scenarios with the same paper, one of {', '.join(SETS_BESIDE)}",
             remedy="run it without --beside; each page stands for itself",
         )
-    return former
+    return results
 
 
 def _write(
@@ -214,7 +217,7 @@ def _write(
     manifest: dict[str, Any],
     *,
     begun: float,
-    beside: FormerResults | None = None,
+    beside: StoredResults | None = None,
 ) -> None:
     """Write the results of a campaign into a folder."""
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
@@ -280,7 +283,7 @@ def git_revision() -> str | None:
     source = Path(__file__).resolve().parents[1]
     if not (source / ".git").exists():
         return None
-    found = []
+    answers = []
     for arguments in (["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
         try:
             done = subprocess.run(
@@ -288,8 +291,8 @@ def git_revision() -> str | None:
             )
         except (OSError, subprocess.SubprocessError):
             return None
-        found.append(done.stdout.strip())
-    return found[0] + ("+" if found[1] else "")
+        answers.append(done.stdout.strip())
+    return answers[0] + ("+" if answers[1] else "")
 
 
 def _judge_folder(folder: Path) -> None:
@@ -316,13 +319,13 @@ def _judge_folder(folder: Path) -> None:
 
 
 def _versions() -> dict[str, str]:
-    found = {}
+    versions = {}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+            versions[package] = "not installed"
+    return versions
 
 
 def _failures(campaign: CampaignResult) -> str:
@@ -335,16 +338,16 @@ def _failures(campaign: CampaignResult) -> str:
     return "\n".join(parts).replace(home, "~")
 
 
-def _keep_good(results: Path, job: Job, kept: Unfinished) -> None:
+def keep_good(results: Path, plan: Plan, key: str, checkpoint: Checkpoint) -> None:
     """Keep the cells of finished results that did not fail.
 
     Parameters
     ----------
     results : Path
         Folder of the results.
-    job : Job
-        What is run.
-    kept : Unfinished
+    plan, key : Plan, str
+        What is run, and its key.
+    checkpoint : Checkpoint
         Where they are kept.
 
     Raises
@@ -358,7 +361,7 @@ def _keep_good(results: Path, job: Job, kept: Unfinished) -> None:
 
     former = read_results(results, field="--retry-failed", remedy="run it without --retry-failed")
     manifest, scores = former.manifest, former.scores
-    if manifest.get("key") != job.key:
+    if manifest.get("key") != key:
         raise refuse(
             "the results there are of another plan, or were made by other code",
             "run it without --retry-failed; rows of different code do not belong together",
@@ -366,14 +369,15 @@ def _keep_good(results: Path, job: Job, kept: Unfinished) -> None:
     failed = {failure["cell"] for failure in manifest["failures"]}
     if not failed:
         raise refuse("nothing failed there", "there is nothing to do")
-    had = set(scores["cell"])  # a run that its stop rule ended has not all
-    said = {ride["number"]: ride for ride in manifest["rides"]}
-    good: dict[int, list[int]] = {}
-    for cell in cells(job.scenario):
-        if cell.number in had - failed:
-            good.setdefault(cell.ride_number, []).append(cell.number)
+    good = set(scores["cell"]) - failed  # a run that its stop rule ended has not all cells
+    rides = {ride["number"]: ride for ride in manifest["rides"]}
+    good_of_ride: dict[int, list[int]] = {}
+    for cell in cells(plan.scenario):
+        if cell.number in good:
+            good_of_ride.setdefault(cell.ride_number, []).append(cell.number)
     wall, cpu = ({stage: manifest[name][stage] for stage in STAGES} for name in ("wall_s", "cpu_s"))
-    for ride_number, numbers in good.items():
+    for ride_number, numbers in good_of_ride.items():
         rows = scores[scores["cell"].isin(numbers)].reset_index(drop=True)
-        kept.add(BatchResult(tuple(numbers), ride_number, rows, (), said.get(ride_number, {}), wall, cpu))
+        ride = rides.get(ride_number, {})
+        checkpoint.add(BatchResult(tuple(numbers), ride_number, rows, (), ride, wall, cpu))
         wall = cpu = dict.fromkeys(STAGES, 0.0)

@@ -16,30 +16,34 @@ import numpy as np
 
 from simrail.core.columns import ACCEL
 from simrail.core.jit import FloatArray
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, odometry_of
 from simrail.track.design import TrackFrame
 
 
-def design_frame(recording: Recording, *, count: int | None = None) -> TrackFrame:
+def design_frame(recording: Recording) -> TrackFrame:
     """Design track frame at the odometry's positions.
 
     Positions beyond the track's ends, where an odometry error may put a train that stands at a
     terminus, are taken at the end.
 
-    Parameters
-    ----------
-    recording : Recording
-        The recording.
-    count : int, optional
-        How many samples from the start; all of them by default.
-
     Returns
     -------
     TrackFrame
-        Arrays of `count` rows.
+        Arrays of one row per sample.
     """
-    position = recording.odometry["position_m"].to_numpy(dtype=np.float64)[:count]
-    return recording.track.frame(np.clip(position, recording.track.start_m, recording.track.end_m))
+    return _frame(recording, odometry_of(recording)["position_m"].to_numpy(dtype=np.float64))
+
+
+def start_frame(recording: Recording) -> TrackFrame:
+    """Design track frame, of one row, where the ride begins: by the odometry, or the platform known."""
+    known = np.array([recording.start_position_m])
+    if recording.odometry is not None:
+        known = recording.odometry["position_m"].to_numpy(dtype=np.float64)[:1]
+    return _frame(recording, known)
+
+
+def _frame(recording: Recording, position_m: FloatArray) -> TrackFrame:
+    return recording.track.frame(np.clip(position_m, recording.track.start_m, recording.track.end_m))
 
 
 class TrackMotion(NamedTuple):
@@ -87,8 +91,8 @@ def track_motion(
         without the coupling of cant and slope, k' = (0, 0, yaw''), no 1/cos th.
     """
     frame = design_frame(recording) if frame is None else frame
-    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
-    speed_rate = recording.odometry["acceleration_mps2"].to_numpy(dtype=np.float64)
+    speed = odometry_of(recording)["speed_mps"].to_numpy(dtype=np.float64)
+    speed_rate = odometry_of(recording)["acceleration_mps2"].to_numpy(dtype=np.float64)
     square = speed * speed
     if printed:
         t, v, h = frame.rates.T

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from filterpy.kalman import ExtendedKalmanFilter
-from simrail.estimators.attitude.compensation import design_frame, gravity_force
+from simrail.estimators.attitude.compensation import design_frame, gravity_force, start_frame
 from simrail.estimators.attitude.kernel import attitude_ekf
 from simrail.estimators.attitude.noise import (
     SWING_PER_SPEED,
@@ -92,6 +92,18 @@ class AttitudeEkf:
     start_yaw_sd_rad: float = math.radians(0.3)
 
     causal = True
+    label = "EKF"
+    cites = ("Briales, Urda and Escalona 2021",)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The odometry, for the compensation, and for what the recommended tuning knows of the vibration."""
+        return ("odometry",) if self.compensated or self.tuning == "recommended" else ()
+
+    @property
+    def role(self) -> str:
+        """Under test with compensation; a filter that knows nothing of trains without."""
+        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         check_tuning(self.tuning, self.process_noise)
@@ -136,7 +148,7 @@ class AttitudeEkf:
         rest = rest_bias(recording, enabled=self.rest_bias)
         frame = design_frame(recording) if self.compensated else None
         noise = self._noise(recording, rest, frame)
-        first = design_frame(recording, count=1)
+        first = start_frame(recording)
         sd = np.array([self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad])
         force = gravity_force(recording, frame, compensated=self.compensated, printed=self.printed)
         excess = np.linalg.norm(force, axis=1) - recording.gravity_mps2

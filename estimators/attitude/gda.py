@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.attitude.compensation import design_frame, gravity_force
+from simrail.estimators.attitude.compensation import gravity_force, start_frame
 from simrail.estimators.attitude.kernel import attitude_gda
 from simrail.estimators.attitude.quaternions import from_euler, level, to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
@@ -58,6 +58,18 @@ class AttitudeGda:
     printed: bool = False
 
     causal = True
+    label = "GDA"
+    cites = ("Briales, Urda and Escalona 2021", "Madgwick 2010")
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The odometry, for the compensation."""
+        return ("odometry",) if self.compensated else ()
+
+    @property
+    def role(self) -> str:
+        """Under test with compensation; a filter that knows nothing of trains without."""
+        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         if self.tuning not in GYRO_ERROR_RADPS:
@@ -76,7 +88,7 @@ class AttitudeGda:
         """Estimate roll, pitch and yaw at every IMU sample."""
         force = gravity_force(recording, compensated=self.compensated, printed=self.printed)
         rates = step_rates(recording, rest_bias(recording, enabled=self.rest_bias).bias)
-        start_yaw = float(design_frame(recording, count=1).yaw_rad[0])
+        start_yaw = float(start_frame(recording).yaw_rad[0])
         given = self.gyro_error_radps
         gyro_error = GYRO_ERROR_RADPS[self.tuning] if given is None else given
         quaternions = np.empty((force.shape[0], 4))

@@ -46,7 +46,7 @@ from simrail.estimators.attitude.rest_bias import RestBias
 from simrail.core.columns import ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.recording.recording import ImuSheet, Recording
+from simrail.recording.recording import ImuSheet, Recording, odometry_of
 from simrail.track.design import TrackFrame
 
 PAPER = {"paper_initial": (1e-2, 1.5e-2), "paper_final": (1e-3, 15.0)}
@@ -129,7 +129,7 @@ def recommended_noise(
     n = len(recording.imu)
     step_s = 1.0 / sheet.rate_hz
     bias = bias_variance(sheet, rest.samples * step_s)
-    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
+    speed = odometry_of(recording)["speed_mps"].to_numpy(dtype=np.float64)
     swing = (vibration * speed) ** 2
     white = sheet.gyro_noise_radpsqrts**2 + MODEL_RATE_INTENSITY
     sensor = sheet.accel_noise_mpsqrts**2 + MODEL_FORCE_SD**2 * step_s
@@ -138,7 +138,7 @@ def recommended_noise(
     force = np.empty((n, 3))
     force[:] = ((sensor + 2.0 * swing / tau) / step_s)[:, None]
     if frame is not None:
-        place, pace, push = recording.odometry[list(ODOMETRY_SD)].to_numpy(dtype=np.float64).T
+        place, pace, push = odometry_of(recording)[list(ODOMETRY_SD)].to_numpy(dtype=np.float64).T
         force[:, 0] += push**2
         for axis, component in ((1, 2), (2, 1)):
             by_place = speed**2 * frame.dk[:, component] * place

@@ -112,11 +112,17 @@ class CurveMatchedOdometry:
     gate: float = 7.0
 
     needs = ("encoder",)
+    cites = ("Escalona, Urda and Munoz, Sensors 21(3) 683, 2021",)
 
     @property
     def causal(self) -> bool:
         """The filter is causal, the smoother is not."""
         return not self.smoothed
+
+    @property
+    def label(self) -> str:
+        """What a reader calls it."""
+        return "curve-smoothed odometry" if self.smoothed else "curve-matched odometry"
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:

@@ -7,134 +7,145 @@ width^2/12. A train without pulses is put to rest exactly: its estimated speed w
 for ever, and drift.
 
 Of the wheel it knows the nominal radius; how far the true rolling radius may be from that (wear, taper,
-running on the flange in a curve) enters the standard deviations through `radius_relative_sd`, as one
-constant factor. It knows nothing of slip, nor of the longer way of the outer wheel. The error of a
+running on the flange in a curve) enters the standard deviations through the sheet's `radius_relative_sd`, as
+one constant factor. It knows nothing of slip, nor of the longer way of the outer wheel. The error of a
 count is treated as white. That is wrong in one case: at an exactly constant speed of a whole number
 of pulses per reading the count's error is a slow sawtooth, which the filter follows.
+
+An odometer that shows the speed, in place of a counter, runs through the same model.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
+from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray, njit
-from simrail.recording.recording import EncoderSheet
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import EncoderSheet, OdometerSheet, Recording
+from simrail.recording.wheel_speed import pulse_way_m
 
 JERK_INTENSITY_M2PS5 = 0.01
 """Intensity of the model's white jerk. Small enough for quiet accelerations at constant speed, large
 enough to follow service braking (0.6 m/s2, jerk 0.4 m/s3) with a lag of about 0.15 s."""
 
 
-def encoder_odometry(
-    encoder: pd.DataFrame,
-    sheet: EncoderSheet,
-    times: FloatArray,
-    *,
-    start_position_m: float,
-    radius_relative_sd: float = 0.0,
-    jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5,
-    still_s: float = 0.5,
-) -> pd.DataFrame:
-    """Position, speed and acceleration from encoder counts.
+@dataclass(frozen=True)
+class EncoderOdometry:
+    """Position, speed and acceleration from the wheel alone: encoder counts, or an odometer's speed.
 
-    The count c says that the train is between (c - 1/2) q and (c + 1/2) q from its start, on average
-    over the unknown place between two edges where the wheel first stood; q is the way of one pulse.
-    A count that has just changed by one says more at low speed: the edge was passed less than one
-    reading ago.
-
-    Parameters
+    Attributes
     ----------
-    encoder : pandas.DataFrame
-        Indexed by ``time_s``, column ``pulse_count``.
-    sheet : EncoderSheet
-        Pulses per revolution and nominal wheel radius.
-    times : ndarray (n,)
-        Increasing times at which the odometry is wanted, s. The answer at a time uses no count read
-        after it.
-    start_position_m : float
-        Position s at the first count.
-    radius_relative_sd : float
-        Relative standard deviation of the rolling radius about the nominal one.
     jerk_intensity_m2ps5 : float
         Intensity of the white jerk.
     still_s : float
         Shortest time without pulses after which the train is at rest. A train that was slow at its
         last pulse is given three pulse intervals, at most ten times `still_s`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Indexed by `times`, columns `simrail.core.columns.ODOMETRY` and `ODOMETRY_SD`. At rest speed and
-        acceleration are exactly 0.
-    """
-    quantum = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
-    wanted = np.ascontiguousarray(times, dtype=np.float64)
-    states = _filter(
-        np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
-        encoder["pulse_count"].to_numpy(dtype=np.float64),
-        wanted,
-        quantum,
-        jerk_intensity_m2ps5,
-        still_s,
-    )
-    way, speed, acceleration = states[:, 0], states[:, 1], states[:, 2]
-    # The unknown first place between two edges shifts every position alike, by up to half a pulse.
-    states[:, 3] = np.sqrt(states[:, 3] + quantum**2 / 12.0 + (radius_relative_sd * way) ** 2)
-    states[:, 4] = np.sqrt(states[:, 4] + (radius_relative_sd * speed) ** 2)
-    states[:, 5] = np.sqrt(states[:, 5] + (radius_relative_sd * acceleration) ** 2)
-    states[:, 0] += start_position_m
-    return pd.DataFrame(states, index=pd.Index(wanted, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
-
-
-def speed_odometry(
-    time: FloatArray,
-    speed_mps: FloatArray,
-    times: FloatArray,
-    *,
-    start_position_m: float,
-    speed_sd_mps: float,
-    scale_relative_sd: float = 0.0,
-    jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5,
-    still_mps: float = 0.02,
-) -> pd.DataFrame:
-    """Position, speed and acceleration from an odometer that gives the speed, with the same model.
-
-    Parameters
-    ----------
-    time, speed_mps : ndarray (m,)
-        Increasing times of the readings, s, and the readings, negative towards smaller s.
-    times : ndarray (n,)
-        As in `encoder_odometry`.
-    start_position_m : float
-        Position s at the first reading.
-    speed_sd_mps : float
-        Standard deviation of a reading; its error is treated as white.
-    scale_relative_sd : float
-        Relative standard deviation of the odometer's scale.
-    jerk_intensity_m2ps5 : float
-        Intensity of the white jerk.
     still_mps : float
-        A reading below this is a train at rest.
-
-    Returns
-    -------
-    pandas.DataFrame
-        As that of `encoder_odometry`.
+        An odometer's reading below this is a train at rest.
     """
-    wanted = np.ascontiguousarray(times, dtype=np.float64)
-    states = _speed_filter(
-        np.ascontiguousarray(time, dtype=np.float64),
-        np.ascontiguousarray(speed_mps, dtype=np.float64),
-        wanted,
-        speed_sd_mps**2,
-        jerk_intensity_m2ps5,
-        still_mps,
-    )
-    states[:, 3:] = np.sqrt(states[:, 3:] + (scale_relative_sd * states[:, :3]) ** 2)
-    states[:, 0] += start_position_m
-    return pd.DataFrame(states, index=pd.Index(wanted, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
+
+    jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5
+    still_s: float = 0.5
+    still_mps: float = 0.02
+
+    causal = True
+    needs = ("encoder",)
+    uses_imu = False
+    label = "encoder odometry"
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate position, speed and acceleration along the track at every IMU sample.
+
+        Raises
+        ------
+        InputError
+            If the recording has neither encoder nor odometer.
+        """
+        times, start_m = recording.imu.index.to_numpy(dtype=np.float64), recording.start_position_m
+        if recording.encoder is not None and recording.encoder_sheet is not None:
+            states = self.from_counts(recording.encoder, recording.encoder_sheet, times, start_m)
+        elif recording.odometer is not None and recording.odometer_sheet is not None:
+            states = self.from_speed(recording.odometer, recording.odometer_sheet, times, start_m)
+        else:
+            raise InputError(
+                "the recording has no encoder",
+                field="encoder",
+                value=recording.name,
+                remedy="add an [encoder] to the scenario, or [encoder] or [odometer] to the ride",
+            )
+        return Estimate(states=states, mount=recording.mount)
+
+    def from_counts(
+        self, encoder: pd.DataFrame, sheet: EncoderSheet, times: FloatArray, start_position_m: float
+    ) -> pd.DataFrame:
+        """Odometry from encoder counts.
+
+        The count c says that the train is between (c - 1/2) q and (c + 1/2) q from its start, on average
+        over the unknown place between two edges where the wheel first stood; q is the way of one pulse.
+        A count that has just changed by one says more at low speed: the edge was passed less than one
+        reading ago.
+
+        Parameters
+        ----------
+        encoder : pandas.DataFrame
+            Indexed by ``time_s``, column ``pulse_count``.
+        sheet : EncoderSheet
+            Pulses per revolution, nominal wheel radius and how far the rolling one may be from it.
+        times : ndarray (n,)
+            Increasing times at which the odometry is wanted, s. The answer at a time uses no count read
+            after it.
+        start_position_m : float
+            Position s at the first count.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by `times`, columns `simrail.core.columns.ODOMETRY` and `ODOMETRY_SD`. At rest speed
+            and acceleration are exactly 0.
+        """
+        quantum = pulse_way_m(sheet)
+        states = _filter(
+            np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
+            encoder["pulse_count"].to_numpy(dtype=np.float64),
+            np.ascontiguousarray(times, dtype=np.float64),
+            quantum,
+            self.jerk_intensity_m2ps5,
+            self.still_s,
+        )
+        # The unknown first place between two edges shifts every position alike, by up to half a pulse.
+        states[:, 3] += quantum**2 / 12.0
+        return _frame(states, times, start_position_m, sheet.radius_relative_sd)
+
+    def from_speed(
+        self, odometer: pd.DataFrame, sheet: OdometerSheet, times: FloatArray, start_position_m: float
+    ) -> pd.DataFrame:
+        """Odometry from readings of the speed (column ``speed_mps``), otherwise as `from_counts`."""
+        states = _speed_filter(
+            np.ascontiguousarray(odometer.index.to_numpy(dtype=np.float64)),
+            np.ascontiguousarray(odometer["speed_mps"].to_numpy(dtype=np.float64)),
+            np.ascontiguousarray(times, dtype=np.float64),
+            sheet.speed_sd_mps**2,
+            self.jerk_intensity_m2ps5,
+            self.still_mps,
+        )
+        return _frame(states, times, start_position_m, sheet.radius_relative_sd)
+
+
+def _frame(states: FloatArray, times: FloatArray, start_m: float, scale_sd: float) -> pd.DataFrame:
+    """The odometry of states and variances (n, 6), whose way has a scale of relative sd `scale_sd`."""
+    states[:, 3:] = np.sqrt(states[:, 3:] + (scale_sd * states[:, :3]) ** 2)
+    states[:, 0] += start_m
+    return pd.DataFrame(states, index=pd.Index(times, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
 
 
 @njit
@@ -177,6 +188,17 @@ def _update(x: FloatArray, p: FloatArray, measured: float, variance: float, m: i
 
 
 @njit
+def _ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: FloatArray) -> None:
+    """Write s, V, A and their variances into out (6,), predicted by a time; x and P stay."""
+    ahead_x, ahead_p = x.copy(), p.copy()
+    if lead > 0.0:
+        _predict(ahead_x, ahead_p, lead, intensity)
+    out[:3] = ahead_x
+    for i in range(3):
+        out[3 + i] = ahead_p[i, i]
+
+
+@njit
 def _filter(
     time: FloatArray, count: FloatArray, wanted: FloatArray, q: float, intensity: float, still: float
 ) -> FloatArray:
@@ -184,8 +206,6 @@ def _filter(
     out = np.empty((len(wanted), 6))
     x = np.zeros(3)
     p = np.zeros((3, 3))
-    ahead_x = np.empty(3)
-    ahead_p = np.empty((3, 3))
     # A start with constant jerk from rest: speed and acceleration when the first pulse comes.
     jerk = 0.5
     start_speed = 0.5 * jerk ** (1.0 / 3.0) * (6.0 * q) ** (2.0 / 3.0)
@@ -236,14 +256,8 @@ def _filter(
             p[2, 2] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
-            ahead_x[:] = x
-            ahead_p[:, :] = p
-            lead = wanted[next_out] - time[k]
-            if lead > 0.0 and not resting:
-                _predict(ahead_x, ahead_p, lead, intensity)
-            out[next_out, :3] = ahead_x
-            for i in range(3):
-                out[next_out, 3 + i] = ahead_p[i, i]
+            lead = 0.0 if resting else wanted[next_out] - time[k]
+            _ahead(x, p, lead, intensity, out[next_out])
             next_out += 1
     return out
 
@@ -256,8 +270,6 @@ def _speed_filter(
     out = np.empty((len(wanted), 6))
     x = np.zeros(3)
     p = np.zeros((3, 3))
-    ahead_x = np.empty(3)
-    ahead_p = np.empty((3, 3))
     resting = True
     next_out = 0
     for k in range(len(time)):
@@ -282,13 +294,7 @@ def _speed_filter(
             _update(x, p, speed[k], variance, 1)
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
-            ahead_x[:] = x
-            ahead_p[:, :] = p
-            lead = wanted[next_out] - time[k]
-            if lead > 0.0 and not resting:
-                _predict(ahead_x, ahead_p, lead, intensity)
-            out[next_out, :3] = ahead_x
-            for i in range(3):
-                out[next_out, 3 + i] = ahead_p[i, i]
+            lead = 0.0 if resting else wanted[next_out] - time[k]
+            _ahead(x, p, lead, intensity, out[next_out])
             next_out += 1
     return out

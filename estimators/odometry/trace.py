@@ -9,12 +9,13 @@ Not here: the filter (`simrail.estimators.odometry.curve_matched`).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy import signal
-from simrail.estimators.odometry.encoder import encoder_odometry
+from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.kernel import S, V
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
@@ -111,13 +112,8 @@ def _roll(values: FloatArray, recording: Recording, slipping: np.ndarray, radius
     it would take the body's own pitch away as well.
     """
     assert recording.encoder is not None and recording.encoder_sheet is not None
-    wheel = encoder_odometry(
-        recording.encoder,
-        recording.encoder_sheet,
-        recording.imu.index.to_numpy(dtype=np.float64),
-        start_position_m=recording.start_position_m,
-        radius_relative_sd=radius_sd,
-    )
+    sheet = replace(recording.encoder_sheet, radius_relative_sd=radius_sd)
+    wheel = EncoderOdometry().estimate(replace(recording, encoder_sheet=sheet)).states
     rolls = ~slipping
     values[rolls, 2] = wheel["acceleration_mps2"].to_numpy()[rolls]
     values[rolls, 5] = wheel["acceleration_sd_mps2"].to_numpy()[rolls]

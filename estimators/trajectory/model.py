@@ -25,7 +25,7 @@ from simrail.estimators.trajectory.noise import Hyperparameters
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray, IntArray
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, odometry_of
 from simrail.track.design import STRAIGHT
 from simrail.track.frame import TrackFrame
 
@@ -113,7 +113,7 @@ def with_noise(model: Model, *parameters: Hyperparameters) -> Model:
 
 def kinds_of(recording: Recording) -> IntArray:
     """0 on straights of the design track and 1 in its transitions and curves, (n,), by the odometry."""
-    track, place = recording.track, recording.odometry["position_m"].to_numpy(dtype=np.float64)
+    track, place = recording.track, odometry_of(recording)["position_m"].to_numpy(dtype=np.float64)
     kind = track.kind(np.clip(place, track.start_m, track.end_m))
     return np.ascontiguousarray(kind != STRAIGHT, dtype=np.int64)
 
@@ -147,7 +147,7 @@ def model_of(
     frame = design_frame(recording)
     signals = recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64, copy=True)
     signals[:, :3] -= rest_bias(recording, enabled=use_rest_bias).bias
-    speed = recording.odometry["speed_mps"].to_numpy(dtype=np.float64)
+    speed = odometry_of(recording)["speed_mps"].to_numpy(dtype=np.float64)
     if second_order and not printed:
         angles, rates = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]), frame.rates
         if around is None:

@@ -22,8 +22,9 @@ The model stands in `simrail.estimators.trajectory.model`, the noise in `simrail
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,7 @@ from simrail.core.columns import (
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
+from simrail.estimation.tunable import Tunable
 from simrail.recording.recording import Recording
 
 OUTPUT = (0, 2, 4, 6, 9)
@@ -182,6 +184,10 @@ class TrajectorySmoother:
         if self.tuning is not None and given:
             raise InputError("a file and values cannot both be given", field="tuning")
 
+    needs = ("odometry",)
+    label = "trajectory smoother"
+    cites = ("Gonzalez-Carbajal et al. 2023",)
+
     @property
     def causal(self) -> bool:
         """The filter is causal, the smoother is not."""
@@ -250,6 +256,12 @@ class TrajectorySmoother:
     def log_likelihood(self, recording: Recording) -> float:
         """Log-likelihood of the recording by prediction-error decomposition."""
         return log_likelihood(self.model(recording))
+
+    def tunables(self, settings: Mapping[str, Any]) -> Mapping[str, Tunable]:
+        """What `simrail tune` searches; see `simrail.estimators.tuning.objectives`."""
+        from simrail.estimators.tuning.objectives import tunables_of_smoother  # which is made of this module
+
+        return tunables_of_smoother(self, settings)
 
     def model(self, recording: Recording, *, around: FloatArray | None = None) -> Model:
         """What the backends take of a recording; `around` is the states (n, 12) of a pass before."""

@@ -25,7 +25,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
 from simrail.estimation.estimate import Estimate
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, odometry_of
 
 GAUGE = IRREGULARITY.index("gauge_m")
 OUTLIER_SDS = 5.0
@@ -117,7 +117,7 @@ def sight_of(estimate: Estimate, recording: Recording) -> Sight:
     states = estimate.states
     require(states, (*ATTITUDE, *RELATIVE_POSITION), what="states")
     sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
-    known = states if "position_m" in states.columns else recording.odometry
+    known = states if "position_m" in states.columns else odometry_of(recording)
     if len(known) != len(states):
         raise InputError("states are not at the recording's times", field="states", value=len(states))
     track = recording.track

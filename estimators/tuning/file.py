@@ -1,4 +1,4 @@
-"""A tuning of the trajectory smoother and its file: hyper-parameters, and where they come from.
+"""What a search has found, as a file, and the trajectory smoother's tuning that is read from it.
 
     [hyperparameters]          # all 13; SI
     roll_rad2ps3 = 1e-2
@@ -18,10 +18,9 @@ parameters set by hand, leave [search] out. Not here: the search (`simrail.estim
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from simrail.estimators.tuning.space import NAMES, STATUSES, SearchSpace
 
 from simrail.core.atomic_files import whole_file
 from simrail.core.errors import InputError
+from simrail.core.toml_files import toml_text
 
 REMEDY = "tune anew with 'simrail tune', or leave out [search] for values set by hand"
 
@@ -108,31 +108,82 @@ class Tuning:
         sets = [_hyperparameters(tables[name], name, search, file) for name in SETS if name in tables]
         for name in (name for name in STATUS if name in tables):
             _judge_status(tables[name], name, file)
-        known = [tables.get(name) for name in STATUS]
-        return cls(sets[0], sets[1] if len(sets) > 1 else None, search, *known)
+        statuses = [tables.get(name) for name in STATUS]
+        return cls(sets[0], sets[1] if len(sets) > 1 else None, search, *statuses)
 
     def text(self) -> str:
         """The file's text; numbers read back bit by bit."""
-        lines = []
-        if self.search is not None and self.search.command:
-            lines.append(f"# Made by: {self.search.command}\n\n")
-        for name in SETS:
-            values = getattr(self, name)
-            if values is not None:
-                lines.append(f"[{name}]\n{_lines(asdict(values))}\n")
+        tables: dict[str, Mapping[str, Any] | None] = {
+            name: None if getattr(self, name) is None else asdict(getattr(self, name)) for name in SETS
+        }
         if self.search is not None:
-            table = asdict(self.search)
-            lines.append(f"[search]\n{_lines(table | table.pop('space'))}\n")
-        for name in STATUS:
-            known = getattr(self, name)
-            if known is not None:
-                lines.append(f"[{name}]\n{_lines(known)}\n")
-        return "".join(lines).rstrip("\n") + "\n"
+            search = asdict(self.search)
+            tables["search"] = search | search.pop("space")
+        return _text(tables | {name: getattr(self, name) for name in STATUS})
 
     def write(self, path: str | Path) -> None:
         """Write the file: whole or not at all."""
         with whole_file(Path(path)) as stream:
             stream.write(self.text().encode())
+
+
+@dataclass(frozen=True)
+class TuningResult:
+    """What a search has found for any tunable estimator: parameters by name, and how.
+
+    Attributes
+    ----------
+    values : tuple of mapping of str to float
+        Of the first set of parameters, and of that for transitions and curves if there is one.
+    status : tuple of mapping of str to str
+        What the search knows of each parameter, set by set; empty if it has not been judged.
+    method, objective, unit, seed, evaluations, fitted_on, command, finished
+        See `Search`.
+    settings : mapping of str
+        Settings of the search that are the estimator's own, e.g. those of `SearchSpace`.
+    """
+
+    method: str
+    unit: str
+    seed: int
+    settings: Mapping[str, Any]
+    values: tuple[Mapping[str, float], ...] = ()
+    status: tuple[Mapping[str, str], ...] = ()
+    objective: tuple[float, ...] = ()
+    evaluations: int = 0
+    fitted_on: tuple[str, ...] = ()
+    command: str = ""
+    finished: bool = False
+
+    def extended(self, values: Mapping[str, float], objective: float, evaluations: int) -> TuningResult:
+        """The result with one more set."""
+        return replace(
+            self,
+            values=(*self.values, values),
+            objective=(*self.objective, objective),
+            evaluations=self.evaluations + evaluations,
+        )
+
+    def text(self) -> str:
+        """The file's text, as `Tuning.text` has it."""
+        own = {entry.name for entry in fields(Search)} - {"space"}
+        search = {entry.name: getattr(self, entry.name) for entry in fields(Search) if entry.name in own}
+        return _text(
+            dict(zip(SETS, self.values, strict=False))
+            | {"search": {**search, **self.settings}}
+            | dict(zip(STATUS, self.status, strict=False))
+        )
+
+    def write(self, path: str | Path) -> None:
+        """Write the file: whole or not at all."""
+        with whole_file(Path(path)) as stream:
+            stream.write(self.text().encode())
+
+
+def _text(tables: Mapping[str, Mapping[str, Any] | None]) -> str:
+    """Text of a tuning file: the command that made it, if there is one, and the tables that there are."""
+    command = (tables.get("search") or {}).get("command")
+    return (f"# Made by: {command}\n\n" if command else "") + toml_text(tables)
 
 
 SETS = ("hyperparameters", "curve_hyperparameters")
@@ -160,23 +211,23 @@ def _tables(file: Path) -> dict[str, dict[str, Any]]:
 
 def _judge_names(
     data: Mapping[str, Any],
-    known: tuple[str, ...],
+    allowed: tuple[str, ...],
     *,
     needed: tuple[str, ...],
     file: Path,
     what: str,
     prefix: str = "",
 ) -> None:
-    """Refuse a name that is not known, and one that is needed and missing."""
+    """Refuse a name that is not allowed, and one that is needed and missing."""
     for name in [*data, *needed]:
-        if name not in known or name not in data:
+        if name not in allowed or name not in data:
             raise InputError(
-                f"no such {what}" if name not in known else f"the {what} is missing",
+                f"no such {what}" if name not in allowed else f"the {what} is missing",
                 file=file.name,
                 field=prefix + name,
                 value=data.get(name),
-                limit=f"the {what}s " + ", ".join(known),
-                remedy=REMEDY if name in known else "remove it",
+                limit=f"the {what}s " + ", ".join(allowed),
+                remedy=REMEDY if name in allowed else "remove it",
             )
 
 
@@ -195,12 +246,11 @@ def _judge_status(table: dict[str, Any], name: str, file: Path) -> None:
 
 
 def _hyperparameters(table: dict[str, Any], name: str, search: Search | None, file: Path) -> Hyperparameters:
-    known = tuple(entry.name for entry in fields(Hyperparameters))
-    _judge_names(table, known, needed=known, file=file, what="hyper-parameter", prefix=f"{name}.")
+    _judge_names(table, NAMES, needed=NAMES, file=file, what="hyper-parameter", prefix=f"{name}.")
     try:
-        found = Hyperparameters(**table)
+        hyperparameters = Hyperparameters(**table)
         if search is not None:
-            search.space.check(found)
+            search.space.check(hyperparameters)
     except InputError as error:
         raise InputError(
             error.problem,
@@ -210,7 +260,7 @@ def _hyperparameters(table: dict[str, Any], name: str, search: Search | None, fi
             limit=error.limit,
             remedy=REMEDY,
         ) from error
-    return found
+    return hyperparameters
 
 
 KINDS: dict[str, tuple[str, type | tuple[type, ...], bool]] = {
@@ -252,17 +302,3 @@ def _search(table: dict[str, Any], file: Path) -> Search:
         error.file, error.field = file.name, f"search.{error.field}"
         raise
     return Search(space=space, **values)
-
-
-def _lines(table: Mapping[str, Any]) -> str:
-    return "".join(f"{name} = {_value(value)}\n" for name, value in table.items() if value is not None)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, (tuple, list)):
-        return f"[{', '.join(_value(item) for item in value)}]"
-    return repr(value)

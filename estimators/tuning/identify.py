@@ -2,7 +2,8 @@
 
 About an optimum the objective f is a bowl in the logarithms of the parameters. A parameter is judged by how
 far it can go before f rises by a tolerance: along its own axis the others stay, along the bowl's valley they
-follow (the profile). With the likelihood of a model that is true, the inverse of n times the curvature is the
+follow (the profile). A parameter that is searched on a linear scale has no decades: a tenth of its box
+stands for one. With the likelihood of a model that is true, the inverse of n times the curvature is the
 covariance of the estimate (Cramer-Rao); on a real ride the model is not true and that is but a scale.
 
 Not here: how the optimum was found (`simrail.estimators.tuning.tune`).
@@ -12,25 +13,17 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.tuning.objectives import Likelihood, Objective
-from simrail.estimators.tuning.space import (
-    CONSTRAINT,
-    FLAT,
-    HELD,
-    IDENTIFIED,
-    LOWER,
-    NAMES,
-    UPPER,
-    SearchSpace,
-)
+from simrail.estimators.tuning.cube import Cube
+from simrail.estimators.tuning.space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, UPPER
 
 from simrail.core.jit import FloatArray
+from simrail.estimation.tunable import Objective, Parameter
 
 TOLERANCE = 1e-3
 """Rise of the objective that counts: negative log-likelihood per sample, or mm."""
@@ -51,7 +44,8 @@ class Identification:
     table : pandas.DataFrame
         One row per hyper-parameter (index ``parameter``): ``value``; ``status``; ``tenth`` and ``tenfold``,
         the rise of the objective if the value is divided by or multiplied with ten and the others stay
-        (negative where the optimum lies beyond what was allowed); ``curvature`` along its own axis and
+        (negative where the optimum lies beyond what was allowed), ``tenth_allowed`` and ``tenfold_allowed``,
+        whether boxes and bounds allow it; ``curvature`` along its own axis and
         ``profile_curvature`` along the valley, second derivatives by the natural logarithm; ``span_decades``,
         how many powers of ten it can go along the valley until the objective has changed by the tolerance;
         and, for a likelihood, ``sd_decades``, the standard deviation of its logarithm if the model were
@@ -73,13 +67,13 @@ class Identification:
 
 def identify(
     objective: Objective,
-    parameters: Hyperparameters,
-    space: SearchSpace,
+    values: Mapping[str, float],
+    cube: Cube,
     *,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
 ) -> Identification:
-    """Judge every hyper-parameter at an optimum of a search.
+    """Judge every parameter at an optimum of a search.
 
     A parameter that is held is ``held``. One that can be divided by and multiplied with ten, as far as box
     and constraint allow, at less than the tolerance is ``flat``, and so is one inside the box whose span is
@@ -89,35 +83,33 @@ def identify(
     Parameters
     ----------
     objective : Objective
-        What was minimised.
-    parameters : Hyperparameters
+        What was minimised; a likelihood says in ``samples`` how many samples it counts.
+    values : mapping of str to float
         The optimum.
-    space : SearchSpace
+    cube : Cube
         Where was searched.
     tolerance : float
         Rise of the objective that counts.
     threads : int, optional
         By default one per core.
     """
-    logs = np.log(parameters.vector())
-    ends = {
-        number: _end(number, parameters.vector(), space) if number in space.searched else HELD
-        for number in range(len(NAMES))
-    }
+    names, parameters = cube.names, cube.parameters
+    optimum = np.array([values[name] for name in names])
+    logs = np.array(list(map(_to_log, parameters, optimum)))
+    n = len(names)
+    ends = {i: _end(i, optimum, cube) if i in cube.searched else HELD for i in range(n)}
     inside = [number for number, end in ends.items() if end == ""]
     k = len(inside)
-    axes = np.eye(len(NAMES))[inside] * STEP
-    decades = np.eye(len(NAMES)) * math.log(10.0)
+    axes = np.eye(n)[inside] * STEP
+    tens = np.eye(n) * math.log(10.0)
     pairs = [(i, j) for i in range(k) for j in range(i)]
-    both = np.array([axes[i] + axes[j] for i, j in pairs]).reshape(-1, len(NAMES))
-    points = logs + np.vstack([np.zeros(len(NAMES)), -decades, decades, -axes, axes, -both, both])
+    both = np.array([axes[i] + axes[j] for i, j in pairs]).reshape(-1, n)
+    places = logs + np.vstack([np.zeros(n), -tens, tens, -axes, axes, -both, both])
+    points = [dict(zip(names, map(_from_log, parameters, place), strict=True)) for place in places]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        sets = [Hyperparameters.from_vector(np.exp(point)) for point in points]
-        values = np.array(list(pool.map(objective.value, sets)))
-    rises = values[1:] - values[0]
-    tenth, tenfold, less, more, both_less, both_more = np.split(
-        rises, np.cumsum([len(NAMES), len(NAMES), k, k, len(pairs)])
-    )
+        heights = np.array(list(pool.map(objective.value, points)))
+    rises = heights[1:] - heights[0]
+    tenth, tenfold, less, more, both_less, both_more = np.split(rises, np.cumsum([n, n, k, k, len(pairs)]))
     curvature = np.diag(less + more)
     for at, (i, j) in enumerate(pairs):
         mixed = both_less[at] + both_more[at] - less[i] - more[i] - less[j] - more[j]
@@ -127,42 +119,77 @@ def identify(
 
     # A direction without curvature ends at the box: with no end at all, any parameter that it holds a trace
     # of would count as flat. Where a search was cut short, it may curve down: the fall tells too.
-    least = 2.0 * tolerance / math.log(space.box[1] / space.box[0]) ** 2
+    least = 2.0 * tolerance / max(_width(parameters[i]) for i in cube.searched) ** 2
     spread = (directions**2 / np.maximum(np.abs(curvatures), least)).sum(axis=1)
     columns = {
         "curvature": np.diag(curvature),
         "profile_curvature": 1.0 / spread,
         "span_decades": np.sqrt(2.0 * tolerance * spread) / math.log(10.0),
     }
-    if isinstance(objective, Likelihood):
-        columns["sd_decades"] = np.sqrt(spread / objective.samples) / math.log(10.0)
+    samples = getattr(objective, "samples", None)
+    if samples is not None:
+        columns["sd_decades"] = np.sqrt(spread / samples) / math.log(10.0)
     spans = dict(zip(inside, columns["span_decades"], strict=True))
+    allowed = [
+        cube.allows({**values, parameter.name: _moved(parameter, values[parameter.name], decades=by)})
+        for by in (-1, 1)
+        for parameter in parameters
+    ]
     table = pd.DataFrame(
         {
-            "value": parameters.vector(),
+            "value": optimum,
             "status": [
-                _status(ends[number], tenth[number], tenfold[number], spans.get(number, 0.0), tolerance)
-                for number in range(len(NAMES))
+                _status(ends[i], tenth[i], tenfold[i], spans.get(i, 0.0), tolerance) for i in range(n)
             ],
             "tenth": tenth,
             "tenfold": tenfold,
+            "tenth_allowed": allowed[:n],
+            "tenfold_allowed": allowed[n:],
         },
-        index=pd.Index(NAMES, name="parameter"),
+        index=pd.Index(names, name="parameter"),
     )
-    names = [NAMES[number] for number in inside]
-    table = table.join(pd.DataFrame(columns, index=names))
-    return Identification(table, tuple(names), curvature, curvatures, directions)
+    inner = [names[number] for number in inside]
+    table = table.join(pd.DataFrame(columns, index=inner))
+    return Identification(table, tuple(inner), curvature, curvatures, directions)
 
 
-def _end(number: int, values: FloatArray, space: SearchSpace) -> str:
+def _width(parameter: Parameter) -> float:
+    """Width of a parameter's box in natural logarithms; ten decades on a linear scale."""
+    if parameter.scale == "log":
+        return math.log(parameter.upper / parameter.lower)
+    return 10.0 * math.log(10.0)
+
+
+def _moved(parameter: Parameter, value: float, *, decades: int) -> float:
+    """A value some decades further on; on a linear scale a tenth of the box is one decade."""
+    if parameter.scale == "log":
+        return float(10.0**decades) * value
+    return value + 0.1 * decades * (parameter.upper - parameter.lower)
+
+
+def _to_log(parameter: Parameter, value: float) -> float:
+    """Natural logarithm of a value; on a linear scale a tenth of the box is one decade."""
+    if parameter.scale == "log":
+        return math.log(value)
+    return _width(parameter) * value / (parameter.upper - parameter.lower)
+
+
+def _from_log(parameter: Parameter, log: float) -> float:
+    """Inverse of `_to_log`."""
+    if parameter.scale == "log":
+        return math.exp(log)
+    return log * (parameter.upper - parameter.lower) / _width(parameter)
+
+
+def _end(number: int, values: FloatArray, cube: Cube) -> str:
     """Which end of its range a searched parameter is at; empty inside."""
-    low, high = np.log(space.limits(values)[space.searched.index(number)])
-    at = math.log(values[number])
-    width = math.log(space.box[1] / space.box[0])
-    if at - low < EDGE * width:
+    parameter = cube.parameters[number]
+    low, high = (_to_log(parameter, end) for end in cube.limits(values)[cube.searched.index(number)])
+    place, width = _to_log(parameter, values[number]), _width(parameter)
+    if place - low < EDGE * width:
         return LOWER
-    if high - at < EDGE * width:
-        return UPPER if high > math.log(space.box[1]) - EDGE * width else CONSTRAINT
+    if high - place < EDGE * width:
+        return UPPER if high > _to_log(parameter, parameter.upper) - EDGE * width else CONSTRAINT
     return ""
 
 

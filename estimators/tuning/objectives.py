@@ -1,15 +1,25 @@
-"""What a tuning of the trajectory smoother minimises: a recording's unlikeliness, or the error of the rails.
+"""The trajectory smoother as something to tune: its parameters, and what a search of them minimises.
 
-Gonzalez-Carbajal et al. 2023 (paper 001), section 4: CML and KOM. The rails that KOM knows are handed in as a
-frame, as a measured reference would be. Not here: the search (`simrail.estimators.tuning.tune`).
+Gonzalez-Carbajal et al. 2023 (paper 001), section 4. **CML** (constrained maximum likelihood) takes the
+hyper-parameters under which the recorded signals are likeliest, by prediction-error decomposition. **KOM**
+(known output) takes those with which the rails come out as a reference has them, which is handed in as a
+frame, as a measured one would be.
+
+Straights and curves may have a set each: what is minimised then counts the samples, or places, of its own
+kind only, the set holding throughout, so that the two searches do not depend on each other.
+
+The likelihood does not identify the virtual positions' variances (`SearchSpace.position_m2`), and what it
+finds for the other parameters makes the signals likely under a model that the train does not obey: see
+`simrail.estimators.tuning.identify`.
+
+Not here: the search (`simrail.estimators.tuning.tune`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,13 +29,13 @@ from simrail.estimators.trajectory.model import Model, kinds_of, with_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import OUTPUT, TrajectorySmoother, compiled_backend
 from simrail.estimators.trajectory.track_geometry import track_geometry
-from simrail.estimators.tuning.search import Batch
 from simrail.estimators.tuning.space import SearchSpace
 
 from simrail.core.columns import ATTITUDE, IRREGULARITY, RELATIVE_POSITION, require
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
+from simrail.estimation.tunable import Parameter
 from simrail.recording.recording import Recording
 from simrail.track.bands import Band, band_pass, why_not
 from simrail.track.design import STRAIGHT
@@ -38,16 +48,6 @@ TUNED = IRREGULARITY[:3]
 
 STEP_M = 0.25
 """Distance of the places at which the rails are compared, unless another is given."""
-
-
-class Objective(Protocol):
-    """What is minimised."""
-
-    unit: str
-
-    def value(self, parameters: Hyperparameters) -> float:
-        """Of a set of hyper-parameters that holds throughout."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,9 @@ class Likelihood:
     counts: tuple[np.ndarray, ...]
     unit = "negative log-likelihood per sample"
 
-    def value(self, parameters: Hyperparameters) -> float:
-        """See `Objective`."""
+    def value(self, values: Mapping[str, float]) -> float:
+        """See `simrail.estimation.tunable.Objective`."""
+        parameters = Hyperparameters(**values)
         total = sum(
             float(likelihoods(with_noise(model, parameters))[counts].sum())
             for model, counts in zip(self.models, self.counts, strict=True)
@@ -84,9 +85,9 @@ def likelihoods(model: Model) -> FloatArray:
     """Log-likelihood (n,) of each sample given those before it."""
     none = np.empty((0, STATES)), np.empty((0, PACKED))
     updates = np.empty((0, ROWS, STATES)), np.empty((0, ROWS, 2))
-    found = np.empty(len(model.signals))
-    trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), found)
-    return found
+    each = np.empty(len(model.signals))
+    trajectory_filter(*model, *none, *updates, *none, np.empty((0, 7)), each)
+    return each
 
 
 @dataclass(frozen=True)
@@ -117,29 +118,31 @@ class KnownOutput:
     step_m: float = STEP_M
     unit = "sum of rms errors in mm"
 
-    def value(self, parameters: Hyperparameters) -> float:
-        """See `Objective`."""
-        errors = [
-            self._errors(*ride, parameters)
-            for ride in zip(self.recordings, self.models, self.references, strict=True)
-        ]
-        return 1e3 * float(np.sqrt((np.concatenate(errors) ** 2).mean(axis=0)).sum())
+    def value(self, values: Mapping[str, float]) -> float:
+        """See `simrail.estimation.tunable.Objective`."""
+        errors = self.errors(Hyperparameters(**values))
+        return 1e3 * float(np.sqrt((errors**2).mean(axis=0)).sum())
+
+    def errors(self, parameters: Hyperparameters) -> FloatArray:
+        """Estimate less reference at the places of all rides that count, (p, 3)."""
+        rides = zip(self.recordings, self.models, self.references, strict=True)
+        return np.concatenate([self._errors(*ride, parameters) for ride in rides])
 
     def _errors(
         self, recording: Recording, model: Model, reference: pd.DataFrame, parameters: Hyperparameters
     ) -> FloatArray:
         """Estimate less reference at the places that count, (p, 3)."""
-        found = compiled_backend(with_noise(model, parameters), smoothed=True, with_covariance=False)
+        trace = compiled_backend(with_noise(model, parameters), smoothed=True, with_covariance=False)
         names = [*ATTITUDE, *RELATIVE_POSITION]
-        states = pd.DataFrame(found.states[:, list(OUTPUT)], index=recording.imu.index, columns=names)
-        if not np.isfinite(found.states).all():
+        states = pd.DataFrame(trace.states[:, list(OUTPUT)], index=recording.imu.index, columns=names)
+        if not np.isfinite(trace.states).all():
             return np.full((1, len(TUNED)), np.inf)
         geometry = track_geometry(Estimate(states, recording.mount), recording, step_m=self.step_m)
-        place, known = geometry.index.to_numpy(), reference.index.to_numpy()
-        inside = (place >= known[0]) & (place <= known[-1])
+        place, surveyed = geometry.index.to_numpy(), reference.index.to_numpy()
+        inside = (place >= surveyed[0]) & (place <= surveyed[-1])
         place, geometry = place[inside], geometry[inside]
         errors = np.column_stack(
-            [geometry[name].to_numpy() - np.interp(place, known, reference[name]) for name in TUNED]
+            [geometry[name].to_numpy() - np.interp(place, surveyed, reference[name]) for name in TUNED]
         )
         if self.band is not None:
             edges = [self.band.edges_m(name.removesuffix("_m")) for name in TUNED]
@@ -147,69 +150,112 @@ class KnownOutput:
             errors = np.column_stack([band_pass(column, edge, step_m=self.step_m) for column, edge in pairs])
         if self.kind is not None:
             errors = errors[(recording.track.kind(place) != STRAIGHT) == bool(self.kind)]
-        return errors[np.isfinite(errors).all(axis=1)]
+        counted: FloatArray = errors[np.isfinite(errors).all(axis=1)]
+        return counted
 
 
-def objective_of(
-    recordings: Sequence[Recording],
-    smoother: TrajectorySmoother,
-    *,
-    kind: int | None = None,
-    references: Sequence[pd.DataFrame] | None = None,
-    band: Band | None = None,
-    step_m: float = STEP_M,
-) -> Objective:
-    """What is minimised: the `Likelihood` of recordings, or, with references, their `KnownOutput`.
+@dataclass(frozen=True)
+class SmootherTuning:
+    """One set of a smoother's hyper-parameters, as a `simrail.estimation.tunable.Tunable`.
 
-    Raises
-    ------
-    InputError
-        If there is no recording, or nothing in them counts: no samples of the kind, no places that the
-        reference knows, a band that is longer than the ride.
+    Attributes
+    ----------
+    smoother : TrajectorySmoother
+        Its equations are used; its hyper-parameters (on straights) are where the search begins.
+    space : SearchSpace
+        Where to search; the paper's box and constraint if not given.
+    kind : int, optional
+        0 to count straights only, 1 for transitions and curves.
+    band : Band, optional
+        KOM compares within this band of wavelengths.
+    step_m : float
+        Distance of the places at which KOM compares.
     """
-    if not recordings:
-        raise InputError("there is nothing to tune on", field="recordings", limit="at least one")
-    models = tuple(smoother.model(recording) for recording in recordings)
-    which = "whole track" if kind is None else KINDS[kind]
-    if references is None:
+
+    smoother: TrajectorySmoother
+    space: SearchSpace = field(default_factory=SearchSpace)
+    kind: int | None = None
+    band: Band | None = None
+    step_m: float = STEP_M
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The 13 hyper-parameters."""
+        return self.space.parameters(self.smoother.noise[0])
+
+    @property
+    def search_settings(self) -> dict[str, Any]:
+        """What the file of a tuning says of the search beside the rest."""
+        return asdict(self.space)
+
+    def likelihood(self, recordings: Sequence[Recording]) -> Likelihood:
+        """What CML minimises.
+
+        Raises
+        ------
+        InputError
+            If no sample is of the kind.
+        """
         counts = tuple(
-            np.ones(len(recording.imu), dtype=bool) if kind is None else kinds_of(recording) == kind
+            np.ones(len(recording.imu), dtype=bool) if self.kind is None else kinds_of(recording) == self.kind
             for recording in recordings
         )
-        likelihood = Likelihood(models, counts)
+        likelihood = Likelihood(tuple(map(self.smoother.model, recordings)), counts)
         if likelihood.samples == 0:
-            raise InputError("no sample is of this kind", field="kind", value=which)
+            raise InputError("no sample is of this kind", field="kind", value=self._which)
         return likelihood
-    if len(references) != len(recordings):
-        raise InputError("are not one per recording", field="references", value=len(references))
-    for reference in references:
-        require(reference, TUNED, what="reference")
-        place = reference.index.to_numpy(dtype=np.float64)
-        finite = np.isfinite(place).all() and np.isfinite(reference[list(TUNED)].to_numpy()).all()
-        if len(place) < 2 or not finite or np.any(np.diff(place) <= 0.0):
-            raise InputError(
-                "is no reference of the rails",
-                field="reference",
-                limit="finite numbers over rising position_m, two places or more",
-            )
-        if band is not None:
-            count = int((place[-1] - place[0]) / step_m)
-            edges = [band.edges_m(name.removesuffix("_m")) for name in TUNED]
-            reasons = [why_not(edge, count=count, step_m=step_m) for edge in edges]
-            if any(reasons):
-                raise InputError(max(reasons), field="band", value=band.name)
-    output = KnownOutput(tuple(recordings), models, tuple(references), kind, band, step_m)
-    rides = zip(recordings, models, references, strict=True)
-    if not any(len(output._errors(*ride, Hyperparameters())) for ride in rides):
-        raise InputError("knows none of the places", field="reference", value=which)
-    return output
+
+    def reference_error(
+        self, recordings: Sequence[Recording], references: Sequence[pd.DataFrame]
+    ) -> KnownOutput:
+        """What KOM minimises.
+
+        Raises
+        ------
+        InputError
+            If a reference is none, or knows no place that counts, or the band is longer than the ride.
+        """
+        for reference in references:
+            require(reference, TUNED, what="reference")
+            place = reference.index.to_numpy(dtype=np.float64)
+            finite = np.isfinite(place).all() and np.isfinite(reference[list(TUNED)].to_numpy()).all()
+            if len(place) < 2 or not finite or np.any(np.diff(place) <= 0.0):
+                raise InputError(
+                    "is no reference of the rails",
+                    field="reference",
+                    limit="finite numbers over rising position_m, two places or more",
+                )
+            if self.band is not None:
+                count = int((place[-1] - place[0]) / self.step_m)
+                edges = [self.band.edges_m(name.removesuffix("_m")) for name in TUNED]
+                reasons = [why_not(edge, count=count, step_m=self.step_m) for edge in edges]
+                if any(reasons):
+                    raise InputError(max(reasons), field="band", value=self.band.name)
+        models = tuple(map(self.smoother.model, recordings))
+        output = KnownOutput(tuple(recordings), models, tuple(references), self.kind, self.band, self.step_m)
+        if not len(output.errors(Hyperparameters())):
+            raise InputError("knows none of the places", field="reference", value=self._which)
+        return output
+
+    @property
+    def _which(self) -> str:
+        return "whole track" if self.kind is None else KINDS[self.kind]
 
 
-def side_by_side(objective: Objective, space: SearchSpace, pool: Executor) -> Batch:
-    """An objective of many points of the cube at once: the kernels run without the GIL."""
+def tunables_of_smoother(
+    smoother: TrajectorySmoother, settings: Mapping[str, Any]
+) -> dict[str, SmootherTuning]:
+    """One set for the whole track, or with the setting ``by_kind`` one for straights and one for curves.
 
-    def evaluate(points: FloatArray) -> FloatArray:
-        parameters = [Hyperparameters.from_vector(space.values(point)) for point in points]
-        return np.array(list(pool.map(objective.value, parameters)))
-
-    return evaluate
+    Parameters
+    ----------
+    smoother : TrajectorySmoother
+        What is tuned.
+    settings : mapping
+        Of the search: ``box``, ``constrained``, ``position_m2`` (see `SearchSpace`), ``by_kind``, ``band``,
+        ``step_m``; those that differ from the defaults.
+    """
+    settings = dict(settings)
+    by_kind = settings.pop("by_kind", False)
+    compared = {name: settings.pop(name) for name in ("band", "step_m") if name in settings}
+    whole = SmootherTuning(smoother, SearchSpace(**settings), **compared)
+    return {name: replace(whole, kind=kind) for kind, name in enumerate(KINDS)} if by_kind else {"all": whole}

@@ -119,13 +119,13 @@ class Record:
         return self._next
 
     def values(self, points: FloatArray, evaluate: Batch) -> FloatArray:
-        """Values (b,) at points (b, m): from the record as far as it has them, else evaluated and kept."""
+        """Values (b,) at points (b, m): from the record as far as it has them, else evaluated."""
         first, last = self._next, self._next + len(points)
-        known = self._points[first:last]
-        if len(known) < len(points) or not np.array_equal(known, points):
-            found = np.where(np.isfinite(got := evaluate(points)), got, WORST)
+        recorded = self._points[first:last]
+        if len(recorded) < len(points) or not np.array_equal(recorded, points):
+            values = evaluate(points)
             self._points[first:] = [point.copy() for point in points]
-            self._values[first:] = list(found)
+            self._values[first:] = list(np.where(np.isfinite(values), values, WORST))
             self._save()
         self._next = last
         return np.array(self._values[first:last])
@@ -171,13 +171,13 @@ def least(
     Least
         The best of all points that were evaluated.
     """
-    kept = Record() if record is None else record
+    record = Record() if record is None else record
 
     def ask(points: FloatArray) -> FloatArray:
-        values = kept.values(points, evaluate)
+        values = record.values(points, evaluate)
         if report is not None:
-            report(kept.asked, *kept.best())
-        if at_most is not None and kept.asked >= at_most:
+            report(record.asked, *record.best())
+        if at_most is not None and record.asked >= at_most:
             raise _Enough
         return values
 
@@ -185,13 +185,13 @@ def least(
         ask(np.clip(start, 0.0, 1.0)[None])
         _cma(ask, start, generator, evaluations)
         for _ in range(ROUNDS):
-            _descend(ask, kept.best()[0])
-            point, value = kept.best()
+            _descend(ask, record.best()[0])
+            point, value = record.best()
             ask(along_axes(point))
-            if kept.best()[1] > value - GAIN:
+            if record.best()[1] > value - GAIN:
                 break
-    point, value = kept.best()
-    return Least(point, value, kept.asked)
+    point, value = record.best()
+    return Least(point, value, record.asked)
 
 
 def _cma(ask: Batch, start: FloatArray, generator: np.random.Generator, evaluations: int) -> None:

@@ -2,36 +2,40 @@
 
 A cell is one recording (`simrail.scenario.cells`): a ride is simulated once and shared by its cells,
 each cell draws its sensors, every estimator runs on the recording, and each estimate is scored. Here
-cells are put into batches, batches are handed to a crew (`simrail.campaign.executors`), and each that is done
-is kept (`simrail.campaign.checkpoint`) before its worker gets another; cells that have been kept before are
-not run.
+cells are put into batches, batches are handed to an executor (`simrail.campaign.executors`), and each that is
+done is kept (`simrail.campaign.checkpoint`) before its worker gets another; cells that have been kept before
+are not run.
 
 Seeds belong to names, so neither the batches, nor their order, nor who runs them changes a score.
 """
 
 from __future__ import annotations
 
+import hashlib
+import inspect
+import json
 import tempfile
 from collections import Counter, deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
+from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from simrail.campaign.checkpoint import Unfinished
-from simrail.campaign.executors import Crew, broken, crew_of, error_of, lost
-from simrail.campaign.job import Job, prepare
+from simrail.campaign.checkpoint import Checkpoint
+from simrail.campaign.executors import Executor, broken, error_of, executor_of, lost
 from simrail.campaign.progress import Watcher
-from simrail.campaign.result import CampaignResult, chosen_cells, gather, look_at_draws
-from simrail.campaign.worker import BatchResult, RideResult, forget, lost_batch, run_batch, run_ride
+from simrail.campaign.result import CampaignResult, chosen_cells, gather, stop_state
+from simrail.campaign.worker import BatchResult, fail_batch, forget, pack, run_batch, run_ride
 from simrail.core.interrupts import interruptible
+from simrail.core.source_hash import score_code_hash
 from simrail.ride.ride import is_cached
-from simrail.scenario.build import profile_of
 from simrail.scenario.cells import Cell
+from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.stop_rule import Look, stop_rule_of
+from simrail.scenario.stop_rule import StopState, stop_rule_of
 
 _MOST_CELLS, _MOST_SECONDS = 20, 600.0
 """Largest batch: cells, and seconds of recordings together, which are held in memory at once."""
@@ -39,31 +43,30 @@ _MOST_CELLS, _MOST_SECONDS = 20, 600.0
 _MOST_TRIES = 3
 """How often a cell is run whose worker dies each time; then it has failed."""
 
+_PACKAGES = ("numpy", "scipy", "pandas", "numba", "exudyn")
+"""Whose versions a score depends on."""
 
-class _Task(NamedTuple):
-    """A ride to simulate, for the cells that it has, or a batch of cells to run on it."""
 
-    is_ride: bool
-    cells: tuple[Cell, ...]
-
-    @property
-    def words(self) -> str:
-        """What it is, for messages."""
-        first, last = self.cells[0], self.cells[-1]
-        return f"ride {first.ride.name} is" if self.is_ride else f"cells {first.number} to {last.number} are"
-
-    @property
-    def name(self) -> tuple[bool, int, int]:
-        """What tells it from others."""
-        return self.is_ride, self.cells[0].number, len(self.cells)
+def key_of(plan: Plan) -> str:
+    """Hash of all that decides the scores of a plan: scenario, parts, estimators, code and versions."""
+    methods = (*plan.estimators.values(), *plan.parts.odometries().values())
+    files = {inspect.getsourcefile(type(method)) for method in methods}
+    decides = {
+        "name": plan.scenario.name,
+        "plan": plan.content_hash,
+        "code": score_code_hash(),
+        "estimators": sorted(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if file),
+        "versions": {package: version(package) for package in _PACKAGES},
+    }
+    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
 
 def run_campaign(
-    scenario: Scenario | Job,
+    scenario: Scenario | Plan,
     *,
     workers: int | None = None,
     cluster: str | None = None,
-    kept: Unfinished | None = None,
+    checkpoint: Checkpoint | None = None,
     batch_cells: int | None = None,
     only: int | None = None,
     watcher: Watcher | None = None,
@@ -72,11 +75,11 @@ def run_campaign(
 
     Parameters
     ----------
-    scenario : Scenario or Job
+    scenario : Scenario or Plan
         As read by `simrail.load_scenario`, or judged already.
     workers, cluster : int, str, optional
-        Who runs it, see `simrail.campaign.executors.crew_of`.
-    kept : Unfinished, optional
+        Who runs it, see `simrail.campaign.executors.executor_of`.
+    checkpoint : Checkpoint, optional
         Batches that have been run, and where those to come are kept; else they are kept for now only.
     batch_cells : int, optional
         Cells of a batch; as many as suit if not given.
@@ -94,72 +97,98 @@ def run_campaign(
     KeyboardInterrupt
         If interrupted; batches and rides that are complete are kept.
     """
-    job = scenario if isinstance(scenario, Job) else prepare(scenario)
+    plan = scenario if isinstance(scenario, Plan) else judge_scenario(scenario)
+    packed = pack(plan.parts)
     with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
-        kept = Unfinished(Path(spare)) if kept is None else kept
-        loop = _Loop(job, kept, watcher or Watcher(), only)
+        checkpoint = Checkpoint(Path(spare)) if checkpoint is None else checkpoint
+        loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only)
         with interruptible():
             try:
-                with crew_of(workers, cluster if loop.left else None, cells=loop.left) as crew:
-                    stopped = loop.run(crew, batch_cells)
-                return gather(job, kept, only=only, stopped=stopped)
+                with executor_of(workers, cluster if loop.left else None, cells=loop.left) as executor:
+                    stopped = loop.run(executor, batch_cells)
+                return gather(plan, packed, checkpoint, only=only, stopped=stopped)
             finally:
                 forget()
 
 
-class _Loop:
-    """The loop over the cells that are not kept yet; with a stop rule, from look to look."""
+class _Batch(NamedTuple):
+    """Cells that share a ride, for one worker: to be run, or to have their ride simulated before."""
 
-    def __init__(self, job: Job, kept: Unfinished, watcher: Watcher, only: int | None) -> None:
-        self.job, self.kept, self.watcher, self.only = job, kept, watcher, only
-        self.done = kept.cells()
-        self.total = job.plan.cells if only is None else 1
+    ride_only: bool
+    cells: tuple[Cell, ...]
+
+    @property
+    def words(self) -> str:
+        """What it is, for messages."""
+        first, last = self.cells[0], self.cells[-1]
+        return (
+            f"ride {first.ride.name} is" if self.ride_only else f"cells {first.number} to {last.number} are"
+        )
+
+    @property
+    def key(self) -> tuple[bool, int, int]:
+        """What tells it from others."""
+        return self.ride_only, self.cells[0].number, len(self.cells)
+
+
+class _Loop:
+    """The loop over the cells that are not kept yet; with a stop rule, from one of its stages to the next."""
+
+    def __init__(
+        self, plan: Plan, packed: bytes, checkpoint: Checkpoint, watcher: Watcher, only: int | None
+    ) -> None:
+        self.plan, self.packed, self.only = plan, packed, only
+        self.checkpoint, self.watcher = checkpoint, watcher
+        self.done = checkpoint.cells()
+        self.total = plan.cells if only is None else 1
         self.left = self.total - len(self.done)
         self.failed = 0
-        self.rides: dict[int, RideResult] = {}
-        self.ready: deque[_Task] = deque()
-        self.suspects: deque[_Task] = deque()
+        self.simulated: dict[int, BatchResult] = {}
+        self.ready: deque[_Batch] = deque()
+        self.suspects: deque[_Batch] = deque()
         self.tries: Counter[tuple[bool, int, int]] = Counter()
-        if kept.damaged:
-            self._tell(f"{kept.damaged} damaged file(s) of finished batches dropped: run again")
+        if checkpoint.damaged:
+            self._tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
         if self.done:
             self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
-    def run(self, crew: Crew, batch_cells: int | None) -> Look | None:
-        """Run what is left, or as much as the stop rule asks for; its last look."""
-        rule = stop_rule_of(self.job.scenario) if self.only is None else None
+    def run(self, executor: Executor, batch_cells: int | None) -> StopState | None:
+        """Run what is left, or as much as the stop rule asks for; its last state."""
+        rule = stop_rule_of(self.plan.scenario) if self.only is None else None
         if rule is None:
-            self._run(crew, batch_cells)
+            self._run(executor, batch_cells)
             return None
-        for draws in rule.looks:
-            numbers = {cell.number for cell in chosen_cells(self.job, draws=draws)}
+        for draws in rule.stages:
+            numbers = {cell.number for cell in chosen_cells(self.plan, draws=draws)}
             self.total, self.left = len(numbers), len(numbers - self.done)
-            self._run(crew, batch_cells, draws=draws)
-            look = look_at_draws(self.job, self.kept, rule, draws)
-            self._tell(look.words)
-            if look.reached:
+            self._run(executor, batch_cells, draws=draws)
+            state = stop_state(self.plan, self.checkpoint, rule, draws)
+            self._tell(state.words)
+            if state.reached:
                 break
-        return look
+        return state
 
-    def _run(self, crew: Crew, batch_cells: int | None, *, draws: int | None = None) -> None:
+    def _run(self, executor: Executor, batch_cells: int | None, *, draws: int | None = None) -> None:
         """Run what is left of these draws; each batch is kept before its worker gets another."""
         if not self.left:
             return
-        self.kept.log(f"{self.left} cells to run, {crew.workers()} at once")
+        self.checkpoint.log(f"{self.left} cells to run, {executor.workers()} at once")
         self.watcher.cells_begin(self.total - self.left, self.total)
-        waiting: dict[Future[Any], _Task] = {}
+        waiting: dict[Future[BatchResult], _Batch] = {}
         rides = self._rides(draws)
         while True:
-            while len(waiting) < (1 if self.suspects else crew.workers()):
-                task = self._next(rides, crew, batch_cells)
-                if task is None:
+            while len(waiting) < (1 if self.suspects else executor.workers()):
+                batch = self._next(rides, executor, batch_cells)
+                if batch is None:
                     break
-                waiting[self._submit(crew, task)] = task
+                waiting[self._submit(executor, batch)] = batch
             if not waiting:
                 return
-            self._collect(waiting, crew, batch_cells)
+            self._collect(waiting, executor, batch_cells)
 
-    def _collect(self, waiting: dict[Future[Any], _Task], crew: Crew, batch_cells: int | None) -> None:
+    def _collect(
+        self, waiting: dict[Future[BatchResult], _Batch], executor: Executor, batch_cells: int | None
+    ) -> None:
         """Wait until something is done, and take it.
 
         No future that has been taken is held on to from here: a cluster keeps a result for as long as
@@ -169,98 +198,98 @@ class _Loop:
         if any(broken(error_of(future)) for future in done):
             done = set(waiting)  # all that were under way are lost; which one it was, is not known
             wait(done)
-            crew.renew()
+            executor.renew()
         for future in done:
-            self._take(waiting.pop(future), future, crew, batch_cells)
+            self._take(waiting.pop(future), future, executor, batch_cells)
 
     def _rides(self, draws: int | None) -> Iterator[tuple[Cell, ...]]:
         """The cells left of each ride."""
-        chosen = chosen_cells(self.job, self.only, draws=draws)
+        chosen = chosen_cells(self.plan, self.only, draws=draws)
         for _, group in groupby(chosen, key=lambda cell: cell.ride_number):
             left = tuple(cell for cell in group if cell.number not in self.done)
             if left:
                 yield left
 
-    def _next(self, rides: Iterator[tuple[Cell, ...]], crew: Crew, batch_cells: int | None) -> _Task | None:
+    def _next(
+        self, rides: Iterator[tuple[Cell, ...]], executor: Executor, batch_cells: int | None
+    ) -> _Batch | None:
         """What to run next: suspects, alone; then batches of rides that are there; then another ride."""
         if self.suspects:
             return self.suspects.popleft()
         if not self.ready and (ride := next(rides, None)) is not None:
-            self.watcher.ride_begins(ride[0].ride_number + 1, self.job.plan.rides, ride[0].ride.name)
-            if not is_cached(self.job.parts.ride(ride[0])):
-                return _Task(True, ride)
-            self._ride_is_there(ride, crew, batch_cells)
+            self.watcher.ride_begins(ride[0].ride_number + 1, self.plan.rides, ride[0].ride.name)
+            if not is_cached(self.plan.parts.ride(ride[0])):
+                return _Batch(True, ride)
+            self._ride_is_there(ride, executor, batch_cells)
         return self.ready.popleft() if self.ready else None
 
-    def _ride_is_there(self, ride: tuple[Cell, ...], crew: Crew, batch_cells: int | None) -> None:
+    def _ride_is_there(self, ride: tuple[Cell, ...], executor: Executor, batch_cells: int | None) -> None:
         """Make the batches of a ride: small enough for memory, and for every worker to have some."""
-        seconds = max(profile_of(ride[0]).duration_s, 1e-3)
-        most = min(_MOST_CELLS, int(_MOST_SECONDS / seconds), self.left // (4 * crew.workers()))
+        seconds = max(self.plan.parts.ride(ride[0]).profile.duration_s, 1e-3)
+        most = min(_MOST_CELLS, int(_MOST_SECONDS / seconds), self.left // (4 * executor.workers()))
         size = batch_cells or max(1, most)
-        self.ready.extend(_Task(False, ride[i : i + size]) for i in range(0, len(ride), size))
+        self.ready.extend(_Batch(False, ride[i : i + size]) for i in range(0, len(ride), size))
         self.watcher.ride_ends()
 
-    def _submit(self, crew: Crew, task: _Task) -> Future[Any]:
-        """Hand a task to the crew."""
-        if not task.is_ride:
-            return crew.submit(run_batch, self.job.order, task.cells)
-        progress = (self.watcher.ride_goes,) if crew.here else ()
-        return crew.submit(run_ride, self.job.order, task.cells[0], *progress)
+    def _submit(self, executor: Executor, batch: _Batch) -> Future[BatchResult]:
+        """Hand a batch to the executor."""
+        if not batch.ride_only:
+            return executor.submit(run_batch, self.packed, batch.cells)
+        progress = (self.watcher.ride_goes,) if executor.here else ()
+        return executor.submit(run_ride, self.packed, batch.cells, *progress)
 
-    def _take(self, task: _Task, future: Future[Any], crew: Crew, batch_cells: int | None) -> None:
-        """Take what came of a task."""
+    def _take(
+        self, batch: _Batch, future: Future[BatchResult], executor: Executor, batch_cells: int | None
+    ) -> None:
+        """Take what came of a batch."""
         error = error_of(future)
         if error is not None and not lost(error):
             raise error
         if error is not None:
-            self._lost(task, given_up=not broken(error))
-        elif not task.is_ride:
-            self._keep(future.result())
+            self._lost(batch, given_up=not broken(error))
+            return
+        result = future.result()
+        for note in result.notes:
+            self._tell(note)
+        if result.cells:
+            self._keep(result)
         else:
-            ride: RideResult = future.result()
-            for note in ride.notes:
-                self._tell(note)
-            self.rides[task.cells[0].ride_number] = ride
-            if ride.reason:
-                self._keep(lost_batch(self.job.order, task.cells, ride.reason, ride.trace))
-            else:
-                self._ride_is_there(task.cells, crew, batch_cells)
+            self.simulated[result.ride_number] = result
+            self._ride_is_there(batch.cells, executor, batch_cells)
 
-    def _lost(self, task: _Task, *, given_up: bool) -> None:
-        """A worker died over a task: run it again, alone; in the end, its cells have failed."""
-        self.tries[task.name] += 1
-        single = task.is_ride or len(task.cells) == 1
-        if not given_up and self.tries[task.name] < (_MOST_TRIES if single else _MOST_TRIES - 1):
-            self._tell(f"a worker died: {task.words} run again")
-            self.suspects.append(task)
+    def _lost(self, batch: _Batch, *, given_up: bool) -> None:
+        """A worker died over a batch: run it again, alone; in the end, its cells have failed."""
+        self.tries[batch.key] += 1
+        single = batch.ride_only or len(batch.cells) == 1
+        if not given_up and self.tries[batch.key] < (_MOST_TRIES if single else _MOST_TRIES - 1):
+            self._tell(f"a worker died: {batch.words} run again")
+            self.suspects.append(batch)
         elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it.
-            singles = [_Task(False, (cell,)) for cell in task.cells]
-            self.tries.update({one.name: _MOST_TRIES - 1 for one in singles})
+            singles = [_Batch(False, (cell,)) for cell in batch.cells]
+            self.tries.update({one.key: _MOST_TRIES - 1 for one in singles})
             self.suspects.extend(singles)
         else:
             reason = "the worker died, killed or out of memory, each time this was run"
-            self._keep(lost_batch(self.job.order, task.cells, reason, reason + "\n"))
+            self._keep(fail_batch(self.packed, batch.cells, reason))
 
     def _keep(self, result: BatchResult) -> None:
         """Keep a batch, with the ride that was simulated for it, and tell of it."""
-        ride = self.rides.pop(result.ride_number, None)
+        ride = self.simulated.pop(result.ride_number, None)
         if ride is not None:
-            wall = result.wall_s | {"simulate": result.wall_s["simulate"] + ride.wall_s}
-            cpu = result.cpu_s | {"simulate": result.cpu_s["simulate"] + ride.cpu_s}
-            result = replace(result, ride=ride.facts, wall_s=wall, cpu_s=cpu)
-        self.kept.add(result)
-        for note in result.notes:
-            self._tell(note)
+            wall = result.wall_s | {"simulate": result.wall_s["simulate"] + ride.wall_s["simulate"]}
+            cpu = result.cpu_s | {"simulate": result.cpu_s["simulate"] + ride.cpu_s["simulate"]}
+            result = replace(result, ride=ride.ride, wall_s=wall, cpu_s=cpu)
+        self.checkpoint.add(result)
         for failure in result.failures:
-            self.kept.log(f"cell {failure.cell}, {failure.estimator} failed: {failure.reason}")
+            self.checkpoint.log(f"cell {failure.cell}, {failure.estimator} failed: {failure.reason}")
         self.done.update(result.cells)
         self.left -= len(result.cells)
         self.failed += len({failure.cell for failure in result.failures})
         done = self.total - self.left
-        self.kept.log(f"{done} of {self.total} cells done; the last by {result.worker}")
+        self.checkpoint.log(f"{done} of {self.total} cells done; the last by {result.worker}")
         self.watcher.cells_done(done, self.total, self.failed, result.worker)
 
     def _tell(self, line: str) -> None:
-        self.kept.log(line)
+        self.checkpoint.log(line)
         self.watcher.told(line)

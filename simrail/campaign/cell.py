@@ -8,34 +8,137 @@ where, is decided in `simrail.campaign.campaign`.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from simrail.campaign.example import CellResult
-from simrail.campaign.ledger import Ledger
+from simrail.core.errors import InputError
 from simrail.core.interrupts import Check
-from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
 from simrail.ride.truth import Truth
-from simrail.scenario.build import (
-    Parts,
-    bands_of,
-    earth_of,
-    encoder_of,
-    magnetometer_of,
-    mount_of,
-    rail_sensor_of,
-    temperature_of,
-)
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
-from simrail.scoring.geometry import score_geometry
+from simrail.scenario.tables import RidePart
+from simrail.scoring.geometry import HasRails, score_geometry
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
+from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
+
+STAGES = ("simulate", "measure", "estimate", "score")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A cell, or one estimator on it, that failed: the reason for the table, the traceback for its author."""
+
+    cell: int
+    estimator: str
+    reason: str
+    trace: str
+
+
+@dataclass(frozen=True)
+class CellResult:
+    """Recording, truth and estimates of one cell: what the report draws.
+
+    Attributes
+    ----------
+    cell : dict
+        The labels of the cell, as in the score table (``ride``, ``vehicle``, ``imu``, ...), and the
+        values of the scenario's axes.
+    recording : Recording
+        What the train recorded.
+    motion : pandas.DataFrame
+        True motion of the mount at the IMU times (`simrail.scoring.score.truth_at_imu`).
+    estimates : dict of str to Estimate
+        By the estimator's name in the scenario, in the scenario's order; failed ones are left out.
+    rails : LaidTrack, optional
+        The rails that the ride was run on, if an estimate speaks of rails.
+    """
+
+    cell: dict[str, object]
+    recording: Recording
+    motion: pd.DataFrame
+    estimates: dict[str, Estimate]
+    rails: HasRails | None = None
+
+
+@dataclass
+class BatchTally:
+    """What is gathered while the cells of a batch run: tables with their labels, failures, times.
+
+    Attributes
+    ----------
+    scenario : str
+        Name of what is run.
+    estimators : mapping of str to Estimator
+        By their names in the tables.
+    tunings : mapping of str to str
+        How each is tuned, by the same names.
+    warm : set of str
+        Estimators whose kernels have been compiled in this process.
+    figures : list of (pandas.DataFrame, dict)
+        Figures of one estimate, and their labels.
+    failures : list of Failure
+        What failed.
+    wall_s, cpu_s : dict of str to float
+        Wall time, and time of this process on the processor, of the stages `STAGES`.
+    """
+
+    scenario: str
+    estimators: Mapping[str, Estimator]
+    tunings: Mapping[str, str]
+    warm: set[str] = field(default_factory=set)
+    figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    wall_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    cpu_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the time of a block to a stage."""
+        begun, worked = time.perf_counter(), time.process_time()
+        try:
+            yield
+        finally:
+            self.wall_s[stage] += time.perf_counter() - begun
+            self.cpu_s[stage] += time.process_time() - worked
+
+    def fail(self, cell: Cell, estimator: str, error: Exception) -> None:
+        """Note a failure as a row with its reason."""
+        self.fail_for(cell, estimator, _reason_of(error), "".join(traceback.format_exception(error)))
+
+    def fail_for(self, cell: Cell, estimator: str, reason: str, trace: str) -> None:
+        """Note a failure whose reason is known in words."""
+        self.failures.append(Failure(cell.number, estimator, reason, trace))
+        self.add(cell, estimator, failed_figures(reason))
+
+    def add(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
+        """Note the figures of one estimator, or of the odometry, on a cell."""
+        self.figures.append((figures, self.labels(cell, estimator)))
+
+    def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
+        """Labels of a row of the score table."""
+        return {
+            "cell": cell.number,
+            "scenario": self.scenario,
+            "ride": cell.ride.name,
+            "vehicle": cell.spec.vehicle,
+            "mount": cell.imu.name,
+            "imu": cell.imu.grade,
+            "odometry": cell.spec.odometry,
+            "tuning": self.tunings.get(estimator, "default"),
+            "track_draw": cell.track_draw,
+            "sensor_draw": cell.sensor_draw,
+            "estimator": estimator,
+        }
 
 
 @dataclass(frozen=True)
@@ -47,7 +150,7 @@ class _Recorded:
     reference: Reference
 
 
-def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, ledger: Ledger, check: Check) -> None:
+def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTally, check: Check) -> None:
     """Record cells of one ride, run every estimator on the recordings, and score.
 
     Parameters
@@ -58,147 +161,180 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, ledger: Ledger,
         Their ride.
     parts : Parts
         Parts of their scenario.
-    ledger : Ledger
-        Gathers what was found.
+    tally : BatchTally
+        Gathers what comes of it.
     check : callable
         Raises `KeyboardInterrupt` if there was one that a library swallowed.
     """
     recorded = []
     for cell in cells:
         try:
-            recorded.append(_record(cell, truth, parts, ledger))
+            recorded.append(_record(cell, truth, parts, tally))
         except Exception as error:
             check()
-            for name in ledger.estimators:
-                ledger.failed(cell, name, error)
+            for name in tally.estimators:
+                tally.fail(cell, name, error)
     if not recorded:
         return
-    for name, estimator in ledger.estimators.items():
-        found = _estimates(name, estimator, [one.recording for one in recorded], ledger, check)
-        for one, outcome in zip(recorded, found, strict=True):
+    for name, estimator in tally.estimators.items():
+        outcomes = _estimates(name, estimator, [one.recording for one in recorded], tally, check)
+        for one, outcome in zip(recorded, outcomes, strict=True):
             try:
                 if isinstance(outcome, Exception):
                     raise outcome
-                with ledger.timed("score"):
-                    _score(one, name, *outcome, parts, ledger)
-                ledger.judge_finite(one.cell, name, outcome[0])
+                _score(one, name, *outcome, parts, tally)
             except Exception as error:
                 check()
-                ledger.failed(one.cell, name, error)
+                tally.fail(one.cell, name, error)
 
 
 def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
-    """Measure a cell: its sensors on its ride."""
+    """Measure a cell, its sensors on its ride, and run its odometry."""
+    resolved = parts.resolve(cell)
     recording = measure(
         truth,
         name=cell.ride.name,
-        mount=mount_of(cell),
-        grade=parts.grade(cell),
-        encoder=encoder_of(cell),
-        magnetometer=magnetometer_of(cell),
-        rail_sensor=rail_sensor_of(cell),
-        rails=None if rail_sensor_of(cell) is None else parts.rails(cell),
-        odometry="truth" if cell.spec.odometry == "truth" else "encoder",
+        mount=resolved.mount,
+        grade=resolved.grade,
+        encoder=resolved.encoder,
+        magnetometer=resolved.magnetometer,
+        rail_sensor=resolved.rail_sensor,
+        rails=None if resolved.rail_sensor is None else parts.rails(cell),
+        odometry=TRUTH if cell.spec.odometry == TRUTH else None,
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,
-        earth_rate=earth_of(cell),
-        temperature=temperature_of(cell),
+        earth_rate=resolved.earth_rate,
+        temperature=resolved.temperature,
     )
-    return with_odometry(recording, cell.spec.odometry)
+    if resolved.odometry is None:
+        return recording
+    return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
 
 
-def look_at(
-    cell: Cell, truth: Truth, parts: Parts, ledger: Ledger, described: dict[str, object]
-) -> CellResult:
+def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellResult:
     """Run a cell again for the figures of a report: its recording and estimates, without scores."""
     recording = record_cell(cell, truth, parts)
     estimates = {}
-    for name, estimator in ledger.estimators.items():
+    for name, estimator in tally.estimators.items():
         with suppress(Exception):
             (estimates[name],) = estimate_many(estimator, [recording])
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
-    return CellResult(described, recording, truth_at_imu(truth, recording), estimates, rails)
+    labels = {**tally.labels(cell, ""), **cell_record(cell)}
+    del labels["estimator"], labels["tuning"]
+    return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails)
 
 
-def _record(cell: Cell, truth: Truth, parts: Parts, ledger: Ledger) -> _Recorded:
-    """Record one cell and score its odometry."""
-    with ledger.timed("measure"):
+def cell_record(cell: Cell) -> dict[str, object]:
+    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
+    record: dict[str, object] = {
+        "cell": cell.number,
+        "case": cell.case,
+        "ride": cell.ride.name,
+        "vehicle": cell.spec.vehicle,
+        "mount": cell.imu.name,
+        "imu": cell.imu.grade,
+        "odometry": cell.spec.odometry,
+        "sample": cell.sample,
+        "track_draw": cell.track_draw,
+        "sensor_draw": cell.sensor_draw,
+        "track": cell.spec.track,
+        "engine": cell.spec.engine,
+        "speed_kmh": cell.ride.speed_kmh or 0.0,
+        "direction": _direction(cell.ride),
+    }
+    return record | {name: value for name, value in cell.settings.items() if name not in record}
+
+
+def _direction(ride: RidePart) -> str:
+    """Whether a ride runs towards larger s, smaller s, or not at all."""
+    if ride.end_m is None:
+        return "standing"
+    return "forward" if ride.end_m > ride.start_m else "backward"
+
+
+def _reason_of(error: Exception) -> str:
+    """One line that says why."""
+    text = " ".join(str(error).split())
+    named = text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
+    return named[:300]
+
+
+def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> _Recorded:
+    """Record one cell and score its odometry, if it has one."""
+    with tally.timed("measure"):
         recording = record_cell(cell, truth, parts)
-    with ledger.timed("score"):
+    with tally.timed("score"):
         reference = reference_of(truth_at_imu(truth, recording), recording)
-        figures = score_odometry(recording, reference, **kept_of(cell))
-        ledger.scored(cell, f"odometry:{recording.odometry_source}", figures)
+        if recording.odometry is not None:
+            figures = score_odometry(recording, reference, **_wanted(cell))
+            tally.add(cell, f"odometry:{recording.odometry_source}", figures)
     return _Recorded(cell, recording, reference)
 
 
 def _estimates(
-    name: str, estimator: Estimator, recordings: list[Recording], ledger: Ledger, check: Check
+    name: str, estimator: Estimator, recordings: list[Recording], tally: BatchTally, check: Check
 ) -> Iterator[tuple[Estimate, float] | Exception]:
     """Each estimate and the microseconds per sample that it took, or what went wrong with it.
 
     A method that takes many recordings at once takes them all; if one of them upsets it, it takes them
     one by one, so that only that one fails.
     """
-    if name not in ledger.warm:
+    if name not in tally.warm:
         # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
-        with ledger.timed("estimate"), suppress(Exception):
+        with tally.timed("estimate"), suppress(Exception):
             estimate_many(estimator, [beginning(recordings[0], samples=64)])
-        ledger.warm.add(name)
-    together = [recordings] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
-    while together:
-        group = together.pop(0)
+        tally.warm.add(name)
+    groups = [recordings] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
+    while groups:
+        group = groups.pop(0)
         try:
-            with ledger.timed("estimate"):
+            with tally.timed("estimate"):
                 begun = time.perf_counter()
-                found = estimate_many(estimator, group)
+                estimates = estimate_many(estimator, group)
                 seconds = time.perf_counter() - begun
-            if len(found) != len(group):
-                raise ValueError(f"estimate_many gave {len(found)} estimates of {len(group)} recordings")
+            if len(estimates) != len(group):
+                raise ValueError(f"estimate_many gave {len(estimates)} estimates of {len(group)} recordings")
         except Exception as error:
             check()
             if len(group) > 1:
-                together = [[one] for one in group]
+                groups = [[one] for one in group]
             else:
                 yield error
             continue
         us_per_sample = 1e6 * seconds / sum(len(one.imu) for one in group)
-        yield from ((estimate, us_per_sample) for estimate in found)
+        yield from ((estimate, us_per_sample) for estimate in estimates)
 
 
 def _score(
-    one: _Recorded, name: str, estimate: Estimate, us_per_sample: float, parts: Parts, ledger: Ledger
+    one: _Recorded, name: str, estimate: Estimate, us_per_sample: float, parts: Parts, tally: BatchTally
 ) -> None:
-    """Score one estimate."""
-    for figures in figures_of(one.cell, estimate, one.reference, one.recording, us_per_sample, parts):
-        ledger.scored(one.cell, name, figures)
+    """Score one estimate: its states, and its geometry if it has one.
 
-
-def figures_of(
-    cell: Cell,
-    estimate: Estimate,
-    reference: Reference,
-    recording: Recording,
-    us_per_sample: float,
-    parts: Parts,
-) -> list[pd.DataFrame]:
-    """Scores of one estimate as a cell wants them: of its states, and of its geometry if it has one."""
-    keep = kept_of(cell)
-    tables = [score(estimate, reference, recording, us_per_sample=us_per_sample, **keep)]
-    if estimate.geometry is not None:
-        tables.append(
-            score_geometry(
-                estimate,
-                parts.rails(cell),
-                recording,
-                bands=bands_of(cell),
-                twist_base_m=cell.spec.geometry.twist_base_m,
-                **keep,
+    One that is not finite has rows that say so, and is a failure of its cell as well.
+    """
+    cell, wanted = one.cell, _wanted(one.cell)
+    with tally.timed("score"):
+        tables = [score(estimate, one.reference, one.recording, us_per_sample=us_per_sample, **wanted)]
+        if estimate.geometry is not None:
+            tables.append(
+                score_geometry(
+                    estimate,
+                    parts.rails(cell),
+                    one.recording,
+                    bands=parts.resolve(cell).bands,
+                    twist_base_m=cell.spec.geometry.twist_base_m,
+                    **wanted,
+                )
             )
-        )
-    return tables
+        for figures in tables:
+            tally.add(cell, name, figures)
+    bad = int((~np.isfinite(estimate.states.to_numpy(dtype=np.float64))).any(axis=1).sum())
+    if bad:
+        reason = f"estimate not finite in {bad} of {len(estimate.states)} samples"
+        tally.failures.append(Failure(cell.number, name, reason, reason + "\n"))
 
 
-def kept_of(cell: Cell) -> dict[str, Any]:
+def _wanted(cell: Cell) -> dict[str, Any]:
     """What of the score table the scenario keeps."""
     return {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}

@@ -14,9 +14,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import shutil
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -27,8 +25,9 @@ from typing import Literal
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from filelock import FileLock
 
-from simrail.campaign.ledger import Failure
+from simrail.campaign.cell import Failure
 from simrail.campaign.worker import BatchResult
 from simrail.core.atomic_files import whole_file
 from simrail.core.errors import InputError
@@ -39,7 +38,7 @@ _KEPT_DAYS = 30.0
 _META = b"simrail"
 
 
-class Unfinished:
+class Checkpoint:
     """Batches of one plan, as files.
 
     Parameters
@@ -57,15 +56,15 @@ class Unfinished:
 
     def cells(self) -> set[int]:
         """Numbers of the cells that are done; damaged files are dropped and counted in ``damaged``."""
-        found: set[int] = set()
+        done: set[int] = set()
         for file in self._files():
             content = file.read_bytes()
             if _hash(content) != file.stem.partition("-")[2]:
                 file.unlink()
                 self.damaged += 1
             else:
-                found.update(_result_of(content, rows=False).cells)
-        return found
+                done.update(_result_of(content, rows=False).cells)
+        return done
 
     def add(self, result: BatchResult) -> None:
         """Keep a batch.
@@ -109,7 +108,7 @@ class Unfinished:
 
 
 @contextmanager
-def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator[Unfinished]:
+def checkpoint_of(results: Path, key: str, *, start: Start = "auto") -> Iterator[Checkpoint]:
     """Hold the unfinished run of a plan, beside the folder of its results, for this process.
 
     What the block leaves behind without a finished batch goes.
@@ -133,9 +132,9 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
     folder = results.parent / f".{results.name}.unfinished-{key[:16]}"
     with _locked(folder):
         # Only now: what lies there may be another process's, at work.
-        kept = Unfinished(folder)
+        checkpoint = Checkpoint(folder)
         try:
-            if start == "resume" and kept.is_empty:
+            if start == "resume" and checkpoint.is_empty:
                 raise InputError(
                     "there is no unfinished run of this plan",
                     field="--resume",
@@ -144,11 +143,11 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
                     remedy="run it without --resume",
                 )
             if start in ("fresh", "retry-failed"):
-                kept.clear()
-            yield kept
+                checkpoint.clear()
+            yield checkpoint
         finally:
-            if kept.is_empty:
-                kept.remove()
+            if checkpoint.is_empty:
+                checkpoint.remove()
             with suppress(OSError):  # those that were made for it, if nothing has come into them
                 for above in made:
                     above.rmdir()
@@ -158,24 +157,20 @@ def unfinished_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
 def _locked(folder: Path) -> Iterator[None]:
     """Hold a folder, made if it is not there, for this process; the lock goes with the process."""
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / ".lock"
-    with file.open("a") as stream:
-        if sys.platform != "win32":
-            import fcntl
-
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # One that has just ended took its folder with it, and this would be a lock that nobody sees.
-                if not os.path.samestat(os.fstat(stream.fileno()), file.stat()):
-                    raise FileNotFoundError(file)
-            except OSError as error:
-                raise InputError(
-                    "this plan is being run by another process, into the same folder",
-                    field="--out",
-                    value=folder.name,
-                    remedy="wait for it, or choose another folder with --out",
-                ) from error
+    lock = FileLock(folder / ".lock")
+    try:
+        lock.acquire(blocking=False)
+    except OSError as error:  # also where one that has just ended took its folder with it
+        raise InputError(
+            "this plan is being run by another process, into the same folder",
+            field="--out",
+            value=folder.name,
+            remedy="wait for it, or choose another folder with --out",
+        ) from error
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def _drop_abandoned(results: Path) -> None:

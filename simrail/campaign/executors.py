@@ -13,7 +13,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Future
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
@@ -28,7 +28,7 @@ _WAIT_S = 20.0
 """How long a cluster may take to answer."""
 
 
-class Crew(Protocol):
+class Executor(Protocol):
     """Runs functions, here or elsewhere."""
 
     here: bool
@@ -62,12 +62,12 @@ def lost(error: BaseException) -> bool:
 
 
 def broken(error: BaseException | None) -> bool:
-    """Whether a worker took the whole crew with it, and nobody knows which batch killed it."""
+    """Whether a worker took all the others with it, and nobody knows which batch killed it."""
     return isinstance(error, BrokenExecutor)
 
 
 @contextmanager
-def crew_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator[Crew]:
+def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator[Executor]:
     """Who runs a campaign.
 
     Parameters
@@ -94,19 +94,19 @@ def crew_of(workers: int | None, cluster: str | None, *, cells: int) -> Iterator
         )
     if workers is None:
         workers = 1 if cells <= FEW_CELLS else _cores()
-    crew: Crew
+    executor: Executor
     if cluster is not None:
-        crew = _Cluster(cluster)
+        executor = _Cluster(cluster)
     else:
-        crew = _Here() if min(workers, cells) <= 1 else _Processes(min(workers, cells))
+        executor = _Here() if min(workers, cells) <= 1 else _Processes(min(workers, cells))
     try:
-        yield crew
+        yield executor
     finally:
-        crew.close()
+        executor.close()
 
 
 class _Here:
-    """This process."""
+    """The process itself, without others."""
 
     here = True
 
@@ -176,7 +176,7 @@ class _Cluster:
 
     def __init__(self, address: str) -> None:
         try:
-            from distributed import Client
+            import distributed
         except ImportError:
             raise InputError(
                 "a cluster needs dask, which is not installed",
@@ -189,7 +189,8 @@ class _Cluster:
         self._log_level = self._log.level
         self._log.setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
         try:
-            self._client = Client(address, timeout=_WAIT_S, set_as_default=False)
+            client: Any = distributed.Client  # its methods have no types
+            self._client = client(address, timeout=_WAIT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             self._log.setLevel(self._log_level)
             raise InputError(
@@ -204,13 +205,13 @@ class _Cluster:
         except BaseException:
             self.close()
             raise
-        self._pool: Executor = self._client.get_executor(pure=False)
+        self._pool: Any = self._client.get_executor(pure=False)
         self._busy: set[str] = set()
 
     def _judge_workers(self) -> None:
         """Refuse a cluster without workers, or one whose workers run another simrail."""
         begun = time.perf_counter()
-        while not self._threads():
+        while not self._client.nthreads():
             if time.perf_counter() - begun > _WAIT_S:
                 raise InputError(
                     "the dask scheduler has no workers",
@@ -236,9 +237,6 @@ class _Cluster:
                 value=others[0],
                 remedy="install the same simrail on every machine",
             )
-
-    def _threads(self) -> int:
-        return sum(self._client.nthreads().values())
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.

@@ -19,7 +19,6 @@ from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
 from simrail.ride.ride import simulate
-from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -76,8 +75,7 @@ def export(
     """
     watcher = watcher or Watcher()
     refuse_existing(folder)
-    parts = Parts(scenario)
-    judge_scenario(scenario, parts)
+    parts = judge_scenario(scenario).parts
     chosen = [replace(cell, sensor_draw=draw) for cell in first_cells(scenario)]
     rides = len({cell.ride_number for cell in chosen})
     names = _names(chosen)

@@ -1,8 +1,9 @@
-"""What a scenario will run, and about what it will take, before anything runs: ``simrail run NAME --plan``.
+"""What a scenario will run, and about what it will take: ``simrail run NAME --plan``.
 
-Numbers of cells, rides and cached rides are counted; rows, time and disk are estimates from a rehearsal
-(`simrail.campaign.timing`). Nothing but the rehearsal's short rides is written, and those into the ride
-cache.
+Numbers of cells, rides and cached rides are counted. Rows, time and disk are those of one cell, run as the
+campaign runs it, times the number of cells, or of seconds ridden. Its ride stays in the cache, where the
+campaign finds it. A machine that is busy, rides on other engines and vehicles, or recordings at other rates
+make them differ: they are an estimate, no promise.
 """
 
 from __future__ import annotations
@@ -11,29 +12,32 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from simrail.campaign.timing import CellCost, EngineCost, rehearse_cell, rehearse_engine
+from simrail.campaign.cell import STAGES
+from simrail.campaign.worker import forget, pack, run_batch, run_ride
+from simrail.core.interrupts import interruptible
 from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, is_cached
-from simrail.ride.truth import Truth
-from simrail.scenario.build import Parts, profile_of
-from simrail.scenario.cells import Cell, first_cells, sensor_draws
+from simrail.scenario.build import Parts
+from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import LEVELS, stop_rule_of
-from simrail.scoring.windows import chosen_windows, windows_of
 
 SCORE_ROW_BYTES = 8.0
 """Of ``scores.parquet``; recorded on tables of 60,000 to 800,000 rows, which take 5 to 8."""
 
-MOST_ENGINES = 8
-"""Engines, vehicles and steps that are rehearsed; more of them cost what the mean of these costs."""
-
 MOST_LOOKED_UP = 2000
 """Rides that are looked for in the cache, each in some 10 ms."""
+
+_STAGE_WORDS = {
+    "simulate": "rides that the cache lacks",
+    "measure": "motion, sensors and odometry",
+    "estimate": "all estimators",
+    "score": "their scores",
+}
 
 
 @dataclass(frozen=True)
@@ -45,26 +49,21 @@ class Forecast:
     plan : Plan
         Counted, and judged.
     cached : int, optional
-        Rides that the cache holds; None if there are too many to look for.
+        Rides that the cache held before; None if there are too many to look for.
     rows : int
         Rows of the score table.
-    simulate_s, motion_s, measure_s : float
-        Processor time of what the cache lacks, of the motion of the mounts, and of the sensors.
-    methods_s : dict of str to float
-        Processor time of estimates and scores, by method.
+    stages_s : dict of str to float
+        Processor time of the stages `simrail.campaign.cell.STAGES`; of rides, what the cache lacks.
     ride_bytes, score_bytes : float
         Disk for all rides (cached ones among them), and for the score table.
     failed : dict of str to str
-        Methods that could not be rehearsed, with the reason; their time and rows are not in it.
+        Estimators that failed on the cell, with the reason; their time and rows are not in it.
     """
 
     plan: Plan
     cached: int | None
     rows: int
-    simulate_s: float
-    motion_s: float
-    measure_s: float
-    methods_s: dict[str, float]
+    stages_s: dict[str, float]
     ride_bytes: float
     score_bytes: float
     failed: dict[str, str]
@@ -72,7 +71,18 @@ class Forecast:
     @property
     def total_s(self) -> float:
         """Processor time of all."""
-        return self.simulate_s + self.motion_s + self.measure_s + sum(self.methods_s.values())
+        return sum(self.stages_s.values())
+
+
+@dataclass(frozen=True)
+class _CellCost:
+    """What one cell took: simulated time, processor time by stage, disk of its ride, rows, failures."""
+
+    duration_s: float
+    stages_s: dict[str, float]
+    ride_bytes: float
+    rows: int
+    failed: dict[str, str]
 
 
 def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
@@ -90,125 +100,97 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     InputError
         If the scenario cannot be run.
     """
-    parts = Parts(scenario)
-    plan = judge_scenario(scenario, parts, many=many)
-    costs = _Costs(parts)
-    draws, look = scenario.spec.monte_carlo.track_draws, plan.rides <= MOST_LOOKED_UP
-    cached = 0
-    rows = simulate = motion = measured = size = 0.0
-    methods: dict[str, float] = {}
-    for _, group in groupby(first_cells(scenario), key=lambda cell: cell.ride_number):
-        ride_cells = list(group)
-        first = ride_cells[0]
-        duration = profile_of(first).duration_s
-        engine, cell_cost = costs.of(first)
-        found = sum(is_cached(ride) for ride in _rides(first, draws, parts)) if look else 0
-        cached += found
-        simulate += (draws - found) * (duration / engine.real_time_factor + engine.setup_s)
-        size += draws * duration * engine.bytes_per_s
-        motion += draws * duration * cell_cost.motion_s * len({cell.imu.name for cell in ride_cells})
-        windows = _windows(first, parts)
-        for cell in ride_cells:
-            number = draws * sensor_draws(scenario.spec, cell.imu)
-            samples = duration * parts.grade(cell).rate_hz
-            rows += number * cell_cost.rows * windows / max(cell_cost.windows, 1)
-            measured += number * cell_cost.measure.of(samples)
-            for name, cost in cell_cost.methods.items():
-                methods[name] = methods.get(name, 0.0) + number * cost.of(samples)
+    plan = judge_scenario(scenario, many=many)
+    look = plan.rides <= MOST_LOOKED_UP
+    cached = cached_s = 0.0
+    shortest: tuple[bool, float, Cell] | None = None
+    for first, ride in _rides(scenario, plan.parts):
+        duration = ride.profile.duration_s
+        in_cache = look and is_cached(ride)
+        cached, cached_s = cached + in_cache, cached_s + in_cache * duration
+        if shortest is None or (not in_cache, duration) < shortest[:2]:
+            shortest = (not in_cache, duration, first)
+        if not look:
+            break
+    assert shortest is not None  # there is no scenario without a ride
+    cost = _cost_of(shortest[2], plan.parts)
+    mean_s = plan.simulated_s / plan.rides
+    stages = {stage: plan.cells * mean_s * cost.stages_s[stage] / cost.duration_s for stage in STAGES}
+    left_s = plan.simulated_s - cached_s
     return Forecast(
         plan=plan,
-        cached=cached if look else None,
-        rows=round(rows),
-        simulate_s=simulate,
-        motion_s=motion,
-        measure_s=measured,
-        methods_s=methods,
-        ride_bytes=size,
-        score_bytes=SCORE_ROW_BYTES * rows,
-        failed=costs.failed,
+        cached=int(cached) if look else None,
+        rows=plan.cells * cost.rows,
+        stages_s=stages | {"simulate": left_s * cost.stages_s["simulate"] / cost.duration_s},
+        ride_bytes=plan.simulated_s * cost.ride_bytes / cost.duration_s,
+        score_bytes=SCORE_ROW_BYTES * plan.cells * cost.rows,
+        failed=cost.failed,
     )
 
 
-class _Costs:
-    """Costs of rides and cells, each kind of engine rehearsed once, the methods on the first of them."""
-
-    def __init__(self, parts: Parts) -> None:
-        self._parts = parts
-        self._engines: dict[tuple[object, ...], EngineCost] = {}
-        self._cell: CellCost | None = None
-
-    @property
-    def failed(self) -> dict[str, str]:
-        return {} if self._cell is None else self._cell.failed
-
-    def of(self, cell: Cell) -> tuple[EngineCost, CellCost]:
-        spec = cell.spec
-        key = (spec.engine, spec.vehicle, spec.step_s, spec.truth_rate_hz)
-        truth: Truth | None = None
-        if key not in self._engines and len(self._engines) < MOST_ENGINES:
-            self._engines[key], truth = rehearse_engine(cell, self._parts)
-        if self._cell is None:
-            assert truth is not None
-            self._cell = rehearse_cell(cell, truth, self._parts)
-        return self._engines.get(key) or _mean(list(self._engines.values())), self._cell
+def _rides(scenario: Scenario, parts: Parts) -> Iterator[tuple[Cell, Ride]]:
+    """Every ride, with its first cell."""
+    for _, group in groupby(first_cells(scenario), key=lambda cell: cell.ride_number):
+        first = next(group)
+        for draw in range(scenario.spec.monte_carlo.track_draws):
+            cell = replace(first, ride_number=first.ride_number + draw, track_draw=draw)
+            yield cell, parts.ride(cell)
 
 
-def _mean(costs: list[EngineCost]) -> EngineCost:
-    return EngineCost(
-        1.0 / float(np.mean([1.0 / cost.real_time_factor for cost in costs])),
-        float(np.mean([cost.setup_s for cost in costs])),
-        float(np.mean([cost.bytes_per_s for cost in costs])),
+def _cost_of(cell: Cell, parts: Parts) -> _CellCost:
+    """Run a cell as the campaign does, a second time where kernels are compiled, and take the time."""
+    packed, ride = pack(parts), parts.ride(cell)
+    duration = max(ride.profile.duration_s, 1e-3)
+    with interruptible():
+        try:
+            simulated = run_ride(packed, (cell,))
+            run_batch(packed, (cell,))
+            result = run_batch(packed, (cell,))
+        finally:
+            forget()
+    place = ride_cache.folder() / ride_cache.key_of(ride.describe())
+    engine = result.ride.get("real_time_factor")
+    seconds = duration / engine + result.ride["setup_s"] if engine else simulated.cpu_s["simulate"]
+    return _CellCost(
+        duration_s=duration,
+        stages_s=result.cpu_s | {"simulate": seconds},
+        ride_bytes=sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0,
+        rows=len(result.scores),
+        failed={failure.estimator: failure.reason for failure in result.failures},
     )
 
 
-def _rides(first: Cell, draws: int, parts: Parts) -> Iterator[Ride]:
-    for draw in range(draws):
-        yield parts.ride(replace(first, track_draw=draw))
-
-
-def _windows(cell: Cell, parts: Parts) -> int:
-    """Number of windows that the scores of a cell's ride are kept for."""
-    profile = profile_of(cell)
-    times = np.arange(0.0, profile.duration_s, 0.1)
-    position, speed, _ = profile.motion(times)
-    found = windows_of(parts.track(cell), position, speed, time_s=times)
-    return len(chosen_windows(found, cell.spec.score.windows))
-
-
-def print_forecast(console: Console, scenario: Scenario, told: Forecast, *, cores: int) -> None:
+def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
     """Print a forecast as a table."""
-    plan = told.plan
-    new = plan.rides if told.cached is None else plan.rides - told.cached
-    known = "cache not searched" if told.cached is None else f"{told.cached:,} in the cache"
+    plan = expected.plan
+    new = plan.rides if expected.cached is None else plan.rides - expected.cached
+    cache = "cache not searched" if expected.cached is None else f"{expected.cached:,} in the cache"
     table = Table(
-        title=f"{scenario.name}: what it will run", title_justify="left", show_header=False, box=None
+        title=f"{plan.scenario.name}: what it will run", title_justify="left", show_header=False, box=None
     )
     table.add_column(style="cyan", no_wrap=True)
     table.add_column(justify="right", no_wrap=True)
     table.add_column(style="dim")
     table.add_row(
-        "rides to simulate", f"{new:,}", f"of {plan.rides:,}, {_time(plan.simulated_s)} of riding; {known}"
+        "rides to simulate", f"{new:,}", f"of {plan.rides:,}, {_time(plan.simulated_s)} of riding; {cache}"
     )
     table.add_row("cells", f"{plan.cells:,}", f"recordings, {len(plan.estimators)} estimators on each")
-    table.add_row("score rows", f"about {told.rows:,}", _bytes(told.score_bytes))
-    table.add_row("disk", _bytes(told.ride_bytes), _cache_words(told.ride_bytes))
+    table.add_row("score rows", f"about {expected.rows:,}", _bytes(expected.score_bytes))
+    table.add_row("disk", _bytes(expected.ride_bytes), _cache_words(expected.ride_bytes))
     table.add_section()
-    table.add_row("simulate", _time(told.simulate_s), "")
-    table.add_row("motion, sensors, odometry", _time(told.motion_s + told.measure_s), "")
-    for name, seconds in told.methods_s.items():
-        table.add_row(f"  {name}", _time(seconds), "estimates and their scores")
-    table.add_row(
-        "[bold]about[/bold]", f"[bold]{_time(told.total_s)}[/bold]", f"on one of {cores} cores; an estimate"
-    )
+    for stage, words in _STAGE_WORDS.items():
+        table.add_row(stage, _time(expected.stages_s[stage]), words)
+    total = f"[bold]{_time(expected.total_s)}[/bold]"
+    table.add_row("[bold]about[/bold]", total, f"on one of {cores} cores; an estimate from one cell")
     console.print(table)
-    rule = stop_rule_of(scenario)
+    rule = stop_rule_of(plan.scenario)
     if rule is not None:
         first = f"{rule.asked.least_draws} of {rule.draws} {LEVELS[rule.level]}"
         console.print(
             f"these are upper limits: the stop rule may end it after {first}, or later", highlight=False
         )
-    for name, reason in told.failed.items():
-        console.print(f"[yellow]not in it:[/yellow] {name} could not be rehearsed: {reason}", highlight=False)
+    for name, reason in expected.failed.items():
+        console.print(f"[yellow]not in it:[/yellow] {name} failed: {reason}", highlight=False)
     for warning in plan.warnings:
         console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False)
 

@@ -1,6 +1,17 @@
-"""Who is told how a campaign, an export or a tuning goes; what it shows, see `simrail.cli.progress_bar`."""
+"""Who is told how a campaign, an export or a tuning goes, and what the command line shows of it."""
 
 from __future__ import annotations
+
+import time
+from datetime import timedelta
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+_EVERY_S = 10.0
+"""On a plain stream, how often the progress is told."""
 
 
 class Watcher:
@@ -29,3 +40,108 @@ class Watcher:
 
     def search_goes(self, name: str, evaluations: int, value: float) -> None:
         """A tuning has evaluated its objective so often for a set of parameters; its least value so far."""
+
+
+class ProgressWatcher(Watcher):
+    """Shows simulated time, speed and time left; on a plain stream, a line per stage."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=20),
+            TextColumn("{task.fields[note]}"),
+            TimeElapsedColumn(),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self._ride: TaskID | None = None
+        self._cells: TaskID | None = None
+        self._begun = self._cells_begun = self._said = 0.0
+        self._before = self._done = 0
+        self._by_worker: dict[str, int] = {}
+        self._searches: dict[str, TaskID] = {}
+
+    def __enter__(self) -> Self:
+        self._progress.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.__exit__(kind, error, trace)
+
+    def ride_begins(self, number: int, count: int, name: str) -> None:
+        """See `Watcher`."""
+        if self._ride is not None:
+            self._progress.remove_task(self._ride)
+        which = f" {number}/{count}" if count > 1 else ""
+        self._ride = self._progress.add_task(f"ride {name}{which}", total=None, note="")
+        self._begun = time.perf_counter()
+        if not self._console.is_terminal:
+            self._console.print(f"ride {name}{which}", highlight=False)
+
+    def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
+        """See `Watcher`."""
+        if self._ride is None:
+            return
+        wall = max(time.perf_counter() - self._begun, 1e-6)
+        left = (total_s - done_s) * wall / max(done_s, 1e-6)
+        note = (
+            f"{done_s:.0f} of {total_s:.0f} s, {done_s / wall:.1f} x real time, "
+            f"{3.6 * abs(speed_mps):3.0f} km/h, {left:.0f} s left"
+        )
+        self._progress.update(self._ride, total=total_s, completed=done_s, note=note)
+
+    def ride_ends(self) -> None:
+        """See `Watcher`."""
+        if self._ride is not None:
+            note = "running its cells" if self._cells is not None else "simulated"
+            self._progress.update(self._ride, total=1.0, completed=1.0, note=note)
+
+    def cells_begin(self, done: int, count: int) -> None:
+        """See `Watcher`."""
+        self._before = self._done = done
+        self._cells_begun = self._said = time.perf_counter()
+        if self._cells is not None:
+            self._progress.remove_task(self._cells)
+        self._cells = self._progress.add_task("cells", total=count, completed=done, note="")
+
+    def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
+        """See `Watcher`."""
+        now = time.perf_counter()
+        self._by_worker[worker] = self._by_worker.get(worker, 0) + done - self._done
+        self._done = done
+        seconds = max(now - self._cells_begun, 1e-6)
+        left = (count - done) * seconds / max(done - self._before, 1)
+        each = "+".join(map(str, self._by_worker.values()))
+        by = f", by {len(self._by_worker)} workers: {each}" if len(self._by_worker) > 1 else ""
+        note = (
+            f"{done} of {count}, {failed} failed, {(done - self._before) / seconds:.3g} per second, "
+            f"{timedelta(seconds=round(left))} left{by}"
+        )
+        if self._cells is not None:
+            self._progress.update(self._cells, completed=done, note=note)
+        if not self._console.is_terminal and (now > self._said + _EVERY_S or done == count):
+            self._said = now
+            self._console.print(f"cells: {note}", highlight=False, soft_wrap=True)
+
+    def told(self, line: str) -> None:
+        """See `Watcher`."""
+        self._console.print(line, highlight=False, soft_wrap=True)
+
+    def recording_written(self, number: int, count: int, name: str) -> None:
+        """See `Watcher`."""
+        if self._ride is not None:
+            self._progress.update(self._ride, note=f"{number} of {count} recordings written, {name}")
+        if not self._console.is_terminal:
+            self._console.print(f"wrote {name} ({number} of {count})", highlight=False)
+
+    def search_goes(self, name: str, evaluations: int, value: float) -> None:
+        """See `Watcher`."""
+        if self._searches.get(name) is None:
+            self._searches[name] = self._progress.add_task(f"search, {name}", total=None, note="")
+            if not self._console.is_terminal:
+                self._console.print(f"search, {name}", highlight=False)
+        note = f"{evaluations} evaluations, {value:.6f}"
+        self._progress.update(self._searches[name], note=note)

@@ -6,6 +6,7 @@ estimates is large, and no batch hands it on.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -13,14 +14,12 @@ from typing import Any
 
 import pandas as pd
 
-from simrail.campaign.checkpoint import Unfinished
-from simrail.campaign.example import CellResult
-from simrail.campaign.job import Job
-from simrail.campaign.ledger import STAGES, Failure, cell_record
+from simrail.campaign.cell import STAGES, CellResult, Failure, cell_record
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.worker import BatchResult, example_of
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import Plan
-from simrail.scenario.stop_rule import Look, StopRule, stop_rule_of
+from simrail.scenario.stop_rule import StopRule, StopState, stop_rule_of
 from simrail.scoring.table import concat_scores, in_order
 
 MOST_EXAMPLES = 6
@@ -47,8 +46,8 @@ class CampaignResult:
         What failed; each is a row of the scores as well.
     plan : Plan
         What was planned, with its warnings.
-    stopped : Look, optional
-        The last look of the scenario's stop rule: the tables hold the draws that it looked at.
+    stopped : StopState, optional
+        The last state of the scenario's stop rule: the tables hold the draws that it was asked about.
     """
 
     scores: pd.DataFrame
@@ -59,79 +58,94 @@ class CampaignResult:
     cpu_s: dict[str, float]
     failures: list[Failure]
     plan: Plan
-    stopped: Look | None = None
+    stopped: StopState | None = None
 
 
-def chosen_cells(job: Job, only: int | None = None, *, draws: int | None = None) -> Iterator[Cell]:
-    """The cells of a job: all, the one that is wanted, or those of the first draws of its stop rule."""
-    rule = stop_rule_of(job.scenario)
-    for cell in cells(job.scenario):
+def chosen_cells(plan: Plan, only: int | None = None, *, draws: int | None = None) -> Iterator[Cell]:
+    """The cells of a plan: all, the one that is wanted, or those of the first draws of its stop rule."""
+    rule = stop_rule_of(plan.scenario)
+    for cell in cells(plan.scenario):
         beyond = rule is not None and draws is not None and not rule.has(cell, draws)
         if not beyond and (only is None or cell.number == only):
             yield cell
 
 
-def look_at_draws(job: Job, kept: Unfinished, rule: StopRule, draws: int) -> Look:
+def stop_state(plan: Plan, checkpoint: Checkpoint, rule: StopRule, draws: int) -> StopState:
     """Ask a stop rule about the first so many draws, all of whose cells are kept."""
-    return rule.look(chosen_cells(job), (result.scores for result in kept.results()), draws)
+    return rule.state(chosen_cells(plan), (result.scores for result in checkpoint.results()), draws)
 
 
 def gather(
-    job: Job, kept: Unfinished, *, only: int | None = None, stopped: Look | None = None
+    plan: Plan,
+    packed: bytes,
+    checkpoint: Checkpoint,
+    *,
+    only: int | None = None,
+    stopped: StopState | None = None,
 ) -> CampaignResult:
-    """Put together the batches that are kept, up to where the stop rule ended the campaign."""
-    listed = list(chosen_cells(job, only, draws=None if stopped is None else stopped.draws))
-    results = list(kept.results())
+    """Put together the batches that are kept, up to where the stop rule ended the campaign.
+
+    Parameters
+    ----------
+    plan, packed : Plan, bytes
+        What was run, and the same for `simrail.campaign.worker`.
+    checkpoint : Checkpoint
+        Its batches.
+    only : int, optional
+        The one cell that was wanted.
+    stopped : StopState, optional
+        Where the stop rule ended it.
+    """
+    listed = list(chosen_cells(plan, only, draws=None if stopped is None else stopped.draws))
+    results = list(checkpoint.results())
     if stopped is not None:
         results = _without_others(results, {cell.number for cell in listed})
     failures = [failure for result in results for failure in result.failures]
     rides: dict[int, dict[str, Any]] = {}
     for result in results:
-        known = rides.get(result.ride_number)
-        if result.ride and (known is None or (known["from_cache"] and not result.ride["from_cache"])):
+        former = rides.get(result.ride_number)
+        if result.ride and (former is None or (former["from_cache"] and not result.ride["from_cache"])):
             rides[result.ride_number] = result.ride
     return CampaignResult(
         scores=in_order(concat_scores(result.scores for result in results)),
         cells=pd.DataFrame.from_records([cell_record(cell) for cell in listed]),
-        examples=_examples(job, listed, failures),
+        examples=_examples(plan, packed, listed, failures),
         rides=[rides[number] for number in sorted(rides)],
         wall_s={stage: sum(result.wall_s[stage] for result in results) for stage in STAGES},
         cpu_s={stage: sum(result.cpu_s[stage] for result in results) for stage in STAGES},
         failures=sorted(failures, key=lambda failure: failure.cell),
-        plan=job.plan,
+        plan=plan,
         stopped=stopped,
     )
 
 
 def _without_others(results: list[BatchResult], numbers: set[int]) -> list[BatchResult]:
     """Batches with the cells of these numbers only; a run whose failed cells are tried again has others."""
-    found = []
+    batches = []
     for result in results:
         if not numbers.issuperset(result.cells):
             scores = result.scores[result.scores["cell"].isin(numbers)].reset_index(drop=True)
             failures = tuple(failure for failure in result.failures if failure.cell in numbers)
             result = replace(result, scores=scores, failures=failures)
         if numbers.intersection(result.cells):
-            found.append(result)
-    return found
+            batches.append(result)
+    return batches
 
 
-def _examples(job: Job, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
+def _examples(plan: Plan, packed: bytes, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
     """The first cell of each ride over the first draw that did not fail altogether, and of added noise."""
-    failed: dict[int, int] = {}
-    for failure in failures:
-        failed[failure.cell] = failed.get(failure.cell, 0) + 1
+    failed = Counter(failure.cell for failure in failures)
     shown: set[int] = set()
     noise_shown = False
-    found: list[CellResult] = []
+    examples: list[CellResult] = []
     for cell in listed:
-        if len(found) == MOST_EXAMPLES:
+        if len(examples) == MOST_EXAMPLES:
             break
-        lost = failed.get(cell.number, 0) >= len(job.plan.estimators)
+        lost = failed[cell.number] >= len(plan.estimators)
         first = cell.ride_number not in shown or (cell.imu.noise_added and not noise_shown)
         if cell.track_draw == cell.sample == 0 and first and not lost:
             shown.add(cell.ride_number)
             noise_shown |= cell.imu.noise_added
             with suppress(Exception):
-                found.append(example_of(job.order, cell))
-    return found
+                examples.append(example_of(packed, cell))
+    return examples

@@ -19,7 +19,7 @@ from simrail.scoring.table import SCORE_COLUMNS
 
 
 @dataclass(frozen=True)
-class FormerResults:
+class StoredResults:
     """What a results folder holds.
 
     Attributes
@@ -45,13 +45,13 @@ class FormerResults:
         InputError
             If today's simrail does not read it any more.
         """
-        said = self.manifest
-        name, settings = str(said["scenario"]), [*said["settings"], f"seed={said['seed']}"]
+        manifest = self.manifest
+        name, settings = str(manifest["scenario"]), [*manifest["settings"], f"seed={manifest['seed']}"]
         file = f"{self.folder / 'manifest.json'}, scenario_text"
-        return read_scenario(str(said["scenario_text"]), name=name, file=file, overrides=settings)
+        return read_scenario(str(manifest["scenario_text"]), name=name, file=file, overrides=settings)
 
 
-def read_results(folder: Path, *, field: str, remedy: str) -> FormerResults:
+def read_results(folder: Path, *, field: str, remedy: str) -> StoredResults:
     """Read a results folder.
 
     Parameters
@@ -72,13 +72,13 @@ def read_results(folder: Path, *, field: str, remedy: str) -> FormerResults:
     except (OSError, ValueError) as error:
         problem = "there are no finished results there"
         raise InputError(problem, field=field, value=str(folder), remedy=remedy) from error
-    for what, there, wanted in (
+    for what, names, needed in (
         ("manifest", manifest, ("scenario", "settings", "seed", "scenario_text")),
         ("score table", scores, SCORE_COLUMNS),
         ("table of cells", cells, ("cell", "case")),
     ):
-        missing = [name for name in wanted if name not in there]
+        missing = [name for name in needed if name not in names]
         if missing:
             problem = f"its {what} does not say {missing[0]}"
             raise InputError(problem, field=field, value=str(folder), remedy=remedy)
-    return FormerResults(folder, manifest, scores, cells)
+    return StoredResults(folder, manifest, scores, cells)

@@ -1,16 +1,19 @@
-"""Tuning the trajectory smoother on the rides of a scenario: what ``simrail tune`` does.
+"""Tuning an estimator on the rides of a scenario: what ``simrail tune`` does.
 
 Simulates (or finds in the cache) the rides, draws the sensors as a campaign would, and searches. The rails of
-a known output are those that were laid: a measured reference without error.
+a known output are those that were laid: a measured reference without error. What is tuned is any estimator
+that says what there is to search (`simrail.estimation.tunable`).
 """
 
 from __future__ import annotations
 
 import os
-import shlex
-from collections.abc import Iterable, Sequence
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,28 +23,30 @@ from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
 from simrail.core.toml_files import blame
-from simrail.estimators.trajectory.smoother import TrajectorySmoother
-from simrail.estimators.tuning.file import Tuning
+from simrail.estimation.estimate import Estimator
+from simrail.estimation.tunable import METHODS, tunables_of
+from simrail.estimators.tuning.cube import Cube
+from simrail.estimators.tuning.file import TuningResult
 from simrail.estimators.tuning.identify import Identification, identify
-from simrail.estimators.tuning.objectives import KINDS, objective_of
-from simrail.estimators.tuning.space import SearchSpace
-from simrail.estimators.tuning.tune import tune
+from simrail.estimators.tuning.tune import objective_of, tune
 from simrail.recording.recording import Recording
 from simrail.ride.ride import simulate
-from simrail.scenario.build import Parts, bands_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.scenario import EstimatorPart, Scenario
+from simrail.scenario.scenario import Scenario
+from simrail.scenario.tables import EstimatorPart
 from simrail.track.bands import SAMPLES_PER_WAVE, Band
 
-METHODS = ("cml", "kom")
+STEP_M = 0.25
+"""Distance of the places of a reference, unless another is given."""
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """A tuning, the file that it was written into, and what it knows, by set: ``all``, or one of `KINDS`."""
+    """What a search found, the file that it was written into, and what it knows, by set of parameters."""
 
-    tuning: Tuning
+    result: TuningResult
     file: Path
     identified: dict[str, Identification]
 
@@ -55,11 +60,8 @@ def tune_scenario(
     rides: Sequence[str] = (),
     draws: int = 1,
     imu: str | None = None,
-    space: SearchSpace | None = None,
-    by_kind: bool = False,
-    band: str | None = None,
     within_m: tuple[float, float] | None = None,
-    step_m: float = 0.25,
+    settings: Mapping[str, Any] | None = None,
     evaluations: int = 480,
     at_most: int | None = None,
     command: str = "",
@@ -75,9 +77,9 @@ def tune_scenario(
         File of the tuning. A former tuning is replaced when the new one is there. What has been found before
         lies beside it, and an interrupted search with the same arguments goes on from there.
     estimator : str
-        Name of the estimator in the scenario, a trajectory smoother, or ``"TrajectorySmoother"`` for one
-        without options. Options hold, but a tuning that they name is not read: it may be the one that is made
-        here.
+        Name of the estimator in the scenario; or, for one without options, a registered name or
+        ``"file.py:Class"``. Options hold, but a tuning that they name is not read: it may be the one that is
+        made here.
     method : str
         ``"cml"`` or ``"kom"``.
     rides : sequence of str
@@ -87,13 +89,11 @@ def tune_scenario(
         has too few waves, and one set of sensor biases, to know thirteen parameters by its rails.
     imu : str, optional
         Name of the IMU; the first if not given.
-    space : SearchSpace, optional
-        Where to search; the paper's if not given.
-    by_kind : bool
-        One set for straights and one for transitions and curves.
-    band, within_m, step_m
-        KOM compares in this band (of those that the scenario scores), between these places, and at places
-        this far apart.
+    within_m : (float, float), optional
+        The reference of KOM lies between these places.
+    settings : mapping, optional
+        Settings of the search that are the estimator's own. Of those, ``band``, by its name, is one of the
+        bands that the scenario scores, and ``step_m`` is also the distance of the reference's places.
     evaluations : int
         Of CMA-ES.
     at_most : int, optional
@@ -106,13 +106,15 @@ def tune_scenario(
     Raises
     ------
     InputError
-        If the scenario cannot be run, or has no such ride, IMU, smoother or number of draws; if the file is
-        no tuning.
+        If the scenario cannot be run, or has no such ride, IMU, estimator or number of draws; if the
+        estimator has nothing to tune by this method; if the file is no tuning.
     KeyboardInterrupt
         If interrupted; the search can be gone on with.
     """
+    chosen_settings = dict(settings or {})
+    band, step_m = chosen_settings.get("band"), float(chosen_settings.get("step_m", STEP_M))
     if method not in METHODS:
-        raise InputError("no such method", field="--method", value=method, limit="cml or kom")
+        raise InputError("no such method", field="--method", value=method, limit=" or ".join(METHODS))
     if method == "cml" and (band is not None or within_m is not None):
         field = "--band" if band is not None else "--within"
         raise InputError("belongs to a known output", field=field, remedy="use --method kom, or leave it out")
@@ -124,13 +126,51 @@ def tune_scenario(
     watcher = watcher or Watcher()
     scenario = alone(scenario, estimator)
     parts = Parts(scenario)
-    smoother = smoother_of(scenario, parts, estimator)
+    tuned_estimator = estimator_named(scenario, parts, estimator)
     chosen = chosen_cells(scenario, rides, imu, draws=draws)
-    wanted = None if band is None else _band(chosen[0], band, step_m=step_m)
+    if band is not None:
+        chosen_settings["band"] = _band(parts.resolve(chosen[0]).bands, band, step_m=step_m)
+    tunables = tunables_of(tuned_estimator, chosen_settings, method=method)
+    recordings, references = _rides(chosen, parts, watcher, within_m=within_m, step_m=step_m)
+    rails = references if method == "kom" else None
+    with interruptible(), blame(scenario.file, "tuning"):
+        result = tune(
+            tunables,
+            recordings,
+            references=rails,
+            evaluations=evaluations,
+            at_most=at_most,
+            seed=scenario.spec.seed,
+            unfinished=unfinished(out),
+            progress=watcher.search_goes,
+            fitted_on=[_words(scenario, *pair) for pair in zip(chosen, recordings, strict=True)],
+            command=command,
+        )
+        identified = {
+            name: identify(
+                objective_of(tunable, recordings, rails), values, Cube(tuple(tunable.parameters()))
+            )
+            for (name, tunable), values in zip(tunables.items(), result.values, strict=True)
+        }
+    result = replace(result, status=tuple(dict(one.table["status"]) for one in identified.values()))
+    result.write(out)
+    return Tuned(result, out, identified)
+
+
+def _rides(
+    chosen: Sequence[Cell],
+    parts: Parts,
+    watcher: Watcher,
+    *,
+    within_m: tuple[float, float] | None,
+    step_m: float,
+) -> tuple[list[Recording], list[pd.DataFrame]]:
+    """Recordings of cells, and the rails below them."""
     recordings, references = [], []
     with interruptible() as check:
         for number, cell in enumerate(chosen, start=1):
             watcher.ride_begins(number, len(chosen), cell.ride.name)
+            references.append(reference_of(cell, parts, within_m, step_m))
             try:
                 truth = simulate(parts.ride(cell), progress=watcher.ride_goes)
             except Exception:
@@ -138,38 +178,7 @@ def tune_scenario(
                 raise
             watcher.ride_ends()
             recordings.append(record_cell(cell, truth, parts))
-            if method == "kom":
-                references.append(reference_of(cell, parts, within_m, step_m))
-        space = SearchSpace() if space is None else space
-        rails = references if method == "kom" else None
-        with blame(scenario.file, "tuning"):
-            found = tune(
-                recordings,
-                smoother,
-                references=rails,
-                space=space,
-                by_kind=by_kind,
-                band=wanted,
-                step_m=step_m,
-                evaluations=evaluations,
-                at_most=at_most,
-                seed=scenario.spec.seed,
-                unfinished=unfinished(out),
-                progress=watcher.search_goes,
-                fitted_on=[_words(scenario, *pair) for pair in zip(chosen, recordings, strict=True)],
-                command=command,
-            )
-        sets = {name: kind for kind, name in enumerate(KINDS)} if by_kind else {"all": None}
-        values = [found.hyperparameters, found.curve_hyperparameters]
-        identified = {}
-        for (name, kind), parameters in zip(sets.items(), values, strict=False):
-            goal = objective_of(recordings, smoother, kind=kind, references=rails, band=wanted, step_m=step_m)
-            assert parameters is not None
-            identified[name] = identify(goal, parameters, space)
-    known = [dict(judged.table["status"]) for judged in identified.values()]
-    found = replace(found, status=known[0], curve_status=known[1] if by_kind else None)
-    found.write(out)
-    return Tuned(found, out, identified)
+    return recordings, references
 
 
 def unfinished(out: Path) -> Path:
@@ -181,14 +190,14 @@ def alone(scenario: Scenario, estimator: str) -> Scenario:
     """The scenario with one estimator, without its tuning; the others only keep places, for messages."""
     spec = scenario.spec
     names = [part.name for part in spec.estimator]
-    own = () if estimator in names else (EstimatorPart(name=estimator, method=estimator),)
-    if own and estimator != TrajectorySmoother.__name__:
+    registered = sorted({entry.name for entry in entry_points(group="simrail.estimators")})
+    if estimator not in names and estimator not in registered and ".py:" not in estimator:
         raise InputError(
             "the scenario has no such estimator",
             file=scenario.file,
             field="--estimator",
             value=estimator,
-            limit="one of " + ", ".join([*names, TrajectorySmoother.__name__]),
+            limit=f"one of {', '.join(names)}; registered: {', '.join(registered)}; or FILE.py:CLASS",
         )
     parts = [
         part.model_copy(update={"options": {k: v for k, v in part.options.items() if k != "tuning"}})
@@ -196,61 +205,59 @@ def alone(scenario: Scenario, estimator: str) -> Scenario:
         else EstimatorPart(name=part.name, method="DesignAngles")
         for part in spec.estimator
     ]
-    parts += own
+    if estimator not in names:
+        parts.append(EstimatorPart(name=_name(estimator), method=estimator))
     return replace(scenario, spec=spec.model_copy(update={"estimator": parts}))
 
 
-def smoother_of(scenario: Scenario, parts: Parts, estimator: str) -> TrajectorySmoother:
-    """The smoother of that name, in a scenario that has been judged."""
+def _name(estimator: str) -> str:
+    """Name of an estimator that is none of the scenario's: its class."""
+    return estimator.rpartition(":")[2]
+
+
+def estimator_named(scenario: Scenario, parts: Parts, estimator: str) -> Estimator:
+    """The estimator of that name, in a scenario that has been judged."""
     made = judge_scenario(scenario, parts).estimators
-    found = {name: value for name, value in made.items() if name.split("[")[0] == estimator}
-    if len(found) > 1:
+    variants = {name: value for name, value in made.items() if name.split("[")[0] == _name(estimator)}
+    if len(variants) > 1:
         raise InputError(
             "has variants, and one can be tuned",
             file=scenario.file,
             field="--estimator",
-            value=", ".join(found),
+            value=", ".join(variants),
             remedy=f"choose one with --set estimator.{estimator}.options.NAME=VALUE",
         )
-    (smoother,) = found.values()
-    if not isinstance(smoother, TrajectorySmoother):
-        raise InputError(
-            "is no trajectory smoother, and has nothing to tune",
-            file=scenario.file,
-            field="--estimator",
-            value=estimator,
-            limit="an estimator whose method is TrajectorySmoother",
-        )
-    return smoother
+    (only,) = variants.values()
+    return only
 
 
 def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, draws: int = 1) -> list[Cell]:
     """First cells of each ride that is wanted, in the scenario's order, those of new tracks first."""
     spec = scenario.spec
-    for field, wanted, known in (
+    for field, wanted, named in (
         ("--ride", list(rides), [part.name for part in spec.ride]),
         ("--imu", [] if imu is None else [imu], [part.name for part in spec.imu]),
     ):
         for name in wanted:
-            if name not in known:
+            if name not in named:
                 raise InputError(
                     "the scenario has none of this name",
                     file=scenario.file,
                     field=field,
                     value=name,
-                    limit="one of " + ", ".join(known),
+                    limit="one of " + ", ".join(named),
                 )
     names = set(rides) or {part.name for part in spec.ride}
     mount = spec.imu[0].name if imu is None else imu
-    found: dict[str, list[Cell]] = {}
+    by_ride: dict[str, list[Cell]] = {}
     for cell in cells(scenario):
         if cell.ride.name in names and cell.imu.name == mount:
-            of_ride = found.setdefault(cell.ride.name, [])
+            of_ride = by_ride.setdefault(cell.ride.name, [])
             if not of_ride or cell.case == of_ride[0].case:
                 of_ride.append(cell)
     if draws < 1:
         raise InputError("is out of range", field="--draws", value=draws, limit=">= 1")
-    least = min(len(of_ride) for of_ride in found.values())
+    least = min(len(of_ride) for of_ride in by_ride.values())
     if draws > least:
         raise InputError(
             "the scenario does not draw so often",
@@ -260,9 +267,9 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
             limit=f"1 to {least}",
             remedy="for more, --set monte_carlo.track_draws=N",
         )
-    for of_ride in found.values():
+    for of_ride in by_ride.values():
         of_ride.sort(key=lambda cell: (cell.sample, cell.sensor_draw, cell.track_draw))
-    return [cell for of_ride in found.values() for cell in of_ride[:draws]]
+    return [cell for of_ride in by_ride.values() for cell in of_ride[:draws]]
 
 
 def reference_of(
@@ -282,16 +289,16 @@ def reference_of(
     return parts.rails(cell).irregularities(place)
 
 
-def _band(cell: Cell, name: str, *, step_m: float) -> Band:
-    known = {band.name: band for band in bands_of(cell)}
-    if name not in known:
-        raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(known))
-    coarsest = known[name].shortest_m / SAMPLES_PER_WAVE
+def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
+    by_name = {band.name: band for band in bands}
+    if name not in by_name:
+        raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(by_name))
+    coarsest = by_name[name].shortest_m / SAMPLES_PER_WAVE
     if step_m > coarsest:
         raise InputError(
             f"is too coarse for the band {name}", field="--step", value=step_m, limit=f"<= {coarsest:g} m"
         )
-    return known[name]
+    return by_name[name]
 
 
 def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:
@@ -320,16 +327,13 @@ def _judge_file(out: Path) -> None:
         )
     if out.exists():
         try:
-            Tuning.from_file(out)
-        except InputError as error:
+            is_tuning = "hyperparameters" in tomllib.loads(out.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+            is_tuning = False
+        if not is_tuning:
             raise InputError(
                 "is no tuning, and would be replaced",
                 field="--out",
                 value=str(out),
                 remedy="choose another file with --out",
-            ) from error
-
-
-def command_of(words: Sequence[str]) -> str:
-    """A command line, quoted where a shell needs it."""
-    return shlex.join(["simrail", "tune", *words])
+            )

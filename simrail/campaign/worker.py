@@ -1,21 +1,19 @@
 """What one process does for a campaign: simulate a ride, or run a batch of its cells.
 
-Both are plain functions of an order and of cells, so they run alike in this process, in another one, and on
-another machine; a process remembers the last order and ride, which its next batch often shares. Nothing
-here knows which batches there are, nor who runs them: see `simrail.campaign.campaign` and
+Both are plain functions of a packed plan and of cells, so they run alike in this process, in another one,
+and on another machine; a process remembers the last plan and ride, which its next batch often shares.
+Nothing here knows which batches there are, nor who runs them: see `simrail.campaign.campaign` and
 `simrail.campaign.executors`.
 """
 
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 import pickle
 import socket
 import threading
 import time
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
@@ -24,9 +22,7 @@ from typing import Any
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from simrail.campaign.cell import look_at, run_cells
-from simrail.campaign.example import CellResult
-from simrail.campaign.ledger import Failure, Ledger, cell_record, reason_of
+from simrail.campaign.cell import BatchTally, CellResult, Failure, look_at, run_cells
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
 from simrail.core.source_hash import score_code_hash
@@ -34,51 +30,8 @@ from simrail.estimation.user_modules import install, sources_of
 from simrail.ride.ride import Progress, is_cached, simulate
 from simrail.ride.truth import Mount, Truth
 from simrail.scenario.build import Parts
-from simrail.scenario.cells import Cell, methods
+from simrail.scenario.cells import Cell
 from simrail.scoring.table import labelled_all
-
-
-@dataclass(frozen=True)
-class Order:
-    """What every batch of a campaign needs, packed for other processes.
-
-    Attributes
-    ----------
-    data : bytes
-        Parts, estimators among them, pickled.
-    key : str
-        SHA-256 of the data.
-    code : str
-        Hash of the code that ordered it: other code would give other bits.
-    """
-
-    data: bytes
-    key: str
-    code: str
-
-
-@dataclass(frozen=True)
-class RideResult:
-    """What came of a ride.
-
-    Attributes
-    ----------
-    facts : dict
-        What the engine said of its run; plain values. Empty if it failed.
-    reason, trace : str
-        Why it failed; empty if it did not.
-    notes : tuple of str
-        What is worth a line to the user.
-    wall_s, cpu_s : float
-        Time that it took.
-    """
-
-    facts: dict[str, Any]
-    reason: str = ""
-    trace: str = ""
-    notes: tuple[str, ...] = ()
-    wall_s: float = 0.0
-    cpu_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -88,7 +41,7 @@ class BatchResult:
     Attributes
     ----------
     cells : tuple of int
-        Numbers of its cells.
+        Numbers of its cells; none of a ride that was simulated for cells to come.
     ride_number : int
         Number of their ride.
     scores : pandas.DataFrame
@@ -96,9 +49,9 @@ class BatchResult:
     failures : tuple of Failure
         What failed.
     ride : dict
-        What the engine said of the ride; empty if the ride failed.
+        What the engine said of the ride; plain values, empty if the ride failed.
     wall_s, cpu_s : dict of str to float
-        Time of the stages `simrail.campaign.ledger.STAGES`.
+        Time of the stages `simrail.campaign.cell.STAGES`.
     notes : tuple of str
         What is worth a line to the user.
     worker : str
@@ -131,29 +84,43 @@ class _RememberedTruth(Truth):
 
 
 @dataclass
-class _Desk:
-    """What this process remembers between batches: an order, unpacked, and the ride used last."""
+class _Worker:
+    """What this process remembers between batches: a plan, unpacked, and the ride used last."""
 
-    key: str
+    packed: bytes
     parts: Parts
-    tunings: dict[int, dict[str, str]] = field(default_factory=dict)
     warm: set[str] = field(default_factory=set)
     ride: tuple[int, Truth, dict[str, Any]] | None = None
 
-    def ledger(self, sample: int) -> Ledger:
-        """A ledger for one batch, whose cells are of one sample, as they share a ride."""
-        scenario = self.parts.scenario
-        if sample not in self.tunings:
-            self.tunings[sample] = {each.name: each.tuning for each in methods(scenario, sample=sample)}
-        return Ledger(scenario.name, self.parts.estimators(sample), self.tunings[sample], self.warm)
+    def tally(self, sample: int) -> BatchTally:
+        """What gathers one batch, whose cells are of one sample, as they share a ride."""
+        parts = self.parts
+        return BatchTally(parts.scenario.name, parts.estimators(sample), parts.tunings(sample), self.warm)
+
+    def truth(
+        self, cell: Cell, notes: list[str], progress: Progress | None = None
+    ) -> tuple[Truth, dict[str, Any]]:
+        """The ride of a cell and what the engine said: remembered, from the cache, or simulated."""
+        if self.ride is None or self.ride[0] != cell.ride_number:
+            self.ride = None
+            ride = self.parts.ride(cell)
+            cached = is_cached(ride)
+            begun = time.perf_counter()
+            truth = simulate(ride, progress=progress, told=notes.append)
+            took = time.perf_counter() - begun
+            truth = _RememberedTruth(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
+            facts = {key: value for key, value in truth.manifest.items() if key != "versions"}
+            facts |= {"number": cell.ride_number, "ride": cell.ride.name, "track_draw": cell.track_draw}
+            self.ride = cell.ride_number, truth, facts | {"from_cache": cached, "took_s": took}
+        return self.ride[1], self.ride[2]
 
 
-_desk: _Desk | None = None
+_worker: _Worker | None = None
 _at_work = threading.RLock()
 """One batch at a time in a process, whatever threads it has: timings and memory are those of one batch."""
 
 
-def order_of(parts: Parts) -> Order:
+def pack(parts: Parts) -> bytes:
     """Pack what every batch needs: the parts of a scenario that has been judged, its estimators among them.
 
     Raises
@@ -161,7 +128,8 @@ def order_of(parts: Parts) -> Order:
     InputError
         If an estimator cannot be sent to another process.
     """
-    for name, estimator in parts.estimators(0).items():
+    estimators = {**parts.estimators(0), **parts.odometries()}
+    for name, estimator in estimators.items():
         try:
             pickle.dumps(estimator)
         except Exception as error:
@@ -171,132 +139,106 @@ def order_of(parts: Parts) -> Order:
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
             ) from error
-    sources = sources_of(list(parts.estimators(0).values()))
-    data = pickle.dumps((sources, pickle.dumps(parts)))
-    return Order(data, hashlib.sha256(data).hexdigest(), score_code_hash())
+    sources = sources_of(list(estimators.values()))
+    return pickle.dumps((score_code_hash(), sources, pickle.dumps(parts)))
 
 
-def run_ride(order: Order, cell: Cell, progress: Progress | None = None) -> RideResult:
-    """Simulate the ride of a cell into the cache, or find it there.
+def run_ride(packed: bytes, cells: tuple[Cell, ...], progress: Progress | None = None) -> BatchResult:
+    """Simulate the ride of cells into the cache, or find it there; if it fails, all of them have failed.
 
     Raises
     ------
     InputError
-        If this process runs other code than the one that ordered.
+        If this process runs other code than the one that packed the plan.
     OSError
         If the disk is full.
     """
-    begun, worked = time.perf_counter(), time.process_time()
-    notes: list[str] = []
-    with _at_desk(order) as (desk, check):
-        try:
-            _, facts = _ride(desk, cell, notes, progress)
-            reason = trace = ""
-        except Exception as error:
-            check()
-            _raise_full_disk(error)
-            facts, reason, trace = {}, reason_of(error), "".join(traceback.format_exception(error))
-    took = time.perf_counter() - begun, time.process_time() - worked
-    return RideResult(facts, reason, trace, tuple(notes), *took)
+    return _run(packed, cells, progress, ride_only=True)
 
 
-def run_batch(order: Order, cells: tuple[Cell, ...]) -> BatchResult:
+def run_batch(packed: bytes, cells: tuple[Cell, ...]) -> BatchResult:
     """Run cells that share a ride; for errors see `run_ride`."""
+    return _run(packed, cells, None, ride_only=False)
+
+
+def _run(
+    packed: bytes, cells: tuple[Cell, ...], progress: Progress | None, *, ride_only: bool
+) -> BatchResult:
     notes: list[str] = []
-    with _at_desk(order) as (desk, check):
-        ledger = desk.ledger(cells[0].sample)
-        facts: dict[str, Any] = {}
+    facts: dict[str, Any] = {}
+    with _at_work_on(packed) as (worker, check):
+        tally = worker.tally(cells[0].sample)
         try:
-            with ledger.timed("simulate"):
-                truth, facts = _ride(desk, cells[0], notes)
+            with tally.timed("simulate"):
+                truth, facts = worker.truth(cells[0], notes, progress)
         except Exception as error:
             check()
             _raise_full_disk(error)
             for cell in cells:
-                for name in ledger.estimators:
-                    ledger.failed(cell, name, error)
-        else:
-            run_cells(cells, truth, desk.parts, ledger, check)
-    return _result(cells, ledger, facts, tuple(notes))
+                for name in tally.estimators:
+                    tally.fail(cell, name, error)
+            return _result(cells[0].ride_number, cells, tally, facts, notes)
+        if not ride_only:
+            run_cells(cells, truth, worker.parts, tally, check)
+    return _result(cells[0].ride_number, () if ride_only else cells, tally, facts, notes)
 
 
-def lost_batch(order: Order, cells: tuple[Cell, ...], reason: str, trace: str) -> BatchResult:
-    """Failed rows for cells that cannot be run, and why."""
-    with _at_desk(order) as (desk, _):
-        ledger = desk.ledger(cells[0].sample)
+def fail_batch(packed: bytes, cells: tuple[Cell, ...], reason: str) -> BatchResult:
+    """Failed rows for cells that cannot be run."""
+    with _at_work_on(packed) as (worker, _):
+        tally = worker.tally(cells[0].sample)
         for cell in cells:
-            for name in ledger.estimators:
-                ledger.lost(cell, name, reason, trace)
-    return _result(cells, ledger, {}, ())
+            for name in tally.estimators:
+                tally.fail_for(cell, name, reason, reason + "\n")
+    return _result(cells[0].ride_number, cells, tally, {}, [])
 
 
-def example_of(order: Order, cell: Cell) -> CellResult:
+def example_of(packed: bytes, cell: Cell) -> CellResult:
     """Run a cell again to look at it closely."""
-    with _at_desk(order) as (desk, _):
-        truth, _ = _ride(desk, cell, [])
-        ledger = desk.ledger(cell.sample)
-        described = {**ledger.labels(cell, ""), **cell_record(cell)}
-        del described["estimator"], described["tuning"]
-        return look_at(cell, truth, desk.parts, ledger, described)
+    with _at_work_on(packed) as (worker, _):
+        truth, _ = worker.truth(cell, [])
+        return look_at(cell, truth, worker.parts, worker.tally(cell.sample))
 
 
 def forget() -> None:
     """Drop what this process remembers."""
-    global _desk
+    global _worker
     with _at_work:
-        _desk = None
+        _worker = None
 
 
 @contextmanager
-def _at_desk(order: Order) -> Iterator[tuple[_Desk, Check]]:
-    """This process, at work on an order: alone, with one thread for linear algebra."""
-    global _desk
+def _at_work_on(packed: bytes) -> Iterator[tuple[_Worker, Check]]:
+    """Put this process to work on a plan: alone, with one thread for linear algebra."""
+    global _worker
     # The sums of a linear-algebra library depend on its number of threads.
     with _at_work, threadpool_limits(1), interruptible() as check:
-        if order.code != score_code_hash():
-            raise InputError(
-                "the worker runs other code than the campaign, and would give other bits",
-                value=_worker(),
-                remedy="change no source while a campaign runs, and install the same on every machine",
-            )
-        if _desk is None or _desk.key != order.key:
-            sources, data = pickle.loads(order.data)
+        if _worker is None or _worker.packed != packed:
+            code, sources, parts = pickle.loads(packed)
+            if code != score_code_hash():
+                raise InputError(
+                    "the worker runs other code than the campaign, and would give other bits",
+                    value=_name(),
+                    remedy="change no source while a campaign runs, and install the same on every machine",
+                )
             install(sources)
-            _desk = _Desk(order.key, pickle.loads(data))
-        yield _desk, check
-
-
-def _ride(
-    desk: _Desk, cell: Cell, notes: list[str], progress: Progress | None = None
-) -> tuple[Truth, dict[str, Any]]:
-    """The ride of a cell and what the engine said: remembered, from the cache, or simulated."""
-    if desk.ride is None or desk.ride[0] != cell.ride_number:
-        desk.ride = None
-        ride = desk.parts.ride(cell)
-        found = is_cached(ride)
-        begun = time.perf_counter()
-        truth = simulate(ride, progress=progress, told=notes.append)
-        took = time.perf_counter() - begun
-        truth = _RememberedTruth(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
-        said = {key: value for key, value in truth.manifest.items() if key != "versions"}
-        said |= {"number": cell.ride_number, "ride": cell.ride.name, "track_draw": cell.track_draw}
-        desk.ride = cell.ride_number, truth, said | {"from_cache": found, "took_s": took}
-    return desk.ride[1], desk.ride[2]
+            _worker = _Worker(packed, pickle.loads(parts))
+        yield _worker, check
 
 
 def _result(
-    cells: tuple[Cell, ...], ledger: Ledger, facts: dict[str, Any], notes: tuple[str, ...]
+    ride_number: int, cells: tuple[Cell, ...], tally: BatchTally, facts: dict[str, Any], notes: list[str]
 ) -> BatchResult:
     return BatchResult(
         cells=tuple(cell.number for cell in cells),
-        ride_number=cells[0].ride_number,
-        scores=labelled_all(ledger.figures),
-        failures=tuple(ledger.failures),
+        ride_number=ride_number,
+        scores=labelled_all(tally.figures) if cells else pd.DataFrame(),
+        failures=tuple(tally.failures),
         ride=facts,
-        wall_s=ledger.wall_s,
-        cpu_s=ledger.cpu_s,
-        notes=notes,
-        worker=_worker(),
+        wall_s=tally.wall_s,
+        cpu_s=tally.cpu_s,
+        notes=tuple(notes),
+        worker=_name(),
     )
 
 
@@ -306,5 +248,5 @@ def _raise_full_disk(error: Exception) -> None:
         raise error
 
 
-def _worker() -> str:
+def _name() -> str:
     return f"{socket.gethostname()}:{os.getpid()}"

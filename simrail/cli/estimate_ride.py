@@ -9,14 +9,14 @@ from pathlib import Path
 
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
-from simrail.core.toml_files import blame
-from simrail.estimation.estimate import Estimate, Estimator
-from simrail.recording.files.ride_reader import read_ride
+from simrail.core.toml_files import blame, label
+from simrail.estimation.estimate import Estimate, Estimator, description_of
+from simrail.estimation.recorded_ride import read_ride
+from simrail.estimation.user_modules import class_named
 from simrail.recording.files.ride_writer import Format, write_frame
 from simrail.recording.recording import Recording
 from simrail.report.pages.estimate_page import write_estimate_page
-from simrail.report.tables.methods import readable
-from simrail.scenario.build_estimator import class_named, construct
+from simrail.scenario.build_estimator import construct
 from simrail.scenario.overrides import override
 
 PAGE = "estimate.html"
@@ -67,21 +67,30 @@ def estimate_ride(
             remedy="choose another folder with --out",
         )
     with blame("--estimator", method):
-        known = class_named(method, None)
+        estimator_class = class_named(method, None)
     with blame("--set", method):
-        estimator = construct(known, override({}, settings))
+        estimator = construct(estimator_class, override({}, settings))
     recording = read_ride(ride)
+    if recording.odometry is None and "odometry" in description_of(estimator).needs:
+        raise InputError(
+            f"{method} needs to know where the train is, and the ride does not say",
+            file=label(ride),
+            field="encoder",
+            limit="[encoder], [odometer] or [odometry]",
+            remedy="add the table of the one that was recorded, or choose an estimator that needs none",
+        )
     begun = time.perf_counter()
     estimate = estimator.estimate(recording)
     us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)
     if not len(estimate.states.columns):
         raise InputError("concludes nothing", field="--estimator", value=method)
-    place = [name for name in ("position_m", "speed_mps") if name not in estimate.states]
-    with draft_of(folder) as draft:
+    states = estimate.states
+    if recording.odometry is not None:
         # Where each state belongs on the track stands beside it, as the odometry has it.
-        write_frame(
-            estimate.states.join(recording.odometry[place]), draft / f"estimate.{format}", format=format
-        )
+        place = [name for name in ("position_m", "speed_mps") if name not in states]
+        states = states.join(recording.odometry[place])
+    with draft_of(folder) as draft:
+        write_frame(states, draft / f"estimate.{format}", format=format)
         for name in ("innovations", "geometry"):
             frame = getattr(estimate, name)
             if frame is not None:
@@ -90,7 +99,7 @@ def estimate_ride(
             draft / PAGE,
             recording,
             estimate,
-            label=readable(method.rpartition(":")[2]),
+            label=description_of(estimator).label,
             method=repr(estimator),
             us_per_sample=us_per_sample,
         )

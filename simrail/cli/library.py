@@ -1,7 +1,15 @@
-"""``simrail list | vehicle | imu | new | cache``: what there is, and parts of your own."""
+"""``simrail list | vehicle | imu | new | cache``: what there is, and parts of your own.
+
+What there is, is read without importing any of it, so that the answer comes at once.
+"""
 
 from __future__ import annotations
 
+import ast
+import tomllib
+from importlib.metadata import EntryPoint, entry_points
+from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -9,12 +17,13 @@ import typer
 
 from simrail.cli.options import DONE, number
 
+FOLDERS = {"scenarios": "", "tracks": "tracks", "vehicles": "vehicles", "imus": "imus"}
+"""Where the shipped files of each kind lie among the scenarios."""
+
 
 def list_parts() -> int:
     """Show the scenarios, tracks, vehicles, IMUs and estimators that are there."""
     from rich.console import Console
-
-    from simrail.cli.catalogue import catalogue
 
     console = Console(highlight=False)
     for kind, entries in catalogue().items():
@@ -24,6 +33,39 @@ def list_parts() -> int:
             console.print(f"  [cyan]{name:{width}}[/cyan]  ", end="")
             console.print(title, markup=False, overflow="ignore", crop=False, no_wrap=True)
     return DONE
+
+
+def catalogue() -> dict[str, dict[str, str]]:
+    """Return name -> title for each kind: scenarios, tracks, vehicles, imus, estimators."""
+    home = Path(str(files("simrail.scenarios")))
+    titles = {
+        kind: {path.stem: _toml_title(path) for path in sorted((home / folder).glob("*.toml"))}
+        for kind, folder in FOLDERS.items()
+    }
+    entries = sorted(entry_points(group="simrail.estimators"), key=lambda entry: entry.name)
+    titles["estimators"] = {entry.name: _class_title(entry) for entry in entries}
+    return titles
+
+
+def _toml_title(path: Path) -> str:
+    try:
+        title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
+    except (OSError, ValueError):
+        return "(cannot be read)"
+    return str(title)
+
+
+def _class_title(entry: EntryPoint) -> str:
+    """First line of a class's docstring, read from its source."""
+    try:
+        spec = find_spec(entry.module)
+        source = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
+    except (ImportError, OSError, ValueError):
+        return "(not installed)"
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ClassDef) and node.name == entry.attr:
+            return (ast.get_docstring(node) or "").split("\n")[0]
+    return ""
 
 
 def vehicle(

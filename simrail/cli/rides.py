@@ -26,7 +26,7 @@ def export(
 
     from simrail.campaign.export import export as export_scenario
     from simrail.campaign.export import format_of
-    from simrail.cli.progress_bar import ProgressWatcher
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.scenario.scenario import load_scenario
 
     chosen, read = format_of(form), load_scenario(scenario, overrides=settings or [], seed=seed)
@@ -68,7 +68,7 @@ def estimate(
     for fact in ride_facts(done.recording):
         print(fact)
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in done.estimate.states:
+        if angle in done.estimate.states and done.recording.odometry is not None:
             rms = design_difference_deg(done.recording, done.estimate, angle)
             print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
     print("there is no truth beside a recording, hence no scores")

@@ -108,9 +108,9 @@ def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> in
     from simrail.scenario.scenario import load_scenario
 
     read = load_scenario(name, overrides=settings, seed=seed)
-    with Console(stderr=True).status("rehearsing"):
-        told = forecast(read, many=many)
-    print_forecast(Console(), read, told, cores=os.cpu_count() or 1)
+    with Console(stderr=True).status("running one cell"):
+        expected = forecast(read, many=many)
+    print_forecast(Console(), expected, cores=os.cpu_count() or 1)
     return DONE
 
 

@@ -16,7 +16,6 @@ from simrail.report.tables.methods import MethodStyle, attitude_methods, method_
 from simrail.report.tables.pivot import Figures, cases
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
-from simrail.scenario.cells import methods
 from simrail.scoring.table import OK
 from simrail.track.bands import Band
 
@@ -43,7 +42,7 @@ def print_scores(console: Console, results: Results) -> None:
     """Print the tables of every case, ride by ride and IMU by IMU: means over all draws."""
     campaign = results.campaign
     scores, cells = campaign.scores, campaign.cells
-    styles = list(method_styles(methods(results.scenario)).values())
+    styles = list(method_styles(results.scenario).values())
     bands = bands_by_name(results.scenario.spec)
     for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
         if number == MOST_GROUPS:
@@ -96,17 +95,17 @@ def _case(
         style="bold",
     )
     shown = rows[(rows["status"] == OK) & rows["metric"].isin(("rms", "sd", "us_per_sample"))]
-    found = cases(shown, members)
-    if not found:
+    of_cases = cases(shown, members)
+    if not of_cases:
         return Group(title)
-    case = found[0]
+    case = of_cases[0]
     notes: list[str] = []
     parts: list[RenderableType] = [title]
     mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
     if mapping:
         band = judged_band(case)
-        told = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
-        parts += [Text(told), _rails(console, case, mapping, band)]
+        heading = f"Rails: sd of the error {waves_words(band, bands)}, mm; {draws}"
+        parts += [Text(heading), _rails(console, case, mapping, band)]
         notes += _lost_rails(case, mapping, band)
     attitude = [s for s in attitude_methods(styles) if case.get(s.name, "roll", "rms").draws]
     if attitude:
@@ -146,16 +145,16 @@ def _attitude(console: Console, case: Figures, styles: list[MethodStyle], beside
             columns.append((quantity, reference, window))
     lines = []
     for style in styles:
-        found = [case.get(style.name, q, "rms", window=w, reference=r) for q, r, w in columns]
+        errors = [case.get(style.name, q, "rms", window=w, reference=r) for q, r, w in columns]
         time = "" if beside_rails else _time(case, style)
-        lines.append((style, [f"{one.value:.3f}" if one.draws else "-" for one in found], time))
+        lines.append((style, [f"{one.value:.3f}" if one.draws else "-" for one in errors], time))
     heads = [f"{q}\n{w}" + ("\nvs\ndesign" if r == "design" else "") for q, r, w in columns]
     return _table(console, heads, lines)
 
 
 def _time(case: Figures, style: MethodStyle) -> str:
-    found = case.get(style.name, "roll", "us_per_sample")
-    return f"{found.value:.2f}" if found.draws else "-"
+    time = case.get(style.name, "roll", "us_per_sample")
+    return f"{time.value:.2f}" if time.draws else "-"
 
 
 def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, list[str], str]]) -> Table:
@@ -167,7 +166,7 @@ def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, li
         table.add_column(head, justify="right", no_wrap=True)
     for style, numbers, time in lines:
         table.add_row(
-            f"{style.name}{' *' if style.baseline else ''}",
+            f"{style.name}{' *' if style.baseline else ' (ablation)' if style.ablation else ''}",
             *numbers,
             *([time] if timed else []),
             style="dim" if style.baseline else None,
@@ -196,5 +195,5 @@ def _lost_attitude(case: Figures, styles: list[MethodStyle]) -> list[str]:
     beaten = [
         s.name for s in styles if s.uses_imu and case.get(s.name, "roll", "rms", window="curve").value > least
     ]
-    told = f"{floor.name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
-    return [told] if beaten else []
+    note = f"{floor.name}, which uses no IMU, has the smaller roll error in curves than {', '.join(beaten)}"
+    return [note] if beaten else []

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from inspect import signature
+import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,11 +13,21 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from simrail.campaign.tune import Tuned
-    from simrail.estimators.tuning.identify import Identification
-    from simrail.estimators.tuning.space import SearchSpace
+
+
+OPTIONS = {
+    "box": "--box",
+    "constrained": "--constrain",
+    "position_m2": "--position",
+    "by_kind": "--by-kind",
+    "band": "--band",
+    "step_m": "--step",
+}
+"""Options that are settings of an estimator's own search, by the setting."""
 
 
 def tune(
+    context: typer.Context,
     scenario: Annotated[
         str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")
     ],
@@ -26,7 +36,7 @@ def tune(
         typer.Option(
             "--estimator",
             metavar="NAME",
-            help="A trajectory smoother of the scenario, or TrajectorySmoother.",
+            help="An estimator of the scenario, a registered one, or FILE.py:CLASS.",
         ),
     ],
     method: Annotated[
@@ -39,10 +49,6 @@ def tune(
             "--out", metavar="FILE", help="File of the tuning; <scenario>_<method>.toml if not given."
         ),
     ] = None,
-    rides: Annotated[
-        list[str] | None,
-        typer.Option("--ride", metavar="NAME", help="Ride to fit on; all if none is named. Repeatable."),
-    ] = None,
     draws: Annotated[
         int, typer.Option("--draws", metavar="N", help="Draws of each ride to fit on, new tracks first.")
     ] = 1,
@@ -50,24 +56,28 @@ def tune(
         str | None, typer.Option("--imu", metavar="NAME", help="IMU of the scenario; the first if not given.")
     ] = None,
     box: Annotated[
-        tuple[float, float],
-        typer.Option("--box", metavar="LEAST GREATEST", help="Range of every hyper-parameter, SI."),
-    ] = (1e-4, 1e4),
+        tuple[float, float] | None,
+        typer.Option(
+            "--box",
+            metavar="LEAST GREATEST",
+            help="Smoother: range of every hyper-parameter, SI; 1e-4 to 1e4 if not given.",
+        ),
+    ] = None,
     constrain: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--constrain",
             metavar="y|z|yz|none",
-            help="Where the accelerometer counts as better known than the virtual position.",
+            help="Smoother: where the accelerometer counts as better known than the virtual position; y if "
+            "not given.",
         ),
-    ] = "y",
+    ] = None,
     position: Annotated[
         float | None,
-        typer.Option("--position", metavar="M2", help="Hold the virtual positions' variances at this value."),
+        typer.Option(
+            "--position", metavar="M2", help="Smoother: hold the virtual positions' variances there."
+        ),
     ] = None,
-    by_kind: Annotated[
-        bool, typer.Option("--by-kind", help="One set for straights, one for transitions and curves.")
-    ] = False,
     band: Annotated[
         str | None, typer.Option("--band", metavar="NAME", help="KOM: compare in this band, e.g. D1.")
     ] = None,
@@ -76,8 +86,11 @@ def tune(
         typer.Option("--within", metavar="FROM TO", help="KOM: compare between these places, m."),
     ] = None,
     step: Annotated[
-        float, typer.Option("--step", metavar="M", min=0.001, help="KOM: distance of the places.")
-    ] = 0.25,
+        float | None,
+        typer.Option(
+            "--step", metavar="M", min=0.001, help="KOM: distance of the places; 0.25 if not given."
+        ),
+    ] = None,
     evaluations: Annotated[
         int, typer.Option("--evaluations", metavar="N", help="Of CMA-ES, before L-BFGS-B takes over.")
     ] = 480,
@@ -85,52 +98,40 @@ def tune(
         int | None,
         typer.Option("--at-most", metavar="N", help="Evaluations after which the search ends as it is."),
     ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Replace the scenario's seed.")] = None,
+    rides: Annotated[
+        list[str] | None,
+        typer.Option("--ride", metavar="NAME", help="Ride to fit on; all if none is named. Repeatable."),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
             "--set", metavar="KEY=VALUE", help="Replace a value, e.g. --set ride.speed_kmh=70. Repeatable."
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Replace the scenario's seed.")] = None,
+    by_kind: Annotated[
+        bool,
+        typer.Option("--by-kind", help="Smoother: one set for straights, one for transitions and curves."),
+    ] = False,
 ) -> int:
-    """Tune a trajectory smoother on rides of a scenario; interrupted, the same command goes on."""
+    """Search an estimator's parameters on rides of a scenario; interrupted, the same command goes on."""
     from rich.console import Console
 
-    from simrail.campaign.tune import command_of, tune_scenario, unfinished
-    from simrail.cli.progress_bar import ProgressWatcher
+    from simrail.campaign.progress import ProgressWatcher
+    from simrail.campaign.tune import tune_scenario, unfinished
     from simrail.core.errors import InputError
-    from simrail.core.toml_files import blame
-    from simrail.estimators.tuning.space import SearchSpace
     from simrail.scenario.scenario import load_scenario
 
-    axes = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
-    if constrain not in axes:
-        raise InputError(
-            "no such constraint", field="--constrain", value=constrain, limit="one of " + ", ".join(axes)
-        )
-    with blame("--box, --constrain, --position", "search"):
-        space = SearchSpace(box=box, constrained=axes[constrain], position_m2=position)
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
     file = out or Path(f"{read.name}_{method}.toml")
-    words = [scenario, "--estimator", estimator, "--method", method]
-    given = {
-        "draws": draws,
-        "imu": imu,
+    own = {
         "box": box,
-        "constrain": constrain,
-        "position": position,
+        "constrained": _axes(constrain),
+        "position_m2": position,
         "band": band,
+        "step_m": step,
+        "by_kind": by_kind or None,
     }
-    given |= {"within": within, "step": step, "evaluations": evaluations, "at_most": at_most, "seed": seed}
-    usual = signature(tune).parameters
-    for name, value in given.items():
-        if value != usual[name].default:
-            parts = map(repr, value) if isinstance(value, tuple) else [str(value)]
-            words += ["--" + name.replace("_", "-"), *parts]
-    words += [word for ride in rides or [] for word in ("--ride", ride)]
-    words += [word for setting in settings or [] for word in ("--set", setting)]
-    words += ["--by-kind"] * by_kind
-
     best = unfinished(file)
     if best.is_file():
         print(f"going on from {best}")
@@ -144,22 +145,56 @@ def tune(
                 rides=rides or [],
                 draws=draws,
                 imu=imu,
-                space=space,
-                by_kind=by_kind,
-                band=band,
                 within_m=within,
-                step_m=step,
+                settings={name: value for name, value in own.items() if value is not None},
                 evaluations=evaluations,
                 at_most=at_most,
-                command=command_of(words),
+                command=_command(context),
                 watcher=watcher,
             )
+    except InputError as error:
+        error.field = OPTIONS.get(str(error.field), error.field)
+        raise
     except KeyboardInterrupt:
         if best.is_file():
             print(f"the best so far is in {best}; the same command goes on from there")
         raise
     _show(Console(), done)
     return 0
+
+
+def _command(context: typer.Context) -> str:
+    """The command line, quoted where a shell needs it: what differs from the defaults, but for --out."""
+    words = ["simrail", "tune"]
+    for parameter in context.command.params:
+        value: Any = context.params[str(parameter.name)]
+        if parameter.name == "out" or not value or value == parameter.default:
+            continue
+        option = [parameter.opts[0]] if parameter.param_type_name == "option" else []
+        if value is True:
+            words += option
+        elif isinstance(value, list):
+            words += [word for item in value for word in (*option, item)]
+        else:
+            words += [*option, *(map(repr, value) if isinstance(value, tuple) else [str(value)])]
+    return shlex.join(words)
+
+
+def _axes(constrain: str | None) -> tuple[str, ...] | None:
+    """Axes that are constrained, by the option's words."""
+    from simrail.core.errors import InputError
+
+    axes: dict[str | None, tuple[str, ...] | None] = {
+        None: None,
+        "y": ("y",),
+        "z": ("z",),
+        "yz": ("y", "z"),
+        "none": (),
+    }
+    if constrain not in axes:
+        words = ", ".join(word for word in axes if word is not None)
+        raise InputError("no such constraint", field="--constrain", value=constrain, limit=f"one of {words}")
+    return axes[constrain]
 
 
 def _show(console: Console, done: Tuned) -> None:
@@ -169,21 +204,20 @@ def _show(console: Console, done: Tuned) -> None:
 
     from simrail.estimators.tuning.identify import TOLERANCE
 
-    search = done.tuning.search
-    assert search is not None
+    search = done.result
     lower: list[str] = []
-    for (name, known), reached in zip(done.identified.items(), search.objective, strict=True):
+    for (name, identification), reached in zip(done.identified.items(), search.objective, strict=True):
         table = Table(box=boxes.SIMPLE_HEAD, padding=0, show_edge=False)
         columns = (name, "value,\nSI", "", "a tenth\ncosts", "tenfold\ncosts", "known to\ndecades")
         for number, column in enumerate(columns):
             table.add_column(
                 column, justify="left" if number in (0, 2) else "right", no_wrap=number in (0, 2)
             )
-        for parameter, row in known.table.iterrows():
+        for parameter, row in identification.table.iterrows():
             span = "" if math.isnan(row["span_decades"]) else f"{row['span_decades']:.2g}"
             costs = []
-            for column, factor in (("tenth", 0.1), ("tenfold", 10.0)):
-                allowed = _is_allowed(known, str(parameter), factor, search.space)
+            for column in ("tenth", "tenfold"):
+                allowed = row[f"{column}_allowed"]
                 costs.append(f"{row[column]:.3g}" if allowed else f"({row[column]:.3g})")
                 if allowed and row[column] < -TOLERANCE:
                     lower.append(str(parameter))
@@ -205,17 +239,3 @@ def _show(console: Console, done: Tuned) -> None:
             highlight=False,
         )
     print(f"{search.evaluations} evaluations; wrote {done.file}")
-
-
-def _is_allowed(known: Identification, parameter: str, factor: float, space: SearchSpace) -> bool:
-    """Whether a search may make a parameter so many times as large, the others being as they are."""
-    from simrail.core.errors import InputError
-    from simrail.estimators.trajectory.noise import Hyperparameters
-
-    values = known.table["value"].copy()
-    values[parameter] *= factor
-    try:
-        space.check(Hyperparameters.from_vector(values.to_numpy()))
-    except InputError:
-        return False
-    return True

@@ -28,7 +28,7 @@ def interruptible() -> Iterator[Check]:
         if interrupted:
             raise KeyboardInterrupt
 
-    def note(number: int, frame: FrameType | None) -> None:
+    def note(_number: int, _frame: FrameType | None) -> None:
         nonlocal interrupted
         interrupted = True
         raise KeyboardInterrupt

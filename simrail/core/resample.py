@@ -32,8 +32,8 @@ GAPS = ("start_s", "end_s", "missing")
 
 def interpolated(frame: pd.DataFrame, times: FloatArray, *columns: str) -> FloatArray:
     """Columns of a frame, indexed by time, at times (n,): ndarray (n, m)."""
-    known = frame.index.to_numpy(dtype=np.float64)
-    return np.column_stack([np.interp(times, known, frame[column].to_numpy()) for column in columns])
+    stamps = frame.index.to_numpy(dtype=np.float64)
+    return np.column_stack([np.interp(times, stamps, frame[column].to_numpy()) for column in columns])
 
 
 def check_stamps(time: FloatArray, *, field: str, file: object = None) -> None:

@@ -14,13 +14,16 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from importlib.resources import files
-from numbers import Integral
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import tomli_w
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from simrail.core.errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imus"}
 
@@ -50,6 +53,27 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
+def existing_file(name: str, folder: Path | None, *, also: Path | None = None) -> Path:
+    """A file by its path, seen from a folder (that of the scenario), from here, or from one more folder.
+
+    Raises
+    ------
+    InputError
+        If there is none; the message names the nearest file in the folders of ``also``.
+    """
+    for candidate in (*([folder / name] if folder else []), Path(name), *([also / name] if also else [])):
+        if candidate.is_file():
+            return candidate
+    shown = [path.relative_to(also).as_posix() for path in sorted(also.glob("*/*.toml"))] if also else []
+    near = difflib.get_close_matches(name, shown, n=1)
+    raise InputError(
+        "no such file",
+        value=name,
+        remedy="mend the path; it is seen from the scenario's folder"
+        + (f" (shipped: {near[0]})" if near else ""),
+    )
+
+
 def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
     """Find a file: a path as given, a path in a folder (that of the scenario), or a shipped name.
 
@@ -69,10 +93,10 @@ def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
             limit=f"the path of a {kind} file, or a shipped name",
             remedy=f"mend the path; shipped: {', '.join(shipped(kind))}",
         )
-    known = shipped(kind)
-    if name in known:
-        return known[name]
-    near = difflib.get_close_matches(name, known, n=3) or sorted(known)
+    paths = shipped(kind)
+    if name in paths:
+        return paths[name]
+    near = difflib.get_close_matches(name, paths, n=3) or sorted(paths)
     raise InputError(
         f"no {kind} of this name is shipped",
         value=name,
@@ -116,34 +140,21 @@ def parse_toml(text: str, *, file: object) -> dict[str, Any]:
         ) from error
 
 
-def toml_text(data: Mapping[str, Any], *, prefix: str = "") -> str:
+def toml_text(data: Mapping[str, Any]) -> str:
     """TOML text of plain data: text, numbers, tuples or lists of them, tables and arrays of tables.
 
     Numbers read back bit by bit. None is left out: TOML has no such value.
     """
-    lines, tables = [], []
-    for key, value in data.items():
-        if isinstance(value, Mapping):
-            tables.append(f"\n[{prefix}{key}]\n" + toml_text(value, prefix=f"{prefix}{key}."))
-        elif isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
-            tables += [f"\n[[{prefix}{key}]]\n" + toml_text(item, prefix=f"{prefix}{key}.") for item in value]
-        elif value is not None:
-            lines.append(f"{key} = {_toml_value(value)}\n")
-    return "".join(lines) + "".join(tables)
+    return tomli_w.dumps(_plain(data))
 
 
-def _toml_value(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Integral):
-        return str(int(value))
-    if isinstance(value, float):
-        return repr(float(value))
+def _plain(value: Any) -> Any:
+    """A value without None in its tables, and numpy's numbers as Python's."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(_toml_value(item) for item in value)}]"
-    raise TypeError(f"no TOML for {type(value).__name__}")
+        return [_plain(item) for item in value]
+    return value.item() if hasattr(value, "item") else value
 
 
 def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Path | None = None) -> _Part:
@@ -165,87 +176,115 @@ def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None
 
 
 @contextmanager
-def blame(file: object, field: str) -> Iterator[None]:
+def blame(file: object, field: str = "") -> Iterator[None]:
     """Say in which file and field an `InputError` arose, where it does not say so itself."""
     try:
         yield
     except InputError as error:
         if error.file is None:
             error.file = file
-            error.field = f"{field}.{error.field}" if error.field else field
+            error.field = ".".join(part for part in (field, error.field) if part) or None
         raise
 
 
+class _Message(NamedTuple):
+    """What an `InputError` says of a value."""
+
+    problem: str
+    limit: str | None = None
+    remedy: str | None = None
+    with_value: bool = True
+
+
 def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
+    """The first fault of a model as a message that names its place."""
     faults = error.errors()
     # An unknown key is usually a misspelling that also leaves a required one missing: say it first.
     first = next((fault for fault in faults if fault["type"] in _UNKNOWN), faults[0])
     field = ""
     for step in first["loc"]:
         field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
-    problem, limit, remedy = first["msg"], None, None
-    value = first.get("input")
-    if isinstance(value, (dict, list)) and len(repr(value)) > 60:
-        value = None
-    context = first.get("ctx", {})
-    kind = first["type"]
-    if kind in _UNKNOWN:
-        allowed = _fields_at(model, first["loc"][:-1])
-        near = difflib.get_close_matches(str(first["loc"][-1]), allowed, n=1)
-        problem = "unknown key"
-        # A guess is worth more than a list that nobody reads.
-        limit = "one of " + ", ".join(allowed) if allowed and not (near and len(allowed) > 25) else None
-        remedy = f"did you mean {near[0]}?" if near else "remove it"
-    elif kind == "missing":
-        problem, value, remedy = "is required", None, "add it"
-    elif kind == "value_error":
-        inner = context.get("error")
-        if isinstance(inner, InputError):
-            inner.file = file if inner.file is None else inner.file
-            inner.field = ".".join(part for part in (field, inner.field) if part) or None
-            return inner
-        problem = str(inner)
-    elif kind == "finite_number":
-        problem, limit, remedy = "is not a finite number", "a finite number", "replace NaN or infinity"
-    elif kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
-        sign = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-        key = next(key for key in sign if key in context)
-        problem, limit = "is out of range", f"{sign[key]} {context[key]}"
-        counted = isinstance(context[key], int)  # a count has no unit
-        remedy = (
-            "give a number within the limit"
-            if counted
-            else "mind the unit, which is in the name of the field"
-        )
-    elif kind in _TYPES:
-        problem, limit = "has the wrong type", _TYPES[kind]
-        remedy = (
-            "write it without quotes, in the unit that the field's name says"
-            if isinstance(value, str)
-            else None
-        )
-        remedy = "write it in quotes" if kind == "string_type" else remedy
-        if kind == "tuple_type" and isinstance(value, str) and any(letter.isalpha() for letter in value):
-            limit, remedy = "an array", f'write it in brackets: ["{value}"]'
-        if isinstance(value, list) and kind not in ("tuple_type", "list_type"):
-            remedy = "give one value, not a list"
-    elif kind == "literal_error":
-        expected = str(context.get("expected", ""))
-        problem, limit = "is not one of the possible values", f"one of {expected}"
-        near = difflib.get_close_matches(
-            str(value), expected.replace("'", "").replace(" or ", ", ").split(", "), n=1
-        )
-        remedy = f"did you mean {near[0]}?" if near else None
-    elif kind == "string_pattern_mismatch":
-        problem, limit = "is no name", f"what matches {context.get('pattern')}"
+    inner = first.get("ctx", {}).get("error")
+    if isinstance(inner, InputError):
+        inner.file = file if inner.file is None else inner.file
+        inner.field = ".".join(part for part in (field, inner.field) if part) or None
+        return inner
+    if first["type"] == "string_pattern_mismatch":
         field = field.removesuffix(".[key]")
-    elif kind in {"too_short", "too_long"}:
-        problem, limit = "has the wrong number of items", first["msg"].split(" after ")[0]
-    more = len(faults) - 1
+    message = _message(first, model)
+    value = first.get("input")
+    if not message.with_value or (isinstance(value, (dict, list)) and len(repr(value)) > 60):
+        value = None
+    problem, more = message.problem, len(faults) - 1
     if more:
         problem += f" (and {more} more fault{'s' if more > 1 else ''} in this file)"
-    return InputError(problem, file=file, field=field or None, value=value, limit=limit, remedy=remedy)
+    return InputError(
+        problem, file=file, field=field or None, value=value, limit=message.limit, remedy=message.remedy
+    )
 
+
+def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
+    """What to say of a fault that pydantic found."""
+    kind, context = fault["type"], fault.get("ctx", {})
+    if kind in _UNKNOWN:
+        return _unknown_key(model, fault["loc"])
+    if kind in _SIGNS:
+        # A count has no unit.
+        key, sign = _SIGNS[kind]
+        is_count = isinstance(context[key], int)
+        remedy = (
+            "give a number within the limit"
+            if is_count
+            else "mind the unit, which is in the name of the field"
+        )
+        return _Message("is out of range", f"{sign} {context[key]}", remedy)
+    if kind in _TYPES:
+        return _wrong_type(kind, fault["input"])
+    if kind == "literal_error":
+        expected = str(context.get("expected", ""))
+        words = expected.replace("'", "").replace(" or ", ", ").split(", ")
+        near = difflib.get_close_matches(str(fault["input"]), words, n=1)
+        guess = f"did you mean {near[0]}?" if near else None
+        return _Message("is not one of the possible values", f"one of {expected}", guess)
+    if kind in ("too_short", "too_long"):
+        return _Message("has the wrong number of items", fault["msg"].split(" after ")[0])
+    return {
+        "missing": _Message("is required", remedy="add it", with_value=False),
+        "value_error": _Message(str(context.get("error"))),
+        "finite_number": _Message("is not a finite number", "a finite number", "replace NaN or infinity"),
+        "string_pattern_mismatch": _Message("is no name", f"what matches {context.get('pattern')}"),
+    }.get(kind, _Message(fault["msg"]))
+
+
+def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
+    allowed = _fields_at(model, place[:-1])
+    near = difflib.get_close_matches(str(place[-1]), allowed, n=1)
+    # A guess is worth more than a list that nobody reads.
+    limit = "one of " + ", ".join(allowed) if allowed and not (near and len(allowed) > 25) else None
+    return _Message("unknown key", limit, f"did you mean {near[0]}?" if near else "remove it")
+
+
+def _wrong_type(kind: str, value: Any) -> _Message:
+    limit = _TYPES[kind]
+    remedy: str | None = None
+    if kind == "string_type":
+        remedy = "write it in quotes"
+    elif kind == "tuple_type" and isinstance(value, str) and any(letter.isalpha() for letter in value):
+        limit, remedy = "an array", f'write it in brackets: ["{value}"]'
+    elif isinstance(value, str):
+        remedy = "write it without quotes, in the unit that the field's name says"
+    if isinstance(value, list) and kind not in ("tuple_type", "list_type"):
+        remedy = "give one value, not a list"
+    return _Message("has the wrong type", limit, remedy)
+
+
+_SIGNS = {
+    "greater_than": ("gt", ">"),
+    "greater_than_equal": ("ge", ">="),
+    "less_than": ("lt", "<"),
+    "less_than_equal": ("le", "<="),
+}
+"""Of a number out of range: where its limit stands, and its sign."""
 
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 """An unknown key, in a model and in a dataclass."""
@@ -283,7 +322,7 @@ def _model_in(annotation: Any) -> type[Any] | None:
     if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = _model_in(argument)
-        if found is not None:
-            return found
+        model = _model_in(argument)
+        if model is not None:
+            return model
     return None

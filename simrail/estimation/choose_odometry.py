@@ -1,40 +1,98 @@
-"""Which odometry the estimators of a recording work with: by name, from the encoder's to the line's.
+"""Which odometry the estimators of a recording work with: by name, from the encoder's to a stranger's own.
 
-``encoder`` and ``truth`` are made where the recording is (`simrail.sensors.measure`). The two here know the
-line as well; they are the work of an estimator, which runs before the others and sees no more than they do.
+An odometry is an estimator like any other: it runs before those that need one and sees no more than they do.
+Its states, position, speed and acceleration along the track with their standard deviations, are handed on in
+the recording. The true odometry, an ablation, is no estimator's work: it comes with the recording
+(`simrail.sensors.measure`), labelled, or not at all.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+import difflib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-from simrail.core.columns import ODOMETRY, ODOMETRY_SD
-from simrail.estimation.estimate import Estimator, estimator_class
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD, require
+from simrail.core.errors import InputError
+from simrail.estimation.estimate import Estimator, description_of, registered
+from simrail.estimation.user_modules import class_named
 from simrail.recording.recording import Recording
 
-OdometryName = Literal["curve_matched", "curve_smoothed", "encoder", "truth"]
+SHIPPED: dict[str, tuple[str, dict[str, Any]]] = {
+    "curve_matched": ("CurveMatchedOdometry", {"smoothed": False}),
+    "curve_smoothed": ("CurveMatchedOdometry", {"smoothed": True}),
+    "encoder": ("EncoderOdometry", {}),
+}
+"""Short names: registered class and its options."""
 
-METHOD = "CurveMatchedOdometry"
-_SMOOTHED = {"curve_matched": False, "curve_smoothed": True}
+TRUTH, NONE = "truth", "none"
+"""Names of what no estimator makes: the true odometry of a simulated ride, and none at all."""
 
 
-def with_odometry(recording: Recording, name: OdometryName) -> Recording:
-    """Return the recording with the odometry of a name in place of the one that it came with.
+def odometry_named(name: str, folder: Path | None = None) -> Estimator:
+    """An odometry by its short name, by that of a registered class, or by ``"file.py:Class"``.
 
     Parameters
     ----------
-    recording : Recording
-        With the odometry of its encoder, or the true one.
     name : str
-        ``"curve_matched"`` (causal) or ``"curve_smoothed"``; any other leaves the recording as it is.
+        See `SHIPPED`; any other is looked for as every estimator is, and made with its own defaults.
+    folder : Path, optional
+        Where files are looked for first.
 
     Raises
     ------
     InputError
-        If it needs an encoder and there is none.
+        If there is none, or it cannot be made without options.
     """
-    if name not in _SMOOTHED:
+    method, options = SHIPPED.get(name, (name, {}))
+    known = [*SHIPPED, TRUTH, NONE]
+    if ":" not in name and method not in registered():
+        near = difflib.get_close_matches(name, [*known, *registered()], n=1)
+        raise InputError(
+            "no such odometry",
+            value=name,
+            limit=f"one of {', '.join(known)}, a registered estimator, or FILE.py:CLASS",
+            remedy=f"did you mean {near[0]}?" if near else "see 'simrail new odometry NAME'",
+        )
+    try:
+        return class_named(method, folder)(**options)
+    except TypeError as error:
+        raise InputError(f"cannot be made without options: {error}", value=name) from error
+
+
+def with_odometry(recording: Recording, odometry: str | Estimator, *, source: str = "") -> Recording:
+    """Return the recording with another odometry in place of the one that it came with, if any.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    odometry : str or Estimator
+        ``"encoder"``, ``"curve_matched"`` (causal), ``"curve_smoothed"``, any registered name or
+        ``"file.py:Class"``; ``"none"`` for no odometry; ``"truth"`` for the true one that the recording was
+        measured with; or an odometry itself.
+    source : str, optional
+        How tables call it; by default its name, or the label of the estimator.
+
+    Raises
+    ------
+    InputError
+        If there is no such odometry, it cannot work on this recording, or what it concludes is none.
+    """
+    if odometry == NONE:
+        return replace(recording, odometry=None, odometry_source="")
+    if odometry == TRUTH:
+        if recording.odometry_source != TRUTH:
+            raise InputError(
+                "the recording does not hold the true odometry",
+                field="odometry",
+                value=recording.odometry_source or NONE,
+                remedy='measure it with odometry="truth"',
+            )
         return recording
-    method: type[Estimator] = estimator_class(METHOD)
-    states = method(smoothed=_SMOOTHED[name]).estimate(recording).states  # type: ignore[call-arg]
+    estimator = odometry_named(odometry) if isinstance(odometry, str) else odometry
+    name = source or (odometry if isinstance(odometry, str) else description_of(estimator).label)
+    states = estimator.estimate(recording).states
+    require(states, ODOMETRY + ODOMETRY_SD, what=f"odometry {name}")
     return recording.with_odometry(states[[*ODOMETRY, *ODOMETRY_SD]], name)

@@ -1,27 +1,37 @@
 """A battery that every estimator must pass: ours in the tests, a stranger's in his own.
 
-    from simrail.estimation.conformance import check_estimator
+    from simrail.estimation.conformance import check_estimator, check_odometry
     check_estimator(MyEstimator(), recording)
+    check_odometry(MyOdometry(), recording)
 
 It tests the contract between an estimator and the rest of simrail, not how good the estimates are:
 the right columns at the right times, finite, repeatable, no look-ahead, nothing of the recording
-changed, running backwards and standing still.
+changed, running backwards and standing still, doing without what it does not say it needs.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import COLUMNS, INNOVATION, IRREGULARITY, IRREGULARITY_SD, RATE_INNOVATION
-from simrail.estimation.estimate import Estimate, Estimator
-from simrail.recording.recording import Recording
+from simrail.core.columns import (
+    COLUMNS,
+    INNOVATION,
+    IRREGULARITY,
+    IRREGULARITY_SD,
+    ODOMETRY,
+    ODOMETRY_SD,
+    RATE_INNOVATION,
+)
+from simrail.estimation.estimate import Estimate, Estimator, description_of
+from simrail.recording.recording import AT_IMU_TIMES, AT_OWN_TIMES, Recording, beginning
 from simrail.recording.standstill import at_rest_initially, rest_periods
+from simrail.recording.wheel_speed import counted_way_m
 
 Check = Callable[[Estimator, Recording], None]
 
@@ -42,8 +52,17 @@ def check_estimator(estimator: Estimator, recording: Recording) -> None:
     AssertionError
         One line for each check that failed.
     """
+    _run(CHECKS, estimator, recording)
+
+
+def check_odometry(estimator: Estimator, recording: Recording) -> None:
+    """Run every check of `check_estimator`, and those of an odometry; otherwise as that."""
+    _run((*CHECKS, *ODOMETRY_CHECKS), estimator, recording)
+
+
+def _run(checks: tuple[Check, ...], estimator: Estimator, recording: Recording) -> None:
     failures = []
-    for check in CHECKS:
+    for check in checks:
         try:
             # Its own copy, so that an estimator that spoils one recording does not spoil the others.
             check(estimator, copy.deepcopy(recording))
@@ -54,14 +73,33 @@ def check_estimator(estimator: Estimator, recording: Recording) -> None:
 
 def frozen_dataclass(estimator: Estimator, recording: Recording) -> None:
     """Parameters are the fields of a frozen dataclass, so that a run can be repeated from them."""
-    parameters = getattr(estimator, "__dataclass_params__", None)
-    assert is_dataclass(estimator) and parameters is not None, "is no dataclass"
+    parameters = getattr(type(estimator), "__dataclass_params__", None)
+    assert parameters is not None, "is no dataclass"
     assert parameters.frozen, "is a dataclass that is not frozen"
 
 
 def says_whether_causal(estimator: Estimator, recording: Recording) -> None:
     """`causal` is there, and is a truth value."""
     assert isinstance(getattr(estimator, "causal", None), bool), "has no `causal` of True or False"
+
+
+def says_what_it_is(estimator: Estimator, recording: Recording) -> None:
+    """What it says of itself (`simrail.estimation.estimate.Description`) is such as others understand."""
+    description_of(estimator)
+
+
+def needs_what_it_says(estimator: Estimator, recording: Recording) -> None:
+    """It does without those of an odometry, an encoder and other sensors that it does not say it needs."""
+    needs = description_of(estimator).needs
+    fields: dict[str, dict[str, Any]] = {
+        "odometry": {"odometry": None, "odometry_source": ""},
+        "encoder": {"encoder": None, "encoder_sheet": None, "odometer": None, "odometer_sheet": None},
+        "magnetometer": {"magnetometer": None, "magnetometer_sheet": None},
+        "rail_sensor": {"rail_displacement": None, "rail_sensor_sheet": None},
+    }
+    spared = {name: value for need in fields if need not in needs for name, value in fields[need].items()}
+    poor: Recording = replace(recording, **spared)
+    require_well_formed(estimator.estimate(poor), poor)
 
 
 def estimate_is_well_formed(estimator: Estimator, recording: Recording) -> None:
@@ -85,12 +123,13 @@ def leaves_the_recording_alone(estimator: Estimator, recording: Recording) -> No
     """No signal, no odometry, no piece of knowledge is changed."""
     own = copy.deepcopy(recording)
     estimator.estimate(own)
-    for field in ("imu", "odometry", "encoder", "magnetometer", "rail_displacement"):
+    for field in (*AT_IMU_TIMES, *AT_OWN_TIMES):
         before, after = getattr(recording, field), getattr(own, field)
         assert before is None or (before.equals(after) and list(before) == list(after)), f"changed {field}"
     for field in (
         "imu_sheet",
         "encoder_sheet",
+        "odometer_sheet",
         "magnetometer_sheet",
         "rail_sensor_sheet",
         "track",
@@ -117,13 +156,17 @@ def sees_no_future(estimator: Estimator, recording: Recording) -> None:
         return
     whole = estimator.estimate(recording)
     for n in prefix_lengths(recording):
-        part = replace(estimator.estimate(prefix(recording, n)), geometry=None, geometry_draws=None)
+        part = replace(
+            estimator.estimate(beginning(recording, samples=n)), geometry=None, geometry_draws=None
+        )
         require_same(first_samples(whole, n), part, when=f"cut after {n} of {len(recording.imu)} samples")
 
 
 CHECKS: tuple[Check, ...] = (
     frozen_dataclass,
     says_whether_causal,
+    says_what_it_is,
+    needs_what_it_says,
     estimate_is_well_formed,
     works_backwards,
     works_at_standstill,
@@ -131,6 +174,25 @@ CHECKS: tuple[Check, ...] = (
     is_deterministic,
     sees_no_future,
 )
+
+
+def gives_an_odometry(estimator: Estimator, recording: Recording) -> None:
+    """Its states hold position, speed and acceleration along the track, and their standard deviations."""
+    states = estimator.estimate(recording).states
+    missing = [name for name in ODOMETRY + ODOMETRY_SD if name not in states]
+    assert not missing, f"states lack {', '.join(missing)}"
+    negative = [name for name in ODOMETRY_SD if (states[name] < 0.0).any()]
+    assert not negative, f"negative standard deviations: {', '.join(negative)}"
+
+
+def is_no_copy(estimator: Estimator, recording: Recording) -> None:
+    """It says the same whatever odometry the recording came with, and needs none."""
+    assert "odometry" not in description_of(estimator).needs, "an odometry needs an odometry"
+    alone = replace(recording, odometry=None, odometry_source="")
+    require_same(estimator.estimate(recording), estimator.estimate(alone), when="without another odometry")
+
+
+ODOMETRY_CHECKS: tuple[Check, ...] = (gives_an_odometry, is_no_copy)
 
 
 def require_well_formed(estimate: Estimate, recording: Recording) -> None:
@@ -239,24 +301,6 @@ def prefix_lengths(recording: Recording) -> list[int]:
     return sorted(length for length in wanted if 2 <= length < n)
 
 
-def prefix(recording: Recording, n: int) -> Recording:
-    """What the logger had after n IMU samples."""
-    encoder = recording.encoder
-    return replace(
-        recording,
-        imu=recording.imu.iloc[:n].copy(),
-        odometry=recording.odometry.iloc[:n].copy(),
-        encoder=None if encoder is None else encoder.loc[: recording.imu.index[n - 1]].copy(),
-        **_beside_imu(recording, lambda frame: frame.iloc[:n].copy()),
-    )
-
-
-def _beside_imu(recording: Recording, change: Callable[[pd.DataFrame], pd.DataFrame]) -> dict[str, Any]:
-    """The other signals that are sampled at the IMU's times, changed; those that there are."""
-    frames = {name: getattr(recording, name) for name in ("magnetometer", "rail_displacement")}
-    return {name: change(frame) for name, frame in frames.items() if frame is not None}
-
-
 def first_samples(estimate: Estimate, n: int) -> Estimate:
     """The first n samples of an estimate, without its geometry."""
     return replace(
@@ -274,22 +318,24 @@ def time_reversed(recording: Recording) -> Recording:
 
     It is what a train would record that made the same way in the other direction.
     """
-    imu = _turned(recording.imu, negate="gyro_")
-    odometry = _turned(recording.odometry, negate="speed_mps")
-    encoder = recording.encoder
-    if encoder is not None:
+    negated = {"imu": "gyro_", "odometry": "speed_mps", "odometer": "speed_mps"}
+    turned = _changed(recording, lambda name, frame: _turned(frame, negate=negated.get(name, "")))
+    counts, sheet, start_m = turned.encoder, recording.encoder_sheet, recording.start_position_m
+    if recording.encoder is not None and sheet is not None and counts is not None:
         # When an edge passed on the way back, the times of the way there do not say.
-        encoder = _turned(encoder[["pulse_count"]], negate="")
-        encoder["pulse_count"] -= encoder["pulse_count"].iloc[0]
-    return replace(
-        recording,
-        name=f"{recording.name} backwards",
-        imu=imu,
-        odometry=odometry,
-        encoder=encoder,
-        **_beside_imu(recording, lambda frame: _turned(frame, negate="")),
-        start_position_m=float(odometry["position_m"].iloc[0]),
-    )
+        counts = counts[["pulse_count"]] - counts["pulse_count"].iloc[0]
+        start_m += float(counted_way_m(recording.encoder, sheet).iloc[-1])
+    if turned.odometry is not None:
+        start_m = float(turned.odometry["position_m"].iloc[0])
+    return replace(turned, name=f"{recording.name} backwards", encoder=counts, start_position_m=start_m)
+
+
+def _changed(recording: Recording, change: Callable[[str, pd.DataFrame], pd.DataFrame]) -> Recording:
+    """A recording with every signal that there is changed, and the odometry; by name and frame."""
+    frames = {name: getattr(recording, name) for name in (*AT_IMU_TIMES, *AT_OWN_TIMES)}
+    there = {name: frame for name, frame in frames.items() if frame is not None}
+    changed: dict[str, Any] = {name: change(name, frame) for name, frame in there.items()}
+    return replace(recording, **changed)
 
 
 def _turned(frame: pd.DataFrame, *, negate: str) -> pd.DataFrame:
@@ -303,18 +349,11 @@ def _turned(frame: pd.DataFrame, *, negate: str) -> pd.DataFrame:
 def standing(recording: Recording) -> Recording:
     """A train that stands where the ride began: the first IMU sample, for ever."""
 
-    def held(frame: pd.DataFrame) -> pd.DataFrame:
+    def held(name: str, frame: pd.DataFrame) -> pd.DataFrame:
         values = np.repeat(frame.iloc[:1].to_numpy(), len(frame), axis=0)
-        return pd.DataFrame(values, index=frame.index, columns=frame.columns).astype(frame.dtypes)
+        still = pd.DataFrame(values, index=frame.index, columns=frame.columns).astype(frame.dtypes)
+        if name in ("odometry", "odometer"):
+            still[[c for c in ("speed_mps", "acceleration_mps2") if c in still]] = 0.0
+        return still
 
-    odometry = held(recording.odometry)
-    odometry["speed_mps"] = 0.0
-    odometry["acceleration_mps2"] = 0.0
-    return replace(
-        recording,
-        name=f"{recording.name} standing",
-        imu=held(recording.imu),
-        odometry=odometry,
-        encoder=None if recording.encoder is None else held(recording.encoder),
-        **_beside_imu(recording, held),
-    )
+    return replace(_changed(recording, held), name=f"{recording.name} standing")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import pandas as pd
 
@@ -56,16 +56,20 @@ class Estimate:
     geometry_draws: FloatArray | None = None
 
 
-SENSORS = ("encoder", "magnetometer", "rail_sensor")
-"""What an estimator may need beside the IMU, by the names of a scenario's tables."""
+NEEDS = ("odometry", "encoder", "magnetometer", "rail_sensor")
+"""What an estimator may need beside the IMU, by the keys of a scenario."""
+
+ROLES = ("method", "baseline", "general_purpose", "ablation")
+"""What an estimator is in a comparison: under test; what every method has to beat; a filter that knows
+nothing of trains; a method with what no train has, or without a part of its own, which shows its worth."""
 
 
 @runtime_checkable
 class Estimator(Protocol):
     """One method. Parameters are fields of a frozen dataclass; `estimate` is its only verb.
 
-    A method that cannot do without some of `SENSORS` may name them in an attribute ``needs`` (tuple of
-    str): a scenario without them is refused before anything runs.
+    What else it says of itself, as attributes that may be left out, is listed in `Description`.
+    An *odometry* is an estimator whose states hold `simrail.core.columns.ODOMETRY` and `ODOMETRY_SD`.
     """
 
     causal: bool
@@ -74,6 +78,72 @@ class Estimator(Protocol):
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate from a recording and nothing else."""
         ...
+
+
+@dataclass(frozen=True)
+class Description:
+    """What an estimator says of itself: attributes of its class, or properties that follow its options.
+
+    Attributes
+    ----------
+    needs : tuple of str
+        Those of `NEEDS` that it cannot do without: a scenario that lacks one is refused before anything runs.
+    uses_imu : bool
+        False for what is concluded without any inertial sensor.
+    role : str
+        One of `ROLES`.
+    label : str
+        What a reader calls it; the name of its class if it does not say.
+    cites : tuple of str
+        Where its equations come from.
+    """
+
+    needs: tuple[str, ...]
+    uses_imu: bool
+    role: str
+    label: str
+    cites: tuple[str, ...]
+
+
+def description_of(estimator: Estimator) -> Description:
+    """What an estimator says of itself, defaults in place of what it does not say.
+
+    Raises
+    ------
+    InputError
+        If it says what nobody understands; the field is the attribute.
+    """
+    defaults: dict[str, Any] = {
+        "needs": (),
+        "uses_imu": True,
+        "role": "method",
+        "label": type(estimator).__name__,
+        "cites": (),
+    }
+    told = {name: getattr(estimator, name, default) for name, default in defaults.items()}
+    texts = {name: told[name] for name in ("needs", "cites")}
+    limits = {
+        name: "a tuple of str"
+        for name, words in texts.items()
+        if not (isinstance(words, tuple) and all(isinstance(word, str) for word in words))
+    }
+    if "needs" not in limits and not set(told["needs"]) <= set(NEEDS):
+        limits["needs"] = "some of " + ", ".join(NEEDS)
+    if not isinstance(told["uses_imu"], bool):
+        limits["uses_imu"] = "True or False"
+    if told["role"] not in ROLES:
+        limits["role"] = "one of " + ", ".join(ROLES)
+    if not (isinstance(told["label"], str) and told["label"]):
+        limits["label"] = "a text"
+    for name, limit in limits.items():
+        raise InputError(
+            f"{type(estimator).__name__} says of itself what nobody understands",
+            field=name,
+            value=told[name],
+            limit=limit,
+            remedy=f"mend '{name}' of the estimator",
+        )
+    return Description(**told)
 
 
 @cache
@@ -90,17 +160,21 @@ def estimator_class(method: str) -> type[Estimator]:
     InputError
         If no installed package registers that name; the message lists those that are there.
     """
-    found = entry_points(group="simrail.estimators")
-    for entry in found:
+    for entry in entry_points(group="simrail.estimators"):
         if entry.name == method:
             loaded: type[Estimator] = entry.load()
             return loaded
     raise InputError(
         "no such estimator",
         value=method,
-        limit="one of " + ", ".join(sorted({entry.name for entry in found})),
+        limit="one of " + ", ".join(registered()),
         remedy="install the package that registers it under the entry-point group simrail.estimators",
     )
+
+
+def registered() -> list[str]:
+    """Names of all estimators that installed packages register."""
+    return sorted({entry.name for entry in entry_points(group="simrail.estimators")})
 
 
 def estimate_many(estimator: Estimator, recordings: Sequence[Recording]) -> list[Estimate]:

@@ -1,4 +1,4 @@
-"""Estimators from a person's own Python files: loaded, and carried into other processes.
+"""Estimator classes by name; those of a person's own Python files are loaded, and carried to other processes.
 
 A file becomes a module named after its content, so two files, or two versions of one, never share a
 module. An instance of a class in it can be unpickled where `install` has been called with the file.
@@ -13,8 +13,41 @@ from pathlib import Path
 from types import ModuleType
 
 from simrail.core.errors import InputError
+from simrail.core.toml_files import existing_file
+from simrail.estimation.estimate import Estimator, estimator_class
 
 _PREFIX = "simrail_own_"
+
+
+def class_named(name: str, folder: Path | None) -> type[Estimator]:
+    """Class of a method: a registered name, or ``"file.py:Class"`` for one's own file.
+
+    Parameters
+    ----------
+    name : str
+        As a scenario has it.
+    folder : Path, optional
+        Where files are looked for first, before the working folder.
+
+    Raises
+    ------
+    InputError
+        If nothing of that name is registered, or the file is missing, cannot be imported, or has no such
+        class.
+    """
+    path_name, colon, class_name = name.rpartition(":")
+    if not colon or not path_name.endswith(".py"):
+        return estimator_class(name)
+    found = getattr(load_own(existing_file(path_name, folder), shown=path_name), class_name, None)
+    if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
+        raise InputError(
+            "the file has no such estimator class",
+            value=class_name,
+            limit="a class with a method estimate(recording)",
+            remedy="see 'simrail new estimator NAME'",
+        )
+    own: type[Estimator] = found
+    return own
 
 
 def load_own(path: Path, *, shown: str) -> ModuleType:

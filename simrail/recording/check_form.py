@@ -1,4 +1,4 @@
-"""The judgement of a recording, ours or a stranger's: is it one at all?
+"""The judgement of a recording, ours or a stranger's: whether it is one at all.
 
 Columns, numbers, time stamps, sheets. Nothing is repaired: a recording with a fault is refused, with the
 place of the fault. Whether what it says can be true (units, axes) is judged by
@@ -6,6 +6,8 @@ place of the fault. Whether what it says can be true (units, axes) is judged by
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -24,16 +26,52 @@ from simrail.core.columns import (
 )
 from simrail.core.errors import InputError
 from simrail.core.resample import check_stamps
-from simrail.recording.recording import Recording
+from simrail.recording.recording import AT_IMU_TIMES, Recording
 
-MAX_RATE_RADPS, MAX_FORCE_MPS2 = 20.0, 500.0
-"""No train turns or shakes harder: beyond this the unit is wrong."""
 
-MAX_FIELD_T = 1e-2
-"""Two hundred times the Earth's field: beyond this the unit is wrong."""
+class _Limit(NamedTuple):
+    """Magnitude that no train reaches: beyond it the unit is wrong, and looks like another one."""
 
-MAX_RAIL_M = 10.0
-"""No rail is farther from a sensor that sees it: beyond this the unit is wrong."""
+    frame: str
+    columns: tuple[str, ...]
+    limit: float
+    unit: str
+    suspect: str
+
+
+LIMITS = (
+    _Limit("imu", GYRO, 20.0, "rad/s", "degrees"),
+    _Limit("imu", ACCEL, 500.0, "m/s2", "mg"),
+    # Two hundred times the Earth's field.
+    _Limit("magnetometer", MAGNETIC, 1e-2, "T", "microtesla or gauss"),
+    _Limit("rail_displacement", RAIL_DISPLACEMENT, 10.0, "m", "millimetres"),
+)
+
+COLUMNS_OF = {
+    "imu": IMU,
+    "odometry": ODOMETRY + ODOMETRY_SD,
+    "encoder": ENCODER,
+    "odometer": ("speed_mps",),
+    "magnetometer": MAGNETIC,
+    "rail_displacement": RAIL_DISPLACEMENT,
+}
+"""Columns that the frames of a recording must have."""
+
+SHEETS = {
+    "encoder": ("encoder_sheet", "says nothing", "give pulses per revolution and wheel radius"),
+    "odometer": ("odometer_sheet", "says nothing", "give the standard deviations of its speed and scale"),
+    "magnetometer": (
+        "magnetometer_sheet",
+        "gives no heading",
+        "give the Earth's field and the direction of magnetic north",
+    ),
+    "rail_displacement": (
+        "rail_sensor_sheet",
+        "says nothing of the rails",
+        "give its noise and the distance of the nominal rails",
+    ),
+}
+"""Sheet that each device needs, what it is worth without, and the remedy."""
 
 
 def check_recording(recording: Recording, *, file: object = None) -> None:
@@ -50,62 +88,34 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
     ------
     InputError
         At the first of: a missing column; a value that is no number; time stamps that are not
-        increasing, or not uniform in the IMU; angular rates above 20 rad/s (degrees?) or specific
-        forces above 500 m/s2, fields above 10 mT; an IMU rate other than its sheet's; odometry or
-        magnetometer at other times than the IMU's; an encoder, magnetometer or rail sensor without its sheet.
+        increasing, or not uniform in the IMU; a device without its sheet; values beyond `LIMITS`
+        (degrees?); an IMU rate other than its sheet's; a frame at other times than the IMU's that
+        belongs there.
     """
-    _check_signal(recording.imu, IMU, what="imu", file=file)
-    _check_signal(recording.odometry, ODOMETRY + ODOMETRY_SD, what="odometry", file=file)
-    if recording.encoder is not None:
-        timed = (EDGE_TIME,) if EDGE_TIME in recording.encoder else ()
-        _check_signal(recording.encoder, ENCODER + timed, what="encoder", file=file)
-        if recording.encoder_sheet is None:
-            raise InputError(
-                "an encoder without its sheet says nothing",
-                file=file,
-                field="encoder_sheet",
-                remedy="give pulses per revolution and wheel radius",
-            )
+    frames = {name: getattr(recording, name) for name in COLUMNS_OF}
+    frames = {name: frame for name, frame in frames.items() if frame is not None}
+    for name, frame in frames.items():
+        timed = (EDGE_TIME,) if name == "encoder" and EDGE_TIME in frame else ()
+        _check_signal(frame, COLUMNS_OF[name] + timed, what=name, file=file)
+        if name in SHEETS:
+            sheet, worth, remedy = SHEETS[name]
+            if getattr(recording, sheet) is None:
+                raise InputError(f"{name} without its sheet {worth}", file=file, field=sheet, remedy=remedy)
     _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz, file)
-    limits: list[tuple[str, tuple[str, ...], float, str, str]] = [
-        ("imu", GYRO, MAX_RATE_RADPS, "rad/s", "degrees"),
-        ("imu", ACCEL, MAX_FORCE_MPS2, "m/s2", "mg"),
-    ]
-    at_imu_times = ["odometry"]
-    if recording.magnetometer is not None:
-        _check_signal(recording.magnetometer, MAGNETIC, what="magnetometer", file=file)
-        if recording.magnetometer_sheet is None:
-            raise InputError(
-                "a magnetometer without its sheet gives no heading",
-                file=file,
-                field="magnetometer_sheet",
-                remedy="give the Earth's field and the direction of magnetic north",
-            )
-        limits.append(("magnetometer", MAGNETIC, MAX_FIELD_T, "T", "microtesla or gauss"))
-        at_imu_times.append("magnetometer")
-    if recording.rail_displacement is not None:
-        _check_signal(recording.rail_displacement, RAIL_DISPLACEMENT, what="rail_displacement", file=file)
-        if recording.rail_sensor_sheet is None:
-            raise InputError(
-                "a rail sensor without its sheet says nothing of the rails",
-                file=file,
-                field="rail_sensor_sheet",
-                remedy="give its noise and the distance of the nominal rails",
-            )
-        limits.append(("rail_displacement", RAIL_DISPLACEMENT, MAX_RAIL_M, "m", "millimetres"))
-        at_imu_times.append("rail_displacement")
-    for what, columns, limit, unit, suspect in limits:
-        _check_size(getattr(recording, what), columns, (limit, unit, suspect), what=what, file=file)
-    for what in at_imu_times:
-        frame = getattr(recording, what)
-        if not np.array_equal(frame.index.to_numpy(), recording.imu.index.to_numpy()):
+    for limit in LIMITS:
+        if limit.frame in frames:
+            _check_size(frames[limit.frame], limit, file)
+    for name in AT_IMU_TIMES:
+        if name in frames and not np.array_equal(
+            frames[name].index.to_numpy(), recording.imu.index.to_numpy()
+        ):
             raise InputError(
                 "has other time stamps than the IMU",
                 file=file,
-                field=f"{what}.time_s",
-                value=f"{len(frame)} samples",
+                field=f"{name}.time_s",
+                value=f"{len(frames[name])} samples",
                 limit=f"the {len(recording.imu)} time stamps of the IMU",
-                remedy=f"make the {what} at the IMU's times",
+                remedy=f"make the {name} at the IMU's times",
             )
 
 
@@ -144,22 +154,19 @@ def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, f
     check_stamps(frame.index.to_numpy(dtype=np.float64), field=f"{what}.time_s", file=file)
 
 
-def _check_size(
-    frame: pd.DataFrame, columns: tuple[str, ...], bound: tuple[float, str, str], *, what: str, file: object
-) -> None:
-    """Refuse values beyond (limit, unit); they look like another unit, which the bound names third."""
-    limit, unit, suspect = bound
-    for column in columns:
+def _check_size(frame: pd.DataFrame, bound: _Limit, file: object) -> None:
+    """Refuse values beyond a limit."""
+    for column in bound.columns:
         values = np.abs(frame[column].to_numpy(dtype=np.float64))
-        if values.max() > limit:
+        if values.max() > bound.limit:
             worst = int(np.argmax(values))
             raise InputError(
                 f"is beyond what a train does at time_s = {float(frame.index[worst]):.6g}",
                 file=file,
-                field=f"{what}.{column}",
+                field=f"{bound.frame}.{column}",
                 value=float(frame[column].iloc[worst]),
-                limit=f"{limit:g} {unit}",
-                remedy=f"convert to {unit}; the values look like {suspect}",
+                limit=f"{bound.limit:g} {bound.unit}",
+                remedy=f"convert to {bound.unit}; the values look like {bound.suspect}",
             )
 
 

@@ -9,6 +9,7 @@ test has a limit far from what a sound recording does and far from what the faul
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
@@ -47,7 +48,7 @@ def check_plausible(recording: Recording, *, file: object = None) -> None:
     The specific force is judged at rest, where the ride begins with a second of it, else by its median.
     Where the ride has them, its curves are compared with the gyro's Z (the track's yaw rate, d yaw / ds times
     speed), its setting off and braking with the accelerometer's X and Y, by least squares. A ride on the
-    straight at constant speed says nothing of either.
+    straight at constant speed says nothing of either, nor does one without odometry.
 
     Raises
     ------
@@ -58,7 +59,8 @@ def check_plausible(recording: Recording, *, file: object = None) -> None:
     """
     _check_gravity(recording, file)
     _check_turning(recording, file)
-    _check_motion(recording, file)
+    if recording.odometry is not None:
+        _check_motion(recording, recording.odometry, file)
 
 
 def _check_gravity(recording: Recording, file: object) -> None:
@@ -127,9 +129,9 @@ def _check_turning(recording: Recording, file: object) -> None:
             )
 
 
-def _check_motion(recording: Recording, file: object) -> None:
+def _check_motion(recording: Recording, odometry: pd.DataFrame, file: object) -> None:
     """Hold gyro and accelerometer against what track and odometry say, in means over a second."""
-    odometry, track = recording.odometry, recording.track
+    track = recording.track
     position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
     for place in (position.min(), position.max()):
         if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:

@@ -1,8 +1,9 @@
 """What the logger on the train saw, and what the train may know: the wall before the truth.
 
-A `Recording` holds the signals (IMU, encoder, magnetometer), an odometry frame that says where on the
-track each sample was taken, and the knowledge that a real train has: the design track, the nominal wheel
-radius, the IMU's data sheet, where it is mounted. It never holds a true value, except in an odometry
+A `Recording` holds the signals (IMU, encoder, magnetometer) and the knowledge that a real train has: the
+design track, the nominal wheel radius, the IMU's data sheet, where it is mounted. Where the train is, nobody
+records: an odometry estimator concludes it, and its odometry frame is handed on to those estimators that
+need one (`simrail.estimation.choose_odometry`). A recording never holds a true value, except in an odometry
 frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read into the same
 class, so the same estimators run on them.
 
@@ -15,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from simrail.core.errors import InputError
 from simrail.track.design import TrackDesign
 
 
@@ -98,12 +100,31 @@ class EncoderSheet:
         Nominal wheel radius; the true one differs.
     rate_hz : float
         Rate at which the logger reads the counter.
+    radius_relative_sd : float
+        Relative standard deviation of the rolling radius about the nominal one.
     """
 
     wheel: str
     pulses_per_revolution: int
     wheel_radius_m: float
     rate_hz: float
+    radius_relative_sd: float = 0.005
+
+
+@dataclass(frozen=True)
+class OdometerSheet:
+    """What the train knows of an odometer that gives its speed.
+
+    Attributes
+    ----------
+    speed_sd_mps : float
+        Standard deviation of a reading; its error is treated as white.
+    radius_relative_sd : float
+        Relative standard deviation of its scale.
+    """
+
+    speed_sd_mps: float
+    radius_relative_sd: float
 
 
 @dataclass(frozen=True)
@@ -166,11 +187,11 @@ class Recording:
         Its data sheet.
     start_position_m : float
         Where on the track the IMU stood at the first sample (the train knows its platform).
-    odometry : pandas.DataFrame
+    odometry : pandas.DataFrame, optional
         Indexed by the IMU's ``time_s``; columns `simrail.core.columns.ODOMETRY` + `ODOMETRY_SD`: position,
-        speed and acceleration of the IMU along the track.
+        speed and acceleration of the IMU along the track. None until some odometry has been run.
     odometry_source : str
-        ``"encoder"``, ``"truth"`` (an ablation), or the name of the method that made it.
+        ``"encoder"``, ``"truth"`` (an ablation), or the name of the method that made it; "" without one.
     gravity_mps2 : float
         Local gravity.
     gaps : pandas.DataFrame, optional
@@ -185,6 +206,10 @@ class Recording:
         from the place of the IMU, along Y and Z of the body.
     rail_sensor_sheet : RailSensorSheet, optional
         What is known of the sensor that sees them.
+    odometer : pandas.DataFrame, optional
+        Indexed by ``time_s``, column ``speed_mps``, negative towards smaller s: what an odometer shows.
+    odometer_sheet : OdometerSheet, optional
+        Its data sheet.
     """
 
     name: str
@@ -197,32 +222,54 @@ class Recording:
     encoder: pd.DataFrame | None
     encoder_sheet: EncoderSheet | None
     start_position_m: float
-    odometry: pd.DataFrame
-    odometry_source: str
+    odometry: pd.DataFrame | None = None
+    odometry_source: str = ""
     gravity_mps2: float = 9.81
     gaps: pd.DataFrame | None = None
     magnetometer: pd.DataFrame | None = None
     magnetometer_sheet: MagnetometerSheet | None = None
     rail_displacement: pd.DataFrame | None = None
     rail_sensor_sheet: RailSensorSheet | None = None
+    odometer: pd.DataFrame | None = None
+    odometer_sheet: OdometerSheet | None = None
 
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""
         return replace(self, odometry=odometry, odometry_source=source)
 
 
+def odometry_of(recording: Recording) -> pd.DataFrame:
+    """The odometry frame of a recording, for those that cannot do without.
+
+    Raises
+    ------
+    InputError
+        If no odometry has been run on it.
+    """
+    if recording.odometry is None:
+        raise InputError(
+            "the recording has no odometry: nobody knows where the train is",
+            field="odometry",
+            value=recording.name,
+            remedy='choose one, e.g. simrail.with_odometry(recording, "curve_matched")',
+        )
+    return recording.odometry
+
+
+AT_IMU_TIMES = ("imu", "odometry", "magnetometer", "rail_displacement")
+"""Frames of a recording that have one row per sample of the IMU."""
+
+AT_OWN_TIMES = ("encoder", "odometer")
+"""Frames of a recording whose device has a clock rate of its own."""
+
+
 def beginning(recording: Recording, *, samples: int) -> Recording:
-    """The first samples of a recording, counted by the IMU."""
-    imu = recording.imu.iloc[:samples]
-    encoder = recording.encoder
-    if encoder is not None:
-        encoder = encoder.loc[: imu.index[-1]]
-    magnetic, seen = recording.magnetometer, recording.rail_displacement
-    return replace(
-        recording,
-        imu=imu,
-        encoder=encoder,
-        odometry=recording.odometry.iloc[:samples],
-        magnetometer=None if magnetic is None else magnetic.iloc[:samples],
-        rail_displacement=None if seen is None else seen.iloc[:samples],
-    )
+    """What the logger had after the first samples of the IMU; the frames are copies."""
+    last = recording.imu.index[samples - 1] if samples <= len(recording.imu) else None
+    frames = {name: getattr(recording, name) for name in (*AT_IMU_TIMES, *AT_OWN_TIMES)}
+    cut = {
+        name: (frame.iloc[:samples] if name in AT_IMU_TIMES else frame.loc[:last]).copy()
+        for name, frame in frames.items()
+        if frame is not None
+    }
+    return replace(recording, **cut)

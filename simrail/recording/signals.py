@@ -116,6 +116,16 @@ ODOMETRY_SIGNAL = Signal(
         for column, units in zip(ODOMETRY + ODOMETRY_SD, 2 * (LENGTHS, SPEEDS, ACCELERATIONS), strict=True)
     ),
 )
+ODOMETER_SIGNAL = Signal(
+    "odometer",
+    (
+        Quantity("distance", ("distance_m",), LENGTHS, required=False),
+        Quantity("speed", ("speed_mps",), SPEEDS, required=False),
+    ),
+)
+"""What a train's odometer gives in place of an encoder's pulses; a recording holds the speed alone, since a
+distance in steps is an encoder's."""
+
 GAPS_SIGNAL = Signal(
     "gaps",
     (_alone("start_s", TIMES), _alone("end_s", TIMES), _alone("missing", COUNTS, whole=True)),
@@ -128,15 +138,7 @@ SIGNALS: tuple[Signal, ...] = (
     MAGNETOMETER_SIGNAL,
     RAIL_SIGNAL,
     ODOMETRY_SIGNAL,
+    ODOMETER_SIGNAL,
     GAPS_SIGNAL,
 )
 """Every frame of a `Recording`."""
-
-ODOMETER_SIGNAL = Signal(
-    "odometer",
-    (
-        Quantity("distance", ("distance_m",), LENGTHS, required=False),
-        Quantity("speed", ("speed_mps",), SPEEDS, required=False),
-    ),
-)
-"""What a train's odometer gives, which a ride file may name instead of an encoder's pulses."""

@@ -1,4 +1,4 @@
-"""When does the train stand? As a logger would find it: from the encoder alone.
+"""When does the train stand? As a logger would find it: from the encoder, where there is one.
 
 A count that stays within one of where it was says that the wheel has turned by less than two counts; how
 slowly it still turned, no encoder knows. Therefore the rest that is trusted keeps away from the pulses at
@@ -32,7 +32,7 @@ SHORTEST_S = 1.0
 two pulses in between (below 2 mm/s with 1024 pulses on a wheel of 0.29 m)."""
 
 STILL_MPS = 0.01
-"""Without an encoder, a train is at rest below this speed of its odometry."""
+"""Without an encoder, a train is at rest below this speed of its odometry or odometer."""
 
 
 def guard_s(recording: Recording) -> float:
@@ -55,14 +55,23 @@ def motion_times(recording: Recording) -> FloatArray:
 
     From the encoder: first the first pulse, then every reading whose count is more than one away from any
     since the last such time. Whether a time is among them depends on no later reading. Without an
-    encoder: every time at which the odometry's speed is above `STILL_MPS`.
+    encoder: every time at which the speed of the odometry, or of the odometer, is above `STILL_MPS`. Where
+    nothing tells of motion, nothing tells of rest: every time.
     """
-    if recording.encoder is None:
-        speed = recording.odometry["speed_mps"].to_numpy()
-        times = recording.odometry.index.to_numpy(dtype=np.float64)
-        return times[np.abs(speed) > STILL_MPS]
-    counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)
-    return recording.encoder.index.to_numpy(dtype=np.float64)[_moves(counts)]
+    if recording.encoder is not None:
+        moves = _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64))
+        moving: FloatArray = _times(recording.encoder)[moves]
+        return moving
+    way = recording.odometer if recording.odometry is None else recording.odometry
+    if way is None:
+        return _times(recording.imu)
+    moving = _times(way)[np.abs(way["speed_mps"].to_numpy()) > STILL_MPS]
+    return moving
+
+
+def _times(frame: pd.DataFrame) -> FloatArray:
+    times: FloatArray = frame.index.to_numpy(dtype=np.float64)
+    return times
 
 
 @njit
@@ -106,7 +115,7 @@ def rest_periods(recording: Recording) -> pd.DataFrame:
 
 
 def first_motion_s(recording: Recording) -> float:
-    """Time of the first sign of motion: the first pulse, or without an encoder a speed above 0.01 m/s.
+    """Time of the first sign of motion: the first of `motion_times`.
 
     Returns
     -------

@@ -10,14 +10,14 @@ This module neither reads files nor knows what the fields mean.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from typing import Annotated, Any, TypeVar
 
 from pydantic import WrapValidator
 
 from simrail.core.toml_files import Part
-from simrail.scenario.distributions import Distribution, Value, read_distribution
+from simrail.scenario.distributions import Distribution, Value, distributions_of, leaves, read_distribution
 
 Scalar = Value
 _T = TypeVar("_T")
@@ -72,25 +72,7 @@ def axes_of(model: Part, *, prefix: str = "", fields: Iterable[str] | None = Non
         Dotted field name -> its values, in the order of the fields. Arrays of tables (rides, IMUs,
         estimators) are not looked into: each of their tables has axes of its own.
     """
-    return {name: value for name, value in _leaves(model, prefix, fields) if isinstance(value, Axis)}
-
-
-def distributions_of(
-    model: Part, *, prefix: str = "", fields: Iterable[str] | None = None
-) -> dict[str, Distribution]:
-    """Find the distributions of a model and of the tables within it, as `axes_of` finds its axes."""
-    return {name: value for name, value in _leaves(model, prefix, fields) if isinstance(value, Distribution)}
-
-
-def _leaves(model: Part, prefix: str, fields: Iterable[str] | None) -> Iterator[tuple[str, object]]:
-    for name in type(model).model_fields if fields is None else fields:
-        value = getattr(model, name)
-        if isinstance(value, Part):
-            yield from _leaves(value, f"{prefix}{name}.", None)
-        elif isinstance(value, dict):
-            yield from ((f"{prefix}{name}.{key}", item) for key, item in value.items())
-        else:
-            yield prefix + name, value
+    return {name: value for name, value in leaves(model, prefix, fields) if isinstance(value, Axis)}
 
 
 def expand(

@@ -1,6 +1,7 @@
-"""From a scenario's words to the nouns of the testbed: track, vehicle, ride, mount, grade.
+"""From a scenario's words to the nouns of the testbed: track, vehicle, ride, mount, sensors.
 
-Each noun is made for one cell, and every fault is an `InputError` that names the field of the scenario,
+Each cell is resolved once (`Parts.resolve`), and what is judged is what is run: checks, campaign, export and
+tuning take the same `ResolvedCell`. Every fault is an `InputError` that names the field of the scenario,
 or the file of the part and its field. Nothing is simulated here. Estimators are made in
 `simrail.scenario.build_estimator`.
 """
@@ -9,6 +10,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,10 +23,11 @@ from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.ride.ride import Ride, rails_of
 from simrail.ride.truth import Mount
-from simrail.scenario.build_estimator import estimator_of, option_files
+from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import Distribution
 from simrail.scenario.scenario import Scenario, ScenarioFile
+from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
@@ -42,12 +46,55 @@ from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
 _Part = TypeVar("_Part", bound=Part)
+_Noun = TypeVar("_Noun")
 
 NO_IRREGULARITY = Irregularity(spectrum="none", fade_m=0.0)
 
+_MOST_RESOLVED = 1000
+"""Resolved cells that are remembered; cells come ride by ride, and draws of the sensors share one."""
+
+
+@dataclass(frozen=True)
+class ResolvedCell:
+    """A cell and the nouns that its words stand for.
+
+    Attributes
+    ----------
+    cell : Cell
+        The words, and its place among the others.
+    ride : Ride
+        All that decides the motion; shared by the cells of a ride.
+    mount : Mount
+        Where the IMU sits.
+    grade : ImuGrade
+        The IMU.
+    encoder, magnetometer, rail_sensor : EncoderSpec, MagnetometerSpec, RailSensorSpec, optional
+        The other sensors; None where the scenario has none.
+    earth_rate : EarthRate, optional
+        Rotation of the Earth; None for an Earth at rest.
+    temperature : Temperature, optional
+        Temperature of the IMU; None for that of its calibration.
+    odometry : Estimator, optional
+        The odometry that is run on the recording; None where there is none to be run.
+    bands : tuple of Band
+        Wavelength bands that rail geometry is scored in.
+    """
+
+    cell: Cell
+    ride: Ride
+    mount: Mount
+    grade: ImuGrade
+    encoder: EncoderSpec | None
+    magnetometer: MagnetometerSpec | None
+    rail_sensor: RailSensorSpec | None
+    earth_rate: EarthRate | None
+    temperature: Temperature | None
+    odometry: Estimator | None
+    bands: tuple[Band, ...]
+
 
 class Parts:
-    """The parts that a scenario names, each file read once.
+    """The parts that a scenario names, each file read once, and the nouns of its cells.
 
     Parameters
     ----------
@@ -57,14 +104,17 @@ class Parts:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        self._read: dict[tuple[str, str], Any] = {}
+        self._nouns: dict[tuple[str, str], Any] = {}
         self._estimators: dict[int, dict[str, Estimator]] = {}
-        self._laid: tuple[tuple[object, ...], LaidTrack] | None = None
+        self._tunings: dict[int, dict[str, str]] = {}
+        self._resolved: dict[tuple[int, ...], ResolvedCell] = {}
+        self._rides: dict[tuple[int, ...], Ride] = {}
+        self._laid: tuple[Ride, LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the rails, for another process: they are laid faster than sent."""
-        return {**self.__dict__, "_laid": None}
+        """What was read, for another process: cells are resolved, and rails laid, faster than sent."""
+        return {**self.__dict__, "_laid": None, "_resolved": {}, "_rides": {}}
 
     @property
     def hash(self) -> str:
@@ -75,97 +125,153 @@ class Parts:
         text = json.dumps(self._content, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
-    def track(self, cell: Cell) -> TrackDesign:
-        """Design track of a cell."""
-        name = cell.spec.track
-        if ("track", name) not in self._read:
-            with blame(self.scenario.file, "track"):
-                part = self._load(TrackFile, "track", name)
-            self._read["track", name] = part.design(Path(name).stem)
-        found: TrackDesign = self._read["track", name]
-        return found
+    def resolve(self, cell: Cell) -> ResolvedCell:
+        """The nouns of a cell.
 
-    def vehicle(self, cell: Cell) -> VehicleModel:
-        """Vehicle of a cell."""
-        name = cell.spec.vehicle
-        if ("vehicle", name) not in self._read:
-            with blame(self.scenario.file, "vehicle"):
-                part = self._load(VehicleFile, "vehicle", name)
-            model = part.model(Path(name).stem)
-            self._content[f"profiles {name}"] = profiles_digest(model.wheel_rail)
-            self._read["vehicle", name] = model
-        vehicle: VehicleModel = self._read["vehicle", name]
-        return vehicle
+        Raises
+        ------
+        InputError
+            If a file that it names is missing or faulty, or a sensor cannot be as its words say.
+        """
+        # All but the draw of the sensors is in the case, the sample and the draw of the track.
+        key = (cell.case, cell.sample, cell.track_draw)
+        if key not in self._resolved:
+            if len(self._resolved) >= _MOST_RESOLVED:
+                self._resolved.clear()
+            self._resolved[key] = self._resolve(cell)
+        resolved = self._resolved[key]
+        return resolved if resolved.cell is cell else replace(resolved, cell=cell)
 
-    def grade(self, cell: Cell) -> ImuGrade:
-        """IMU grade of a cell."""
-        name = cell.imu.grade
-        if ("imu", name) not in self._read:
-            with blame(self.scenario.file, f"imu[{cell.imu_index}].grade"):
-                part = self._load(ImuFile, "imu", name)
-                self._read["imu", name] = part.grade(Path(name).stem)
-        grade: ImuGrade = self._read["imu", name]
-        return grade
-
-    def estimators(self, sample: int) -> dict[str, Estimator]:
-        """Estimators of a sample by their names in the tables; those that no sample changes are shared."""
-        if sample not in self._estimators:
-            made: dict[str, Estimator] = {}
-            first = self._estimators.get(0, {})
-            for method in methods(self.scenario, sample=sample):
-                is_drawn = any(
-                    isinstance(option, Distribution)
-                    for option in self.scenario.spec.estimator[method.index].options.values()
-                )
-                if method.name in made:
-                    raise InputError(
-                        "two estimators have this name",
-                        file=self.scenario.file,
-                        field=f"estimator[{method.index}].name",
-                        value=method.name,
-                        remedy="give each a name of its own",
-                    )
-                known = None if is_drawn else first.get(method.name)
-                made[method.name] = known or estimator_of(self.scenario, method)
-                for option, content in option_files(made[method.name]).items():
-                    # What is in the files that its options name counts as the scenario's.
-                    self._content[f"estimator {method.name} {option} {sample}"] = content
-            self._estimators[sample] = made
-        return self._estimators[sample]
-
-    def _load(self, model: type[_Part], kind: str, name: str) -> _Part:
-        part = load(model, kind, name, folder=self.scenario.folder)
-        self._content[f"{kind} {name}"] = part.model_dump(mode="json")
-        return part
+    def _resolve(self, cell: Cell) -> ResolvedCell:
+        spec = cell.spec
+        earth, temperature = spec.earth, spec.temperature
+        bands = bands_by_name(spec)
+        return ResolvedCell(
+            cell=cell,
+            ride=self.ride(cell),
+            mount=_mount(cell.imu),
+            grade=self.grade(cell),
+            encoder=None if spec.encoder is None else spec.encoder.spec(),
+            # Steel stands where the seed of the track puts it.
+            magnetometer=None if spec.magnetometer is None else spec.magnetometer.spec(cell.ride_seed),
+            rail_sensor=None if spec.rail_sensor is None else spec.rail_sensor.spec(),
+            earth_rate=None
+            if earth is None
+            else EarthRate(radians(earth.latitude_deg), radians(earth.x_axis_deg)),
+            odometry=self.odometry(cell),
+            temperature=None
+            if temperature is None
+            else Temperature(temperature.start_c, temperature.ambient_c, temperature.time_constant_s),
+            bands=tuple(bands[name] for name in (*spec.geometry.bands, *spec.geometry.own_bands)),
+        )
 
     def ride(self, cell: Cell) -> Ride:
         """Ride of a cell: all that decides the motion."""
-        return Ride(
-            name=cell.ride.name,
-            track=self.track(cell),
-            irregularity=irregularity_of(cell),
-            track_seed=cell.ride_seed,
-            vehicle=self.vehicle(cell),
-            profile=profile_of(cell),
-            engine=cell.spec.engine,
-            step_s=cell.spec.step_s,
-            rate_hz=cell.spec.truth_rate_hz,
-            drive=cell.ride.drive,
-            conditions=conditions_of(cell, self.vehicle(cell)),
-        )
+        key = (cell.ride_number, cell.sample, cell.track_draw)
+        if key not in self._rides:
+            if len(self._rides) >= _MOST_RESOLVED:
+                self._rides.clear()
+            spec, vehicle = cell.spec, self.vehicle(cell)
+            self._rides[key] = Ride(
+                name=cell.ride.name,
+                track=self.track(cell),
+                irregularity=_irregularity(spec.irregularity),
+                track_seed=cell.ride_seed,
+                vehicle=vehicle,
+                profile=_profile(cell.ride),
+                engine=spec.engine,
+                step_s=spec.step_s,
+                rate_hz=spec.truth_rate_hz,
+                drive=cell.ride.drive,
+                conditions=_conditions(spec, vehicle),
+            )
+        return self._rides[key]
 
     def rails(self, cell: Cell) -> LaidTrack:
         """The rails of a cell's ride; the last ones are remembered, since cells come ride by ride."""
         ride = self.ride(cell)
-        key = (cell.spec.track, repr(ride.irregularity), ride.track_seed, repr(ride.conditions))
-        if self._laid is None or self._laid[0] != key:
-            self._laid = key, rails_of(ride)
+        if self._laid is None or self._laid[0] is not ride:
+            self._laid = ride, rails_of(ride)
         return self._laid[1]
 
+    def track(self, cell: Cell) -> TrackDesign:
+        """Design track of a cell."""
+        return self._noun("track", TrackFile, cell.spec.track, "track", TrackFile.design)
 
-def profile_of(cell: Cell) -> SpeedProfile:
-    """Speed profile of a cell's ride."""
-    ride = cell.ride
+    def vehicle(self, cell: Cell) -> VehicleModel:
+        """Vehicle of a cell."""
+        name = cell.spec.vehicle
+        vehicle = self._noun("vehicle", VehicleFile, name, "vehicle", VehicleFile.model)
+        if f"profiles {name}" not in self._content:
+            self._content[f"profiles {name}"] = profiles_digest(vehicle.wheel_rail)
+        return vehicle
+
+    def grade(self, cell: Cell) -> ImuGrade:
+        """IMU grade of a cell."""
+        return self._noun("imu", ImuFile, cell.imu.grade, f"imu[{cell.imu_index}].grade", ImuFile.grade)
+
+    def _noun(
+        self, kind: str, model: type[_Part], name: str, field: str, make: Callable[[_Part, str], _Noun]
+    ) -> _Noun:
+        """What a file of a kind stands for, read once; ``field`` is where the scenario names it."""
+        if (kind, name) not in self._nouns:
+            with blame(self.scenario.file, field):
+                part = load(model, kind, name, folder=self.scenario.folder)
+                self._content[f"{kind} {name}"] = part.model_dump(mode="json")
+                self._nouns[kind, name] = make(part, Path(name).stem)
+        noun: _Noun = self._nouns[kind, name]
+        return noun
+
+    def odometry(self, cell: Cell) -> Estimator | None:
+        """Odometry of a cell; None where there is none to be run (`odometry_estimator`)."""
+        name = cell.spec.odometry
+        if ("odometry", name) not in self._nouns:
+            self._nouns["odometry", name] = odometry_estimator(self.scenario, name)
+        odometry: Estimator | None = self._nouns["odometry", name]
+        return odometry
+
+    def odometries(self) -> dict[str, Estimator]:
+        """Odometries of the cells asked for so far, by the names that the scenario gives them."""
+        nouns = self._nouns.items()
+        return {name: noun for (kind, name), noun in nouns if kind == "odometry" and noun is not None}
+
+    def tunings(self, sample: int) -> dict[str, str]:
+        """How each estimator of a sample is tuned, by its name in the tables."""
+        self.estimators(sample)
+        return self._tunings[sample]
+
+    def estimators(self, sample: int) -> dict[str, Estimator]:
+        """Estimators of a sample by their names in the tables; those that no sample changes are shared."""
+        if sample in self._estimators:
+            return self._estimators[sample]
+        estimators: dict[str, Estimator] = {}
+        first = self._estimators.get(0, {})
+        listed = methods(self.scenario, sample=sample)
+        for method in listed:
+            is_drawn = any(
+                isinstance(option, Distribution)
+                for option in self.scenario.spec.estimator[method.index].options.values()
+            )
+            if method.name in estimators:
+                raise InputError(
+                    "two estimators have this name",
+                    file=self.scenario.file,
+                    field=f"estimator[{method.index}].name",
+                    value=method.name,
+                    remedy="give each a name of its own",
+                )
+            shared = None if is_drawn else first.get(method.name)
+            estimators[method.name] = shared or estimator_of(self.scenario, method)
+            for option, content in option_files(estimators[method.name]).items():
+                # What is in the files that its options name counts as the scenario's.
+                self._content[f"estimator {method.name} {option} {sample}"] = content
+        self._estimators[sample] = estimators
+        self._tunings[sample] = {method.name: method.tuning for method in listed}
+        return estimators
+
+
+def _profile(ride: RidePart) -> SpeedProfile:
+    """Speed profile of a ride."""
     return SpeedProfile(
         start_m=ride.start_m,
         end_m=ride.start_m if ride.end_m is None else ride.end_m,
@@ -178,18 +284,13 @@ def profile_of(cell: Cell) -> SpeedProfile:
     )
 
 
-def irregularity_of(cell: Cell) -> Irregularity:
-    """How the rails of a cell deviate from the design; a spectrum ``"none"`` if the scenario names none."""
-    part = cell.spec.irregularity
-    if part is None:
-        return NO_IRREGULARITY
-    return Irregularity(
-        spectrum=part.spectrum, wavelengths_m=part.wavelengths_m, fade_m=part.fade_m, scale=part.scale
-    )
+def _irregularity(part: IrregularityPart | None) -> Irregularity:
+    """How the rails deviate from the design; a spectrum ``"none"`` if the scenario names none."""
+    return NO_IRREGULARITY if part is None else Irregularity(**part.model_dump())
 
 
-def conditions_of(cell: Cell, vehicle: VehicleModel) -> tuple[RailCondition, ...]:
-    """What lies on the rails of a cell; a coefficient counts in relation to the vehicle's own."""
+def _conditions(spec: ScenarioFile, vehicle: VehicleModel) -> tuple[RailCondition, ...]:
+    """What lies on the rails; a coefficient counts in relation to the vehicle's own."""
     clean = vehicle.wheel_rail.friction
     return tuple(
         RailCondition(
@@ -198,13 +299,12 @@ def conditions_of(cell: Cell, vehicle: VehicleModel) -> tuple[RailCondition, ...
             factor=(part.friction or FRICTION.get(part.condition or "dry", clean)) / clean,
             rails=part.rails,
         )
-        for part in cell.spec.rail_condition
+        for part in spec.rail_condition
     )
 
 
-def mount_of(cell: Cell) -> Mount:
-    """Where the IMU of a cell sits."""
-    imu = cell.imu
+def _mount(imu: ImuPart) -> Mount:
+    """Where an IMU sits."""
     return Mount(
         name=imu.name,
         body=imu.body,
@@ -215,34 +315,10 @@ def mount_of(cell: Cell) -> Mount:
     )
 
 
-def encoder_of(cell: Cell) -> EncoderSpec | None:
-    """Encoder of a cell, if its scenario has one."""
-    part = cell.spec.encoder
-    return None if part is None else part.spec()
-
-
-def magnetometer_of(cell: Cell) -> MagnetometerSpec | None:
-    """Magnetometer of a cell, if its scenario has one; steel stands where the seed of the track puts it."""
-    part = cell.spec.magnetometer
-    return None if part is None else part.spec(cell.ride_seed)
-
-
-def rail_sensor_of(cell: Cell) -> RailSensorSpec | None:
-    """Rail sensor of a cell, if its scenario has one."""
-    part = cell.spec.rail_sensor
-    return None if part is None else part.spec()
-
-
 def bands_by_name(spec: ScenarioFile) -> dict[str, Band]:
     """Every wavelength band that a scenario can speak of: the standard's, and its own."""
     own = spec.geometry.own_bands.items()
     return {**BANDS, **{name: Band(name, *wavelengths) for name, wavelengths in own}}
-
-
-def bands_of(cell: Cell) -> tuple[Band, ...]:
-    """Wavelength bands that the rail geometry of a cell is scored in."""
-    part, known = cell.spec.geometry, bands_by_name(cell.spec)
-    return tuple(known[name] for name in (*part.bands, *part.own_bands))
 
 
 def limits_of(spec: ScenarioFile) -> dict[str, Limits]:
@@ -260,15 +336,3 @@ def goals_mm(spec: ScenarioFile) -> dict[str, float]:
     """What the errors of rail geometry in D1 are asked to be at most, sd."""
     limits = spec.geometry.limits.items()
     return {name: part.error_sd_mm for name, part in limits if part.error_sd_mm is not None}
-
-
-def earth_of(cell: Cell) -> EarthRate | None:
-    """Rotation of the Earth in a cell; None for an Earth at rest."""
-    part = cell.spec.earth
-    return None if part is None else EarthRate(radians(part.latitude_deg), radians(part.x_axis_deg))
-
-
-def temperature_of(cell: Cell) -> Temperature | None:
-    """Temperature of the IMU of a cell; None for that of its calibration."""
-    part = cell.spec.temperature
-    return None if part is None else Temperature(part.start_c, part.ambient_c, part.time_constant_s)

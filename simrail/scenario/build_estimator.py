@@ -19,9 +19,11 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
 from simrail.core.errors import InputError
-from simrail.core.toml_files import blame, shipped_folder
-from simrail.estimation.estimate import SENSORS, Estimator, estimator_class
-from simrail.estimation.user_modules import load_own
+from simrail.core.toml_files import blame, existing_file, shipped_folder
+from simrail.estimation.choose_odometry import NONE, TRUTH, odometry_named
+from simrail.estimation.estimate import Estimator, description_of
+from simrail.estimation.user_modules import class_named
+from simrail.scenario.axes import each
 from simrail.scenario.cells import Method
 from simrail.scenario.scenario import Scenario
 
@@ -45,67 +47,64 @@ def estimator_of(scenario: Scenario, method: Method) -> Estimator:
 
 
 def _judge_needs(scenario: Scenario, method: Method, estimator: Estimator) -> None:
-    """Refuse an estimator that needs a sensor which the scenario lacks."""
-    for need in getattr(estimator, "needs", ()):
-        field = f"estimator[{method.index}]"
-        if need not in SENSORS:
-            raise InputError(
-                "needs what no scenario has",
-                file=scenario.file,
-                field=f"{field}.method",
-                value=need,
-                limit="one of " + ", ".join(SENSORS),
-                remedy="mend 'needs' of the estimator",
-            )
-        if getattr(scenario.spec, need) is not None:
-            continue
-        # Where an option of that name asks for the sensor, the option may as well be given up.
-        asked = method.part.options.get(need)
-        raise InputError(
-            f"the scenario has no {need.replace('_', ' ')}",
-            file=scenario.file,
-            field=f"{field}.options.{need}" if asked else f"{field}.method",
-            value=asked or method.part.method,
-            limit=f"a scenario with a table [{need}]",
-            remedy=f"add a [{need}] to the scenario, or "
-            + (f"set {need} = false" if asked is True else "remove this estimator"),
-        )
-
-
-def class_named(name: str, folder: Path | None) -> type[Estimator]:
-    """Class of a method: a registered name, or ``"file.py:Class"`` for one's own file."""
-    path_name, colon, class_name = name.rpartition(":")
-    if not colon or not path_name.endswith(".py"):
-        return estimator_class(name)
-    found = getattr(load_own(_existing(path_name, folder), shown=path_name), class_name, None)
-    if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
-        raise InputError(
-            "the file has no such estimator class",
-            value=class_name,
-            limit="a class with a method estimate(recording)",
-            remedy="see 'simrail new estimator NAME'",
-        )
-    own: type[Estimator] = found
-    return own
-
-
-def _existing(name: str, folder: Path | None, *, also: Path | None = None) -> Path:
-    """A file by its path, seen from a folder (that of the scenario), from here, or from one more folder."""
-    for candidate in (*([folder / name] if folder else []), Path(name), *([also / name] if also else [])):
-        if candidate.is_file():
-            return candidate
-    near = difflib.get_close_matches(name, _relative(also), n=1) if also else []
+    """Refuse an estimator that says nonsense of itself, or needs what the scenario lacks."""
+    field = f"estimator[{method.index}]"
+    with blame(scenario.file, f"{field}.method"):
+        needs = description_of(estimator).needs
+    lacking = lacks(scenario, needs)
+    if not lacking:
+        return
+    need, limit, remedy = lacking
+    # Where an option of that name asks for the sensor, the option may as well be given up.
+    asked = method.part.options.get(need)
     raise InputError(
-        "no such file",
-        value=name,
-        remedy="mend the path; it is seen from the scenario's folder"
-        + (f" (shipped: {near[0]})" if near else ""),
+        f"the scenario has no {need.replace('_', ' ')}",
+        file=scenario.file,
+        field=f"{field}.options.{need}" if asked else f"{field}.method",
+        value=asked or method.part.method,
+        limit=limit,
+        remedy=f"{remedy}, or " + (f"set {need} = false" if asked is True else "remove this estimator"),
     )
 
 
-def _relative(folder: Path) -> list[str]:
-    """TOML files in the folders of a folder, as a scenario names them."""
-    return [path.relative_to(folder).as_posix() for path in sorted(folder.glob("*/*.toml"))]
+def lacks(scenario: Scenario, needs: tuple[str, ...]) -> tuple[str, str, str] | None:
+    """The first of some needs that a scenario lacks, what it would take, and the remedy; None if none."""
+    for need in needs:
+        if need == "odometry":
+            if NONE in each(scenario.spec.odometry):
+                remedy = "add an [encoder] to the scenario, or name an odometry that needs none"
+                return need, 'an odometry other than "none"', remedy
+        elif getattr(scenario.spec, need) is None:
+            return need, f"a scenario with a table [{need}]", f"add a [{need}] to the scenario"
+    return None
+
+
+def odometry_estimator(scenario: Scenario, name: str) -> Estimator | None:
+    """The odometry that a scenario names; None where there is none to be run: ``"none"`` and ``"truth"``.
+
+    Raises
+    ------
+    InputError
+        If there is no such odometry, or it needs what the scenario lacks.
+    """
+    if name in (NONE, TRUTH):
+        return None
+    with blame(scenario.file, "odometry"):
+        estimator = odometry_named(name, scenario.folder)
+        needs = description_of(estimator).needs
+    lacking = lacks(scenario, needs)
+    if lacking is not None:
+        need, limit, remedy = lacking
+        article = "an" if need[0] in "aeiou" else "a"
+        raise InputError(
+            f"the odometry needs {article} {need.replace('_', ' ')}",
+            file=scenario.file,
+            field="odometry",
+            value=name,
+            limit=limit,
+            remedy=f'{remedy}, or set odometry = "truth" for an ablation, or "none"',
+        )
+    return estimator
 
 
 def option_files(estimator: Estimator) -> dict[str, str]:
@@ -159,7 +158,7 @@ def _option(kind: Any, name: str, value: Any, folder: Path | None) -> Any:
         if not isinstance(value, str):
             raise InputError("has the wrong type", field=name, value=value, limit="the path of a file")
         with blame(None, name):
-            return of_file.from_file(_existing(value, folder, also=shipped_folder()))
+            return of_file.from_file(existing_file(value, folder, also=shipped_folder()))
     if isinstance(value, list):
         value = tuple(tuple(item) if isinstance(item, list) else item for item in value)
     try:

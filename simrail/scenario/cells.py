@@ -22,7 +22,7 @@ from math import prod
 from typing import Any
 
 from simrail.scenario.axes import Scalar, axes_of, drawn, expand
-from simrail.scenario.samples import sample_count, samples_of
+from simrail.scenario.distributions import sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 
@@ -246,7 +246,7 @@ def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:
         Whose values the options have that are distributions. Names are the same in every sample.
     """
     values = samples_of(scenario.spec)[sample]
-    found = []
+    listed_methods = []
     for i, part in enumerate(scenario.spec.estimator):
         for settings, listed in expand(part):
             _, concrete = drawn(listed, values, prefix=f"estimator.{part.name}.")
@@ -254,8 +254,8 @@ def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:
             variant = ",".join(f"{key}={value}" for key, value in options.items())
             name = f"{part.name}[{variant}]" if variant else part.name
             tuning = str(concrete.options.get("tuning", "default"))
-            found.append(Method(name=name, tuning=tuning, part=concrete, index=i))
-    return found
+            listed_methods.append(Method(name=name, tuning=tuning, part=concrete, index=i))
+    return listed_methods
 
 
 def _size(part: Any, fields: tuple[str, ...] | None = None) -> int:

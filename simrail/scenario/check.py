@@ -1,4 +1,4 @@
-"""Judging a scenario without running it: do track, vehicle, rides, sensors and estimators fit?
+"""Judging a scenario without running it: track, vehicle, rides, sensors and estimators fit each other.
 
 `judge_scenario` refuses what cannot be run, or would mean nothing, with one `InputError`; and
 returns a `Plan` that says what will be run, with warnings. Each ride is judged once
@@ -9,15 +9,16 @@ returns a `Plan` that says what will be run, with warnings. Each ride is judged 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from simrail.core.errors import InputError
+from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
-from simrail.scenario.samples import dimensions, sample_count
+from simrail.scenario.distributions import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import judge_stop_rule
 from simrail.scoring.table import CURVE_PREFIX, METRICS, WINDOWS
@@ -27,10 +28,14 @@ MOST_CELLS = 1_000_000
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scenario that has been judged will run.
+    """A scenario that has been judged, and what it will run.
 
     Attributes
     ----------
+    scenario : Scenario
+        As read.
+    parts : Parts
+        What it names, read; its cells are resolved here.
     rides, cells : int
         Numbers of rides to simulate (cached ones among them) and of recordings to estimate from.
     simulated_s : float
@@ -43,6 +48,8 @@ class Plan:
         Hash of the scenario and of the parts that it names.
     """
 
+    scenario: Scenario = field(repr=False)
+    parts: Parts = field(repr=False)
     rides: int
     cells: int
     simulated_s: float
@@ -78,57 +85,67 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
             limit=f"{MOST_CELLS}",
             remedy="shorten a list or take fewer draws; 'simrail run --yes' runs them all",
         )
-    _judge_score(scenario)
-    estimators = parts.estimators(0)
-    for sample in range(1, sample_count(scenario.spec)):
-        parts.estimators(sample)
-    judge_stop_rule(scenario, estimators)
-    warnings: dict[str, None] = dict.fromkeys(
-        [*_judge_samples(scenario), *_judge_twist(scenario, estimators)]
+    with blame(scenario.file):
+        _judge_score(scenario)
+        estimators = parts.estimators(0)
+        for sample in range(1, sample_count(scenario.spec)):
+            parts.estimators(sample)
+        judge_stop_rule(scenario, estimators)
+        simulated, unusual = _judge_cells(scenario, parts)
+        warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
+    return Plan(
+        scenario, parts, rides, total, simulated, estimators, tuple(dict.fromkeys(warnings)), parts.hash
     )
+
+
+def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
+    """Judge each ride, draws aside, and each set of sensors on it; simulated time of all rides, warnings."""
+    warnings: list[str] = []
     simulated = 0.0
-    judged_rides: set[tuple[str, ...]] = set()
-    judged_sensors: set[tuple[str, ...]] = set()
+    last_ride = None
+    durations: dict[tuple[object, ...], float] = {}
+    judged_sensors: set[tuple[object, ...]] = set()
     for cell in first_cells(scenario):
-        ride_key = (
-            cell.spec.track,
-            cell.spec.vehicle,
-            cell.spec.engine,
-            repr(cell.spec.truth_rate_hz),
-            repr(cell.ride),
+        resolved = parts.resolve(cell)
+        ride = resolved.ride
+        way = (
+            ride.name,
+            id(ride.track),
+            id(ride.vehicle),
+            ride.profile,
+            ride.engine,
+            ride.rate_hz,
+            ride.drive,
         )
-        sensor_key = (
-            cell.spec.vehicle,
-            cell.spec.engine,
-            repr(cell.imu),
-            *map(repr, (cell.spec.encoder, cell.spec.magnetometer, cell.spec.rail_sensor)),
-        )
-        if (*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)) not in judged_rides:
-            judged_rides.add((*ride_key, repr(cell.spec.irregularity), repr(cell.spec.step_s)))
-            duration, found = judge_ride(scenario, cell, parts)
-            warnings.update(dict.fromkeys(found))
-            simulated += duration * scenario.spec.monte_carlo.track_draws
-        if (*sensor_key, cell.spec.odometry, *ride_key) not in judged_sensors:
-            judged_sensors.add((*sensor_key, cell.spec.odometry, *ride_key))
-            judge_sensors(scenario, cell, parts)
-    return Plan(rides, total, simulated, estimators, tuple(warnings), parts.hash)
+        ride_key = (*way, ride.irregularity, ride.step_s)
+        if ride_key not in durations:
+            durations[ride_key], unusual = judge_ride(resolved)
+            warnings += unusual
+        if cell.ride_number != last_ride:
+            last_ride = cell.ride_number
+            simulated += durations[ride_key] * scenario.spec.monte_carlo.track_draws
+        words = map(repr, (cell.imu, cell.spec.encoder, cell.spec.magnetometer, cell.spec.rail_sensor))
+        sensor_key = (*way, *words, cell.spec.odometry)
+        if sensor_key not in judged_sensors:
+            judged_sensors.add(sensor_key)
+            judge_sensors(resolved)
+    return simulated, warnings
 
 
 def _judge_score(scenario: Scenario) -> None:
     score = scenario.spec.score
-    for field, words, known in (
+    for name, words, possible in (
         ("windows", score.windows, (*WINDOWS, CURVE_PREFIX + "*")),
         ("metrics", score.metrics, METRICS),
     ):
         for i, word in enumerate(words or ()):
-            of_one_curve = field == "windows" and word.startswith(CURVE_PREFIX)
-            if word not in known and not of_one_curve:
+            of_one_curve = name == "windows" and word.startswith(CURVE_PREFIX)
+            if word not in possible and not of_one_curve:
                 raise InputError(
-                    f"is not one of the {field}",
-                    file=scenario.file,
-                    field=f"score.{field}[{i}]",
+                    f"is not one of the {name}",
+                    field=f"score.{name}[{i}]",
                     value=word,
-                    limit="one of " + ", ".join(known),
+                    limit="one of " + ", ".join(possible),
                 )
 
 
@@ -146,9 +163,9 @@ def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> lis
 
 def _judge_samples(scenario: Scenario) -> list[str]:
     """Warn of samples that draw nothing, and of distributions that are drawn from once."""
-    monte_carlo, found = scenario.spec.monte_carlo, dimensions(scenario.spec)
-    if monte_carlo.samples > 1 and not found:
+    monte_carlo, drawn = scenario.spec.monte_carlo, dimensions(scenario.spec)
+    if monte_carlo.samples > 1 and not drawn:
         return [f"monte_carlo.samples = {monte_carlo.samples} counts for nothing: no value is a distribution"]
-    if monte_carlo.samples == 1 and found:
-        return [f"one sample only of {', '.join(found)}; set monte_carlo.samples"]
+    if monte_carlo.samples == 1 and drawn:
+        return [f"one sample only of {', '.join(drawn)}; set monte_carlo.samples"]
     return []

@@ -1,8 +1,8 @@
-"""Judging a ride and its track: does the vehicle stay on it, can the curves hold the speed, is the step safe?
+"""Judging a ride: the vehicle fits and stays on its track, curves hold the speed, and the step is safe.
 
 European and urban standards advise on cant deficiency; here a ride above 1.0 m/s2 of uncompensated
-lateral acceleration is warned of and one above 1.5 m/s2 is refused. What wheels and rails do to each
-other is judged by `simrail.scenario.check_wheels`, the sensors by `simrail.scenario.check_sensors`.
+lateral acceleration is warned of and one above 1.5 m/s2 is refused. Sensors are judged by
+`simrail.scenario.check_sensors`. Faults name no file: the caller knows the scenario's.
 """
 
 from __future__ import annotations
@@ -11,33 +11,29 @@ import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
-from simrail.scenario.build import Parts, irregularity_of, profile_of
-from simrail.scenario.cells import Cell
-from simrail.scenario.check_wheels import judge_wheels
-from simrail.scenario.scenario import Scenario
+from simrail.ride.ride import rails_of
+from simrail.scenario.build import ResolvedCell
 from simrail.track.design import TrackDesign
-from simrail.track.laid_track import lay
+from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.speed_profile import SpeedProfile
 
 WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5
 LONGEST_RIDE_S = 7200.0
 GRAVITY_MPS2 = 9.81
 
+MOST_BASE_PER_GAUGE = 1.1
+"""The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
 
-def judge_ride(scenario: Scenario, cell: Cell, parts: Parts) -> tuple[float, list[str]]:
+
+def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
     """Judge the ride of a cell.
 
     Parameters
     ----------
-    scenario : Scenario
-        As read.
-    cell : Cell
+    resolved : ResolvedCell
         Any cell of the ride.
-    parts : Parts
-        The scenario's parts.
 
     Returns
     -------
@@ -52,63 +48,59 @@ def judge_ride(scenario: Scenario, cell: Cell, parts: Parts) -> tuple[float, lis
         If its track cannot be laid, the vehicle cannot stand on it or leaves it, or the ride is too long,
         too fast for a curve, or too coarse a step for the integrator.
     """
-    field, ride = f"ride[{cell.ride_index}]", cell.ride
-    track, vehicle = parts.track(cell), parts.vehicle(cell)
-    _judge_irregularity(scenario, cell, track)
+    words, vehicle = resolved.cell.ride, resolved.ride.vehicle
+    with blame(None, f"ride[{resolved.cell.ride_index}]"):
+        if words.start_m == words.end_m:
+            raise InputError(
+                "the ride ends where it starts",
+                field="end_m",
+                value=words.end_m,
+                remedy="end_m > start_m runs forward, end_m < start_m backward",
+            )
     with blame(f"vehicle {vehicle.name}", "axle"):
         _judge_loads(vehicle)
-    if ride.start_m == ride.end_m:
-        raise InputError(
-            "the ride ends where it starts",
-            file=scenario.file,
-            field=f"{field}.end_m",
-            value=ride.end_m,
-            remedy="end_m > start_m runs forward, end_m < start_m backward",
-        )
-    _judge_places(scenario, cell, track, vehicle.reach_m)
-    judge_wheels(scenario, cell, track, vehicle)
-    profile = profile_of(cell)
-    with blame(scenario.file, field):
-        duration = profile.duration_s
-    if not duration <= LONGEST_RIDE_S:
-        raise InputError(
-            "the ride takes too long",
-            file=scenario.file,
-            field=f"{field}.speed_kmh",
-            value="standing" if ride.speed_kmh is None else f"{ride.speed_kmh:g} km/h, {duration:.0f} s",
-            limit=f"{LONGEST_RIDE_S:.0f} s",
-            remedy="ride faster, shorter, or with less dwell time",
-        )
-    warnings = _judge_step(scenario, cell, vehicle)
-    if not ride.stands:
-        warnings += _judge_dynamics(scenario, cell, track, profile)
+    _judge_places(resolved)
+    _judge_wheels(resolved)
+    _judge_rails(resolved)
+    with blame(None, f"ride[{resolved.cell.ride_index}]"):
+        duration = resolved.ride.profile.duration_s
+        if not duration <= LONGEST_RIDE_S:
+            raise InputError(
+                "the ride takes too long",
+                field="speed_kmh",
+                value="standing" if words.stands else f"{words.speed_kmh:g} km/h, {duration:.0f} s",
+                limit=f"{LONGEST_RIDE_S:.0f} s",
+                remedy="ride faster, shorter, or with less dwell time",
+            )
+    warnings = _judge_step(resolved)
+    if not words.stands:
+        warnings += _judge_dynamics(resolved)
     return duration, warnings
 
 
-def _judge_irregularity(scenario: Scenario, cell: Cell, track: TrackDesign) -> None:
-    irregularity = irregularity_of(cell)
-    # Laying the track is the judgement: it takes a moment and no rule can be forgotten.
+def _judge_rails(resolved: ResolvedCell) -> None:
+    """Refuse irregularities that cannot be, and conditions off the track or without sense."""
+    ride = resolved.ride
+    check_conditions(ride.conditions, ride.track.start_m, ride.track.end_m)
     try:
-        lay(track, irregularity, seed=cell.ride_seed)
+        rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
     except InputError as error:
-        if error.file is None:
-            error.file = scenario.file
-            field = error.field or ""
-            error.field = field if field.startswith("irregularity") else f"irregularity.{field}".rstrip(".")
+        if error.file is None and not (error.field or "").startswith("irregularity"):
+            error.field = f"irregularity.{error.field or ''}".rstrip(".")
         raise
 
 
-def _judge_step(scenario: Scenario, cell: Cell, vehicle: VehicleModel) -> list[str]:
+def _judge_step(resolved: ResolvedCell) -> list[str]:
     """Refuse a step that the vehicle's wheels on their rails make unstable; warn where it is inaccurate."""
-    if cell.spec.engine == "kinematic":
+    vehicle, step = resolved.ride.vehicle, resolved.ride.step_s
+    if resolved.ride.engine == "kinematic":
         return []
-    step, resonance = cell.spec.step_s, contact_resonance(vehicle, gravity_mps2=GRAVITY_MPS2)
+    resonance = contact_resonance(vehicle, gravity_mps2=GRAVITY_MPS2)
     advised = f"step_s = {resonance.advised_step_s:.8g}"
     frequency = f"{resonance.normal_radps / (2.0 * np.pi):.0f} Hz"
     if step > resonance.longest_step_s:
         raise InputError(
             f"the integrator would be unstable: axles of {vehicle.name} swing on their rails at {frequency}",
-            file=scenario.file,
             field="step_s",
             value=step,
             limit=f"{resonance.longest_step_s:.2g} s",
@@ -136,39 +128,39 @@ def _judge_loads(vehicle: VehicleModel) -> None:
         )
 
 
-def _judge_places(scenario: Scenario, cell: Cell, track: TrackDesign, ahead: tuple[float, float]) -> None:
+def _judge_places(resolved: ResolvedCell) -> None:
     """Refuse a ride whose vehicle would leave the track, or that stops beyond its end."""
-    ride = cell.ride
+    words, track, ahead = resolved.cell.ride, resolved.ride.track, resolved.ride.vehicle.reach_m
+    field = f"ride[{resolved.cell.ride_index}]"
     low, high = track.start_m - ahead[0], track.end_m - ahead[1]
-    places = {"start_m": ride.start_m} | ({} if ride.end_m is None else {"end_m": ride.end_m})
+    places = {"start_m": words.start_m} | ({} if words.end_m is None else {"end_m": words.end_m})
     for name, position in places.items():
         if not low <= position <= high:
             raise InputError(
                 f"the ride is not on track {track.name!r}",
-                file=scenario.file,
-                field=f"ride[{cell.ride_index}].{name}",
+                field=f"{field}.{name}",
                 value=position,
                 limit=f"{low:g} to {high:g} m (the track is {track.start_m:g} to {track.end_m:g} m"
                 + (", the axles reach out from the reference point)" if any(ahead) else ")"),
                 remedy="shorten the ride or lengthen the track",
             )
     first, last = min(places.values()), max(places.values())
-    for i, stop in enumerate(ride.stops):
+    for i, stop in enumerate(words.stops):
         if not first < stop.position_m < last:
             raise InputError(
                 "the stop is not on the way",
-                file=scenario.file,
-                field=f"ride[{cell.ride_index}].stops[{i}].position_m",
+                field=f"{field}.stops[{i}].position_m",
                 value=stop.position_m,
                 limit=f"between {first:g} and {last:g} m",
                 remedy="move the stop, or let the ride start or end elsewhere",
             )
 
 
-def _judge_dynamics(scenario: Scenario, cell: Cell, track: TrackDesign, profile: SpeedProfile) -> list[str]:
+def _judge_dynamics(resolved: ResolvedCell) -> list[str]:
     """Refuse a speed that a curve cannot hold; warn where it is uncomfortable, or never reached."""
-    field, ride = f"ride[{cell.ride_index}]", cell.ride
-    assert ride.speed_kmh is not None
+    field, words = f"ride[{resolved.cell.ride_index}]", resolved.cell.ride
+    track, profile = resolved.ride.track, resolved.ride.profile
+    assert words.speed_kmh is not None
     times = np.arange(0.0, profile.duration_s, 0.1)
     s, v, _ = profile.motion(times)
     frame = track.frame(np.clip(s, track.start_m, track.end_m))
@@ -185,9 +177,8 @@ def _judge_dynamics(scenario: Scenario, cell: Cell, track: TrackDesign, profile:
         raise InputError(
             f"the track cannot hold this speed: {lateral[i]:.2f} m/s2 uncompensated lateral acceleration "
             f"in {where}",
-            file=scenario.file,
             field=f"{field}.speed_kmh",
-            value=ride.speed_kmh,
+            value=words.speed_kmh,
             limit=f"{REFUSE_LATERAL_MPS2:g} m/s2",
             remedy=f"ride at most at {np.floor(3.6 * np.min(allowed)):.0f} km/h, "
             "or use a wider curve or more cant",
@@ -195,13 +186,52 @@ def _judge_dynamics(scenario: Scenario, cell: Cell, track: TrackDesign, profile:
     warnings = []
     if lateral[i] > WARN_LATERAL_MPS2:
         warnings.append(
-            f"{field} ({ride.name}) at {ride.speed_kmh:g} km/h: {lateral[i]:.2f} m/s2 uncompensated lateral "
-            f"acceleration in {where}; above {WARN_LATERAL_MPS2:g} m/s2 is uncomfortable"
+            f"{field} ({words.name}) at {words.speed_kmh:g} km/h: {lateral[i]:.2f} m/s2 uncompensated "
+            f"lateral acceleration in {where}; above {WARN_LATERAL_MPS2:g} m/s2 is uncomfortable"
         )
     reached = 3.6 * float(np.max(np.abs(v)))
-    if reached < 0.99 * ride.speed_kmh:
+    if reached < 0.99 * words.speed_kmh:
         warnings.append(
-            f"{field} ({ride.name}): reaches {reached:.0f} of {ride.speed_kmh:g} km/h, since the way "
+            f"{field} ({words.name}): reaches {reached:.0f} of {words.speed_kmh:g} km/h, since the way "
             "between stops is too short for its acceleration and jerk"
         )
     return warnings
+
+
+def _judge_wheels(resolved: ResolvedCell) -> None:
+    """Refuse wheels beside the rails, that cannot drive, or that feel no friction where it is asked for."""
+    ride, vehicle = resolved.ride, resolved.ride.vehicle
+    _judge_gauge(ride.track, vehicle)
+    followed = ride.engine == "kinematic"
+    if ride.drive == "wheels" and (followed or vehicle.traction is None):
+        raise InputError(
+            "the wheels cannot drive: " + ("the engine has no forces" if followed else "no [traction]"),
+            field=f"ride[{resolved.cell.ride_index}].drive",
+            value="wheels",
+            limit="engine compiled or exudyn" if followed else f"a vehicle with traction, not {vehicle.name}",
+            remedy='choose such an engine, or drive = "guide"'
+            if followed
+            else 'give the vehicle file a [traction], or drive = "guide"',
+        )
+    if followed and ride.conditions:
+        raise InputError(
+            "a body that follows the rails does not feel their friction",
+            field="rail_condition",
+            value="engine kinematic",
+            limit="engine compiled or exudyn",
+            remedy="choose such an engine, or remove the rail conditions",
+        )
+
+
+def _judge_gauge(track: TrackDesign, vehicle: VehicleModel) -> None:
+    """Refuse a vehicle of another gauge: what a rail is off would not turn it as it turns the track."""
+    low, high = vehicle.wheel_rail.gauge_m, MOST_BASE_PER_GAUGE * vehicle.wheel_rail.gauge_m
+    if not low < track.rail_base_m < high:
+        raise InputError(
+            f"vehicle {vehicle.name!r} does not fit track {track.name!r}: the running tables of its gauge of "
+            f"{1e3 * vehicle.wheel_rail.gauge_m:g} mm are not as far apart as the track's",
+            field="vehicle",
+            value=f"rail_base_mm = {1e3 * track.rail_base_m:g} in the track file",
+            limit=f"{1e3 * low:g} to {1e3 * high:g} mm",
+            remedy="choose a vehicle of the track's gauge, or correct the track's rail_base_mm",
+        )

@@ -1,23 +1,38 @@
 """Distributions as values: ``speed_kmh = { uniform = [20.0, 70.0] }`` instead of one number or a list.
 
 A `Distribution` is what a person wrote, judged; `at` turns a number between 0 and 1 into a value, by
-the inverse of the distribution function. Which numbers those are, jointly for all distributions of a
-scenario, is decided in `simrail.scenario.samples`.
+the inverse of the distribution function. Every distribution is bounded: a value that no field could hold is
+refused when the scenario is read, not when the draw that has it is run hours later.
 
-Every distribution is bounded: a value that no field could hold is refused when the scenario is read,
-not when the draw that has it is run hours later.
+All distributions of a scenario (of its tables, rides, IMUs and estimators) are dimensions of one design, a
+Latin hypercube or Sobol points, so that few samples fill the whole space (`samples_of`). Each dimension has
+a random stream of its own, found by its name:
+
+* Latin hypercube: a dimension's values do not change when another distribution is added; they do
+  when the number of samples changes, since every sample is one of n equal shares.
+* Sobol: a dimension's values stay when samples are added, and when a distribution is added behind it;
+  the number of samples is a power of two. Points are moved by a random digital shift per dimension.
+
+Sources: McKay, Beckman, Conover 1979 (Latin hypercube); Owen 1998, section on digital shifts (Sobol).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import exp, log
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from scipy.special import ndtr, ndtri
 
 from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.seeds import stream
+from simrail.core.toml_files import Part
+
+if TYPE_CHECKING:
+    from simrail.scenario.scenario import ScenarioFile
 
 Value = str | int | float | bool
 
@@ -28,6 +43,9 @@ FORMS = {
     "choice": '{ choice = ["a", "b"] }',
 }
 """How each kind is written."""
+
+SOBOL_BITS = 30
+ARRAYS = ("ride", "imu", "estimator")
 
 LARGEST = 1e300
 """Beyond it, differences of two numbers are no numbers any more."""
@@ -108,14 +126,14 @@ def read_distribution(table: dict[str, Any], judge: Callable[[Any], Any] | None 
         )
     kind, given, bounds = kinds[0], table[kinds[0]], table.get("bounds")
     if kind == "choice":
-        found = _choice(given, bounds)
+        distribution = _choice(given, bounds)
     else:
         pair = _pair(given, kind, "mean and standard deviation" if kind == "normal" else "lowest, highest")
-        found = _continuous(kind, pair, bounds)
+        distribution = _continuous(kind, pair, bounds)
     if judge is None:
-        return found
-    judged = tuple(judge(value) for value in found.extremes)
-    return Distribution(kind, judged) if found.kind == "choice" else found
+        return distribution
+    judged = tuple(judge(value) for value in distribution.extremes)
+    return Distribution(kind, judged) if kind == "choice" else distribution
 
 
 def _choice(given: object, bounds: object) -> Distribution:
@@ -196,3 +214,70 @@ def _numbers(given: list[Any]) -> Iterator[float]:
     for item in given:
         if isinstance(item, (int, float)) and not isinstance(item, bool) and -LARGEST < item < LARGEST:
             yield float(item)
+
+
+def distributions_of(
+    model: Part, *, prefix: str = "", fields: Iterable[str] | None = None
+) -> dict[str, Distribution]:
+    """Find the distributions of a model and of the tables within it; see `simrail.scenario.axes.axes_of`."""
+    return {name: value for name, value in leaves(model, prefix, fields) if isinstance(value, Distribution)}
+
+
+def leaves(model: Part, prefix: str, fields: Iterable[str] | None) -> Iterator[tuple[str, object]]:
+    """Names and values of a model's fields and of those of the tables within it."""
+    for name in type(model).model_fields if fields is None else fields:
+        value = getattr(model, name)
+        if isinstance(value, Part):
+            yield from leaves(value, f"{prefix}{name}.", None)
+        elif isinstance(value, dict):
+            yield from ((f"{prefix}{name}.{key}", item) for key, item in value.items())
+        else:
+            yield prefix + name, value
+
+
+def dimensions(spec: ScenarioFile) -> dict[str, Distribution]:
+    """All distributions of a scenario, by name: ``irregularity.scale``, ``ride.out.speed_kmh``."""
+    named = distributions_of(spec)
+    for array in ARRAYS:
+        for part in getattr(spec, array):
+            named |= distributions_of(part, prefix=f"{array}.{part.name}.")
+    return named
+
+
+def samples_of(spec: ScenarioFile) -> list[dict[str, Value]]:
+    """The values of all distributions in each sample; one sample without values if there are none.
+
+    Parameters
+    ----------
+    spec : ScenarioFile
+        Its ``[monte_carlo]`` says how many samples, and by which method.
+    """
+    named = dimensions(spec)
+    if not named:
+        return [{}]
+    shares = _shares(spec, list(named))
+    return [
+        {name: distribution.at(share) for (name, distribution), share in zip(named.items(), row, strict=True)}
+        for row in shares.tolist()
+    ]
+
+
+def sample_count(spec: ScenarioFile) -> int:
+    """Number of samples; 1 without distributions."""
+    return spec.monte_carlo.samples if dimensions(spec) else 1
+
+
+def _shares(spec: ScenarioFile, names: list[str]) -> FloatArray:
+    """Points (samples, dimensions) in the unit cube."""
+    from scipy.stats import qmc  # slow to import, and needed by few scenarios
+
+    n = spec.monte_carlo.samples
+    if spec.monte_carlo.method == "latin_hypercube":
+        # Columns of a Latin hypercube are independent, so that each may have a stream of its own.
+        columns = [qmc.LatinHypercube(1, rng=stream(spec.seed, "sample", name)).random(n) for name in names]
+        return np.hstack(columns)
+    points = qmc.Sobol(len(names), scramble=False, bits=SOBOL_BITS).random(n)
+    digits = np.round(points * 2**SOBOL_BITS).astype(np.int64)
+    shifts = [int(stream(spec.seed, "sample", name).integers(2**SOBOL_BITS)) for name in names]
+    shares: FloatArray = ((digits ^ np.array(shifts)) + 0.5) / 2.0**SOBOL_BITS
+    return shares

@@ -17,7 +17,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
-from simrail.estimation.choose_odometry import OdometryName
 from simrail.scenario.axes import Axis, Listed, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
@@ -41,6 +40,8 @@ class ScenarioFile(Part):
     """The content of a scenario file.
 
     ``paper`` names the publication whose tables and figures the report sets beside the scenario's own.
+    ``odometry`` names that which the estimators work with (`simrail.estimation.choose_odometry`); if it is
+    not given, ``"curve_matched"`` with an ``[encoder]`` and ``"none"`` without.
     """
 
     title: str
@@ -52,7 +53,7 @@ class ScenarioFile(Part):
     step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=1000.0)]] = 1000.0
     monte_carlo: MonteCarloPart = MonteCarloPart()
-    odometry: Listed[OdometryName] = "curve_matched"
+    odometry: Listed[str] = ""
     irregularity: IrregularityPart | None = None
     rail_condition: tuple[RailConditionPart, ...] = ()
     ride: Annotated[list[RidePart], Field(min_length=1)]
@@ -170,7 +171,8 @@ def read_scenario(
     listed = [
         _options_as_axes(part, f"estimator[{i}].options", file) for i, part in enumerate(spec.estimator)
     ]
-    spec = spec.model_copy(update={"estimator": listed})
+    usual = "none" if spec.encoder is None else "curve_matched"
+    spec = spec.model_copy(update={"estimator": listed, "odometry": spec.odometry or usual})
     return Scenario(name=name, file=file, folder=folder, text=text, overrides=tuple(overrides), spec=spec)
 
 

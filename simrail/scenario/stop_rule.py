@@ -1,8 +1,8 @@
 """When a campaign has seen enough: the interval of a named metric is narrower than asked, in every case.
 
 The rule looks at fixed numbers of draws, `least_draws` first and then half as many more each time, and
-never at what happens to be finished: the cells of a look are all run before it, so that the cells of the
-result, and their scores, are the same for any number of workers, batch size, or interruption.
+never at what happens to be finished: the cells of a stage are all run before it is asked, so that the cells
+of the result, and their scores, are the same for any number of workers, batch size, or interruption.
 
 A draw is one of the level at which an interval resamples (`simrail.scoring.bootstrap`): the track if the
 scenario lays it more than once; else the samples of its distributions, if there are several; else the
@@ -27,7 +27,7 @@ from threadpoolctl import threadpool_limits
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.scenario.cells import Cell, sensor_draws
-from simrail.scenario.samples import sample_count
+from simrail.scenario.distributions import sample_count
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import StopRulePart
 from simrail.scoring.bootstrap import clustered, mean_interval
@@ -44,17 +44,17 @@ _FIGURE = ("estimator", "quantity", "band", "reference", "window", "metric")
 
 
 @dataclass(frozen=True)
-class Look:
-    """What the rule saw after so many draws.
+class StopState:
+    """What the rule knows after so many draws.
 
     Attributes
     ----------
     draws, of : int
-        Draws that were looked at, and that the scenario has.
+        Draws that it was asked about, and that the scenario has.
     level : str
         One of `LEVELS`.
     figure : str
-        What was looked at, in words.
+        Whose interval it is, in words.
     width : float, optional
         Of the widest interval among the cases; None where a case has too few draws with a value.
     asked : float
@@ -82,8 +82,8 @@ class Look:
     @property
     def words(self) -> str:
         """One line for people."""
-        found = "unknown for want of values" if self.width is None else f"{self.width:.3g} {self.unit} wide"
-        which = f"the widest 95 % interval of {self.figure} is {found} ({self.case})"
+        width = "unknown for want of values" if self.width is None else f"{self.width:.3g} {self.unit} wide"
+        which = f"the widest 95 % interval of {self.figure} is {width} ({self.case})"
         of = f"{self.draws} of {self.of}" if self.draws < self.of else f"all {self.of}"
         what = "reached" if self.reached else "not reached"
         asked = f"less than {self.asked:g} {self.unit} asked"
@@ -127,20 +127,20 @@ class StopRule:
         return max(sensor_draws(self.spec, imu) for imu in self.spec.imu)
 
     @property
-    def looks(self) -> tuple[int, ...]:
+    def stages(self) -> tuple[int, ...]:
         """After how many draws the rule is asked."""
-        found, draws = [self.asked.least_draws], self.draws
-        while found[-1] < draws:
-            found.append(min(draws, (3 * found[-1] + 1) // 2))
-        return tuple(found)
+        stages, draws = [self.asked.least_draws], self.draws
+        while stages[-1] < draws:
+            stages.append(min(draws, (3 * stages[-1] + 1) // 2))
+        return tuple(stages)
 
     def has(self, cell: Cell, draws: int) -> bool:
         """Whether a cell is among those of the first so many draws."""
         number: int = getattr(cell, self.level)
         return number < draws
 
-    def look(self, cells: Iterable[Cell], tables: Iterable[pd.DataFrame], draws: int) -> Look:
-        """Look at the first so many draws.
+    def state(self, cells: Iterable[Cell], tables: Iterable[pd.DataFrame], draws: int) -> StopState:
+        """What the first so many draws say.
 
         Intervals are those of ``scores.csv``, but for the ends that are cut off at 0 there: cut, they would
         look narrow when they are widest. A case needs `least_draws` draws with a value. Draws of the sensors
@@ -163,7 +163,7 @@ class StopRule:
                 cases.setdefault(cell.case, []).append(cell)
         widths = self._widths([self._clusters(members, values) for members in cases.values()])
         widest = int(np.argmax(widths))
-        return Look(
+        return StopState(
             draws=draws,
             of=self.draws,
             level=self.level,
@@ -176,31 +176,31 @@ class StopRule:
 
     def _values(self, tables: Iterable[pd.DataFrame]) -> dict[int, float]:
         """Value of the figure in each cell; NaN, or none, where it failed."""
-        found: dict[int, float] = {}
+        values: dict[int, float] = {}
         for scores in tables:
             wanted = np.ones(len(scores), dtype=bool)
             for name in _FIGURE:
                 wanted &= (scores[name] == getattr(self.asked, name)).to_numpy()
-            found.update(zip(scores["cell"][wanted].tolist(), scores["value"][wanted].tolist(), strict=True))
-        return found
+            values.update(zip(scores["cell"][wanted].tolist(), scores["value"][wanted].tolist(), strict=True))
+        return values
 
     def _clusters(self, members: list[Cell], values: dict[int, float]) -> tuple[FloatArray, FloatArray]:
         """Sums and numbers (k,) of the values of each of the k clusters of a case that has some."""
-        found = [values.get(cell.number, np.nan) for cell in members]
+        of_cells = [values.get(cell.number, np.nan) for cell in members]
         if self.level == "sensor_draw":
-            kept, labels = clustered(found, None)
+            finite, labels = clustered(of_cells, None)
         else:
             tracks = {draw: i for i, draw in enumerate(sorted({(c.track_draw, c.sample) for c in members}))}
             clusters = [tracks[cell.track_draw, cell.sample] for cell in members]
-            kept, labels = clustered(found, clusters, apart=False)
+            finite, labels = clustered(of_cells, clusters, apart=False)
         counts = np.bincount(labels)
-        return np.asarray(np.bincount(labels, kept), dtype=np.float64), counts.astype(np.float64)
+        return np.asarray(np.bincount(labels, finite), dtype=np.float64), counts.astype(np.float64)
 
-    def _widths(self, found: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    def _widths(self, clusters: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
         """Width of the interval of each case, infinite where too few draws have a value."""
-        most = max(len(sums) for sums, _ in found)
-        sums, counts = np.zeros((len(found), most)), np.zeros((len(found), most))
-        for i, (total, count) in enumerate(found):
+        most = max(len(sums) for sums, _ in clusters)
+        sums, counts = np.zeros((len(clusters), most)), np.zeros((len(clusters), most))
+        for i, (total, count) in enumerate(clusters):
             sums[i, : len(total)], counts[i, : len(count)] = total, count
         # The sums of a linear-algebra library depend on its number of threads.
         with threadpool_limits(1):
@@ -246,7 +246,7 @@ def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
         return
     asked, spec = rule.asked, scenario.spec
     windows, metrics = spec.score.windows, spec.score.metrics
-    known: dict[str, Collection[str]] = {
+    possible: dict[str, Collection[str]] = {
         "estimator": estimators,
         "quantity": QUANTITY_UNITS,
         # Time differs from run to run, and with it would the draws.
@@ -255,7 +255,7 @@ def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
         "window": WINDOWS if windows is None else windows,
     }
     every_curve = windows is None or EVERY_CURVE in windows
-    for field, words in known.items():
+    for field, words in possible.items():
         value = getattr(asked, field)
         if field == "window" and every_curve and value.startswith(CURVE_PREFIX) and value != EVERY_CURVE:
             continue
@@ -263,7 +263,6 @@ def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
             scored = " or keep another in [score]" if field in ("metric", "window") else ""
             raise InputError(
                 f"is no {field} whose interval this scenario can stop at",
-                file=scenario.file,
                 field=f"stop.{field}",
                 value=value,
                 limit="one of " + ", ".join(words),
@@ -272,7 +271,6 @@ def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
     if asked.least_draws > rule.draws:
         raise InputError(
             f"is more than the scenario has {LEVELS[rule.level]}",
-            file=scenario.file,
             field="stop.least_draws",
             value=asked.least_draws,
             limit=f"2 to {rule.draws}" if rule.draws > 1 else "at least 2 draws, this scenario has 1",

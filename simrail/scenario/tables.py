@@ -172,10 +172,15 @@ class TemperaturePart(Part):
 
 
 class EstimatorPart(Part):
-    """``[[estimator]]``: a method under a name, with the keyword arguments of its class."""
+    """``[[estimator]]``: a method under a name, with the keyword arguments of its class.
+
+    ``stands_for`` says which row of the paper's table it is set beside, by the words of the page of that
+    paper (`simrail.report.papers`).
+    """
 
     name: Name
     method: str
+    stands_for: Name | None = None
     options: dict[str, Any] = Field(default_factory=dict)
 
 

@@ -112,8 +112,7 @@ def _means(total: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatAr
             t = shift * drawn / (scale * np.sqrt(np.maximum(square, 0.0)))
         # One cluster drawn k times has no spread: the resample says nothing.
         t[~np.isfinite(t)] = np.nan
-        known = ~np.isnan(t).all(axis=0)
-        t[:, ~known] = 0.0
+        t[:, np.isnan(t).all(axis=0)] = 0.0
         upper, lower = np.nanquantile(t, [1.0 - tail, tail], axis=0)
         low[part] = mean[part] - upper * error[part]
         high[part] = mean[part] - lower * error[part]
@@ -141,39 +140,39 @@ def interval(
     confidence : float
         Of the interval, two-sided.
     """
-    kept, labels = clustered(values, clusters)
-    if len(kept) == 0:
+    finite, labels = clustered(values, clusters)
+    if len(finite) == 0:
         return Interval(np.nan, np.nan, np.nan)
     k = int(labels.max()) + 1
     if statistic == "mean":
-        sums = np.asarray(np.bincount(labels, kept, k), dtype=np.float64)
+        sums = np.asarray(np.bincount(labels, finite, k), dtype=np.float64)
         counts = np.asarray(np.bincount(labels, minlength=k), dtype=np.float64)
         value, low, high = mean_interval(sums, counts, confidence=confidence)
         return Interval(float(value[0]), float(low[0]), float(high[0]))
-    of = _weighted(statistic, kept)
-    whole = float(of(np.ones((1, len(kept))))[0])
+    of = _weighted(statistic, finite)
+    whole = float(of(np.ones((1, len(finite))))[0])
     if k < FEWEST:
         return Interval(whole, np.nan, np.nan)
-    found = np.concatenate(
-        [of(part[:, labels]) for part in np.array_split(resampled(k), max(1, len(kept) // 500))]
+    redrawn = np.concatenate(
+        [of(part[:, labels]) for part in np.array_split(resampled(k), max(1, len(finite) // 500))]
     )
     left_out = of((1.0 - np.eye(k))[:, labels])
-    return Interval(whole, *_bca(whole, found, left_out, confidence))
+    return Interval(whole, *_bca(whole, redrawn, left_out, confidence))
 
 
-def _bca(value: float, found: FloatArray, left_out: FloatArray, confidence: float) -> tuple[float, float]:
+def _bca(value: float, redrawn: FloatArray, left_out: FloatArray, confidence: float) -> tuple[float, float]:
     """Bounds of the bias-corrected, accelerated bootstrap."""
-    found = found[np.isfinite(found)]
-    if len(found) == 0 or found.min() == found.max():
+    redrawn = redrawn[np.isfinite(redrawn)]
+    if len(redrawn) == 0 or redrawn.min() == redrawn.max():
         return np.nan, np.nan
-    below = np.mean(found < value) + 0.5 * np.mean(found == value)
+    below = np.mean(redrawn < value) + 0.5 * np.mean(redrawn == value)
     bias = ndtri(np.clip(below, 1e-6, 1.0 - 1e-6))
     away = left_out.mean() - left_out
     spread = np.square(away).sum()
     skew = np.power(away, 3).sum() / (6.0 * spread**1.5) if spread > 0.0 else 0.0
     tail = ndtri(np.array([0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence)]))
     shares = ndtr(bias + (bias + tail) / (1.0 - skew * (bias + tail)))
-    low, high = np.quantile(found, shares)
+    low, high = np.quantile(redrawn, shares)
     return float(low), float(high)
 
 
@@ -186,7 +185,10 @@ def _weighted(statistic: str, values: FloatArray) -> Callable[[FloatArray], Floa
             n = weights.sum(axis=1)
             mean = weights @ centred / n
             with np.errstate(divide="ignore", invalid="ignore"):
-                return np.sqrt(np.maximum(weights @ centred**2 - n * mean**2, 0.0) / (n - 1.0))
+                deviations: FloatArray = np.sqrt(
+                    np.maximum(weights @ centred**2 - n * mean**2, 0.0) / (n - 1.0)
+                )
+            return deviations
 
         return sd
     if not (statistic.startswith("p") and statistic[1:].replace(".", "", 1).isdigit()):
@@ -203,7 +205,8 @@ def _weighted(statistic: str, values: FloatArray) -> Callable[[FloatArray], Floa
         first = ranked[(reach <= lower[:, None]).sum(axis=1)]
         after = np.minimum(lower + 1.0, reach[:, -1] - 1.0)
         second = ranked[(reach <= after[:, None]).sum(axis=1)]
-        return first + (place - lower) * (second - first)
+        between: FloatArray = first + (place - lower) * (second - first)
+        return between
 
     return percentile
 
@@ -215,11 +218,11 @@ def clustered(
 
     Without clusters, or where there is one only (unless ``apart`` is false), each value is one of its own.
     """
-    found = np.asarray(values, dtype=np.float64)
-    good = np.isfinite(found)
-    kept = found[good]
-    if clusters is not None and len(kept):
-        _, labels = np.unique(np.asarray(clusters)[good], return_inverse=True)
+    every = np.asarray(values, dtype=np.float64)
+    is_finite = np.isfinite(every)
+    finite = every[is_finite]
+    if clusters is not None and len(finite):
+        _, labels = np.unique(np.asarray(clusters)[is_finite], return_inverse=True)
         if labels.max() > 0 or not apart:
-            return kept, labels.astype(np.intp)
-    return kept, np.arange(len(kept), dtype=np.intp)
+            return finite, labels.astype(np.intp)
+    return finite, np.arange(len(finite), dtype=np.intp)

@@ -25,7 +25,7 @@ from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 from simrail.scoring.metrics import Row, Series, figures
 from simrail.scoring.table import NO_TWIST, UNOBSERVABLE, table_of
-from simrail.scoring.windows import chosen_windows, kept_metrics, windows_of
+from simrail.scoring.windows import chosen_metrics, chosen_windows, windows_of
 from simrail.track.bands import BANDS, Band, band_pass, sd_of_draws, twist, why_not
 
 TWIST_BASE_M = 3.0
@@ -87,10 +87,9 @@ def score_geometry(
     position = geometry.index.to_numpy(dtype=np.float64)
     step = _step_of(position)
     track = recording.track
-    found = windows_of(track, position, np.ones(len(position)))
-    chosen = chosen_windows(found, windows)
+    chosen = chosen_windows(windows_of(track, position, np.ones(len(position))), windows)
     chosen = {name: at for name, at in chosen.items() if name not in ("standstill", "moving")}
-    keep = [name for name in kept_metrics(metrics) if name not in _NO_PLACE_METRICS]
+    keep = [name for name in chosen_metrics(metrics) if name not in _NO_PLACE_METRICS]
     for band in bands:
         band.check()
     draws = estimate.geometry_draws
@@ -105,8 +104,8 @@ def score_geometry(
         )
     rows: list[Row] = []
     for series, counts in _series(geometry, rails.irregularities(position), draws, step, bands, twist_base_m):
-        told = list(chosen)[:1] if series.reason else chosen  # a reason is told once
-        inside = {name: chosen[name][counts[chosen[name]]] for name in told}
+        names = list(chosen)[:1] if series.reason else chosen  # a reason is told once
+        inside = {name: chosen[name][counts[chosen[name]]] for name in names}
         own = series.band == "full" and series.quantity != "twist"  # the estimate's own sd
         rows += figures(series, inside, keep if own else [name for name in keep if name != "nees"])
     return table_of(rows, bands=[band.name for band in bands])
@@ -184,8 +183,8 @@ def _counts(values: FloatArray, reason: str) -> np.ndarray:
 
     Outer NaN are margins; one within is a fault of the estimate and counts, so that it is told.
     """
-    known = np.flatnonzero(~np.isnan(values))
+    numbers = np.flatnonzero(~np.isnan(values))
     counts = np.ones(len(values), dtype=bool)
-    if not reason and len(known):
-        counts[: known[0]] = counts[known[-1] + 1 :] = False
+    if not reason and len(numbers):
+        counts[: numbers[0]] = counts[numbers[-1] + 1 :] = False
     return counts

@@ -72,18 +72,9 @@ def _rows(
 ) -> list[Row]:
     if status != OK:
         values = [np.nan] * len(metrics)
+    q = series.quantity
     return [
-        (
-            series.quantity,
-            series.band,
-            series.reference,
-            window,
-            metric,
-            value,
-            unit_of(series.quantity, metric),
-            n,
-            status,
-        )
+        (q, series.band, series.reference, window, metric, value, unit_of(q, metric), n, status)
         for metric, value in zip(metrics, values, strict=True)
     ]
 
@@ -101,7 +92,7 @@ def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str
     # Not centred @ centred: BLAS would start threads, and its sum depends on how many there are.
     variance = float(np.square(centred).sum()) / n
     size = np.abs(error)
-    known = {
+    values = {
         "mean": mean,
         "sd": variance**0.5,
         "rms": (mean * mean + variance) ** 0.5,
@@ -109,8 +100,8 @@ def _deviations(error: FloatArray, metrics: list[str]) -> tuple[list[float], str
         "final": float(error[-1]),
     }
     if "p95" in metrics:
-        known["p95"] = float(np.percentile(size, 95.0, overwrite_input=True))
-    return [known[name] for name in metrics], OK
+        values["p95"] = float(np.percentile(size, 95.0, overwrite_input=True))
+    return [values[name] for name in metrics], OK
 
 
 def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple[list[float], str]:
@@ -122,11 +113,12 @@ def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple
         return [np.nan] * len(metrics), f"standard deviation not positive in {n - good} of {n} samples"
     ratio = error / sd
     inside = np.count_nonzero(np.abs(ratio) <= _QUANTILE_95)
-    known = {"nees": float(np.square(ratio).sum()) / n, "coverage95": inside / n}
-    return [known[name] for name in metrics], OK
+    values = {"nees": float(np.square(ratio).sum()) / n, "coverage95": inside / n}
+    return [values[name] for name in metrics], OK
 
 
 def nis_figures(innovations: pd.DataFrame, quantity: str, windows: Mapping[str, IntArray]) -> list[Row]:
+    """The figure ``nis`` of every window."""
     names = [name for name in innovations.columns if str(name).startswith("innovation_")]
     nis = innovations[INNOVATION[-1]].to_numpy(dtype=np.float64) / max(len(names), 1)
     # Samples without an update have no innovation at all: they are not counted. A NIS that is

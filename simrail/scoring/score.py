@@ -25,7 +25,7 @@ from simrail.recording.recording import Recording
 from simrail.ride.truth import Mount
 from simrail.scoring.metrics import IntArray, Row, Series, figures, nis_figures
 from simrail.scoring.table import OK, table_of
-from simrail.scoring.windows import chosen_windows, kept_metrics, windows_of
+from simrail.scoring.windows import chosen_metrics, chosen_windows, windows_of
 
 
 class HasMotion(Protocol):
@@ -104,8 +104,8 @@ def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Refer
     frame = recording.track.frame(position)
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
     time = recording.imu.index.to_numpy(dtype=np.float64)
-    found = windows_of(recording.track, position, motion["speed_mps"].to_numpy(), time_s=time)
-    return Reference(motion, design, found)
+    windows = windows_of(recording.track, position, motion["speed_mps"].to_numpy(), time_s=time)
+    return Reference(motion, design, windows)
 
 
 def score(
@@ -150,7 +150,7 @@ def score(
     if not np.array_equal(states.index.to_numpy(), recording.imu.index.to_numpy()):
         raise InputError("the estimate is not at the recording's IMU times", field="states.time_s")
     chosen = chosen_windows(against.windows, windows)
-    keep = kept_metrics(metrics)
+    keep = chosen_metrics(metrics)
     rows: list[Row] = []
     for series in _attitude_series(states, against):
         rows += figures(series, chosen, keep)
@@ -175,12 +175,15 @@ def score_odometry(
     """Score the recording's odometry: position, speed and relative distance, as `score` does.
 
     The estimator's name for it in the score table is ``odometry:<source>``. The relative distance
-    is the position error gained since the start over the true distance run in the whole ride.
+    is the position error gained since the start over the true distance run in the whole ride. A recording
+    without odometry has no rows.
     """
-    against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
-    chosen, keep = chosen_windows(against.windows, windows), kept_metrics(metrics)
-    rows: list[Row] = []
     states = recording.odometry
+    if states is None:
+        return table_of([])
+    against = truth if isinstance(truth, Reference) else reference_of(truth, recording)
+    chosen, keep = chosen_windows(against.windows, windows), chosen_metrics(metrics)
+    rows: list[Row] = []
     if recording.odometry_source == "truth":
         states = states[list(ODOMETRY)]  # its sds are zero, of which nothing can be scored
     for series in _other_series(states, against.motion):

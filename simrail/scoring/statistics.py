@@ -45,18 +45,18 @@ def levels(values: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[float, float
     within clusters, and what is between their means more than that explains. NaN where the number of
     draws does not allow them; a component below zero is zero.
     """
-    kept, labels = clustered(values, clusters, apart=False)
-    k = int(labels.max()) + 1 if len(kept) else 0
+    finite, labels = clustered(values, clusters, apart=False)
+    k = int(labels.max()) + 1 if len(finite) else 0
     if k == 0:
         return np.nan, np.nan
     n = np.bincount(labels, minlength=k).astype(np.float64)
-    means = np.bincount(labels, kept, k) / n
+    means = np.bincount(labels, finite, k) / n
     total = float(n.sum())
-    within = float(np.square(kept - means[labels]).sum())
+    within = float(np.square(finite - means[labels]).sum())
     sensor = within / (total - k) if total > k else np.nan
     if k < 2:
         return float(np.sqrt(sensor)), np.nan
-    between = float((n * np.square(means - kept.mean())).sum()) / (k - 1)
+    between = float((n * np.square(means - finite.mean())).sum()) / (k - 1)
     size = (total - float(np.square(n).sum()) / total) / (k - 1)
     noise = sensor if np.isfinite(sensor) else 0.0
     return float(np.sqrt(sensor)), float(np.sqrt(max(between - noise, 0.0) / size))
@@ -109,19 +109,19 @@ def compare(
         Of the intervals. That of the win rate is Wilson's, with as many trials as there are clusters.
     """
     difference = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
-    kept, labels = clustered(difference, clusters)
-    if len(kept) == 0:
+    paired, labels = clustered(difference, clusters)
+    if len(paired) == 0:
         nothing = Interval(np.nan, np.nan, np.nan)
         return Comparison(nothing, nothing, np.nan, 0)
-    won = (kept < 0.0) + 0.5 * (kept == 0.0)
+    won = (paired < 0.0) + 0.5 * (paired == 0.0)
     rate, trials = float(won.mean()), int(labels.max()) + 1
     z = float(ndtri(0.5 * (1.0 + confidence)))
     middle = (rate + z * z / (2 * trials)) / (1.0 + z * z / trials)
     reach = z / (1.0 + z * z / trials) * np.sqrt(rate * (1.0 - rate) / trials + z * z / (4 * trials**2))
-    spread = float(kept.std(ddof=1)) if len(kept) > 1 else np.nan
+    spread = float(paired.std(ddof=1)) if len(paired) > 1 else np.nan
     return Comparison(
-        difference=interval(kept, labels, confidence=confidence),
+        difference=interval(paired, labels, confidence=confidence),
         win_rate=Interval(rate, float(middle - reach), float(middle + reach)),
-        effect_size=float(kept.mean()) / spread if spread > 0.0 else np.nan,
-        pairs=len(kept),
+        effect_size=float(paired.mean()) / spread if spread > 0.0 else np.nan,
+        pairs=len(paired),
     )

@@ -147,12 +147,12 @@ def table_of(rows: Sequence[tuple[object, ...]], *, bands: Sequence[str] = ()) -
 
 def concat_scores(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     """Stack score tables; categories are united, columns stay categorical and in order."""
-    kept = list(tables)
-    if not kept:
+    stack = list(tables)
+    if not stack:
         return as_score_table(pd.DataFrame(columns=list(SCORE_COLUMNS)))
     columns: dict[str, object] = {}
-    for name in kept[0].columns:
-        parts = [table[name].array for table in kept]
+    for name in stack[0].columns:
+        parts = [table[name].array for table in stack]
         if isinstance(parts[0], pd.Categorical):
             columns[name] = _stacked(parts)
         else:
@@ -165,10 +165,10 @@ def _stacked(parts: Sequence[pd.Categorical]) -> pd.Categorical:
     lists = {id(part.dtype): part.categories for part in parts}
     if len(lists) == 1:
         return pd.Categorical.from_codes(np.concatenate([part.codes for part in parts]), dtype=parts[0].dtype)
-    known = {key: tuple(words) for key, words in lists.items()}
-    dtype = pd.CategoricalDtype(list(dict.fromkeys(word for words in known.values() for word in words)))
+    words_of = {key: tuple(words) for key, words in lists.items()}
+    dtype = pd.CategoricalDtype(list(dict.fromkeys(word for words in words_of.values() for word in words)))
     place = {word: code for code, word in enumerate(dtype.categories)}
-    new = {key: np.array([place[word] for word in words], dtype=np.int64) for key, words in known.items()}
+    new = {key: np.array([place[word] for word in words], dtype=np.int64) for key, words in words_of.items()}
     return pd.Categorical.from_codes(
         np.concatenate([new[id(part.dtype)][part.codes] for part in parts]), dtype=dtype
     )
@@ -249,14 +249,14 @@ def _table(columns: Mapping[str, Sequence[Any]], bands: Sequence[str]) -> pd.Dat
 
 
 def _categorical(name: str, values: Sequence[object], bands: Sequence[str]) -> pd.Categorical:
-    known = tuple(dict.fromkeys((*_CLOSED.get(name, ()), *(bands if name == "band" else ()))))
-    extra = sorted({str(word) for word in dict.fromkeys(values)}.difference(known))
+    vocabulary = tuple(dict.fromkeys((*_CLOSED.get(name, ()), *(bands if name == "band" else ()))))
+    extra = sorted({str(word) for word in dict.fromkeys(values)}.difference(vocabulary))
     is_open = name in LABEL_COLUMNS or name == "status"
     if not is_open:
         refused = [word for word in extra if not (name == "window" and word.startswith(CURVE_PREFIX))]
         if refused:
-            raise ValueError(f"score table: {name} {refused[0]!r} is not in the vocabulary {known}")
-    dtype, place = _words((*known, *extra))
+            raise ValueError(f"score table: {name} {refused[0]!r} is not in the vocabulary {vocabulary}")
+    dtype, place = _words((*vocabulary, *extra))
     codes = np.array([place[str(word)] for word in values], dtype=np.int64)
     return pd.Categorical.from_codes(codes, dtype=dtype)
 

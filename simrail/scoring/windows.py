@@ -9,12 +9,7 @@ import numpy as np
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.scoring.metrics import IntArray
-from simrail.scoring.table import (
-    CURVE_PREFIX,
-    EVERY_CURVE,
-    METRICS,
-    WINDOWS,
-)
+from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, METRICS, WINDOWS
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, TrackDesign
 
 STANDSTILL_MPS = 0.01
@@ -44,29 +39,29 @@ def windows_of(
     }
     if time_s is not None:
         masks["cropped"] = (time_s >= time_s[0] + CROP_S) & (time_s <= time_s[-1] - CROP_S)
-    found = {name: np.flatnonzero(mask) for name, mask in masks.items()}
-    in_curve = found["curve"]
+    windows = {name: np.flatnonzero(mask) for name, mask in masks.items()}
+    in_curve = windows["curve"]
     segments = np.asarray(track.segment(position[in_curve]))
     for number in np.unique(segments):
         name = CURVE_PREFIX + track.segment_name(int(number))
-        found[name] = in_curve[segments == number]
-    return found
+        windows[name] = in_curve[segments == number]
+    return windows
 
 
-def chosen_windows(found: Mapping[str, IntArray], wanted: Collection[str] | None) -> dict[str, IntArray]:
-    """Those of the windows found that are wanted; all if nothing is said."""
+def chosen_windows(windows: Mapping[str, IntArray], wanted: Collection[str] | None) -> dict[str, IntArray]:
+    """Those of a ride's windows that are wanted; all if nothing is said."""
     if wanted is None:
-        return dict(found)
+        return dict(windows)
     for name in wanted:
         if name not in WINDOWS and not name.startswith(CURVE_PREFIX):
             raise InputError(
                 "no such window", value=name, limit="one of " + ", ".join((*WINDOWS, EVERY_CURVE))
             )
     every_curve = EVERY_CURVE in wanted
-    return {n: i for n, i in found.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
+    return {n: i for n, i in windows.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
 
 
-def kept_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
+def chosen_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
     """The metrics that are wanted; all if nothing is said."""
     if wanted is None:
         return METRICS

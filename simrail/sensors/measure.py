@@ -1,7 +1,7 @@
 """Truth in, recording out: everything that the logger on the train would have seen of a ride.
 
-The only place where sensors meet the truth. What comes out holds no true value, unless the true
-odometry is asked for by name (an ablation, labelled in every table).
+The only place where sensors meet the truth. Signals are recorded here, and nothing is estimated. What comes
+out holds no true value, unless the true odometry is asked for by name (an ablation, labelled in every table).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import pandas as pd
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.resample import resample
-from simrail.estimators.odometry.encoder import encoder_odometry
 from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_sheet import imu_sheet
@@ -37,7 +36,7 @@ def measure(
     magnetometer: MagnetometerSpec | None = None,
     rail_sensor: RailSensorSpec | None = None,
     rails: LaidTrack | None = None,
-    odometry: str = "encoder",
+    odometry: str | None = None,
     seed: int,
     draw: int,
     earth_rate: EarthRate | None = None,
@@ -63,8 +62,10 @@ def measure(
         A sensor beside the IMU that sees both rails.
     rails : LaidTrack, optional
         The rails that the ride was run on (`simrail.ride.ride.rails_of`), for that sensor.
-    odometry : str
-        ``"encoder"``, or ``"truth"`` for the true position, speed and acceleration of the mount.
+    odometry : str, optional
+        ``"truth"`` hands the true position, speed and acceleration of the mount on to estimators, an
+        ablation. Any other odometry is concluded from what is recorded
+        (`simrail.estimation.choose_odometry`).
     seed, draw : int
         Seed of the scenario and number of the sensor draw: a new draw is a new set of sensors.
     earth_rate : EarthRate, optional
@@ -75,14 +76,14 @@ def measure(
     Returns
     -------
     Recording
-        Its odometry speaks of the mount; the train knows where the mount stood at time 0. Samples of the
-        IMU that got lost are filled by straight lines and listed in `Recording.gaps`.
+        The train knows where the mount stood at time 0. Samples of the IMU that got lost are filled by
+        straight lines and listed in `Recording.gaps`.
 
     Raises
     ------
     InputError
-        If body, wheel or odometry is unknown, a rate does not divide the truth's, or a rail sensor has no
-        rails to see.
+        If body or wheel is unknown, a rate does not divide the truth's, or a rail sensor has no rails to see;
+        or if another odometry than the true one is asked for.
     """
     motion = truth.motion(mount)
     imu, delay_s = sample_imu(
@@ -101,19 +102,7 @@ def measure(
     start_m = float(motion["position_m"].iloc[0])
     counts, sheet = None, None
     if encoder is not None:
-        wheel = truth.wheel_at(encoder.wheel)
-        angle = truth.wheel_angle(wheel)
-        radius = truth.wheel_radius_m[wheel]
-        if encoder.radius == "calibrated":
-            position = motion["position_m"].to_numpy()
-            radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
-        counts = sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw)
-        sheet = EncoderSheet(
-            wheel=wheel,
-            pulses_per_revolution=encoder.counts_per_revolution,
-            wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
-            rate_hz=encoder.rate_hz,
-        )
+        counts, sheet = _counted(truth, motion, encoder, seed=seed, draw=draw)
     magnetic = None
     if magnetometer is not None:
         magnetic = sample_magnetometer(
@@ -130,24 +119,13 @@ def measure(
         if rails is None:
             raise InputError("a rail sensor needs rails to see", field="rails", remedy="give rails_of(ride)")
         seen = sample_rails(motion, imu.index, rail_sensor, rails, seed=seed, draw=draw, name=mount.name)
-    if odometry == "truth":
-        frame = true_odometry(motion, imu.index)
-    elif odometry != "encoder":
-        raise InputError("no such odometry", field="odometry", value=odometry, limit="encoder, truth")
-    elif encoder is None or counts is None or sheet is None:
+    if odometry not in (None, "truth"):
         raise InputError(
-            "the odometry needs an encoder",
+            "no such thing is measured: an odometry is concluded from a recording",
             field="odometry",
             value=odometry,
-            remedy='add an [encoder], or set odometry = "truth" for an ablation',
-        )
-    else:
-        frame = encoder_odometry(
-            counts,
-            sheet,
-            imu.index.to_numpy(),
-            start_position_m=start_m,
-            radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
+            limit="truth",
+            remedy=f'use simrail.with_odometry(recording, "{odometry}")',
         )
     return Recording(
         name=name,
@@ -160,8 +138,8 @@ def measure(
         encoder=counts,
         encoder_sheet=sheet,
         start_position_m=start_m,
-        odometry=frame,
-        odometry_source=odometry,
+        odometry=None if odometry is None else true_odometry(motion, imu.index),
+        odometry_source=odometry or "",
         gravity_mps2=truth.gravity_mps2,
         gaps=gaps,
         magnetometer=magnetic,
@@ -169,6 +147,25 @@ def measure(
         rail_displacement=seen,
         rail_sensor_sheet=None if rail_sensor is None else RailSensorSheet(rail_sensor.noise_m),
     )
+
+
+def _counted(
+    truth: Truth, motion: pd.DataFrame, encoder: EncoderSpec, *, seed: int, draw: int
+) -> tuple[pd.DataFrame, EncoderSheet]:
+    """Counts of an encoder on a ride, and what the train knows of it."""
+    wheel = truth.wheel_at(encoder.wheel)
+    angle, radius = truth.wheel_angle(wheel), truth.wheel_radius_m[wheel]
+    if encoder.radius == "calibrated":
+        position = motion["position_m"].to_numpy()
+        radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
+    sheet = EncoderSheet(
+        wheel=wheel,
+        pulses_per_revolution=encoder.counts_per_revolution,
+        wheel_radius_m=nominal_radius(radius, encoder, seed=seed, draw=draw),
+        rate_hz=encoder.rate_hz,
+        radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
+    )
+    return sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw), sheet
 
 
 def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:

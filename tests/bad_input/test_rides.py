@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from simrail.cli.main import BAD_INPUT, call
-from simrail.cli.template_ride import ride_template
+from simrail.cli.templates import ride_template
+from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_physics import check_plausible
-from simrail.recording.files.ride_reader import read_ride
 from simrail.recording.files.ride_writer import write_ride
 
 TOML, DATA = "ride.toml", "ride.csv"
@@ -207,7 +207,7 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
     "no_grade": (text(('grade = "lord_3dm_gx4_25"', 'grade = "lord"')), ["imu.grade", "lord_3dm_gx4_25"]),
     "no_way": (
         lambda folder: (folder / TOML).write_text((folder / TOML).read_text().split("[encoder]")[0]) and None,
-        ["encoder", "where it is", "[odometer]"],
+        ["encoder", "where the train is", "[odometer]"],
     ),
     "radius_in_mm": (
         text(("wheel_radius_m = 0.", "wheel_radius_m = 290.")),

@@ -29,6 +29,7 @@ from simrail.estimators.trajectory.reference import filterpy_backend
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, compiled_backend, log_likelihood
 from vqf import VQF
 
+from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import harmonic, kinematic_truth
@@ -50,7 +51,7 @@ def ride() -> Recording:
         SpeedProfile(10.0, 1500.0, 70.0 / 3.6),
         channels={"roll": harmonic(0.005, frequency_hz=1.1), "lateral": harmonic(0.003, frequency_hz=1.7)},
     )
-    return measure(
+    recording = measure(
         truth,
         name="benchmark",
         mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
@@ -59,6 +60,7 @@ def ride() -> Recording:
         seed=1,
         draw=0,
     )
+    return with_odometry(recording, "encoder")
 
 
 @lru_cache

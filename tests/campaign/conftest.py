@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from simrail.campaign.campaign import run_campaign
 from simrail.core.toml_files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario
 
@@ -76,10 +77,23 @@ def short() -> Callable[..., Scenario]:
     return lambda *settings: load_scenario("quick_kinematic", overrides=[*SHORT, *settings])
 
 
+@pytest.fixture(scope="module")
+def module_rides(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A cache of rides that the tests of a module share."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SIMRAIL_RIDES", str(tmp_path_factory.mktemp("rides")))
+        yield
+
+
 @pytest.fixture
 def noting_file(tmp_path: Path, rides: Path, notes: Notes) -> Path:
     """A scenario file whose estimators are `Noting` and a filter: 2 rides of 4 cells."""
-    (tmp_path / "noting.py").write_text(NOTING)
+    return write_noting(tmp_path)
+
+
+def write_noting(folder: Path) -> Path:
+    """Write the scenario of `noting_file`, and its estimator."""
+    (folder / "noting.py").write_text(NOTING)
     text = shipped("scenario")["quick_kinematic"].read_text()
     head = text[: text.index("[[estimator]]")]
     for old, new in (
@@ -93,8 +107,18 @@ def noting_file(tmp_path: Path, rides: Path, notes: Notes) -> Path:
         head = head.replace(old, new, 1)
     head += '[[estimator]]\nname = "ekf"\nmethod = "AttitudeEkf"\n'
     head += '[[estimator]]\nname = "noting"\nmethod = "noting.py:Noting"\n'
-    (tmp_path / "mine.toml").write_text(head)
-    return tmp_path / "mine.toml"
+    (folder / "mine.toml").write_text(head)
+    return folder / "mine.toml"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, module_rides: None) -> pd.DataFrame:
+    """Scores of an undisturbed run of `noting_file`."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("whole")
+        patch.setenv("SIMRAIL_TEST_NOTES", str(folder / "notes.txt"))
+        file = write_noting(folder)
+        return run_campaign(load_scenario(file, overrides=["estimator.noting.options.sleep_s=0.0"])).scores
 
 
 def _without_time(scores: pd.DataFrame) -> pd.DataFrame:

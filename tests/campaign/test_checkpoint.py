@@ -16,14 +16,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import simrail
 from simrail import results
 from simrail.campaign import checkpoint
-from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Start, Unfinished, unfinished_of
-from simrail.campaign.job import prepare
+from simrail.campaign.campaign import key_of, run_campaign
+from simrail.campaign.checkpoint import Checkpoint, Start, checkpoint_of
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.core import source_hash
 from simrail.core.errors import InputError
+from simrail.ride.ride import simulate
+from simrail.scenario.cells import cells
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
@@ -46,9 +49,9 @@ def hidden(folder: Path) -> list[Path]:
 
 
 def test_batches_come_back_as_they_were(rides: Path, short: Callable[..., Scenario], tmp_path: Path) -> None:
-    kept = Unfinished(tmp_path / "kept")
+    kept = Checkpoint(tmp_path / "kept")
     assert kept.is_empty and kept.cells() == set()
-    run_campaign(short("monte_carlo.sensor_draws=3"), kept=kept, batch_cells=2)
+    run_campaign(short("monte_carlo.sensor_draws=3"), checkpoint=kept, batch_cells=2)
     first, second = kept.results()
     assert first.cells == (0, 1) and second.cells == (2,)
     assert set(first.scores["cell"]) == {0, 1}
@@ -60,10 +63,10 @@ def test_batches_come_back_as_they_were(rides: Path, short: Callable[..., Scenar
 def test_a_batch_that_cannot_be_written_leaves_nothing(
     rides: Path, short: Callable[..., Scenario], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = Unfinished(tmp_path / "kept")
-    run_campaign(short("monte_carlo.sensor_draws=1"), kept=kept)
+    kept = Checkpoint(tmp_path / "kept")
+    run_campaign(short("monte_carlo.sensor_draws=1"), checkpoint=kept)
     (result,) = kept.results()
-    other = Unfinished(tmp_path / "other")
+    other = Checkpoint(tmp_path / "other")
 
     def full(descriptor: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -74,32 +77,25 @@ def test_a_batch_that_cannot_be_written_leaves_nothing(
     assert list(other.folder.iterdir()) == []
 
 
-@pytest.mark.parametrize("damage", ["a bit", "a half", "empty", "a leftover draft"])
 def test_damaged_batches_are_dropped_and_run_again(
-    damage: str, mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], assert_same: Same
+    mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame, assert_same: Same
 ) -> None:
-    """Told in one line; the scores are those of an undisturbed run."""
-    assert call([*mine, "--out", "results/whole"]) == DONE
-    job = prepare(load_scenario(mine[1], overrides=[mine[3]]))
-    with unfinished_of(here / "results" / "mine", job.key) as kept:
-        run_campaign(job, kept=kept, batch_cells=3)
-        file = sorted(kept.folder.glob("*.parquet"))[1]
-    content = bytearray(file.read_bytes())
-    if damage == "a bit":
-        content[len(content) // 3] ^= 4
-    if damage == "a leftover draft":
-        (file.parent / f".{file.name}.draft").write_bytes(content[:1000])
-    else:
-        file.write_bytes({"a bit": content, "a half": content[: len(content) // 2], "empty": b""}[damage])
+    """A bit that flipped, a half and an empty file are told in one line; a leftover draft is not."""
+    plan = judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))
+    with checkpoint_of(here / "results" / "mine", key_of(plan)) as kept:
+        run_campaign(plan, checkpoint=kept, batch_cells=1)
+        files = sorted(kept.folder.glob("*.parquet"))
+    content = bytearray(files[1].read_bytes())
+    content[len(content) // 3] ^= 4
+    files[1].write_bytes(content)
+    files[3].write_bytes(files[3].read_bytes()[:1000])
+    files[6].write_bytes(b"")
+    (files[0].parent / f".{files[0].name}.draft").write_bytes(content[:1000])
     capsys.readouterr()
     assert call([*mine, "--resume"]) == DONE
     said = capsys.readouterr().err
-    assert ("1 damaged file" in said) == (damage != "a leftover draft")
-    assert ("7 of 8 cells are done" in said) == (damage != "a leftover draft")
-    whole, mended = (
-        pd.read_parquet(here / "results" / name / "scores.parquet") for name in ("whole", "mine")
-    )
-    assert_same(whole, mended)
+    assert "3 damaged file" in said and "5 of 8 cells are done" in said
+    assert_same(whole, pd.read_parquet(here / "results" / "mine" / "scores.parquet"))
     assert hidden(here) == []
 
 
@@ -108,10 +104,12 @@ def test_a_damaged_ride_and_one_that_is_gone_are_simulated_again(
     here: Path,
     rides: Path,
     capsys: pytest.CaptureFixture[str],
+    whole: pd.DataFrame,
     assert_same: Same,
 ) -> None:
-    assert call(mine) == DONE
-    whole = pd.read_parquet(here / "results" / "mine" / "scores.parquet")
+    plan = judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))
+    for cell in (0, 4):
+        simulate(plan.parts.ride(list(cells(plan.scenario))[cell]))
     damaged, gone = sorted(rides.iterdir())
     array = bytearray((damaged / "body_0.npy").read_bytes())
     array[len(array) // 2] ^= 1
@@ -183,9 +181,9 @@ def test_fresh_and_resume(mine: list[str], here: Path, capsys: pytest.CaptureFix
     assert hidden(here) == [] and not (here / "results" / "mine").exists()
     assert call([*mine, "--resume", "--fresh"]) == BAD_INPUT
     capsys.readouterr()
-    job = prepare(load_scenario(mine[1], overrides=[mine[3]]))
-    with unfinished_of(here / "results" / "mine", job.key) as kept:
-        run_campaign(job, kept=kept, batch_cells=5)
+    plan = judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))
+    with checkpoint_of(here / "results" / "mine", key_of(plan)) as kept:
+        run_campaign(plan, checkpoint=kept, batch_cells=5)
     assert call([*mine, "--fresh"]) == DONE
     assert "unfinished" not in capsys.readouterr().err
     log = (here / "results" / "mine" / "run.log").read_text()
@@ -195,47 +193,49 @@ def test_fresh_and_resume(mine: list[str], here: Path, capsys: pytest.CaptureFix
 def test_another_plan_or_other_code_is_not_gone_on_with(
     mine: list[str], here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    key = prepare(load_scenario(mine[1], overrides=[mine[3]])).key
-    assert prepare(load_scenario(mine[1], overrides=[mine[3]])).key == key
-    assert prepare(load_scenario(mine[1], overrides=[mine[3]], seed=9)).key != key
+    key = key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]])))
+    assert key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))) == key
+    assert key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]], seed=9))) != key
     own = Path(mine[1]).parent / "noting.py"
     own.write_text(own.read_text() + "\n# another version\n")
-    with_other_file = prepare(load_scenario(mine[1], overrides=[mine[3]])).key
+    with_other_file = key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]])))
     assert with_other_file != key
-    monkeypatch.setattr("simrail.campaign.job.score_code_hash", lambda: "other code")
-    assert prepare(load_scenario(mine[1], overrides=[mine[3]])).key not in (key, with_other_file)
+    monkeypatch.setattr("simrail.campaign.campaign.score_code_hash", lambda: "other code")
+    assert key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))) not in (key, with_other_file)
 
 
 def test_code_that_is_left_out_of_the_key_is_there_and_makes_no_score() -> None:
     """A batch imports none of it; a new command or page must not abandon a run that is under way."""
-    left_out = {name.removesuffix(".py") for name in source_hash._NO_MATTER}
-    assert {"cli", "commands", "report"} <= left_out
-    assert all((Path(source_hash.__file__).parent / name).exists() for name in source_hash._NO_MATTER)
+    left_out = source_hash.NO_MATTER
+    assert {"cli/", "report/", "campaign/export.py"} <= set(left_out)
+    package = Path(simrail.__file__).parent
+    # A folder of scenarios stands beside the package in a checkout.
+    assert all((package / name).exists() or (package.parent / name).exists() for name in left_out)
     program = "import sys, simrail.campaign.worker; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    own = {name.split(".")[1] for name in loaded.stdout.split() if name.startswith("simrail.")}
-    assert "cell" in own and not own & left_out
+    own = {name.removeprefix("simrail.").replace(".", "/") + ".py" for name in loaded.stdout.split()}
+    assert "campaign/cell.py" in own and not [name for name in own if name.startswith(left_out)]
 
 
 def test_two_processes_do_not_run_one_plan_into_one_folder(tmp_path: Path) -> None:
-    with unfinished_of(tmp_path / "results", "key") as kept:
+    with checkpoint_of(tmp_path / "results", "key") as kept:
         kept.log("something")
         with (
             pytest.raises(InputError, match="being run by another process"),
-            unfinished_of(tmp_path / "results", "key"),
+            checkpoint_of(tmp_path / "results", "key"),
         ):
             pass
-        with unfinished_of(tmp_path / "results", "another"):
+        with checkpoint_of(tmp_path / "results", "another"):
             pass
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_process_that_is_refused_leaves_the_other_one_alone(tmp_path: Path) -> None:
     """Before the other has a batch, and while it writes one."""
-    with unfinished_of(tmp_path / "results", "key") as kept:
+    with checkpoint_of(tmp_path / "results", "key") as kept:
         draft = kept.folder / ".000000000-ab.parquet.1.draft"
         draft.touch()
-        with pytest.raises(InputError), unfinished_of(tmp_path / "results", "key", start="fresh"):
+        with pytest.raises(InputError), checkpoint_of(tmp_path / "results", "key", start="fresh"):
             pass
         assert draft.exists()
         kept.log("at work")
@@ -253,17 +253,17 @@ def test_a_lock_on_a_folder_that_has_gone_holds_nothing(
         real(stream, how)
 
     monkeypatch.setattr(fcntl, "flock", late)
-    with pytest.raises(InputError, match="another process"), unfinished_of(tmp_path / "results", "key"):
+    with pytest.raises(InputError, match="another process"), checkpoint_of(tmp_path / "results", "key"):
         pytest.fail("it was let in")
 
 
 @pytest.mark.parametrize("start", ["resume", "auto"])
 def test_folders_that_nothing_came_into_go_again(tmp_path: Path, start: Start) -> None:
-    with suppress(InputError), unfinished_of(tmp_path / "a" / "b" / "results", "key", start=start):
+    with suppress(InputError), checkpoint_of(tmp_path / "a" / "b" / "results", "key", start=start):
         pass
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "a").mkdir()
-    with suppress(InputError), unfinished_of(tmp_path / "a" / "results", "key", start=start):
+    with suppress(InputError), checkpoint_of(tmp_path / "a" / "results", "key", start=start):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
@@ -273,7 +273,7 @@ def test_runs_that_nobody_goes_on_with_are_dropped_after_a_month(tmp_path: Path)
     for folder, days in ((old, 31), (young, 29)):
         folder.mkdir()
         os.utime(folder, (time.time() - 86400.0 * days,) * 2)
-    with unfinished_of(tmp_path / "x", "key"):
+    with checkpoint_of(tmp_path / "x", "key"):
         assert not old.exists() and young.exists()
 
 
@@ -298,12 +298,11 @@ class Noting:
 
 
 def test_retry_failed_runs_exactly_the_failed_cells(
-    mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], assert_same: Same
+    mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame, assert_same: Same
 ) -> None:
     (Path(mine[1]).parent / "noting.py").write_text(FLAKY)
     assert call([*mine, "--retry-failed"]) == BAD_INPUT
     assert "there are no finished results" in capsys.readouterr().err
-    assert call([*mine, "--out", "results/whole"]) == DONE
     (here / "broken").touch()
     assert call(mine) == CELL_FAILED
     folder = here / "results" / "mine"
@@ -313,10 +312,7 @@ def test_retry_failed_runs_exactly_the_failed_cells(
     capsys.readouterr()
     assert call([*mine, "--retry-failed"]) == DONE
     assert f"{8 - len(failed)} of 8 cells are done" in capsys.readouterr().err
-    whole, retried = (
-        pd.read_parquet(here / "results" / name / "scores.parquet") for name in ("whole", "mine")
-    )
-    assert_same(whole, retried)
+    assert_same(whole, pd.read_parquet(folder / "scores.parquet"))
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["failed"] == 0 and len(manifest["rides"]) == 2
     assert not (folder / "failures.txt").exists() and hidden(here) == []
@@ -328,21 +324,18 @@ def test_retry_failed_runs_exactly_the_failed_cells(
 
 
 def test_a_cell_alone_is_printed_and_written(
-    mine: list[str], here: Path, capsys: pytest.CaptureFixture[str]
+    mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame
 ) -> None:
-    assert call(mine) == DONE
-    scores = pd.read_parquet(here / "results" / "mine" / "scores.parquet")
-    capsys.readouterr()
     assert call([*mine, "--cell", "5", "--out", "one"]) == DONE
     printed = capsys.readouterr().out
-    value = scores.query(
+    value = whole.query(
         "cell == 5 and estimator == 'ekf' and quantity == 'roll' and reference == 'truth' "
         "and window == 'whole' and metric == 'rms'"
     )["value"].item()
     assert f"{value:.9g}" in printed and "cell 5" in printed
     alone = pd.read_parquet(here / "one" / "scores.parquet")
     ours = alone.query("metric != 'us_per_sample'")["value"].to_numpy()
-    theirs = scores.query("cell == 5 and metric != 'us_per_sample'")["value"].to_numpy()
+    theirs = whole.query("cell == 5 and metric != 'us_per_sample'")["value"].to_numpy()
     assert ours.tobytes() == theirs.tobytes()
     assert json.loads((here / "one" / "manifest.json").read_text())["command"].endswith("--cell 5")
     assert call([*mine, "--cell", "8"]) == BAD_INPUT
@@ -352,8 +345,8 @@ def test_a_cell_alone_is_printed_and_written(
 
 def test_the_hidden_name_is_what_keeps_a_half_batch_out(tmp_path: Path) -> None:
     """Every name that a batch is written under is one that is not read."""
-    kept = Unfinished(tmp_path / "kept")
+    kept = Checkpoint(tmp_path / "kept")
     (kept.folder / ".000000000-abc.parquet.draft").write_bytes(b"half")
     assert kept.is_empty
-    assert Unfinished(tmp_path / "kept").is_empty and list(kept.folder.iterdir()) == []
+    assert Checkpoint(tmp_path / "kept").is_empty and list(kept.folder.iterdir()) == []
     assert checkpoint.LOG == "run.log"

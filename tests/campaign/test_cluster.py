@@ -21,7 +21,7 @@ import pytest
 import simrail
 from simrail import results
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.executors import _Cluster
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.core.errors import InputError
@@ -101,8 +101,8 @@ def test_a_campaign_on_a_cluster_with_a_worker_killed_midway(
 
     thread = threading.Thread(target=kill, daemon=True)
     thread.start()
-    kept = Unfinished(tmp_path / "kept")
-    found = run_campaign(scenario, cluster=cluster.address, batch_cells=2, kept=kept)
+    kept = Checkpoint(tmp_path / "kept")
+    found = run_campaign(scenario, cluster=cluster.address, batch_cells=2, checkpoint=kept)
     thread.join(timeout=10)
     assert not thread.is_alive() and sum(worker.poll() is not None for worker in cluster.workers) == 1
     assert_same(whole.scores, found.scores)
@@ -123,12 +123,12 @@ def test_a_worker_gets_no_batch_before_its_last_result_is_here() -> None:
         def nthreads(self) -> dict[str, int]:
             return {"one": 1, "two": 1}
 
-    crew = object.__new__(_Cluster)
-    crew._client, crew._pool, crew._busy = Client(), Pool(), set()  # type: ignore[assignment]
+    executor = object.__new__(_Cluster)
+    executor._client, executor._pool, executor._busy = Client(), Pool(), set()  # type: ignore[assignment]
     for done in (None, None, 1, None, 2, 0):
         if done is not None:
             asked[done][1].set_result(None)
-        crew.submit(print)
+        executor.submit(print)
     assert [workers for workers, _ in asked] == ["one", "two", "two", None, "two", "one"]
 
 

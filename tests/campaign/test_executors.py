@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import random
 import signal
-import subprocess
-import sys
 import threading
 import time
+import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -21,11 +20,12 @@ import pytest
 
 from simrail.campaign import campaign, executors
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Unfinished
-from simrail.campaign.executors import FEW_CELLS, crew_of
-from simrail.campaign.job import prepare
+from simrail.campaign.checkpoint import Checkpoint
+from simrail.campaign.executors import FEW_CELLS, executor_of
 from simrail.campaign.result import CampaignResult, gather
+from simrail.campaign.worker import pack
 from simrail.core.errors import InputError
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.table import OK
 
@@ -46,19 +46,14 @@ Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 
 
 @pytest.fixture(scope="module")
-def module_rides(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SIMRAIL_RIDES", str(tmp_path_factory.mktemp("rides")))
-        yield
-
-
-@pytest.fixture(scope="module")
 def alone(module_rides: None, short: Callable[..., Scenario]) -> CampaignResult:
     """A campaign of 4 rides and 12 cells, run in this process in batches of one."""
     return run_campaign(short(*AXES), workers=1, batch_cells=1)
 
 
-@pytest.mark.parametrize(("workers", "batch_cells"), [(1, 3), (2, 2), (4, None)])
+@pytest.mark.parametrize(
+    ("workers", "batch_cells"), [(1, 3), (2, 2), pytest.param(4, None, marks=pytest.mark.slow)]
+)
 def test_workers_and_batches_change_no_bit(
     workers: int,
     batch_cells: int | None,
@@ -105,7 +100,7 @@ def test_one_cell_alone_has_the_bits_that_it_has_among_others(
 
 
 def test_each_ride_is_simulated_once_whoever_runs_it(rides: Path, short: Callable[..., Scenario]) -> None:
-    found = run_campaign(short(*AXES), workers=2, batch_cells=1)
+    found = run_campaign(short(*AXES[:2]), workers=2, batch_cells=1)
     assert [ride["from_cache"] for ride in found.rides] == [False] * 4
     assert len(list(rides.glob("[!.]*"))) == 4
 
@@ -123,15 +118,15 @@ def test_a_result_that_was_taken_is_let_go_before_more_is_asked_for(
         return future
 
     monkeypatch.setattr(executors._Here, "submit", noting)
-    run_campaign(short(*AXES), workers=1, batch_cells=1)
+    run_campaign(short(*AXES[:2]), workers=1, batch_cells=1)
     assert len(held) > 3 and not any(held)
 
 
-@pytest.mark.parametrize("kills", [2])
+@pytest.mark.parametrize("kills", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_killed_workers_lose_nothing(
     kills: int, noting_file: Path, notes: Notes, tmp_path: Path, assert_same: Same
 ) -> None:
-    scenario = load_scenario(noting_file, overrides=["monte_carlo.sensor_draws=10"])
+    scenario = load_scenario(noting_file, overrides=[f"monte_carlo.sensor_draws={4 + 4 * kills}"])
     whole = run_campaign(scenario, workers=1)
     assert notes.repeated(main=0) == 2  # the examples
     notes.file.unlink()
@@ -149,9 +144,9 @@ def test_killed_workers_lose_nothing(
 
     thread = threading.Thread(target=kill)
     thread.start()
-    kept = Unfinished(tmp_path / "kept")
+    kept = Checkpoint(tmp_path / "kept")
     try:
-        found = run_campaign(scenario, workers=2, batch_cells=2, kept=kept)
+        found = run_campaign(scenario, workers=2, batch_cells=2, checkpoint=kept)
     finally:
         finished.set()
         thread.join()
@@ -199,12 +194,12 @@ def test_a_cell_that_kills_its_worker_fails_and_its_fellows_do_not(tmp_path: Pat
     assert len(lost) == 2 * len(failed)  # a row for each of the two estimators
 
 
-def test_few_cells_stay_in_this_process_and_one_crew_is_chosen() -> None:
-    with crew_of(None, None, cells=FEW_CELLS) as crew:
-        assert executors.here and crew.workers() == 1
-    with crew_of(8, None, cells=1) as crew:
-        assert executors.here
-    with pytest.raises(InputError, match="has its own workers"), crew_of(2, "tcp://127.0.0.1:1", cells=9):
+def test_few_cells_stay_in_this_process_and_one_executor_is_chosen() -> None:
+    with executor_of(None, None, cells=FEW_CELLS) as executor:
+        assert executor.here and executor.workers() == 1
+    with executor_of(8, None, cells=1) as executor:
+        assert executor.here
+    with pytest.raises(InputError, match="has its own workers"), executor_of(2, "tcp://127.0.0.1:1", cells=9):
         pass
 
 
@@ -216,26 +211,22 @@ def test_estimators_that_cannot_be_sent_are_refused_by_name(tmp_path: Path, noti
         "    def estimate(self, recording):\n        raise ValueError\n"
     )
     with pytest.raises(InputError, match="'noting'"):
-        prepare(load_scenario(noting_file))
+        run_campaign(load_scenario(noting_file))
 
 
 def test_a_result_is_the_same_from_kept_batches_alone(
     alone: CampaignResult, rides: Path, short: Callable[..., Scenario], tmp_path: Path, assert_same: Same
 ) -> None:
-    job, kept = prepare(short(*AXES)), Unfinished(tmp_path / "kept")
-    run_campaign(job, kept=kept, batch_cells=5)
-    assert_same(alone.scores, gather(job, kept).scores)
+    plan, kept = judge_scenario(short(*AXES)), Checkpoint(tmp_path / "kept")
+    run_campaign(plan, checkpoint=kept, batch_cells=5)
+    assert_same(alone.scores, gather(plan, pack(plan.parts), kept).scores)
 
 
 def test_a_worker_that_is_replaced_is_no_news() -> None:
     """loky tells of it in a warning, with a path and advice that do not concern the user."""
-    program = (
-        "import warnings\n"
-        "from simrail.campaign.executors import crew_of\n"
-        "with crew_of(2, None, cells=9) as crew:\n"
-        "    assert executors.submit(abs, -3).result() == 3\n"
-        "    warnings.warn('A worker stopped while some jobs were given to the executor.', UserWarning)\n"
-        "    warnings.warn('something else', UserWarning)\n"
-    )
-    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stderr
-    assert "something else" in said and "A worker stopped" not in said
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        with executor_of(2, None, cells=9):
+            for words in ("A worker stopped while some jobs were given to the executor.", "something else"):
+                warnings.warn(words, UserWarning, stacklevel=1)
+    assert [str(warning.message) for warning in shown] == ["something else"]

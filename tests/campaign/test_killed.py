@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Unfinished
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.cli.main import DONE, INTERRUPTED
 from simrail.scenario.scenario import load_scenario
 
@@ -99,7 +99,7 @@ def run_with_kills(
         folders = list((folder / "results").glob(".mine.unfinished-*"))
         # Killed as it ended, it has left whole results; the next session then begins anew.
         whole = not folders and (folder / "results" / "mine" / "scores.parquet").exists()
-        kept = cells if whole else len(Unfinished(folders[0]).cells()) if folders else 0
+        kept = cells if whole else len(Checkpoint(folders[0]).cells()) if folders else 0
         assert asked - (kept - before) <= in_session * WORKERS * BATCH_CELLS
         before = 0 if whole else kept
 
@@ -110,7 +110,7 @@ def wait_while(condition: Callable[[], bool], *, at_most_s: float) -> None:
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize(("kills", "cells"), [(3, 24), pytest.param(50, 600, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "cells"), [(2, 16), pytest.param(50, 600, marks=pytest.mark.slow)])
 def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     kills: int,
     cells: int,
@@ -138,6 +138,7 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     assert ("going on with an unfinished run" in log) == (kept > 0)
 
 
+@pytest.mark.slow
 def test_killed_with_a_stop_rule_it_stops_where_it_would_have(
     noting_file: Path,
     notes: Notes,

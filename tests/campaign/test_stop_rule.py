@@ -9,27 +9,27 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from simrail.retry import keep_good
 
 from simrail import results
 from simrail.campaign import campaign
-from simrail.campaign.campaign import run_campaign
-from simrail.campaign.checkpoint import Unfinished
-from simrail.campaign.job import prepare
+from simrail.campaign.campaign import key_of, run_campaign
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.progress import Watcher
 from simrail.campaign.result import CampaignResult
 from simrail.cli.main import CELL_FAILED, DONE, call
+from simrail.results import keep_good
 from simrail.scenario.cells import cells
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.scenario.stop_rule import Look, StopRule, stop_rule_of
+from simrail.scenario.stop_rule import StopRule, StopState, stop_rule_of
 from simrail.scoring.bootstrap import interval
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
 
 CASES = ["ride.speed_kmh=[30, 50]"]
-DRAWS = 14
-LOOKS = (3, 5, 8, 12, 14)
+DRAWS = 10
+STAGES = (3, 5, 8, 10)
 
 
 def stop(width: float, *, estimator: str = "ekf_compensated", least: int = 3, quantity: str = "roll") -> str:
@@ -43,7 +43,7 @@ def rule(scenario: Scenario) -> StopRule:
     return found
 
 
-def planted(scenario: Scenario, value: Callable[..., float], draws: int) -> Look:
+def planted(scenario: Scenario, value: Callable[..., float], draws: int) -> StopState:
     """Look at a table in which each cell has a value that is made for it, in no order."""
     listed = list(cells(scenario))
     rows = pd.DataFrame(
@@ -60,14 +60,14 @@ def planted(scenario: Scenario, value: Callable[..., float], draws: int) -> Look
     )
     others = [rows.assign(value=1e3 * rows["cell"], **{name: "another"}) for name in rows.columns[1:-1]]
     mixed = pd.concat([rows, *others]).sample(frac=1.0, random_state=1)
-    return rule(scenario).look(listed, [mixed[::2], mixed[1::2]], draws)
+    return rule(scenario).state(listed, [mixed[::2], mixed[1::2]], draws)
 
 
-def test_looks_grow_by_half_and_end_with_the_draws(short: Short) -> None:
+def test_stages_grow_by_half_and_end_with_the_draws(short: Short) -> None:
     settings = [f"monte_carlo.sensor_draws={DRAWS}", stop(1.0)]
-    assert rule(short(*settings)).looks == LOOKS
-    assert rule(short("monte_carlo.sensor_draws=3", stop(1.0))).looks == (3,)
-    assert rule(short("monte_carlo.sensor_draws=2", stop(1.0, least=2))).looks == (2,)
+    assert rule(short(*settings)).stages == STAGES
+    assert rule(short("monte_carlo.sensor_draws=3", stop(1.0))).stages == (3,)
+    assert rule(short("monte_carlo.sensor_draws=2", stop(1.0, least=2))).stages == (2,)
 
 
 def test_a_draw_is_one_of_what_the_interval_resamples(short: Short) -> None:
@@ -150,12 +150,12 @@ def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
     """
     truth, spread = np.sqrt(np.pi / 2.0), np.sqrt(2.0 - np.pi / 2.0)
     chance = np.random.default_rng(4)
-    looks = rule(short("monte_carlo.sensor_draws=80", stop(1.0, least=10))).looks
-    assert looks == (10, 15, 23, 35, 53, 80)
+    stages = rule(short("monte_carlo.sensor_draws=80", stop(1.0, least=10))).stages
+    assert stages == (10, 15, 23, 35, 53, 80)
     covered = stopped_early = 0
     for _ in range(400):
         values = chance.rayleigh(1.0, 80)
-        for draws in looks:
+        for draws in stages:
             found = interval(values[:draws])
             if found.high - found.low < 0.8 * spread:
                 break
@@ -166,11 +166,9 @@ def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
 
 
 @pytest.fixture(scope="module")
-def all_draws(short: Short, tmp_path_factory: pytest.TempPathFactory) -> CampaignResult:
+def all_draws(short: Short, module_rides: None) -> CampaignResult:
     """The campaign without a rule: 2 cases of `DRAWS` draws of the sensors."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SIMRAIL_RIDES", str(tmp_path_factory.mktemp("rides")))
-        return run_campaign(short(*CASES, f"monte_carlo.sensor_draws={DRAWS}"), workers=1)
+    return run_campaign(short(*CASES, f"monte_carlo.sensor_draws={DRAWS}"), workers=1)
 
 
 def widths_of(found: CampaignResult) -> dict[int, float]:
@@ -181,7 +179,7 @@ def widths_of(found: CampaignResult) -> dict[int, float]:
     ).merge(found.cells[["cell", "case"]], on="cell")
     assert len(rows) == 2 * DRAWS
     widths = {}
-    for draws in LOOKS:
+    for draws in STAGES:
         seen = [interval(case.loc[case["sensor_draw"] < draws, "value"]) for _, case in rows.groupby("case")]
         widths[draws] = max(one.high - one.low for one in seen)
     return widths
@@ -200,20 +198,19 @@ def rows_of(found: CampaignResult, draws: int) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("workers", "batch_cells", "draws"), [(1, None, 8), (1, 1, 8), (2, 3, 8), (2, None, 8), (1, 5, 12)]
+    ("workers", "batch_cells"),
+    [(1, 1), (2, 3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 5), (2, None)))],
 )
 def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
     workers: int,
     batch_cells: int | None,
-    draws: int,
     all_draws: CampaignResult,
-    rides: Path,
     short: Short,
     assert_same: Same,
 ) -> None:
     """Exactly the rows that the campaign without a rule has for these draws, under the same numbers."""
-    width = width_for(all_draws, draws)
-    scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width))
+    draws = 8
+    scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width_for(all_draws, draws)))
     found = run_campaign(scenario, workers=workers, batch_cells=batch_cells)
     assert found.stopped is not None and found.stopped.reached
     assert (found.stopped.draws, found.stopped.of) == (draws, DRAWS)
@@ -226,7 +223,6 @@ def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
 
 def test_order_of_rides_and_what_is_finished_already_do_not_count(
     all_draws: CampaignResult,
-    rides: Path,
     short: Short,
     tmp_path: Path,
     assert_same: Same,
@@ -234,22 +230,22 @@ def test_order_of_rides_and_what_is_finished_already_do_not_count(
 ) -> None:
     """All draws are kept from before: the rule stops where it stops, and the others are dropped."""
     scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width_for(all_draws, 8)))
-    job, kept = prepare(scenario), Unfinished(tmp_path / "kept")
+    plan, kept = judge_scenario(scenario), Checkpoint(tmp_path / "kept")
     with monkeypatch.context() as patch:
         patch.setattr(campaign, "stop_rule_of", lambda scenario: None)
-        run_campaign(job, kept=kept, batch_cells=3)
-    found = run_campaign(job, kept=kept)
+        run_campaign(plan, checkpoint=kept, batch_cells=3)
+    found = run_campaign(plan, checkpoint=kept)
     assert found.stopped is not None and found.stopped.draws == 8
     assert_same(rows_of(all_draws, 8), found.scores)
     assert len(found.cells) == 16
 
 
 def test_interrupted_within_a_round_it_goes_on_to_the_same(
-    all_draws: CampaignResult, rides: Path, short: Short, tmp_path: Path, assert_same: Same
+    all_draws: CampaignResult, short: Short, tmp_path: Path, assert_same: Same
 ) -> None:
     scenario = short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width_for(all_draws, 8)))
-    for ended_after in (1, 4, 7):
-        kept, real = Unfinished(tmp_path / f"kept_{ended_after}"), Unfinished.add
+    for ended_after in (1, 4):
+        kept, real = Checkpoint(tmp_path / f"kept_{ended_after}"), Checkpoint.add
         count = 0
 
         def add(self, result, real=real, ended_after=ended_after):  # type: ignore[no-untyped-def]
@@ -260,17 +256,17 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
                 raise KeyboardInterrupt
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Unfinished, "add", add)
+            patch.setattr(Checkpoint, "add", add)
             with pytest.raises(KeyboardInterrupt):
-                run_campaign(scenario, kept=kept, workers=1, batch_cells=2)
+                run_campaign(scenario, checkpoint=kept, workers=1, batch_cells=2)
         assert not kept.is_empty
-        found = run_campaign(scenario, kept=kept, workers=1, batch_cells=3)
+        found = run_campaign(scenario, checkpoint=kept, workers=1, batch_cells=3)
         assert found.stopped is not None and found.stopped.draws == 8
         assert_same(rows_of(all_draws, 8), found.scores)
 
 
 def test_progress_counts_the_cells_of_a_round(
-    all_draws: CampaignResult, rides: Path, short: Short, tmp_path: Path
+    all_draws: CampaignResult, short: Short, tmp_path: Path
 ) -> None:
     class Counting(Watcher):
         def __init__(self) -> None:
@@ -291,7 +287,7 @@ def test_progress_counts_the_cells_of_a_round(
 
 
 def test_not_reached_after_all_draws_names_the_widest_case(
-    all_draws: CampaignResult, rides: Path, short: Short, assert_same: Same
+    all_draws: CampaignResult, short: Short, assert_same: Same
 ) -> None:
     width = 0.5 * min(widths_of(all_draws).values())
     found = run_campaign(short(*CASES, f"monte_carlo.sensor_draws={DRAWS}", stop(width)), workers=1)
@@ -301,14 +297,14 @@ def test_not_reached_after_all_draws_names_the_widest_case(
     assert f"not reached after all {DRAWS} draws of the sensors" in words and "ride.speed_kmh = " in words
 
 
-def test_a_figure_that_an_estimator_never_gives_is_not_reached(rides: Path, short: Short) -> None:
+def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: None, short: Short) -> None:
     settings = ["monte_carlo.sensor_draws=3", stop(1.0, estimator="design_angles", quantity="gyro_bias")]
     found = run_campaign(short(*settings), workers=1)
     assert found.stopped is not None and found.stopped.width is None
     assert "unknown for want of values" in found.stopped.words
 
 
-def test_one_cell_alone_asks_no_rule(rides: Path, short: Short) -> None:
+def test_one_cell_alone_asks_no_rule(module_rides: None, short: Short) -> None:
     found = run_campaign(short("monte_carlo.sensor_draws=9", stop(9.0)), only=8)
     assert found.stopped is None and list(found.cells["cell"]) == [8]
 
@@ -346,7 +342,8 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     )
     (noting_file.parent / "noting.py").write_text(FLAKY)
     settings = ["monte_carlo.sensor_draws=12", stop(5.0, estimator="ekf", least=4)]
-    words = ["run", str(noting_file), *(word for one in settings for word in ("--set", one))]
+    words = ["run", str(noting_file), "--workers", "1"]
+    words += [word for one in settings for word in ("--set", one)]
     assert call([*words, "--out", "results/whole"]) == DONE
     assert "stop rule reached after 4 of 12 draws of the sensors" in " ".join(capsys.readouterr().out.split())
     (here / "broken").touch()
@@ -354,8 +351,8 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     (here / "broken").unlink()
     capsys.readouterr()
     had = set(pd.read_parquet(here / "results" / "mine" / "scores.parquet")["cell"])
-    job, kept = prepare(load_scenario(noting_file, overrides=settings)), Unfinished(here / "kept")
-    keep_good(here / "results" / "mine", job, kept)
+    plan, kept = judge_scenario(load_scenario(noting_file, overrides=settings)), Checkpoint(here / "kept")
+    keep_good(here / "results" / "mine", plan, key_of(plan), kept)
     failed = json.loads((here / "results" / "mine" / "manifest.json").read_text())["failures"]
     assert len(had) == 8 and kept.cells() == had - {failure["cell"] for failure in failed}
     assert 0 < len(kept.cells()) < 8

@@ -11,6 +11,7 @@ from simrail.campaign.progress import Watcher
 from simrail.campaign.tune import chosen_cells
 from simrail.cli.main import BAD_INPUT, DONE, INTERRUPTED, call
 from simrail.core.toml_files import shipped
+from simrail.estimation.tunable import TunedValues
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import load_scenario
 
@@ -30,7 +31,7 @@ SHORT = (
     .replace("start_m = 10.0", "start_m = 110.0")
     .replace("end_m = 590.0", "end_m = 165.0")
 )
-WORDS = ["tune", "mine.toml", "--estimator", "smoother", "--evaluations", "16"]
+WORDS = ["tune", "mine.toml", "--estimator", "smoother", "--evaluations", "16", "--at-most", "60"]
 
 
 @pytest.fixture
@@ -70,11 +71,11 @@ def test_interrupted_it_goes_on(
     (place / "other.toml").unlink()
 
     def interrupt(self: Watcher, name: str, evaluations: int, value: float) -> None:
-        if name == "curves" and evaluations > 60:
+        if name == "curves" and evaluations > 40:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("simrail.cli.progress_bar.ProgressWatcher.search_goes", interrupt)
+        patch.setattr("simrail.campaign.progress.ProgressWatcher.search_goes", interrupt)
         capsys.readouterr()
         assert call(words) == INTERRUPTED
     assert "best so far is in other.unfinished.toml" in capsys.readouterr().out
@@ -97,6 +98,101 @@ def test_known_output(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert tuning.search is not None
     assert (tuning.search.method, tuning.search.unit) == ("kom", "sum of rms errors in mm")
     assert tuning.hyperparameters.lateral_position_m2 == 3e-3
+
+
+STRANGER = """
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from simrail.estimation.estimate import Estimate
+from simrail.estimation.tunable import Parameter, TunedValues
+
+
+class Fit:
+    def __init__(self, unit, values):
+        self.unit, self.of = unit, values
+
+    def value(self, values):
+        return float(((self.of - values["offset_m"]) ** 2).mean() + (values["tau_s"] - 2.0) ** 2)
+
+
+@dataclass(frozen=True)
+class Mine:
+    offset_m: float = 0.5
+    tuning: TunedValues | None = None
+    causal = True
+
+    def estimate(self, recording):
+        offset = self.offset_m if self.tuning is None else self.tuning.values["offset_m"]
+        return Estimate(pd.DataFrame({"roll_rad": offset}, index=recording.imu.index), recording.mount)
+
+    def parameters(self):
+        return (
+            Parameter("tau_s", "s", 0.1, 10.0, 1.0),
+            Parameter("offset_m", "m", -9.0, 19.0, self.offset_m, scale="linear"),
+        )
+
+    def likelihood(self, recordings):
+        return Fit("of the recordings", np.concatenate([one.imu["accel_z_mps2"] for one in recordings]))
+
+    def reference_error(self, recordings, references):
+        assert len(recordings) == len(references)
+        return Fit("of the rails", np.concatenate([one["cross_level_m"] for one in references]))
+
+
+@dataclass(frozen=True)
+class Half(Mine):
+    reference_error = None
+"""
+
+
+def test_a_strangers_tunable_is_tuned_by_both_methods(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From one file, in a scenario or by its path; what it finds is an option of the estimator."""
+    (place / "mine.py").write_text(STRANGER, encoding="utf-8")
+    entry = '[[estimator]]\nname = "own"\nmethod = "./mine.py:Mine"\n'
+    (place / "mine.toml").write_text(f"{SHORT}\n{entry}", encoding="utf-8")
+    words = ["tune", "mine.toml", "--evaluations", "160", "--method"]
+    assert call([*words, "cml", "--estimator", "own"]) == DONE
+    printed = capsys.readouterr().out
+    assert "of the recordings" in printed and "tau_s" in printed and "offset_m" in printed
+    values = TunedValues.from_file(place / "mine_cml.toml").values
+    assert values == {"tau_s": pytest.approx(2.0, rel=1e-3), "offset_m": pytest.approx(9.81, abs=0.05)}
+    assert call([*words, "kom", "--estimator", "mine.py:Mine"]) == DONE
+    by_rails = TunedValues.from_file(place / "mine_kom.toml").values
+    assert by_rails["offset_m"] == pytest.approx(0.0, abs=0.01) and by_rails["tau_s"] == pytest.approx(2.0)
+    options = '[estimator.options]\ntuning = "mine_cml.toml"\n'
+    (place / "mine.toml").write_text(f"{SHORT}\n{entry}{options}", encoding="utf-8")
+    made = judge_scenario(load_scenario("mine.toml")).estimators["own"]
+    assert made.tuning.values == values  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["--method", "map"], ["--method", "'map'", "cml or kom"]),
+        (["--by-kind"], ["--by-kind: Mine has no such setting of its search; remedy: leave it out"]),
+        (["--constrain", "yz"], ["--constrain: Mine has no such setting"]),
+        (["--box", "1", "2"], ["--box: Mine has no such setting"]),
+        (
+            ["--method", "kom", "--estimator", "./mine.py:Half"],
+            ["--method: Half cannot be tuned by this method; found 'kom'; limit: cml"],
+        ),
+    ],
+)
+def test_what_a_strangers_tunable_does_not_offer_is_refused_in_one_line(
+    words: list[str], parts: list[str], place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (place / "mine.py").write_text(STRANGER, encoding="utf-8")
+    assert call([*WORDS, "--estimator", "./mine.py:Mine", "--method", "cml", *words]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    for part in parts:
+        assert part in line
+    assert {entry.name for entry in place.iterdir()} == {"mine.py", "mine.toml"}
 
 
 def test_fits_on_several_draws_of_new_tracks_first(
@@ -131,7 +227,7 @@ def test_what_a_search_left_and_what_it_was_not_allowed_is_told(
 ) -> None:
     """No fall of the objective stands there as if it were a least; names are whole in 80 columns."""
     monkeypatch.setattr("simrail.estimators.tuning.search.ROUNDS", 0)
-    assert call([*WORDS[:-2], "--method", "cml", "--evaluations", "0", "--at-most", "1"]) == DONE
+    assert call([*WORDS[:-4], "--method", "cml", "--evaluations", "0", "--at-most", "1"]) == DONE
     said = capsys.readouterr().out
     left = " ".join(said.partition("not at the least: ")[2].split()).partition(" would be better")[0]
     assert "lateral_m2ps5" in left or "vertical_m2ps5" in left, said
@@ -145,7 +241,7 @@ def test_what_a_search_left_and_what_it_was_not_allowed_is_told(
     [
         (["--method", "map"], ["--method", "'map'", "cml or kom"]),
         (["--estimator", "smother"], ["--estimator", "'smother'", "smoother"]),
-        (["--estimator", "design_angles"], ["--estimator", "design_angles", "TrajectorySmoother"]),
+        (["--estimator", "design_angles"], ["--estimator", "DesignAngles", "e.g. TrajectorySmoother"]),
         (["--ride", "home"], ["--ride", "'home'", "one of out"]),
         (["--draws", "0"], ["--draws: is out of range; found 0", ">= 1"]),
         (["--draws", "-1"], ["--draws: is out of range; found -1", ">= 1"]),

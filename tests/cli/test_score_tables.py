@@ -21,8 +21,11 @@ seed = 1
 track = "scale_track"
 vehicle = "scale_vehicle"
 engine = "kinematic"
+odometry = "truth"
 [monte_carlo]
 sensor_draws = 2
+[encoder]
+wheel = "wheel"
 [[ride]]
 name = "out"
 start_m = 1.0

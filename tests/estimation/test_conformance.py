@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,11 +14,15 @@ from simrail.estimators.ahrs import Imufusion, Vqf
 from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
 from simrail.estimators.baselines import DesignAngles
+from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
+from simrail.cli.templates import write_template
 from simrail.core.columns import ATTITUDE, IRREGULARITY
-from simrail.estimation.conformance import check_estimator, require_well_formed
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.conformance import check_estimator, check_odometry, require_well_formed
 from simrail.estimation.estimate import Estimate, Estimator
+from simrail.estimation.user_modules import class_named
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import harmonic, kinematic_truth
@@ -37,7 +42,7 @@ def ride(direction: int = 1, imu: str = "lord_3dm_gx4_25") -> Recording:
         SpeedProfile(start, end, 10.0, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=3.0),
         channels={"roll": harmonic(0.005, frequency_hz=1.1), "lateral": harmonic(0.003, frequency_hz=0.7)},
     )
-    return measure(
+    recording = measure(
         truth,
         name="short",
         mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
@@ -46,6 +51,7 @@ def ride(direction: int = 1, imu: str = "lord_3dm_gx4_25") -> Recording:
         seed=1,
         draw=0,
     )
+    return with_odometry(recording, "encoder")
 
 
 OURS = [
@@ -323,6 +329,62 @@ def test_draws_are_of_the_geometry_and_the_same_bits_again() -> None:
         check_estimator(Draws("seed"), ride())
 
 
+class SecretlyCompensated(Sound):
+    """Takes the odometry's speed, and does not say so."""
+
+    needs = ()
+
+    def spoil(self, states: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+        return states.mul(recording.odometry["speed_mps"], axis=0)
+
+
+class King(Sound):
+    """Plays a role that nobody knows."""
+
+    role = "king"
+
+
+@dataclass(frozen=True)
+class Wheel(EncoderOdometry):
+    """The encoder's odometry, to put faults into."""
+
+    fault: str = ""
+
+    def __post_init__(self) -> None:
+        """Judge nothing."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        estimate = super().estimate(recording)
+        states = estimate.states
+        if self.fault == "column":
+            states = states.drop(columns="acceleration_sd_mps2")
+        elif self.fault == "copy" and recording.odometry is not None:
+            states = states.assign(speed_mps=recording.odometry["speed_mps"] + 1e-9)
+        return replace(estimate, states=states)
+
+
+def test_odometries_pass_and_their_faults_are_caught() -> None:
+    check_odometry(EncoderOdometry(), ride())
+    check_odometry(Wheel(), ride(-1, "ideal"))
+    for fault, words in (
+        ("column", "gives_an_odometry: AssertionError: states lack acceleration_sd_mps2"),
+        ("copy", "is_no_copy: AssertionError: without another odometry: speed_mps differs"),
+    ):
+        with pytest.raises(AssertionError, match=words):
+            check_odometry(Wheel(fault=fault), ride())
+    with pytest.raises(AssertionError, match="an odometry needs an odometry"):
+        check_odometry(AttitudeEkf(), ride())
+
+
+def test_the_template_of_an_odometry_passes(tmp_path: Path) -> None:
+    write_template("odometry", "my_odometry", folder=tmp_path)
+    made = class_named("my_odometry.py:MyOdometry", tmp_path)()
+    check_odometry(made, ride())
+
+    states, other = made.estimate(ride()).states, EncoderOdometry().estimate(ride()).states
+    assert states["position_m"].iloc[-1] == pytest.approx(other["position_m"].iloc[-1], abs=0.01)
+
+
 class UnsaidCausal(Sound):
     """Does not say whether it is causal."""
 
@@ -373,6 +435,8 @@ class SmootherThatSaysSo(MeanOfAll):
         (OtherMount, "estimate_is_well_formed", "roof"),
         (CrookedCovariance, "estimate_is_well_formed", "not symmetric"),
         (IndefiniteCovariance, "estimate_is_well_formed", "positive semidefinite"),
+        (SecretlyCompensated, "needs_what_it_says", "NoneType"),
+        (King, "says_what_it_is", "role"),
         (UnsaidCausal, "says_whether_causal", "causal"),
         (NoDataclass, "frozen_dataclass", "no dataclass"),
         (Thawed, "frozen_dataclass", "not frozen"),

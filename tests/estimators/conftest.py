@@ -13,6 +13,7 @@ from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry
 
 from simrail.core.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.toml_files import load
+from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.recording import ImuSheet, Recording
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import Channel, along, kinematic_truth, rail_following
@@ -128,7 +129,7 @@ def line_motion(speed_kmh: float, direction: int) -> pd.DataFrame:
 @lru_cache(maxsize=8)
 def record_line(speed_kmh: float, direction: int, draw: int) -> Recording:
     """That ride as the 3DM-GX4-25 and an encoder with a wheel that is not quite nominal record it."""
-    return measure(
+    recording = measure(
         line_truth(speed_kmh, direction),
         name=f"{speed_kmh:g} km/h {direction:+d}",
         mount=IMU_AT,
@@ -137,6 +138,7 @@ def record_line(speed_kmh: float, direction: int, draw: int) -> Recording:
         seed=1,
         draw=draw,
     )
+    return with_odometry(recording, "encoder")
 
 
 AXLE_AT = Mount("axle", "front", (0.0, 0.0, 0.6))
@@ -167,7 +169,7 @@ def bogie_motion(speed_kmh: float, direction: int) -> pd.DataFrame:
 @lru_cache(maxsize=2)
 def record_bogie(speed_kmh: float, direction: int, draw: int) -> Recording:
     """That ride as recorded."""
-    return measure(
+    recording = measure(
         bogie_truth(speed_kmh, direction),
         name=f"bogie {speed_kmh:g} km/h {direction:+d}",
         mount=AXLE_AT,
@@ -176,6 +178,7 @@ def record_bogie(speed_kmh: float, direction: int, draw: int) -> Recording:
         seed=1,
         draw=draw,
     )
+    return with_odometry(recording, "encoder")
 
 
 METRO_AT = {"axle": AXLE_AT, "frame": Mount("frame", "frame", (0.0, 0.0, 0.6))}

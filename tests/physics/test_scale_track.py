@@ -27,7 +27,7 @@ from simrail.core.toml_files import shipped
 from simrail.estimation.estimate import Estimate, Estimator
 from simrail.recording.recording import Recording
 from simrail.ride.ride import simulate
-from simrail.scenario.build import Parts, mount_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import load_scenario
 from simrail.scoring.geometry import score_geometry
@@ -56,7 +56,7 @@ def ride(own_cache: None) -> tuple[Rides, LaidTrack]:
     def record(*more: str) -> list[Recording]:
         scenario = load_scenario("scale_track", overrides=[*settings, *more])
         parts = Parts(scenario)
-        chosen = [cell for cell in cells(scenario) if mount_of(cell).name == "body"]
+        chosen = [cell for cell in cells(scenario) if cell.imu.name == "body"]
         return [record_cell(cell, simulate(parts.ride(cell)), parts) for cell in chosen]
 
     scenario = load_scenario("scale_track", overrides=settings)

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.estimation.conformance import prefix
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.recording.recording import beginning
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.standstill import (
     GUARD_S,
@@ -157,7 +158,7 @@ def test_a_train_that_moves_from_the_first_reading_never_rests():
 
 
 def test_a_train_that_never_moves_rests_to_the_end():
-    recording = prefix(record(ride()), 1000)
+    recording = beginning(record(ride()), samples=1000)
     found = rest_periods(recording)
     assert len(found) == 1 and len(motion_times(recording)) == 0
     assert found["end_s"].iloc[0] == pytest.approx(recording.imu.index[-1] - GUARD_S)
@@ -165,7 +166,7 @@ def test_a_train_that_never_moves_rests_to_the_end():
 
 def test_without_an_encoder_the_odometry_says_it():
     truth = ride()
-    recording = replace(record(truth), encoder=None, encoder_sheet=None)
+    recording = replace(with_odometry(record(truth), "encoder"), encoder=None, encoder_sheet=None)
     found, true = rest_periods(recording), true_rests(truth)
     assert len(found) == len(true)
     assert (found.to_numpy()[:, 0] >= true[:, 0]).all() and (found.to_numpy()[:, 1] <= true[:, 1]).all()
@@ -176,5 +177,5 @@ def test_signs_of_motion_use_nothing_read_later(direction):
     recording = record(ride(direction), edge_jitter_sd=0.1)
     whole = motion_times(recording)
     for n in (500, 1700, 4000, 6001, len(recording.imu) - 3):
-        part = prefix(recording, n)
+        part = beginning(recording, samples=n)
         np.testing.assert_array_equal(motion_times(part), whole[whole <= part.encoder.index[-1]])

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, Recording
@@ -23,6 +23,8 @@ seed = 1
 track = "test_line"
 vehicle = "none"
 engine = "kinematic"
+[encoder]
+wheel = "wheel"
 [monte_carlo]
 sensor_draws = 2
 [[ride]]

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import _in_two, box_figure, curvature_figure
 from simrail.report.campaign.heat import _short, heat_figure, side_of
@@ -22,7 +22,6 @@ from simrail.report.campaign.rails import rails_figures
 from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
 from simrail.report.pages.page import TABLES, write_report
 from simrail.report.tables.methods import MethodStyle, method_styles
-from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.statistics import compare
 from simrail.scoring.table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
@@ -34,6 +33,8 @@ seed = 1
 track = "test_line"
 vehicle = "none"
 engine = "kinematic"
+[encoder]
+wheel = "wheel"
 [monte_carlo]
 track_draws = 10
 sensor_draws = 20
@@ -170,7 +171,7 @@ def made_up() -> Scenario:
 
 @pytest.fixture(scope="module")
 def styles(made_up: Scenario) -> list[MethodStyle]:
-    return list(method_styles(methods(made_up)).values())
+    return list(method_styles(made_up).values())
 
 
 @pytest.fixture(scope="module")

@@ -9,19 +9,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.estimation.estimate import Estimate
 from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import cases
 from simrail.report.words.findings import findings
 from simrail.report.words.sentences import significant
-from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario
 
 
 def said(scenario: Scenario, scores: pd.DataFrame, cells: pd.DataFrame) -> str:
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     return "\n".join(finding.text for finding in findings(cases(scores, cells)[0], styles))
 
 
@@ -104,13 +103,13 @@ def test_the_ideal_imu_tells_the_floor(
     one = example()
     ideal = CellResult(one.cell | {"imu": "ideal"}, one.recording, one.motion, one.estimates)
     all_cases = cases(*tables(one, ideal))
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     text = "\n".join(finding.text for finding in findings(all_cases[0], styles, others=all_cases))
     assert "With an ideal IMU" in text and "EKF compensated 0.100\u00b0 instead of 0.100\u00b0" in text
 
 
 def test_roles_follow_from_the_scenario_not_from_names(scenario: Scenario) -> None:
-    styles = method_styles(methods(scenario))
+    styles = method_styles(scenario)
     assert {name: style.baseline for name, style in styles.items()} == {
         "ekf_compensated": "",
         "plain_filter": "uncompensated",
@@ -160,7 +159,7 @@ def test_the_floor_is_that_of_the_same_speed(
     one = example()
     ideal = CellResult(one.cell | {"imu": "ideal"}, one.recording, one.motion, one.estimates)
     scores, cells = tables(one, ideal, draws=1)
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
 
     def floor_with(speeds: list[float]) -> str:
         found = cases(scores, cells.assign(**{"ride.speed_kmh": speeds}))

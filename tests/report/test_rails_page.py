@@ -13,13 +13,12 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.estimation.estimate import Estimate
-from simrail.report import write_report
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.figures.style import fitting_columns, legend_above, look, panels
 from simrail.report.figures.track import profile_figure, profile_words
-from simrail.report.pages.page import _ride
+from simrail.report.pages.page import _ride, write_report
 from simrail.report.papers.gonzalez_2023.parts import COLOURS
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
 from simrail.report.tables.geometry_bands import JUDGED, band_words, judged_band, waves_words
@@ -97,7 +96,7 @@ class Ran:
     def __init__(self, scenario: Scenario, result: Any, page: str) -> None:
         self.scenario, self.page = scenario, page
         self.cases = cases(result.scores, result.cells)
-        self.styles = list(method_styles(methods(scenario)).values())
+        self.styles = list(method_styles(scenario).values())
         self.example: CellResult = result.examples[0]
         self.known = bands_by_name(scenario.spec)
         self.examples = result.examples
@@ -413,7 +412,7 @@ def test_methods_are_alike_only_if_every_figure_is(
 ) -> None:
     one = example()
     states = one.estimates["ekf_compensated"].states
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     styles = [*styles, *(replace(styles[0], name=name, label=name, twin="") for name in ("b", "c", "d"))]
     for factor, groups in ((1.005, [["ekf_compensated", "b"], ["c"], ["d"]]), (1.02, [["ekf_compensated"]])):
         error = np.deg2rad(0.1) * (factor - 1.0)
@@ -437,8 +436,8 @@ def test_many_methods_are_told_together(
     tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
 ) -> None:
     one = example()
-    style = method_styles(methods(scenario))["ekf_compensated"]
-    design = method_styles(methods(scenario))["design_angles"]
+    style = method_styles(scenario)["ekf_compensated"]
+    design = method_styles(scenario)["design_angles"]
     names = ["m1", "m2", "m3", "m4"]
     estimates = {"design_angles": one.estimates["design_angles"]}
     for k, name in enumerate(names):

@@ -8,11 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import Figures, cases, of_cell
 from simrail.report.tables.tables import error_table
-from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario
 
 
@@ -25,7 +24,7 @@ def test_table_marks_the_best_method_and_every_loss(
     example: Callable[..., CellResult],
     tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
 ) -> None:
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     table = error_table(case_of(*tables(example())), styles, reference="truth")
     column = table.columns.index("curve")
     marks = {row.label: row.cells[column] for row in table.rows}
@@ -62,9 +61,9 @@ def test_cases_are_found_by_their_labels(
 
 
 def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
-    styles = method_styles(methods(load_scenario("metro_geometry")))
+    styles = method_styles(load_scenario("metro_geometry"))
     smoothers = [style.colour for name, style in styles.items() if name.startswith(("smoother", "filter"))]
     assert len(smoothers) > 3
     assert len(set(smoothers)) == len(smoothers)
-    few = method_styles(methods(load_scenario("validation_quick")))
+    few = method_styles(load_scenario("validation_quick"))
     assert few["ekf_compensated"].colour == "#0072B2"

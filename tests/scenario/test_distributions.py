@@ -11,8 +11,7 @@ from simrail.core.toml_files import shipped
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells, count, first_cells, methods
 from simrail.scenario.check import judge_scenario
-from simrail.scenario.distributions import Distribution
-from simrail.scenario.samples import dimensions, samples_of
+from simrail.scenario.distributions import Distribution, dimensions, samples_of
 from simrail.scenario.scenario import Scenario, read_scenario
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from pydantic import Field
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part, judge, shipped
 from simrail.scenario.axes import Axis, Listed, axes_of, expand
-from simrail.scenario.build import Parts, encoder_of, magnetometer_of, mount_of, profile_of
+from simrail.scenario.build import Parts
 from simrail.scenario.build_estimator import estimator_of
 from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
@@ -48,15 +48,13 @@ def test_shipped_scenarios_are_good(name: str) -> None:
 
 def test_go20a_is_the_ride_of_the_paper() -> None:
     scenario = load_scenario("go20a")
-    first = next(cells(scenario))
-    profile = profile_of(first)
+    first = Parts(scenario).resolve(next(cells(scenario)))
+    profile = first.ride.profile
     assert profile.speed_mps == pytest.approx(20.0 / 3.6)
     assert profile.direction == 1 and profile.rest_s == 20.0
-    mount = mount_of(first)
-    assert mount.body == "front" and mount.position_m == (0.0, 0.0, 0.6)
-    encoder = encoder_of(first)
-    assert encoder is not None and encoder.wheel == "trailing.left"
-    ride = Parts(scenario).ride(first)
+    assert first.mount.body == "front" and first.mount.position_m == (0.0, 0.0, 0.6)
+    assert first.encoder is not None and first.encoder.wheel == "trailing.left"
+    ride = first.ride
     assert ride.engine == "exudyn" and ride.vehicle.synthetic and ride.track.synthetic
     assert {method.name for method in methods(scenario)} >= {
         f"{method}_{word}" for method in ("ekf", "gda") for word in ("compensated", "uncompensated")
@@ -288,32 +286,31 @@ spacing_m = 30.0
 def test_encoder_and_magnetometer_say_in_text_what_their_specifications_are() -> None:
     text = GOOD[: GOOD.index("[encoder]")] + SENSORS + GOOD[GOOD.index("[[estimator]]") :]
     scenario = read_scenario(text, name="sensors", overrides=["monte_carlo.track_draws=2"])
-    judge_scenario(scenario)
-    listed = list(cells(scenario))
+    parts = judge_scenario(scenario).parts
+    listed = [parts.resolve(cell) for cell in cells(scenario)]
     assert len(listed) == 2 * 2 * 2 * 2 * 2  # quadrature, supply, grade, two draws each
     first = listed[0]
-    assert first.settings["magnetometer.traction.supply"] == "catenary"
-    assert encoder_of(first) == EncoderSpec(
+    assert first.cell.settings["magnetometer.traction.supply"] == "catenary"
+    assert first.encoder == EncoderSpec(
         "front.left",
         pulses_per_revolution=100,
         missed_rate=1e-5,
         radius_error=0.002,
         slip=(Slip(20.0, 3.0, -0.1), Slip(30.0, 1.0, 0.2, ramp_s=0.5)),
     )
-    assert magnetometer_of(first) == MagnetometerSpec(
+    assert first.magnetometer == MagnetometerSpec(
         field=EarthField(declination_rad=radians(-1.0), x_axis_rad=radians(30.0)),
         iron=VehicleIron(),
         traction=Traction(mass_kg=60e3),
-        steel=Steel(track_seed=first.ride_seed, spacing_m=30.0),
+        steel=Steel(track_seed=first.ride.track_seed, spacing_m=30.0),
     )
     # Steel is the track's: the same for both sensor draws, another for another track.
-    seeds = {(cell.track_draw, magnetometer_of(cell).steel.track_seed) for cell in listed}  # type: ignore[union-attr]
+    seeds = {(one.cell.track_draw, one.magnetometer.steel.track_seed) for one in listed}  # type: ignore[union-attr]
     assert len(seeds) == 2
-    assert {encoder_of(cell).counts_per_revolution for cell in listed} == {100, 400}  # type: ignore[union-attr]
+    assert {one.encoder.counts_per_revolution for one in listed} == {100, 400}  # type: ignore[union-attr]
 
 
 def test_an_empty_magnetometer_table_is_a_clean_field() -> None:
-    plain = next(cells(read_scenario(GOOD, name="plain")))
-    assert magnetometer_of(plain) is None
-    clean = magnetometer_of(next(cells(read_scenario(GOOD + "\n[magnetometer]\n", name="clean"))))
-    assert clean == MagnetometerSpec()
+    for text, expected in ((GOOD, None), (GOOD + "\n[magnetometer]\n", MagnetometerSpec())):
+        scenario = read_scenario(text, name="mine")
+        assert Parts(scenario).resolve(next(cells(scenario))).magnetometer == expected

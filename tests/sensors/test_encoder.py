@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
+from simrail.core.columns import EDGE_TIME
 from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray, njit
 from simrail.recording.recording import EncoderSheet
-from simrail.recording.wheel_speed import counted_way_m, pulse_way_m, speed_by_counting, speed_by_period
+from simrail.recording.wheel_speed import counted_way_m, pulse_way_m
 from simrail.sensors.encoder import EncoderSpec, Slip, nominal_radius, sample_encoder
 
 TIME = np.arange(60_001) / 1000.0
@@ -239,7 +242,59 @@ def test_terms_have_streams_of_their_own_and_a_longer_ride_begins_with_the_short
     assert alone.equals(sample(angle, **{term: 0.05}))
 
 
-# What a logger makes of it.
+# What a logger makes of it: it counts, or it times edges.
+
+
+def speed_by_counting(encoder: pd.DataFrame, sheet: EncoderSheet, *, readings: int = 1) -> pd.Series:
+    """Mean speed over the interval of so many readings that ends at each, m/s: pulses over time."""
+    counts = encoder["pulse_count"].to_numpy(dtype=np.float64)
+    times = encoder.index.to_numpy(dtype=np.float64)
+    begin = np.maximum(np.arange(len(counts)) - readings, 0)
+    elapsed = times - times[begin]
+    elapsed[0] = np.inf
+    speed = (counts - counts[begin]) * pulse_way_m(sheet) / elapsed
+    return pd.Series(speed, index=encoder.index, name="speed_mps")
+
+
+def speed_by_period(encoder: pd.DataFrame, sheet: EncoderSheet, *, still_s: float = 0.5) -> pd.Series:
+    """Speed from the way between two edges over the time between them, m/s; zero long after the last."""
+    speed = _by_period(
+        encoder.index.to_numpy(dtype=np.float64),
+        encoder["pulse_count"].to_numpy(dtype=np.float64),
+        encoder[EDGE_TIME].to_numpy(dtype=np.float64),
+        pulse_way_m(sheet),
+        still_s,
+    )
+    return pd.Series(speed, index=encoder.index, name="speed_mps")
+
+
+@njit
+def _by_period(time: FloatArray, count: FloatArray, edge: FloatArray, way: float, still: float) -> FloatArray:
+    """Loop of `speed_by_period`; way is that of one count."""
+    speed = np.zeros(len(time))
+    known = False  # whether an edge has passed
+    place, when = 0.0, edge[0]  # of the last edge, in counts
+    value = 0.0
+    for k in range(1, len(time)):
+        change = count[k] - count[k - 1]
+        if edge[k] > when or change != 0.0:
+            # The edge just passed lies below the count when going up, above it when going down.
+            if change == 0.0:
+                now = place  # to and fro within one reading
+            elif change > 0.0:
+                now = count[k]
+            else:
+                now = count[k] + 1.0
+            if known and edge[k] > when:
+                value = (now - place) * way / (edge[k] - when)
+            place, when, known = now, edge[k], True
+        awaited = time[k] - when
+        if awaited > still:
+            value = 0.0
+        if awaited > 0.0 and abs(value) * awaited > way:
+            value = np.sign(value) * way / awaited
+        speed[k] = value
+    return speed
 
 
 def test_way_and_speed_by_counting_are_quantised_as_theory_says():
@@ -368,10 +423,3 @@ def test_bad_encoders_are_refused(change, words):
     with pytest.raises(InputError) as caught:
         sample(TIME, **change)
     assert all(word in str(caught.value) for word in words), str(caught.value)
-
-
-def test_a_logger_without_edge_times_is_told_so():
-    with pytest.raises(InputError, match="edge_time_s"):
-        speed_by_period(sample(TIME), sheet())
-    with pytest.raises(InputError, match="readings"):
-        speed_by_counting(sample(TIME), sheet(), readings=0)

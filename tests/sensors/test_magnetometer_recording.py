@@ -11,9 +11,10 @@ from simrail.estimators.ahrs import Vqf
 
 from simrail.core.columns import ATTITUDE
 from simrail.core.errors import InputError
+from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.conformance import check_estimator
+from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
-from simrail.recording.files.ride_reader import read_ride
 from simrail.recording.files.ride_writer import write_ride
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import kinematic_truth
@@ -53,7 +54,7 @@ def record(truth, magnetometer, **more):
         "seed": 1,
         "draw": 0,
     } | more
-    return measure(truth, magnetometer=magnetometer, **settings)
+    return with_odometry(measure(truth, magnetometer=magnetometer, **settings), "encoder")
 
 
 @pytest.fixture

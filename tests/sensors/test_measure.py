@@ -8,11 +8,12 @@ import pytest
 
 from simrail.core.columns import IMU, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
-from simrail.recording.files.ride_reader import read_ride
 from simrail.recording.files.ride_writer import write_parts
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.recording.standstill import GUARD_S, at_rest_initially, first_motion_s
+from simrail.recording.standstill import GUARD_S, at_rest_initially, first_motion_s, rest_periods
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec, Slip
@@ -56,7 +57,7 @@ def test_a_recording_is_complete_and_passes_its_own_judgement(truth):
     assert recording.mount_position_m == MOUNT.position_m
     assert recording.track == truth.track
     assert recording.gravity_mps2 == truth.gravity_mps2
-    assert recording.odometry_source == "encoder"
+    assert recording.odometry is None and recording.odometry_source == ""
     assert recording.imu_sheet.grade == "lord_3dm_gx4_25"
     assert recording.imu_sheet.rate_hz == 250.0
     assert recording.imu_sheet.delay_s == pytest.approx(recording.imu.index[0])
@@ -68,7 +69,7 @@ def test_a_recording_is_complete_and_passes_its_own_judgement(truth):
 
 
 def test_odometry_speaks_of_the_mount_and_is_honest(truth):
-    recording = record(truth)
+    recording = with_odometry(record(truth), "encoder")
     true = truth.motion(MOUNT).loc[recording.imu.index]
     assert recording.start_position_m == pytest.approx(10.5)
     error = recording.odometry["position_m"] - true["position_m"]
@@ -83,8 +84,9 @@ def test_a_slide_and_quadrature_reach_the_odometry(truth):
     """At 10 m/s for 1.5 s less half of both ramps, 15 % too slow: the train believes 1.875 m less."""
     slide = Slip(start_s=REST_S + 18.3, duration_s=1.5, creepage=-0.15)
     for quadrature in (False, True):
+        wheel = EncoderSpec("wheel", quadrature=quadrature, radius_error=0.0)
         plain, slid = (
-            record(truth, encoder=EncoderSpec("wheel", quadrature=quadrature, slip=slip, radius_error=0.0))
+            with_odometry(record(truth, encoder=replace(wheel, slip=slip)), "encoder")
             for slip in ((), (slide,))
         )
         speed = truth.motion(MOUNT)["speed_mps"].loc[slide.start_s : slide.start_s + 1.5]
@@ -216,11 +218,13 @@ def test_rest_is_found_from_the_encoder(truth):
 def test_rest_without_an_encoder_or_without_motion(truth):
     blind = record(truth, odometry="truth", encoder=None)
     assert first_motion_s(blind) == pytest.approx(REST_S + 0.22, abs=0.02)
+    # Nothing tells of motion, so nothing tells of rest.
+    assert at_rest_initially(replace(blind, odometry=None)) == 0
+    assert rest_periods(replace(blind, odometry=None)).empty
     short = replace(
         record(truth),
         imu=record(truth).imu.loc[:5.0],
         encoder=record(truth).encoder.loc[:5.0],
-        odometry=record(truth).odometry.loc[:5.0],
     )
     assert first_motion_s(short) == float("inf")
     assert at_rest_initially(short) == len(short.imu)
@@ -229,8 +233,7 @@ def test_rest_without_an_encoder_or_without_motion(truth):
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        ({"odometry": "gnss"}, "odometry"),
-        ({"encoder": None}, "encoder"),
+        ({"odometry": "encoder"}, "odometry: no such thing is measured"),
         ({"encoder": EncoderSpec("front.left")}, "wheel"),
         ({"mount": replace(MOUNT, body="bogie")}, "body"),
         ({"grade": replace(LORD, rate_hz=300.0)}, "rate_hz"),

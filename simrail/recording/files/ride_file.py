@@ -7,7 +7,8 @@ of each signal; `simrail.recording.files.ride_reader` reads the data.
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -48,6 +49,8 @@ class ImuSignalPart(VectorPart):
         In SI, as simrail writes it.
     """
 
+    signal: ClassVar[Signal] = IMU_SIGNAL
+
     name: str = "imu"
     body: str
     position_m: tuple[float, float, float]
@@ -55,11 +58,6 @@ class ImuSignalPart(VectorPart):
     grade: str | None = None
     datasheet: ImuFile | None = None
     sheet: ImuSheet | None = None
-
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return IMU_SIGNAL
 
     @model_validator(mode="after")
     def _one_sheet(self) -> Self:
@@ -84,18 +82,15 @@ class EncoderSignalPart(SignalPart):
         What the train knows of it.
     reverse : bool
         True if the logger counts up while the train runs towards smaller s.
-    radius_relative_sd : float
-        Relative standard deviation of the rolling radius about the sheet's, for the odometry.
+    radius_relative_sd : float, optional
+        That of the sheet, where the sheet does not say it.
     """
+
+    signal: ClassVar[Signal] = ENCODER_SIGNAL
 
     sheet: EncoderSheet
     reverse: bool = False
-    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
-
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return ENCODER_SIGNAL
+    radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
 
     @field_validator("sheet")
     @classmethod
@@ -113,6 +108,13 @@ class EncoderSignalPart(SignalPart):
             )
         return value
 
+    @property
+    def known(self) -> EncoderSheet:
+        """What the train knows of it, all told."""
+        if self.radius_relative_sd is None:
+            return self.sheet
+        return replace(self.sheet, radius_relative_sd=self.radius_relative_sd)
+
 
 class MagnetometerSignalPart(VectorPart):
     """``[magnetometer]``: the field at the IMU, and what is known of the Earth's.
@@ -125,12 +127,9 @@ class MagnetometerSignalPart(VectorPart):
         Its noise, and the Earth's field where the train runs.
     """
 
-    sheet: MagnetometerSheet
+    signal: ClassVar[Signal] = MAGNETOMETER_SIGNAL
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return MAGNETOMETER_SIGNAL
+    sheet: MagnetometerSheet
 
 
 class RailSignalPart(SignalPart):
@@ -144,12 +143,9 @@ class RailSignalPart(SignalPart):
         Its noise.
     """
 
-    sheet: RailSensorSheet
+    signal: ClassVar[Signal] = RAIL_SIGNAL
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return RAIL_SIGNAL
+    sheet: RailSensorSheet
 
     @field_validator("sheet")
     @classmethod
@@ -180,15 +176,12 @@ class OdometerPart(SignalPart):
         Relative standard deviation of its scale.
     """
 
+    signal: ClassVar[Signal] = ODOMETER_SIGNAL
+
     reverse: bool = False
     resolution_m: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
     speed_sd_mps: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
     radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
-
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return ODOMETER_SIGNAL
 
     @model_validator(mode="after")
     def _one_quantity(self) -> Self:
@@ -217,21 +210,15 @@ class OdometrySignalPart(SignalPart):
     its intervals.
     """
 
-    source: str
+    signal: ClassVar[Signal] = ODOMETRY_SIGNAL
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return ODOMETRY_SIGNAL
+    source: str
 
 
 class GapsPart(SignalPart):
     """``[gaps]``: where the IMU's samples had been lost before the file was written."""
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        return GAPS_SIGNAL
+    signal: ClassVar[Signal] = GAPS_SIGNAL
 
 
 class RideFile(Part):
@@ -250,7 +237,8 @@ class RideFile(Part):
     longest_gap_s : float
         Longest gap in a signal that is bridged by a straight line.
     imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
-        Its signals. Without an odometry it is made from encoder or odometer.
+        Its signals. Without an odometry it is made from encoder or odometer
+        (`simrail.estimation.choose_odometry.read_ride`); without those as well, nobody knows where it is.
     """
 
     name: str = Field(min_length=1, max_length=200)
@@ -267,16 +255,9 @@ class RideFile(Part):
     gaps: GapsPart | None = None
 
     @model_validator(mode="after")
-    def _knows_where_it_is(self) -> Self:
+    def _one_way(self) -> Self:
         if self.encoder is not None and self.odometer is not None:
             raise InputError(
                 "says twice how far the train went", field="odometer", remedy="remove [odometer] or [encoder]"
-            )
-        if self.encoder is None and self.odometer is None and self.odometry is None:
-            raise InputError(
-                "a ride needs to know where it is",
-                field="encoder",
-                limit="[encoder], [odometer] or [odometry]",
-                remedy="add the table of the one that was recorded",
             )
         return self

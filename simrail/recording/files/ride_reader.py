@@ -1,10 +1,12 @@
 """From a ride file and its data files to a `Recording`: one way for rides of real trains and for our own.
 
 Signals come in SI and in the body's axes (`simrail.recording.files.signal_reader`); an IMU with irregular
-time stamps is resampled (`simrail.core.resample`), with its gaps on record; an odometry that is not there is
-made from encoder or odometer by the same filter that simulated rides use. What is at its best already (SI,
+time stamps is resampled (`simrail.core.resample`), with its gaps on record. What is at its best already (SI,
 the body's own axes, uniform times) passes bit by bit. Nothing else is repaired: what has a fault is refused
 by name.
+
+Not here: an odometry, where the file has none, and whether the ride can be true, which are the matter of
+`simrail.estimation.choose_odometry.read_ride`.
 """
 
 from __future__ import annotations
@@ -27,12 +29,10 @@ from simrail.core.resample import (
     uniform_times,
 )
 from simrail.core.toml_files import blame, judge, label, load, read_toml
-from simrail.estimators.odometry.encoder import encoder_odometry, speed_odometry
 from simrail.recording.check_form import check_recording
-from simrail.recording.check_physics import check_plausible
-from simrail.recording.files.ride_file import ImuSignalPart, OdometerPart, RideFile
+from simrail.recording.files.ride_file import ImuSignalPart, RideFile
 from simrail.recording.files.signal_reader import SignalReader
-from simrail.recording.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.sheets.imu_sheet import imu_sheet
 from simrail.track.file import TrackFile
@@ -44,8 +44,8 @@ WAY_GAP_S = 1.0
 """A wheel or an odometer may be silent for this long (or three readings) while the train moves."""
 
 
-def read_ride(path: Path) -> Recording:
-    """Read a ride.
+def read_signals(path: Path) -> Recording:
+    """Read the signals of a ride, and what the train knows; its odometry only where the file has one.
 
     Parameters
     ----------
@@ -55,78 +55,56 @@ def read_ride(path: Path) -> Recording:
     Raises
     ------
     InputError
-        If a file is missing or unreadable, or says something impossible, or the recording passes neither
-        `check_recording` nor `check_plausible`.
+        If a file is missing or unreadable, or says something impossible, or the recording does not pass
+        `check_recording`.
     """
-    path = path / RIDE_FILE if path.is_dir() else path
+    path = ride_file(path)
     file = label(path)
     spec = judge(RideFile, read_toml(path), file=file)
     with blame(file, "track"):
         track = load(TrackFile, "track", spec.track, folder=path.parent).design(Path(spec.track).stem)
     reader = SignalReader(path.parent, file)
-    imu = reader.frame(spec.imu, "imu")
-    imu, rate_hz, gaps = _uniform(imu, spec, file)
+    imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu"), spec, file)
     if spec.gaps is not None:
         noted = reader.frame(spec.gaps, "gaps")
         gaps = noted if gaps is None else pd.concat([noted, gaps], ignore_index=True)
-    sheet = replace(_sheet(spec.imu, path.parent, file), rate_hz=rate_hz)
-    encoder, encoder_sheet = None, None
-    if spec.encoder is not None:
-        encoder, encoder_sheet = reader.frame(spec.encoder, "encoder"), spec.encoder.sheet
-        if spec.encoder.reverse:
-            encoder["pulse_count"] = -encoder["pulse_count"]
-        _judge_way(encoder, "encoder", imu, 1.0, file)
-    times = imu.index.to_numpy()
-    magnetometer = None
-    if spec.magnetometer is not None:
-        magnetometer = _at(
-            reader.frame(spec.magnetometer, "magnetometer"), times, spec.longest_gap_s, "magnetometer", file
-        )
-    seen = None
-    if spec.rail_displacement is not None:
-        seen = reader.frame(spec.rail_displacement, "rail_displacement")
-        seen = _at(seen, times, spec.longest_gap_s, "rail_displacement", file)
-    if spec.odometry is not None:
-        odometry = _at(reader.frame(spec.odometry, "odometry"), times, WAY_GAP_S, "odometry", file)
-        source = spec.odometry.source
-    elif encoder is not None and encoder_sheet is not None and spec.encoder is not None:
-        source = "encoder"
-        odometry = encoder_odometry(
-            encoder,
-            encoder_sheet,
-            times,
-            start_position_m=spec.start_position_m,
-            radius_relative_sd=spec.encoder.radius_relative_sd,
-        )
-    else:
-        assert spec.odometer is not None
-        odometry, encoder, encoder_sheet = _from_odometer(
-            reader.frame(spec.odometer, "odometer"), spec.odometer, imu, spec.start_position_m, file
-        )
-        source = "odometer"
+    frames: dict[str, pd.DataFrame] = {}
+    for name, longest_gap_s in (
+        ("magnetometer", spec.longest_gap_s),
+        ("rail_displacement", spec.longest_gap_s),
+        ("odometry", WAY_GAP_S),
+    ):
+        part = getattr(spec, name)
+        if part is not None:
+            frames[name] = _at(reader.frame(part, name), imu.index.to_numpy(), longest_gap_s, name, file)
     recording = Recording(
         name=spec.name,
         imu=imu,
-        imu_sheet=sheet,
+        imu_sheet=replace(_sheet(spec.imu, path.parent, file), rate_hz=rate_hz),
         mount=spec.imu.name,
         mount_body=spec.imu.body,
         mount_position_m=spec.imu.position_m,
         track=track,
-        encoder=encoder,
-        encoder_sheet=encoder_sheet,
+        encoder=None,
+        encoder_sheet=None,
         start_position_m=spec.start_position_m,
-        odometry=odometry,
-        odometry_source=source,
+        odometry_source="" if spec.odometry is None else spec.odometry.source,
         gravity_mps2=spec.gravity_mps2,
         gaps=gaps,
-        magnetometer=magnetometer,
         magnetometer_sheet=None if spec.magnetometer is None else spec.magnetometer.sheet,
-        rail_displacement=seen,
         rail_sensor_sheet=None if spec.rail_displacement is None else spec.rail_displacement.sheet,
+        magnetometer=frames.get("magnetometer"),
+        rail_displacement=frames.get("rail_displacement"),
+        odometry=frames.get("odometry"),
     )
+    recording = _with_way(recording, spec, reader, file)
     check_recording(recording, file=file)
-    check_plausible(recording, file=file)
     return recording
+
+
+def ride_file(path: Path) -> Path:
+    """The ride file that a path means."""
+    return path / RIDE_FILE if path.is_dir() else path
 
 
 def _at(frame: pd.DataFrame, times: FloatArray, longest_gap_s: float, what: str, file: str) -> pd.DataFrame:
@@ -191,30 +169,35 @@ def _judge_way(frame: pd.DataFrame, table: str, imu: pd.DataFrame, step: float, 
     refuse_long_gaps(gaps, max(WAY_GAP_S, 3.0 * interval), what=table, file=file)
 
 
-def _from_odometer(
-    frame: pd.DataFrame, part: OdometerPart, imu: pd.DataFrame, start_m: float, file: str
-) -> tuple[pd.DataFrame, pd.DataFrame | None, EncoderSheet | None]:
-    """Odometry from distance or speed; a distance in steps is an encoder with one pulse per step."""
-    sign = -1.0 if part.reverse else 1.0
-    times = imu.index.to_numpy()
-    if "distance_m" in frame:
-        step = float(part.resolution_m or 0.0)
-        _judge_way(frame[["distance_m"]], "odometer", imu, step, file)
-        way = frame["distance_m"].to_numpy()
-        counts = np.rint(sign * (way - way[0]) / step).astype(np.int64)
-        encoder = pd.DataFrame({"pulse_count": counts}, index=frame.index)
-        sheet = EncoderSheet("odometer", 1, step / (2.0 * np.pi), rate_of(frame.index.to_numpy()))
-        made = encoder_odometry(
-            encoder, sheet, times, start_position_m=start_m, radius_relative_sd=part.radius_relative_sd
-        )
-        return made, encoder, sheet
-    _judge_way(frame, "odometer", imu, 0.0, file)
-    made = speed_odometry(
-        frame.index.to_numpy(),
-        sign * frame["speed_mps"].to_numpy(),
-        times,
-        start_position_m=start_m,
-        speed_sd_mps=part.speed_sd_mps,
-        scale_relative_sd=part.radius_relative_sd,
+def _with_way(recording: Recording, spec: RideFile, reader: SignalReader, file: str) -> Recording:
+    """Add the encoder or the odometer; a distance in steps is an encoder with one pulse per step."""
+    if spec.encoder is not None:
+        counts = reader.frame(spec.encoder, "encoder")
+        if spec.encoder.reverse:
+            counts["pulse_count"] = -counts["pulse_count"]
+        _judge_way(counts, "encoder", recording.imu, 1.0, file)
+        return replace(recording, encoder=counts, encoder_sheet=spec.encoder.known)
+    part = spec.odometer
+    if part is None:
+        return recording
+    frame, sign = reader.frame(part, "odometer"), -1.0 if part.reverse else 1.0
+    if "speed" in part.columns:
+        _judge_way(frame, "odometer", recording.imu, 0.0, file)
+        odometer = frame[["speed_mps"]] * sign
+        sheet = OdometerSheet(part.speed_sd_mps, part.radius_relative_sd)
+        return replace(recording, odometer=odometer, odometer_sheet=sheet)
+    step = float(part.resolution_m or 0.0)
+    _judge_way(frame[["distance_m"]], "odometer", recording.imu, step, file)
+    way = frame["distance_m"].to_numpy()
+    steps = np.rint(sign * (way - way[0]) / step).astype(np.int64)
+    return replace(
+        recording,
+        encoder=pd.DataFrame({"pulse_count": steps}, index=frame.index),
+        encoder_sheet=EncoderSheet(
+            wheel="odometer",
+            pulses_per_revolution=1,
+            wheel_radius_m=step / (2.0 * np.pi),
+            rate_hz=rate_of(frame.index.to_numpy()),
+            radius_relative_sd=part.radius_relative_sd,
+        ),
     )
-    return made, None, None

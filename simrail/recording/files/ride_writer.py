@@ -80,13 +80,17 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         "position_m": recording.mount_position_m,
         "sheet": asdict(recording.imu_sheet),
     }
-    tables["odometry"] |= {"source": recording.odometry_source}
-    if recording.encoder_sheet is not None:
-        tables["encoder"] |= {"sheet": asdict(recording.encoder_sheet)}
-    if recording.magnetometer_sheet is not None:
-        tables["magnetometer"] |= {"sheet": asdict(recording.magnetometer_sheet)}
-    if recording.rail_sensor_sheet is not None:
-        tables["rail_displacement"] |= {"sheet": asdict(recording.rail_sensor_sheet)}
+    if "odometry" in tables:
+        tables["odometry"] |= {"source": recording.odometry_source}
+    if recording.odometer_sheet is not None:
+        tables["odometer"] |= {"columns": {"speed": "speed_mps"}, **asdict(recording.odometer_sheet)}
+    for table, sheet in (
+        ("encoder", recording.encoder_sheet),
+        ("magnetometer", recording.magnetometer_sheet),
+        ("rail_displacement", recording.rail_sensor_sheet),
+    ):
+        if sheet is not None:
+            tables[table] |= {"sheet": asdict(sheet)}
     head = {
         "name": recording.name,
         "track": f"./{TRACK_FILE}",

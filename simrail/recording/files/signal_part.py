@@ -7,7 +7,7 @@ and a device as one can be mounted. Which signals there are, and what each says 
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -46,20 +46,18 @@ class SignalPart(DataPart):
         Time of the first sample of a file without time stamps.
     """
 
+    signal: ClassVar[Signal]
+    """What the table describes."""
+
     columns: dict[str, Names] = Field(default_factory=dict)
     units: dict[str, str] = Field(default_factory=dict)
     rate_hz: Positive | None = None
     start_s: float = 0.0
 
-    @classmethod
-    def signal(cls) -> Signal:
-        """What the table describes."""
-        raise NotImplementedError
-
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
-        quantities = {quantity.key: quantity for quantity in self.signal().quantities}
-        keys = [*quantities, *(["time"] if self.signal().timed else [])]
+        quantities = {quantity.key: quantity for quantity in self.signal.quantities}
+        keys = [*quantities, *(["time"] if self.signal.timed else [])]
         for field, table in (("columns", self.columns), ("units", self.units)):
             for key in table:
                 if key not in keys:

@@ -60,7 +60,7 @@ class SignalReader:
             raise
 
     def _frame(self, part: SignalPart, table: str) -> pd.DataFrame:
-        signal = part.signal()
+        signal = part.signal
         found = column_names(part, self._folder, table=table)
         names: dict[str, list[str]] = {}
         for quantity in signal.quantities:

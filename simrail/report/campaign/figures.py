@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis
 from simrail.report.figures.attitude import angle_error

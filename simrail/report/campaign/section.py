@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import CampaignAxis, campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import box_figure, curvature_figure
 from simrail.report.campaign.heat import Side, heat_figure, side_of

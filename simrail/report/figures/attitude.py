@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.core.jit import FloatArray
 from simrail.report.figures.decimate import Bins

@@ -30,7 +30,14 @@ LEAST_WAY_M = 10.0
 
 def moves(recording: Recording) -> bool:
     """True if the ride is long enough to be drawn over distance."""
-    return bool(np.ptp(recording.odometry["position_m"].to_numpy()) > LEAST_WAY_M)
+    return bool(np.ptp(place_of(recording)) > LEAST_WAY_M)
+
+
+def place_of(recording: Recording) -> FloatArray:
+    """Where the figures of a recording are drawn, (n,) m: by its odometry; without one, where it began."""
+    if recording.odometry is None:
+        return np.full(len(recording.imu), recording.start_position_m)
+    return recording.odometry["position_m"].to_numpy(dtype=np.float64)
 
 
 def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label: str) -> str:
@@ -38,8 +45,7 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
     with look():
         x = _axis(recording)
         bins = Bins(x)
-        position = recording.odometry["position_m"].to_numpy()
-        frame = recording.track.frame_extended(position[bins.first])
+        frame = recording.track.frame_extended(place_of(recording)[bins.first])
         design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
         drawn = [name for name in ATTITUDE if name in estimate.states]
         figure, axes = panels([1.9] * len(drawn))
@@ -52,9 +58,11 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
                 low, high = bins.envelope(angle - wide).mean, bins.envelope(angle + wide).mean
                 axis.fill_between(bins.x, low, high, color=BAND, alpha=0.16, lw=0, label="its own 95 % band")
             axis.plot(place, line, color=ESTIMATE, lw=1.05, zorder=12, label=label)
-            planned = np.rad2deg(design[ATTITUDE.index(name)])
-            axis.plot(bins.x, planned, color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
-            finite = np.concatenate([line, planned])
+            finite = line
+            if recording.odometry is not None:
+                planned = np.rad2deg(design[ATTITUDE.index(name)])
+                axis.plot(bins.x, planned, color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
+                finite = np.concatenate([line, planned])
             pad_limits(axis, *np.percentile(finite[np.isfinite(finite)], [0.05, 99.95]), top=0.16)
             axis.set_ylabel(f"{name.removesuffix('_rad')}, \u00b0")
         legend_above(axes[0])
@@ -88,7 +96,7 @@ def innovation_figure(recording: Recording, estimate: Estimate) -> str:
 def _axis(recording: Recording) -> FloatArray:
     """What the figures are drawn over: distance, or time for a train that hardly moves."""
     if moves(recording):
-        return recording.odometry["position_m"].to_numpy()
+        return place_of(recording)
     return recording.imu.index.to_numpy()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray
 from simrail.report.figures.ride import direction_of

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO
+from simrail.recording.recording import odometry_of
 from simrail.report.figures.decimate import Bins
 from simrail.report.figures.style import INK, distance_axis, legend_above, look, panels, shade_track, to_svg
 from simrail.scenario.tables import RailConditionPart
@@ -75,8 +76,8 @@ def odometry_figure(example: CellResult) -> str:
     with look():
         recording, motion = example.recording, example.motion
         bins = Bins(motion["position_m"].to_numpy())
-        error = recording.odometry["position_m"].to_numpy() - motion["position_m"].to_numpy()
-        band = 1.96 * recording.odometry["position_sd_m"].to_numpy()
+        error = odometry_of(recording)["position_m"].to_numpy() - motion["position_m"].to_numpy()
+        band = 1.96 * odometry_of(recording)["position_sd_m"].to_numpy()
         figure, (axis,) = panels([1.5])
         wide = bins.envelope(band).mean
         axis.fill_between(bins.x, -wide, wide, color="#009E73", alpha=0.14, lw=0, label="its own 95 % band")

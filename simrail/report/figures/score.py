@@ -128,11 +128,9 @@ def curves_figure(figures: Figures, styles: Sequence[MethodStyle]) -> str:
 
 
 def _row_label(style: MethodStyle) -> str:
-    return (
-        f"{style.label}  (baseline)"
-        if style.baseline and style.label.find("uncompensated") < 0
-        else style.label
-    )
+    # What the label says already is not said again.
+    told = not style.baseline or style.baseline in style.label
+    return style.label if told else f"{style.label}  (baseline)"
 
 
 def _window_legend(figure: Figure, height: float) -> None:

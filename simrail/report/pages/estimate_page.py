@@ -9,13 +9,14 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.core.resample import GAPS
 from simrail.estimation.estimate import Estimate
-from simrail.recording.recording import Recording
-from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves
+from simrail.recording.recording import Recording, odometry_of
+from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves, place_of
 from simrail.report.figures.ride import imu_figure, speed_figure
+from simrail.report.words.ride_words import odometry_words
 
 MOST_GAPS = 20
 
@@ -46,8 +47,8 @@ def write_estimate_page(
         lstrip_blocks=True,
     )
     # Where there is no truth, the odometry says where the figures of the ride are drawn.
-    ride = CellResult({}, recording, recording.odometry, {})
     moving = moves(recording)
+    ride = CellResult({}, recording, odometry_of(recording), {}) if moving else None
     has_attitude = any(name in estimate.states for name in ATTITUDE)
     text = environment.get_template("pages/estimate.html.j2").render(
         recording=recording,
@@ -59,8 +60,8 @@ def write_estimate_page(
         attitude=Markup(estimated_attitude_figure(recording, estimate, label=label))
         if has_attitude
         else None,
-        speed=Markup(speed_figure(ride)) if moving else None,
-        imu=Markup(imu_figure(ride)) if moving else None,
+        speed=Markup(speed_figure(ride)) if ride else None,
+        imu=Markup(imu_figure(ride)) if ride else None,
         innovations=None
         if estimate.innovations is None or len(estimate.innovations) < 2
         else Markup(innovation_figure(recording, estimate)),
@@ -71,40 +72,43 @@ def write_estimate_page(
 
 def ride_facts(recording: Recording) -> list[str]:
     """What there is to know of a recording, one line each."""
-    position = recording.odometry["position_m"].to_numpy()
-    time = recording.imu.index.to_numpy()
-    speed = 3.6 * float(np.abs(recording.odometry["speed_mps"].to_numpy()).max())
+    position, time = place_of(recording), recording.imu.index.to_numpy()
     x, y, z = recording.mount_position_m
     lost = "no gaps"
     if recording.gaps is not None and len(recording.gaps):
         missing = int(recording.gaps["missing"].sum())
         lost = f"{missing} of them lost and interpolated, in {len(recording.gaps)} gaps"
     track = recording.track
+    named = f"track '{track.name}'{' (synthetic)' if track.synthetic else ''}"
+    way = f"from s = {position[0]:.1f} m of {named}"
+    if recording.odometry is not None:
+        speed = 3.6 * float(np.abs(recording.odometry["speed_mps"].to_numpy()).max())
+        way = f"from s = {position[0]:.1f} to {position[-1]:.1f} m of {named}, at most {speed:.1f} km/h"
     return [
         f"{len(time)} samples at {recording.imu_sheet.rate_hz:g} Hz, {time[-1] - time[0]:.1f} s; {lost}",
-        f"from s = {position[0]:.1f} to {position[-1]:.1f} m of track '{track.name}'"
-        f"{' (synthetic)' if track.synthetic else ''}, at most {speed:.1f} km/h",
+        way,
         f"IMU {recording.imu_sheet.grade} on '{recording.mount_body}', "
         f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
-        f"position and speed from the odometry '{recording.odometry_source}'"
-        + (" (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""),
+        odometry_words(recording),
     ]
 
 
 def design_difference_deg(recording: Recording, estimate: Estimate, angle: str) -> float:
-    """RMS difference of an estimated angle to the design track's, in degrees; it is no error."""
-    frame = recording.track.frame_extended(recording.odometry["position_m"].to_numpy())
+    """RMS difference of an estimated angle to the design's at the odometry's place, deg; it is no error."""
+    frame = recording.track.frame_extended(odometry_of(recording)["position_m"].to_numpy())
     difference = estimate.states[angle].to_numpy(dtype=np.float64) - getattr(frame, angle)
     wrapped = (difference + np.pi) % (2.0 * np.pi) - np.pi
     return float(np.rad2deg(np.sqrt(np.mean(wrapped**2))))
 
 
 def _tiles(recording: Recording, estimate: Estimate, us_per_sample: float) -> list[tuple[str, str, str]]:
-    position = recording.odometry["position_m"].to_numpy()
-    way = float(abs(position[-1] - position[0]))
-    tiles = [("way", f"{way:.0f} m", f"in {recording.imu.index[-1] - recording.imu.index[0]:.0f} s")]
+    duration = f"{recording.imu.index[-1] - recording.imu.index[0]:.0f} s"
+    position = place_of(recording)
+    tiles = [("way", f"{abs(position[-1] - position[0]):.0f} m", f"in {duration}")]
+    if recording.odometry is None:
+        tiles = [("duration", duration, "no odometry tells the way")]
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in estimate.states:
+        if angle in estimate.states and recording.odometry is not None:
             word = angle.removesuffix("_rad")
             difference = design_difference_deg(recording, estimate, angle)
             tiles.append(

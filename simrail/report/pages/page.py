@@ -15,8 +15,8 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
-from simrail.campaign.stored_results import FormerResults
+from simrail.campaign.cell import CellResult
+from simrail.campaign.stored_results import StoredResults
 from simrail.report.campaign.section import campaign_view
 from simrail.report.campaign.tables import write_tables
 from simrail.report.figures.attitude import attitude_figure, error_figure
@@ -99,7 +99,7 @@ def write_report(
     cells: pd.DataFrame,
     examples: Sequence[CellResult],
     manifest: Mapping[str, Any],
-    beside: FormerResults | None = None,
+    beside: StoredResults | None = None,
 ) -> None:
     """Write the report of a campaign; where it has axes, its tables into the folder `TABLES` beside it.
 
@@ -117,11 +117,11 @@ def write_report(
         Rides to draw, first draw of each.
     manifest : mapping
         What the campaign noted of itself: command, versions, times; plain values.
-    beside : FormerResults, optional
+    beside : StoredResults, optional
         Results of another scenario of the same publication, one of `SETS_BESIDE`.
     """
     all_cases = cases(scores, cells)
-    styles = list(method_styles(methods(scenario)).values())
+    styles = list(method_styles(scenario).values())
     paper = _beside_paper(scenario, all_cases, styles, examples, beside)
     campaign = campaign_view(scenario, scores, cells, styles, examples, manifest, band=band_of_all(all_cases))
     if campaign is not None:
@@ -172,7 +172,7 @@ def _beside_paper(
     all_cases: list[Figures],
     styles: Sequence[MethodStyle],
     examples: Sequence[CellResult],
-    former: FormerResults | None,
+    former: StoredResults | None,
 ) -> Any:
     """The section that sets a scenario beside a publication; None if it names none."""
     ran = methods(scenario)
@@ -211,7 +211,7 @@ def _ride(
     for style in drawn:
         twin = by_name.get(style.twin)
         if style.compensated and twin:
-            title = f"{style.label.removesuffix(' compensated')}, with and without compensation"
+            title = f"{style.kind}, with and without compensation"
             comparisons.append(
                 (title, Markup(attitude_figure(example, [style, twin], what=f"{title}, {name}")))
             )
@@ -229,7 +229,7 @@ def _ride(
         else nothing,
         comparisons=comparisons,
         errors=Markup(error_figure(example, drawn)) if drawn else nothing,
-        odometry=Markup(odometry_figure(example)),
+        odometry=nothing if example.recording.odometry is None else Markup(odometry_figure(example)),
         rms=Markup(rms_figure(case, attitude_methods(styles))) if case else nothing,
         curves=Markup(curves_figure(case, attitude_methods(styles))) if case else nothing,
         geometry=geometry,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.report.figures.geometry import bands_figure, rails_figure, stretch_of, stretch_words
 from simrail.report.tables.geometry_bands import BAND, JUDGED, judged_band, waves_words

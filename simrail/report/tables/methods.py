@@ -1,6 +1,6 @@
-"""What the report knows of a method: its label, its colour, and what it is a baseline for.
+"""What the report knows of a method: its label, its colour, and what it is in the comparison.
 
-All of it follows from the scenario (class and options of each estimator), not from names.
+Estimators say themselves what they are (`simrail.estimation.estimate.Description`); no name is looked into.
 """
 
 from __future__ import annotations
@@ -11,19 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 
-from simrail.core.errors import InputError
-from simrail.estimation.estimate import estimator_class
+from simrail.estimation.estimate import Estimator, description_of
 from simrail.scenario import cells
+from simrail.scenario.build import Parts
+from simrail.scenario.scenario import Scenario
 
 # Okabe and Ito's colours, which people with any colour vision tell apart: (compensated, not compensated).
 _COLOURS = {
     "AttitudeEkf": ("#0072B2", "#56B4E9"),
     "AttitudeGda": ("#D55E00", "#E69F00"),
     "Vqf": ("#AA4499", "#CC79A7"),
-    "DesignAngles": ("#6b7280", "#6b7280"),
-    "ZeroTrack": ("#6b7280", "#6b7280"),
 }
-_NO_IMU = ("DesignAngles", "ZeroTrack")
+_NO_IMU = ("#6b7280", "#6b7280")
 _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
 _MOST_ALIKE = 3
 """So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
@@ -62,7 +61,7 @@ class MethodStyle:
     name, label : str
         Name in the tables; the same, readable.
     baseline : str
-        ``""`` for a method under test, else what kind of baseline it is.
+        ``""`` for a method under test and for an ablation, else what kind of baseline it is.
     uses_imu : bool
         False for "design angles only", and for rails that lie as designed.
     twin : str
@@ -71,6 +70,10 @@ class MethodStyle:
         Whether it compensates track-frame accelerations; None if it has no such option.
     colour, stroke
         For plots.
+    kind : str
+        Label of its class: what it shares with its twin.
+    ablation : bool
+        True for a method with what no train has, or without a part of its own.
     """
 
     name: str
@@ -81,6 +84,8 @@ class MethodStyle:
     compensated: bool | None
     colour: str
     stroke: str | tuple[float, tuple[float, ...]]
+    kind: str = ""
+    ablation: bool = False
 
 
 def readable(name: str) -> str:
@@ -90,32 +95,39 @@ def readable(name: str) -> str:
     return words + bracket + tail
 
 
-def method_styles(methods: Sequence[cells.Method]) -> dict[str, MethodStyle]:
-    """Styles of the scenario's methods, by name, in their order."""
-    compensated = {method.name: _compensated(method) for method in methods}
+def method_styles(scenario: Scenario) -> dict[str, MethodStyle]:
+    """Styles of a scenario's methods, by name, in their order."""
+    methods, estimators = cells.methods(scenario), Parts(scenario).estimators(0)
+    compensated = {name: _compensated(estimator) for name, estimator in estimators.items()}
     styles: dict[str, MethodStyle] = {}
     seen: list[tuple[str, bool | None]] = []
     other_classes: list[str] = []
     for method in methods:
         family, flag = method.part.method, compensated[method.name]
-        if family not in _COLOURS and family not in other_classes:
+        told = description_of(estimators[method.name])
+        if told.uses_imu and family not in _COLOURS and family not in other_classes:
             other_classes.append(family)
-        pair = _COLOURS.get(family) or _OTHERS[other_classes.index(family) % len(_OTHERS)]
+        if told.uses_imu:
+            pair = _COLOURS.get(family) or _OTHERS[other_classes.index(family) % len(_OTHERS)]
+        else:
+            pair = _NO_IMU
         twins = [m.name for m in methods if m is not method and _is_twin(method, m, compensated)]
         baseline = ""
-        if family in _NO_IMU:
-            baseline = "no IMU"
-        elif flag is False:
+        if told.role == "general_purpose":
             baseline = "uncompensated" if twins else "general purpose"
+        elif told.role == "baseline":
+            baseline = "baseline" if told.uses_imu else "no IMU"
         styles[method.name] = MethodStyle(
             name=method.name,
-            label=readable(method.name),
+            label=readable(method.name) + (" (ablation)" if told.role == "ablation" else ""),
             baseline=baseline,
-            uses_imu=family not in _NO_IMU,
+            uses_imu=told.uses_imu,
             twin=twins[0] if twins else "",
             compensated=flag,
             colour=pair[1] if flag is False else pair[0],
             stroke=_STROKES[seen.count((family, flag)) % len(_STROKES)],
+            kind=told.label,
+            ablation=told.role == "ablation",
         )
         seen.append((family, flag))
     return _shaded(styles)
@@ -155,14 +167,9 @@ def _mixed(colour: str, share: float) -> str:
     return to_hex((red, green, blue))
 
 
-def _compensated(method: cells.Method) -> bool | None:
-    if "compensated" in method.part.options:
-        return bool(method.part.options["compensated"])
-    try:
-        default = getattr(estimator_class(method.part.method), "compensated", None)
-    except InputError:
-        return None
-    return default if isinstance(default, bool) else None
+def _compensated(estimator: Estimator) -> bool | None:
+    flag = getattr(estimator, "compensated", None)
+    return flag if isinstance(flag, bool) else None
 
 
 def _is_twin(one: cells.Method, other: cells.Method, compensated: dict[str, bool | None]) -> bool:

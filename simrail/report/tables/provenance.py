@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.recording.sheets.imu_file import ImuFile

@@ -80,7 +80,7 @@ def _compensation(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]
         without = case.get(style.twin, "roll", "rms", window=window).value
         if not (own > 0.0 and without > 0.0):
             continue
-        name, ratio = style.label.removesuffix(" compensated"), without / own
+        name, ratio = style.kind, without / own
         sizes = f"{degrees(without)} rms without to {degrees(own)} with it"
         if ratio >= 1.05:
             text = (

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
+from simrail.recording.recording import Recording
 from simrail.report.figures.ride import direction_of
 
 _UNITS = {"kmh": "km/h", "mps2": "m/s\u00b2", "mps3": "m/s\u00b3", "m": "m", "s": "s", "hz": "Hz"}
@@ -41,6 +42,13 @@ def ride_facts(example: CellResult) -> list[str]:
         f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
         f"IMU {recording.imu_sheet.grade} at {recording.imu_sheet.rate_hz:g} Hz on '{recording.mount_body}', "
         f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
-        f"position and speed from the odometry '{recording.odometry_source}'"
-        + (" (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""),
+        odometry_words(recording),
     ]
+
+
+def odometry_words(recording: Recording) -> str:
+    """Where position and speed come from."""
+    if recording.odometry is None:
+        return "no odometry: where the train is, no method knows"
+    ablation = " (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""
+    return f"position and speed from the odometry '{recording.odometry_source}'{ablation}"

@@ -11,9 +11,9 @@ from simrail.estimators.attitude.ekf import AttitudeEkf
 
 from simrail.core.columns import ACCEL, ATTITUDE, ATTITUDE_SD
 from simrail.core.errors import InputError
-from simrail.estimation.conformance import prefix, standing, time_reversed
+from simrail.estimation.conformance import standing, time_reversed
 from simrail.estimation.estimate import Estimate
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, beginning
 
 TUNINGS = [
     {},
@@ -45,7 +45,7 @@ def pieces(recording: Recording) -> dict[str, Recording]:
     position = recording.odometry["position_m"].to_numpy()
     curve = cut(int(np.searchsorted(position, 90.0)))
     return {
-        "standstill": prefix(standing(recording), 1000),
+        "standstill": beginning(standing(recording), samples=1000),
         "straight": cut(int(np.searchsorted(position, 420.0))),
         "curve": curve,
         "reverse": time_reversed(curve),
@@ -95,7 +95,7 @@ def test_time_constant_of_the_two_readings(reading: str, tau: float, noisy: Reco
 
 def test_yaw_is_not_touched_by_gravity(noisy: Recording) -> None:
     """Tilt the accelerometer: roll and pitch answer, yaw integrates the gyro as before."""
-    recording = prefix(standing(noisy), 2500)
+    recording = beginning(standing(noisy), samples=2500)
     recording.imu.iloc[:, :3] = np.array([0.0, 0.0, 0.05])
     before = AttitudeEkf(rest_bias=False).estimate(recording)
     np.testing.assert_allclose(np.diff(before.states["yaw_rad"]), 0.05 * 0.004, rtol=1e-3)

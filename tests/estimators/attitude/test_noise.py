@@ -12,8 +12,7 @@ from simrail.estimators.attitude.compensation import design_frame
 from simrail.estimators.attitude.noise import bias_variance, paper_noise, recommended_noise, time_constant
 from simrail.estimators.attitude.rest_bias import rest_bias
 
-from simrail.estimation.conformance import prefix
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, beginning
 
 GRAVITY = 9.81
 
@@ -114,5 +113,5 @@ def test_noise_of_a_prefix_is_the_prefix_of_the_noise(recording: Recording) -> N
         return recommended_noise(ride, rest_bias(ride), frame=design_frame(ride))
 
     for n in (3, 301, 7001):
-        for whole, part in zip(noise(recording), noise(prefix(recording, n)), strict=True):
+        for whole, part in zip(noise(recording), noise(beginning(recording, samples=n)), strict=True):
             np.testing.assert_array_equal(whole[:n], part)

@@ -12,8 +12,7 @@ from scipy import signal, stats
 from simrail.estimators.attitude.rest_bias import CORRELATION_S, WANDER_PER_INSTABILITY, rest_bias, step_rates
 
 from simrail.core.columns import IMU, ODOMETRY, ODOMETRY_SD
-from simrail.estimation.conformance import prefix
-from simrail.recording.recording import EncoderSheet, ImuSheet, Recording
+from simrail.recording.recording import EncoderSheet, ImuSheet, Recording, beginning
 from simrail.recording.standstill import rest_periods
 from simrail.track.design import Straight, TrackDesign
 
@@ -229,7 +228,7 @@ def test_the_bias_of_a_prefix_is_the_prefix_of_the_bias(direction: int) -> None:
     # Inside each rest (before and after it is long enough), at its ends, on the way, one sample apart.
     for n in (3, at(5.0), at(20.0), at(20.02), at(81.5), at(82.6), at(90.0), at(94.6), at(95.02), at(222.0)):
         for more in (0, 1):
-            part = rest_bias(prefix(recording, n + more))
+            part = rest_bias(beginning(recording, samples=n + more))
             for piece, all_of_it in zip(part, whole, strict=True):
                 np.testing.assert_array_equal(piece, all_of_it[: n + more])
 

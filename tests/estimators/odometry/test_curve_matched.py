@@ -30,8 +30,9 @@ from simrail.campaign.cell import record_cell
 from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
-from simrail.estimation.conformance import check_estimator
-from simrail.recording.recording import Recording
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.conformance import check_odometry
+from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.ride import Ride, simulate
 from simrail.ride.truth import Mount, Truth
@@ -65,6 +66,12 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> T
             engine="compiled",
         )
     )
+
+
+@lru_cache(maxsize=8)
+def record_fast(ride: int, draw: int) -> Recording:
+    """One of the fast rides, recorded once for all tests, with the odometry of its encoder."""
+    return with_odometry(record(truth_of(*FAST[ride]), draw), "encoder")
 
 
 def record(truth: Truth, draw: int, *, slip: tuple[Slip, ...] = ()) -> Recording:
@@ -110,7 +117,8 @@ def judge_rides(rides: list[tuple[float, float, float]], draws: int) -> None:
         squares, inside = [], []
         for ride in rides:
             truth = truth_of(*ride)
-            found = [errors(truth, record(truth, k), CurveMatchedOdometry(smoothed)) for k in range(draws)]
+            recordings = [record(truth, k) for k in range(draws)]
+            found = [errors(truth, one, CurveMatchedOdometry(smoothed)) for one in recordings]
             squares.append(np.mean([np.mean(error**2) for error, _ in found]))
             inside += [np.mean(np.abs(error) < 1.96 * sd) for error, sd in found]
             assert np.sqrt(squares[-1]) < 1.0, (ride, smoothed, np.sqrt(squares))
@@ -133,7 +141,7 @@ def test_below_one_metre_at_20_and_70_km_per_hour():
 def test_encoder_alone_is_off_by_metres():
     """What the line's knowledge is worth: more than twenty times, against the wheel alone."""
     truth = truth_of(*FAST[0])
-    recording = record(truth, 1)
+    recording = record_fast(0, 1)
     motion = truth.motion(AXLE).loc[recording.imu.index]
     wheel = rms((recording.odometry["position_m"] - motion["position_m"]).to_numpy())
     assert wheel > 20.0 * rms(errors(truth, recording, CurveMatchedOdometry(True))[0])
@@ -143,7 +151,7 @@ def test_finds_wheel_and_bias():
     """The wheel's scale within 0.3 % of what it rolled over the line, the gyro's bias within 0.002 deg/s."""
     truth = truth_of(*FAST[0])
     for draw in (0, 1):
-        recording = record(truth, draw)
+        recording = record_fast(0, draw)
         trace = CurveMatchedOdometry().trace(recording)
         sheet = recording.encoder_sheet
         way = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
@@ -158,8 +166,8 @@ def test_finds_wheel_and_bias():
 def test_no_curve_in_the_first_300_m_breaks_nothing():
     """From 1700 m backwards the first curve is met at once, from 2090 m after 390 m: the error before it is
     that of the wheel, 1.2 % of the way, and falls below 1 m afterwards."""
-    truth = truth_of(70.0, 2090.0, 10.0)
-    recording = record(truth, 1)
+    truth = truth_of(*FAST[1])
+    recording = record_fast(1, 1)
     error, sd = errors(truth, recording, CurveMatchedOdometry())
     position = truth.motion(AXLE).loc[recording.imu.index, "position_m"].to_numpy()
     before, after = position > 1710.0, position < 1500.0
@@ -173,7 +181,7 @@ def test_slip_is_detected_and_bridged(creepage):
     """Three seconds of spin or slide: found within half a second, the way lost by it is not believed."""
     truth = truth_of(*FAST[0])
     slip = (Slip(start_s=60.0, duration_s=3.0, creepage=creepage),)
-    clean, slipped = record(truth, 0), record(truth, 0, slip=slip)
+    clean, slipped = record_fast(0, 0), record(truth, 0, slip=slip)
     lost = abs(creepage) * 3.0 * 19.4
     way = slipped.encoder["pulse_count"].iloc[-1] - clean.encoder["pulse_count"].iloc[-1]
     sheet = clean.encoder_sheet
@@ -229,22 +237,15 @@ def test_wheels_that_spin_and_slide_on_leaves():
 
 def test_conformance():
     """Columns, finite numbers, the same bits twice, causality bit by bit (of the filter), both directions."""
-    for ride in FAST:
-        recording = record(truth_of(*ride), 0)
-        short = replace(
-            recording,
-            imu=recording.imu.iloc[:9000],
-            odometry=recording.odometry.iloc[:9000],
-            encoder=recording.encoder.loc[: recording.imu.index[8999]],
-        )
-        check_estimator(CurveMatchedOdometry(), short)
-        check_estimator(CurveMatchedOdometry(smoothed=True), short)
+    for ride in (0, 1):
+        short = beginning(record_fast(ride, 0), samples=7000)
+        check_odometry(CurveMatchedOdometry(smoothed=ride == 1), short)
 
 
 def test_stands_still_exactly():
     """While the train stands, before and after the ride, speed and acceleration are zero."""
     truth = truth_of(*FAST[0])
-    recording = record(truth, 0)
+    recording = record_fast(0, 0)
     states = CurveMatchedOdometry().estimate(recording).states
     speed = truth.motion(AXLE).loc[recording.imu.index, "speed_mps"].to_numpy()
     resting = states["speed_mps"].to_numpy() == 0.0
@@ -257,7 +258,7 @@ def test_stands_still_exactly():
 @pytest.mark.parametrize("smoothed", [False, True])
 def test_claims_something_for_every_sample(smoothed):
     """No sd is zero, nor before the filter's first step: a NEES over the whole ride has a value."""
-    recording = record(truth_of(*FAST[0]), 0)
+    recording = record_fast(0, 0)
     states = CurveMatchedOdometry(smoothed=smoothed).estimate(recording).states
     assert (states[["position_sd_m", "speed_sd_mps", "acceleration_sd_mps2"]] > 0.0).all(axis=None)
 
@@ -265,7 +266,7 @@ def test_claims_something_for_every_sample(smoothed):
 def test_bad_options_and_missing_encoder_are_named():
     with pytest.raises(InputError, match="tread_sd"):
         CurveMatchedOdometry(tread_sd=-1.0)
-    recording = record(truth_of(*FAST[0]), 0)
+    recording = record_fast(0, 0)
     with pytest.raises(InputError, match="encoder"):
         CurveMatchedOdometry().estimate(replace(recording, encoder=None, encoder_sheet=None))
 
@@ -337,7 +338,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
 def test_smoother_equals_rauch_tung_striebel():
     """The inverse-free smoother against the textbook one with matrix inverses, states and covariances."""
     filtered, covariance, before, before_covariance, f, smoothed, smoothed_covariance = run_kernel(
-        record(truth_of(*FAST[0]), 0)
+        record_fast(0, 0)
     )
     x, p = filtered[-1], covariance[-1]
     scale = np.sqrt(np.diagonal(covariance[-1]))
@@ -353,7 +354,7 @@ def test_smoother_equals_rauch_tung_striebel():
 
 
 def test_smoother_is_nowhere_less_sure_than_the_filter():
-    filtered = run_kernel(record(truth_of(*FAST[0]), 0))
+    filtered = run_kernel(record_fast(0, 0))
     ahead = np.diagonal(filtered[1], axis1=1, axis2=2)[:, [S, V, WAY, YAW, LAG, LEAD]]
     back = np.diagonal(filtered[6], axis1=1, axis2=2)[:, [S, V, WAY, YAW, LAG, LEAD]]
     assert np.all(back <= ahead * (1.0 + 1e-9) + 1e-15)

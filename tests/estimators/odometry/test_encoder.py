@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from filterpy.common import Q_continuous_white_noise
 from filterpy.kalman import KalmanFilter
-from simrail.estimators.odometry.encoder import _predict, _update, encoder_odometry
+from simrail.estimators.odometry.encoder import EncoderOdometry, _predict, _update
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.recording.recording import EncoderSheet
@@ -21,11 +21,14 @@ def count(time, way, *, pulses=1024, rate_hz=250.0, draw=0):
     return sample_encoder((way - way[0]) / RADIUS, time, spec, seed=1, draw=draw)
 
 
-def odometry_of(time, way, *, pulses=1024, draw=0, radius_error=0.0, rate_hz=250.0, times=None, **settings):
+def odometry_of(
+    time, way, *, pulses=1024, draw=0, radius_error=0.0, rate_hz=250.0, times=None, radius_relative_sd=0.0
+):
     counts = count(time, way, pulses=pulses, rate_hz=rate_hz, draw=draw)
-    sheet = EncoderSheet("front.left", pulses, RADIUS * (1.0 + radius_error), rate_hz)
+    radius_m = RADIUS * (1.0 + radius_error)
+    sheet = EncoderSheet("front.left", pulses, radius_m, rate_hz, radius_relative_sd)
     wanted = time[28:-28:4] if times is None else times
-    return encoder_odometry(counts, sheet, wanted, start_position_m=way[0], **settings)
+    return EncoderOdometry().from_counts(counts, sheet, wanted, way[0])
 
 
 def ride(direction=1, *, speed=20.0 / 3.6, end=400.0, stops=((200.0, 10.0),)):
@@ -94,8 +97,8 @@ def test_backwards_is_the_exact_mirror_of_forwards():
     time, s, _, _ = ride()
     counts = count(time, s)
     sheet = EncoderSheet("front.left", 1024, RADIUS, 250.0)
-    forth = encoder_odometry(counts, sheet, time[28::4], start_position_m=0.0)
-    back = encoder_odometry(-counts, sheet, time[28::4], start_position_m=0.0)
+    forth = EncoderOdometry().from_counts(counts, sheet, time[28::4], 0.0)
+    back = EncoderOdometry().from_counts(-counts, sheet, time[28::4], 0.0)
     np.testing.assert_array_equal(back[list(ODOMETRY)], -forth[list(ODOMETRY)])
     np.testing.assert_array_equal(back[list(ODOMETRY_SD)], forth[list(ODOMETRY_SD)])
 
@@ -106,9 +109,9 @@ def test_the_answer_at_a_time_uses_nothing_read_later():
     sheet = EncoderSheet("front.left", 1024, RADIUS, 250.0)
     # Wanted between the readings as well as at them.
     wanted = np.sort(np.concatenate([time[28::4], time[1::7] + 0.0003]))
-    whole = encoder_odometry(counts, sheet, wanted, start_position_m=10.0)
+    whole = EncoderOdometry().from_counts(counts, sheet, wanted, 10.0)
     for stop in (3.0, 5.9, 9.0004, 31.7, 50.0):
-        part = encoder_odometry(counts.loc[:stop], sheet, wanted[wanted <= stop], start_position_m=10.0)
+        part = EncoderOdometry().from_counts(counts.loc[:stop], sheet, wanted[wanted <= stop], 10.0)
         pd.testing.assert_frame_equal(part, whole.loc[:stop], check_exact=True)
 
 

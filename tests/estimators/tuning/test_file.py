@@ -105,9 +105,12 @@ def changed(old: str, new: str) -> str:
         (changed("seed = 3\n", ""), ["search.seed", "missing"]),
         (changed("seed = 3", "seed = true"), ["search.seed", "True", "whole number"]),
         (changed("seed = 3", "seed = 3.5"), ["search.seed", "3.5", "whole number"]),
-        (changed("box = [1e-08, 10000.0]", "box = [1e-8]"), ["search.box", "two numbers"]),
-        (changed("box = [1e-08, 10000.0]", "box = [1e4, 1e-8]"), ["search.box", "least < greatest"]),
-        (changed('constrained = ["z"]', 'constrained = ["x"]'), ["search.constrained", "y, z"]),
+        (changed("box = [\n    1e-08,\n    10000.0,\n]", "box = [1e-8]"), ["search.box", "two numbers"]),
+        (
+            changed("box = [\n    1e-08,\n    10000.0,\n]", "box = [1e4, 1e-8]"),
+            ["search.box", "least < greatest"],
+        ),
+        (changed('constrained = [\n    "z",\n]', 'constrained = ["x"]'), ["search.constrained", "y, z"]),
         (changed('method = "cml"', "method = 3"), ["search.method", "3", "text"]),
         (
             FITTED + table("status", KNOWN | {"roll_rad2ps3": "sure"}),

@@ -6,10 +6,12 @@ from its measurements. The virtual positions, constants and no draw, get a varia
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,15 +24,17 @@ from simrail.estimators.trajectory.model import Model, kinds_of, packed_process,
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.reference import measured
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
+from simrail.estimators.tuning import tune as generic
+from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import Tuning
 from simrail.estimators.tuning.identify import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, UPPER, identify
-from simrail.estimators.tuning.objectives import Likelihood, likelihoods, objective_of
+from simrail.estimators.tuning.objectives import Likelihood, SmootherTuning, likelihoods
 from simrail.estimators.tuning.search import least
 from simrail.estimators.tuning.space import NAMES, SearchSpace
-from simrail.estimators.tuning.tune import tune
 
 from simrail.core.errors import InputError
 from simrail.core.seeds import stream
+from simrail.estimation.tunable import Objective, Parameter, tunables_of
 from simrail.recording.recording import Recording
 from simrail.track.bands import BANDS
 from simrail.track.irregularity import Irregularity
@@ -55,6 +59,32 @@ TRUE = Hyperparameters(
 )
 START_SD = np.array([2e-3, 5e-3, 2e-3, 5e-3, 2e-3, 5e-3, 0.002, 0.005, 0.05, 0.002, 0.005, 0.05])
 SYNTHETIC = SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=NOTHING)
+
+
+def cube_of(space: SearchSpace) -> Cube:
+    return Cube(space.parameters(Hyperparameters()))
+
+
+def objective_of(
+    recordings: Sequence[Recording],
+    smoother: TrajectorySmoother,
+    *,
+    references: Sequence[pd.DataFrame] | None = None,
+    **settings: Any,
+) -> Objective:
+    return generic.objective_of(SmootherTuning(smoother, **settings), recordings, references)
+
+
+def at(goal: Objective, parameters: Hyperparameters) -> float:
+    return goal.value(asdict(parameters))
+
+
+def tune(recordings: Sequence[Recording], *, settings: dict[str, Any] | None = None, **more: Any) -> Tuning:
+    """The smoother's tuning as it is read from the file of a search."""
+    result = generic.tune(TrajectorySmoother().tunables(settings or {}), recordings, **more)
+    with TemporaryDirectory() as folder:
+        result.write(Path(folder) / "tuned.toml")
+        return Tuning.from_file(Path(folder) / "tuned.toml")
 
 
 @lru_cache
@@ -95,14 +125,15 @@ def synthetic() -> Likelihood:
 
 def found_in(goal: Likelihood, seed: int = 1) -> Hyperparameters:
     """CML of a likelihood, from far off the truth."""
+    cube = cube_of(SYNTHETIC)
 
     def evaluate(points: np.ndarray) -> np.ndarray:
-        values = [goal.value(Hyperparameters.from_vector(SYNTHETIC.values(point))) for point in points]
+        values = [goal.value(cube.named(point)) for point in points]
         return np.array(values)
 
-    start = np.full(len(SYNTHETIC.searched), 0.5)
+    start = np.full(len(cube.searched), 0.5)
     found = least(evaluate, start=start, generator=stream(seed, "synthetic"), evaluations=320)
-    return Hyperparameters.from_vector(SYNTHETIC.values(found.point))
+    return Hyperparameters(**cube.named(found.point))
 
 
 @pytest.mark.slow
@@ -110,7 +141,7 @@ def test_cml_recovers_the_noise_of_its_own_model() -> None:
     """Each within its Cramer-Rao interval, and all together as chi-square of 11 has it, two-sided."""
     goal = synthetic()
     found = found_in(goal)
-    known = identify(goal, found, SYNTHETIC)
+    known = identify(goal, asdict(found), cube_of(SYNTHETIC))
     assert list(known.table["status"][:11]) == [IDENTIFIED] * 11
     assert list(known.table["status"][11:]) == [HELD] * 2
     off = np.log(found.vector() / TRUE.vector())[:11]
@@ -121,7 +152,7 @@ def test_cml_recovers_the_noise_of_its_own_model() -> None:
     low, high = chi2.ppf([0.0005, 0.9995], 11)
     assert low < squares < high
     # The truth costs no more than the fit of 11 parameters to noise gains: half of that chi-square.
-    gain = goal.samples * (goal.value(TRUE) - goal.value(found))
+    gain = goal.samples * (at(goal, TRUE) - at(goal, found))
     assert 0.0 < gain == pytest.approx(0.5 * squares, rel=0.2)
 
 
@@ -140,7 +171,7 @@ def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytes
     monkeypatch.setattr(simrail.estimators.tuning.objectives, "likelihoods", spoilt)
     goal = Likelihood(drawn()[:4], synthetic().counts[:4])
     slope = [
-        goal.value(Hyperparameters.from_vector(TRUE.vector() * factor)) - goal.value(TRUE)
+        at(goal, Hyperparameters.from_vector(TRUE.vector() * factor)) - at(goal, TRUE)
         for factor in (0.5, 2.0)
     ]
     assert min(slope) <= 0.0
@@ -149,11 +180,11 @@ def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytes
 def test_the_true_noise_is_a_minimum_along_every_axis() -> None:
     """Twice and half of each value are less likely, by more than chance lets a true value lose."""
     goal = synthetic()
-    at_truth = goal.value(TRUE)
+    at_truth = at(goal, TRUE)
     for name in NAMES[:11]:
         for factor in (0.5, 2.0):
             other = replace(TRUE, **{name: factor * getattr(TRUE, name)})
-            assert goal.samples * (goal.value(other) - at_truth) > 0.5 * chi2.ppf(0.999, 1), name
+            assert goal.samples * (at(goal, other) - at_truth) > 0.5 * chi2.ppf(0.999, 1), name
 
 
 def test_likelihoods_add_up(line_recording: Callable[..., Recording]) -> None:
@@ -162,11 +193,11 @@ def test_likelihoods_add_up(line_recording: Callable[..., Recording]) -> None:
     terms = likelihoods(smoother.model(recording))
     assert terms.sum() == pytest.approx(smoother.log_likelihood(recording), rel=1e-12)
     kinds = kinds_of(recording)
-    parts = [objective_of([recording], smoother, kind=kind).value(Hyperparameters()) for kind in (0, 1)]
+    parts = [at(objective_of([recording], smoother, kind=kind), Hyperparameters()) for kind in (0, 1)]
     counts = np.bincount(kinds)
-    whole = objective_of([recording], smoother).value(Hyperparameters())
+    whole = at(objective_of([recording], smoother), Hyperparameters())
     assert (counts * parts).sum() == pytest.approx(whole * len(kinds), rel=1e-12)
-    twice = objective_of([recording, recording], smoother).value(Hyperparameters())
+    twice = at(objective_of([recording, recording], smoother), Hyperparameters())
     assert twice == pytest.approx(whole, rel=1e-12)
 
 
@@ -181,16 +212,31 @@ def ride(metro_recording: Callable[..., Recording]) -> Recording:
     return piece(metro_recording(70.0, 1, "axle", 0), 14000, 4000)
 
 
-def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording) -> None:
+SPACES: dict[str, dict[str, Any]] = {
+    "paper": {},
+    "both": {"constrained": ("y", "z")},
+    "held": {"box": (1e-8, 1e4), "constrained": (), "position_m2": 2e-3},
+}
+
+
+@pytest.fixture(scope="module")
+def searched() -> Callable[[Recording, str], Tuning]:
+    """CML of a ride in one of `SPACES`; searched once."""
+    tunings: dict[str, Tuning] = {}
+
+    def search(ride: Recording, name: str) -> Tuning:
+        if name not in tunings:
+            # Only of the paper's space is the least asked for; the others must keep to theirs on the way.
+            at_most = None if name == "paper" else 64
+            tunings[name] = tune([ride], settings=SPACES[name], evaluations=160, at_most=at_most)
+        return tunings[name]
+
+    return search
+
+
+def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording, searched: Callable) -> None:
     """On y only, the likelihood pins z; on both, neither; held, the position is what was said."""
-    found = {
-        name: tune([ride], TrajectorySmoother(), space=space, evaluations=160)
-        for name, space in {
-            "paper": SearchSpace(),
-            "both": SearchSpace(constrained=("y", "z")),
-            "held": SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=2e-3),
-        }.items()
-    }
+    found = {name: searched(ride, name) for name in SPACES}
     paper, both, held = (found[name].hyperparameters for name in ("paper", "both", "held"))
     assert paper.accel_y_m2ps4 <= paper.lateral_position_m2 / 10.0
     assert paper.vertical_position_m2 == pytest.approx(1e-4, rel=1e-6)
@@ -202,11 +248,10 @@ def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording) -> None:
         tuning.search.space.check(tuning.hyperparameters)
 
 
-def test_what_the_likelihood_does_not_identify(ride: Recording) -> None:
+def test_what_the_likelihood_does_not_identify(ride: Recording, searched: Callable) -> None:
     """The virtual positions are constants: ten times the confidence gains ln(10)/2 a sample, for nothing."""
-    space = SearchSpace()
-    tuning = tune([ride], TrajectorySmoother(), space=space, evaluations=160)
-    known = identify(objective_of([ride], TrajectorySmoother()), tuning.hyperparameters, space).table
+    values = asdict(searched(ride, "paper").hyperparameters)
+    known = identify(objective_of([ride], TrajectorySmoother()), values, cube_of(SearchSpace())).table
     for name in ("lateral_position_m2", "vertical_position_m2"):
         assert known.loc[name, "status"] == LOWER
         assert known.loc[name, "tenth"] == pytest.approx(-0.5 * np.log(10.0), rel=0.1)
@@ -218,8 +263,8 @@ def test_ends_flats_and_constraints_are_told_apart() -> None:
     class Bowl:
         unit = "of a test"
 
-        def value(self, parameters: Hyperparameters) -> float:
-            logs = np.log(parameters.vector())
+        def value(self, values: Mapping[str, float]) -> float:
+            logs = np.log(list(values.values()))
             weight = np.array([1.0, 1e-6, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1])
             floor = np.log([1e-2] * 5 + [1e-6, 1e6] + [1e-2] * 2 + [1e4] + [1e-2] * 3)
             together = (logs[3] + logs[4] - 2 * floor[3]) ** 2  # only their product is known
@@ -229,7 +274,8 @@ def test_ends_flats_and_constraints_are_told_apart() -> None:
     low, high = 1e-4, 1e4
     values = np.full(13, 1e-2)
     values[[5, 6, 9]] = low, high, 1e-3  # 9 is y's accelerometer, at a tenth of its position
-    known = identify(Bowl(), Hyperparameters.from_vector(values), SearchSpace(box=(low, high)))
+    at_edges = dict(zip(NAMES, values, strict=True))
+    known = identify(Bowl(), at_edges, cube_of(SearchSpace(box=(low, high))))
     status = known.table["status"]
     assert list(status.iloc[[0, 1, 2, 3, 4, 5, 6, 9]]) == [
         IDENTIFIED, FLAT, FLAT, FLAT, FLAT, LOWER, UPPER, CONSTRAINT,
@@ -259,16 +305,15 @@ def test_kom_does_better_on_sensors_that_it_has_not_seen(
     monkeypatch.setattr("simrail.estimators.tuning.search.ROUNDS", 0)
     first, count = 13000, 2500
     ride = piece(metro_recording(70.0, 1, "axle", 0), first, count)
-    smoother, space = TrajectorySmoother(), SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=3e-3)
-    tuning = tune(
-        [ride], smoother, references=[rails_of(ride)], space=space, band=BANDS["D0"], evaluations=240
-    )
+    smoother = TrajectorySmoother()
+    settings = {"box": (1e-8, 1e4), "constrained": (), "position_m2": 3e-3, "band": BANDS["D0"]}
+    tuning = tune([ride], settings=settings, references=[rails_of(ride)], evaluations=160)
     assert tuning.search is not None and tuning.search.method == "kom"
     by_hand = replace(Hyperparameters(), lateral_position_m2=3e-3, vertical_position_m2=3e-3)
     for draw in (0, 1, 2):
         other = piece(metro_recording(70.0, 1, "axle", draw), first, count)
         goal = objective_of([other], smoother, references=[rails_of(other)], band=BANDS["D0"])
-        reached, before = goal.value(tuning.hyperparameters), goal.value(by_hand)
+        reached, before = at(goal, tuning.hyperparameters), at(goal, by_hand)
         assert reached < 0.9 * before
         if draw == 0:
             assert reached == pytest.approx(tuning.search.objective[0], rel=1e-9)
@@ -279,14 +324,14 @@ def test_kom_counts_the_places_that_the_reference_knows(ride: Recording) -> None
     rails, smoother = rails_of(ride), TrajectorySmoother()
     half = rails.iloc[: len(rails) // 2]
     values = {
-        name: objective_of([ride], smoother, references=[reference]).value(Hyperparameters())
+        name: at(objective_of([ride], smoother, references=[reference]), Hyperparameters())
         for name, reference in {"whole": rails, "half": half, "spoilt": half + 1e-3}.items()
     }
     assert values["whole"] != values["half"]
     # Three irregularities that are off by 1 mm more: each rms moves by 1 mm at most.
     assert 0.0 < abs(values["spoilt"] - values["half"]) < 3.0
     kinds = [
-        objective_of([ride], smoother, references=[rails], kind=kind).value(Hyperparameters())
+        at(objective_of([ride], smoother, references=[rails], kind=kind), Hyperparameters())
         for kind in (0, 1)
     ]
     assert min(kinds) < values["whole"] < max(kinds)
@@ -294,15 +339,15 @@ def test_kom_counts_the_places_that_the_reference_knows(ride: Recording) -> None
 
 def test_straights_and_curves_by_themselves(ride: Recording) -> None:
     """Each set is that of a search on its own kind, and the smoother uses it there."""
-    few = {"evaluations": 32, "space": SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=3e-3)}
-    both = tune([ride], TrajectorySmoother(), by_kind=True, **few)  # type: ignore[arg-type]
+    settings = {"box": (1e-8, 1e4), "constrained": (), "position_m2": 3e-3, "by_kind": True}
+    both = tune([ride], settings=settings, evaluations=32, at_most=400)
     assert both.curve_hyperparameters is not None and both.search is not None
     assert both.hyperparameters != both.curve_hyperparameters
     for kind, parameters in enumerate([both.hyperparameters, both.curve_hyperparameters]):
         goal = objective_of([ride], TrajectorySmoother(), kind=kind)
-        assert goal.value(parameters) == pytest.approx(both.search.objective[kind], rel=1e-12)
+        assert at(goal, parameters) == pytest.approx(both.search.objective[kind], rel=1e-12)
         other = (both.curve_hyperparameters, both.hyperparameters)[kind]
-        assert goal.value(parameters) < goal.value(other)
+        assert at(goal, parameters) < at(goal, other)
     smoother = TrajectorySmoother(tuning=both)
     explicit = TrajectorySmoother(
         hyperparameters=both.hyperparameters, curve_hyperparameters=both.curve_hyperparameters
@@ -317,17 +362,16 @@ def test_threads_do_not_matter_and_interrupted_is_resumed(ride: Recording, tmp_p
     keep = tmp_path / "mine.unfinished.toml"
 
     def run(threads: int, stop_at: int | None = None, unfinished: Path | None = None) -> Tuning:
-        told = []
+        counts = []
 
         def progress(name: str, count: int, value: float) -> None:
-            told.append(count)
+            counts.append(count)
             if stop_at is not None and count >= stop_at:
                 raise KeyboardInterrupt
 
         return tune(
-            [short], TrajectorySmoother(), evaluations=48, threads=threads, unfinished=unfinished,
-            progress=progress,
-        )  # fmt: skip
+            [short], evaluations=48, at_most=220, threads=threads, unfinished=unfinished, progress=progress
+        )
 
     whole = run(1)
     assert run(3) == whole
@@ -336,7 +380,7 @@ def test_threads_do_not_matter_and_interrupted_is_resumed(ride: Recording, tmp_p
     best = Tuning.from_file(keep)
     assert best.search is not None and whole.search is not None and not best.search.finished
     goal = objective_of([short], TrajectorySmoother())
-    assert goal.value(best.hyperparameters) == best.search.objective[0] > whole.search.objective[0]
+    assert at(goal, best.hyperparameters) == best.search.objective[0] > whole.search.objective[0]
     with pytest.raises(KeyboardInterrupt):
         run(2, stop_at=whole.search.evaluations - 30, unfinished=keep)
     assert run(2, unfinished=keep) == whole
@@ -378,14 +422,59 @@ def test_requests_that_mean_nothing(ride: Recording) -> None:
 def test_one_search_is_as_good_as_ten(name: str, metro_recording: Callable[..., Recording]) -> None:
     """CML of the 2.1 km ride at 70 km/h: within 1e-3 of likelihood per sample of the best of ten seeds."""
     recording = metro_recording(70.0, 1, "axle", 0)
-    space = {
-        "paper": SearchSpace(),
-        "held": SearchSpace(box=(1e-8, 1e4), constrained=(), position_m2=3e-3),
-    }[name]
     reached = []
     for seed in range(1, 11):
-        tuning = tune([recording], TrajectorySmoother(), space=space, seed=seed)
+        tuning = tune([recording], settings=SPACES[name], seed=seed)
         assert tuning.search is not None
         reached.append(tuning.search.objective[0])
     assert reached[0] < min(reached) + 1e-3
     assert max(reached) < min(reached) + 1e-3
+
+
+class Scale:
+    """A stranger's: the white noise's standard deviation of one gyro, by likelihood alone."""
+
+    def parameters(self) -> Sequence[Parameter]:
+        return (
+            Parameter("sd_radps", "rad/s", 1e-6, 1.0, 0.1),
+            Parameter("mean_radps", "rad/s", -1.0, 1.0, 0.5, scale="linear"),
+        )
+
+    def likelihood(self, recordings: Sequence[Recording]) -> Objective:
+        gyro = np.concatenate([recording.imu["gyro_x_radps"].to_numpy() for recording in recordings])
+
+        class Gauss:
+            unit = "negative log-likelihood per sample"
+            samples = len(gyro)
+
+            def value(self, values: Mapping[str, float]) -> float:
+                e = (gyro - values["mean_radps"]) / values["sd_radps"]
+                return float(0.5 * (e**2).mean() + np.log(values["sd_radps"]))
+
+        return Gauss()
+
+
+def test_any_tunable_is_searched_and_judged(ride: Recording) -> None:
+    """The maximum likelihood of a Gaussian is known: mean and standard deviation, and how well."""
+    gyro, tunables = ride.imu["gyro_x_radps"], tunables_of(Scale(), {}, method="cml")
+    result = generic.tune(tunables, [ride], evaluations=160)
+    (values,) = result.values
+    assert values["mean_radps"] == pytest.approx(gyro.mean(), rel=1e-3)
+    assert values["sd_radps"] == pytest.approx(gyro.std(ddof=0), rel=1e-3)
+    cube = Cube(tuple(Scale().parameters()))
+    judged = identify(Scale().likelihood([ride]), values, cube).table
+    assert list(judged["status"]) == [IDENTIFIED] * 2
+    known_to = judged["sd_decades"] * np.log(10.0)
+    assert known_to["sd_radps"] == pytest.approx(1.0 / np.sqrt(2 * len(gyro)), rel=0.02)
+    # A tenth of the box of two rad/s stands for a decade.
+    by_mean = gyro.std(ddof=0) / np.sqrt(len(gyro)) / 0.2
+    assert judged["sd_decades"]["mean_radps"] == pytest.approx(by_mean, rel=0.02)
+
+
+def test_what_cannot_be_tuned_is_refused() -> None:
+    with pytest.raises(InputError, match=r"--method: Scale cannot be tuned .*'kom'; limit: cml"):
+        tunables_of(Scale(), {}, method="kom")
+    with pytest.raises(InputError, match=r"by_kind: Scale has no such setting"):
+        tunables_of(Scale(), {"by_kind": True}, method="cml")
+    with pytest.raises(InputError, match="nothing to tune"):
+        tunables_of(object(), {}, method="cml")

@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from simrail.estimators.ahrs import Vqf
 from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
-from simrail.estimators.odometry.encoder import speed_odometry
+from simrail.estimators.odometry.encoder import EncoderOdometry
 
 from simrail.core.columns import ACCEL, ATTITUDE, GYRO, IMU
 from simrail.core.errors import InputError
-from simrail.recording.files.ride_reader import read_ride
-from simrail.recording.recording import Recording
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.recorded_ride import read_ride
+from simrail.recording.recording import OdometerSheet, Recording
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
@@ -222,6 +224,7 @@ speed_sd_mps = 0.02
 """
     found = read_ride(write_head(tmp_path, start, way=way))
     assert found.encoder is None and found.odometry_source == "odometer"
+    assert found.odometer is not None and found.odometer_sheet == OdometerSheet(0.02, 0.005)
     true = motion.iloc[::10]
     error = np.abs(found.odometry["position_m"] - true["position_m"])
     assert (error < 4.0 * found.odometry["position_sd_m"] + 0.01).all()
@@ -245,18 +248,31 @@ resolution_m = 0.1
     found = read_ride(write_head(tmp_path, start, way=way))
     assert found.encoder is not None and found.encoder_sheet is not None
     assert found.encoder["pulse_count"].iloc[-1] == pytest.approx(10.0 * 200.0, abs=1)
+    assert found.odometry is not None and found.odometry_source == "encoder"
     error = np.abs(found.odometry["position_m"] - motion["position_m"].iloc[::10])
     assert error.max() < 0.5
 
 
+def test_a_ride_may_not_know_where_it_is(truth, motion, tmp_path):
+    """Neither encoder nor odometer nor odometry: what needs none runs, what needs one is refused by name."""
+    motion.iloc[::10][list(IMU)].to_csv(tmp_path / "imu.csv")
+    found = read_ride(write_head(tmp_path, float(motion["position_m"].iloc[0]), way=""))
+    assert found.encoder is None and found.odometer is None and found.odometry is None
+    assert np.isfinite(Vqf().estimate(found).states.to_numpy()).all()
+    with pytest.raises(InputError, match=r"odometry: the recording has no odometry.*with_odometry"):
+        AttitudeEkf().estimate(found)
+    with pytest.raises(InputError, match=r"encoder: the recording has no encoder"):
+        with_odometry(found, "encoder")
+
+
 def test_speed_filter_is_causal_and_signed():
     time = np.arange(200) / 10.0
-    speed = np.clip(time - 3.0, 0.0, 8.0)
-    wanted = np.arange(1900) / 100.0
-    whole = speed_odometry(time, speed, wanted, start_position_m=5.0, speed_sd_mps=0.05)
-    part = speed_odometry(time[:100], speed[:100], wanted[:900], start_position_m=5.0, speed_sd_mps=0.05)
+    speed = pd.DataFrame({"speed_mps": np.clip(time - 3.0, 0.0, 8.0)}, index=time)
+    wanted, sheet = np.arange(1900) / 100.0, OdometerSheet(0.05, 0.0)
+    whole = EncoderOdometry().from_speed(speed, sheet, wanted, 5.0)
+    part = EncoderOdometry().from_speed(speed.iloc[:100], sheet, wanted[:900], 5.0)
     assert whole.iloc[:900].to_numpy().tobytes() == part.to_numpy().tobytes()
-    back = speed_odometry(time, -speed, wanted, start_position_m=-5.0, speed_sd_mps=0.05)
+    back = EncoderOdometry().from_speed(-speed, sheet, wanted, -5.0)
     np.testing.assert_array_equal(back["position_m"], -whole["position_m"])
     # s = t^2/2 while the speed rises evenly, known to a small lag.
     assert whole["position_m"].iloc[-1] - 5.0 == pytest.approx(32.0 + 8.0 * 7.99, abs=0.3)

@@ -11,13 +11,15 @@ from hypothesis import strategies as st
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import judge, parse_toml, shipped
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.files.ride_file import RideFile
-from simrail.recording.files.ride_reader import read_ride
+from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.files.ride_writer import write_ride
 from simrail.recording.files.signal_part import SignalPart, VectorPart
-from simrail.recording.recording import Recording
+from simrail.recording.recording import OdometerSheet, Recording
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.signals import SIGNALS
 from simrail.ride.kinematic import kinematic_truth
@@ -49,7 +51,7 @@ def recording() -> Recording:
         vertical_radius_m=1500.0,
     )
     truth = kinematic_truth(track, SpeedProfile(start_m=0.0, end_m=150.0, speed_mps=8.0, rest_s=2.0))
-    return measure(
+    recording = measure(
         truth,
         name="Montequinto é",
         mount=Mount("axle", "body", (0.1, -0.2, 0.6)),
@@ -61,10 +63,14 @@ def recording() -> Recording:
         seed=1,
         draw=0,
     )
+    return with_odometry(recording, "encoder")
+
+
+FRAMES = [signal.name for signal in SIGNALS]
 
 
 def assert_same(a: Recording, b: Recording) -> None:
-    for part in ("imu", "odometry", "encoder", "magnetometer", "rail_displacement", "gaps"):
+    for part in FRAMES:
         left, right = getattr(a, part), getattr(b, part)
         if left is None:
             assert right is None
@@ -74,14 +80,8 @@ def assert_same(a: Recording, b: Recording) -> None:
             assert left.index.to_numpy().tobytes() == right.index.to_numpy().tobytes()
             assert right.index.name == (None if part == "gaps" else "time_s")
             assert left.dtypes.equals(right.dtypes)
-    blank = pd.DataFrame()
-    assert replace(
-        a, imu=blank, odometry=blank, encoder=None, magnetometer=None, rail_displacement=None, gaps=None
-    ).__repr__() == (
-        replace(
-            b, imu=blank, odometry=blank, encoder=None, magnetometer=None, rail_displacement=None, gaps=None
-        ).__repr__()
-    )
+    blank = dict.fromkeys(FRAMES)
+    assert repr(replace(a, **blank)) == repr(replace(b, **blank))
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
@@ -172,6 +172,18 @@ def test_round_trip_without_an_encoder(recording, tmp_path):
     assert_same(blind, read_ride(tmp_path / "deep" / "ride"))
 
 
+@pytest.mark.parametrize("with_odometer", (False, True))
+def test_round_trip_without_odometry(recording, tmp_path, with_odometer):
+    """What was not recorded is not written, and what an odometer showed survives."""
+    poor = replace(recording, encoder=None, encoder_sheet=None, odometry=None, odometry_source="")
+    if with_odometer:
+        odometer = recording.odometry[["speed_mps"]].iloc[::10]
+        poor = replace(poor, odometer=odometer, odometer_sheet=OdometerSheet(0.03, 0.002))
+    write_ride(poor, tmp_path / "ride")
+    assert_same(poor, read_signals(tmp_path / "ride"))
+    assert read_ride(tmp_path / "ride").odometry_source == ("odometer" if with_odometer else "")
+
+
 def test_every_frame_of_a_recording_is_a_signal():
     """A new signal of `Recording` cannot be forgotten by reader and writer."""
     hints = get_type_hints(Recording)
@@ -182,9 +194,9 @@ def test_every_frame_of_a_recording_is_a_signal():
         form = next(
             p
             for p in SignalPart.__subclasses__() + VectorPart.__subclasses__()
-            if p is not VectorPart and p.signal() is signal
+            if p is not VectorPart and p.signal is signal
         )
-        assert form.signal() is signal
+        assert form.signal is signal
 
 
 def test_a_folder_in_use_is_not_overwritten(recording, tmp_path):

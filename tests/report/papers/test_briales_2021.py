@@ -15,7 +15,7 @@ import pytest
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
 from simrail.core.errors import InputError
-from simrail.report import write_report
+from simrail.report.pages.page import write_report
 from simrail.report.papers.briales_2021.figures import spread_of
 from simrail.report.papers.briales_2021.method_claims import method_claims
 from simrail.report.papers.briales_2021.printed import TABLE_3, TIME_CONSTANTS_S
@@ -26,7 +26,7 @@ from simrail.report.papers.claim import Claim
 from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import Figure, Figures, cases
 from simrail.results import describe
-from simrail.scenario.build import profile_of
+from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells, methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 
@@ -39,8 +39,10 @@ MEAN_KMH = {"go20A": 21.0, "go20B": 18.0, "back20A": -21.0, "back20B": -21.0, "g
 
 def test_mean_speeds_are_those_of_table_2() -> None:
     found = {}
-    for cell in cells(load_scenario("metro_table3", overrides=["monte_carlo.sensor_draws=1"])):
-        profile = profile_of(cell)
+    scenario = load_scenario("metro_table3", overrides=["monte_carlo.sensor_draws=1"])
+    parts = Parts(scenario)
+    for cell in cells(scenario):
+        profile = parts.ride(cell).profile
         t = np.linspace(0.0, profile.duration_s, 200_001)
         position, speed, _ = profile.motion(t)
         moving = np.flatnonzero(np.abs(speed) > 1e-6)
@@ -218,7 +220,7 @@ def view_of(names: tuple[str, ...], draws: int = 2) -> PaperView:
     scenario, result = campaign(names, draws)
     listed = methods(scenario)
     view = paper_view(
-        cases(result.scores, result.cells), listed, list(method_styles(listed).values()), result.examples
+        cases(result.scores, result.cells), listed, list(method_styles(scenario).values()), result.examples
     )
     assert view is not None
     return view

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
 from simrail.report.figures.attitude import angle_error
 from simrail.report.figures.decimate import Bins

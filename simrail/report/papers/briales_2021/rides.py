@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from simrail.core.errors import InputError
-from simrail.estimation.estimate import estimator_class
 from simrail.report.tables.pivot import Figures
 from simrail.scenario.cells import Method
 
@@ -37,42 +34,9 @@ GENERAL_PURPOSE = ("vqf_magnetometer", "vqf", "imufusion", "sabatini", "yuan", "
 
 
 def part_of(method: Method) -> str:
-    """Part that a method plays, by its class and options; "" if none."""
-    kind, options = method.part.method, _options(method)
-    if kind == "DesignAngles":
-        return "design"
-    if kind == "Vqf" and not options["compensated"]:
-        return "vqf_magnetometer" if options["magnetometer"] else "vqf"
-    if kind == "Imufusion" and not options["compensated"]:
-        return "imufusion"
-    if kind == "AttitudeGda":
-        return _filter("gda", options, {"recommended": "gda", "paper": "gda_paper"})
-    if kind == "AttitudeEkf":
-        reading = f"ekf_{options['process_noise']}"
-        return _filter("ekf", options, {"recommended": "ekf", "paper_final": reading})
-    return ""
-
-
-def _filter(name: str, options: dict[str, Any], tunings: dict[str, str]) -> str:
-    tuning = options["tuning"]
-    if options.get("doubt"):
-        return "yuan" if not options["compensated"] else ""
-    if not options["compensated"]:
-        plain = "sabatini" if name == "ekf" else "gda_uncompensated"
-        return plain if tuning == "recommended" else ""
-    if options["printed"]:
-        return f"{name}_printed" if tuning == "recommended" else ""
-    return tunings.get(tuning, "")
-
-
-def _options(method: Method) -> dict[str, Any]:
-    """Options of a method, its class's defaults included."""
-    try:
-        known = estimator_class(method.part.method)
-    except InputError:
-        return dict(method.part.options)
-    defaults = {entry.name: entry.default for entry in dataclasses.fields(known)}  # type: ignore[arg-type]
-    return defaults | dict(method.part.options)
+    """Part that a method plays, as the scenario says (``stands_for``); "" if none."""
+    said = method.part.stands_for
+    return said if said in PARTS else ""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.attitude import attitude_figure
 from simrail.report.figures.ride import direction_of
 from simrail.report.papers.briales_2021.figures import (

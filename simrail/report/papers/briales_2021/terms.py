@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
 from simrail.report.papers.briales_2021.printed import PRINTED_TERMS, TERMS_RIDE
 from simrail.report.papers.briales_2021.rides import is_fast

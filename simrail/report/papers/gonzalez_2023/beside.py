@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simrail.campaign.stored_results import FormerResults
+from simrail.campaign.stored_results import StoredResults
 from simrail.report.papers.gonzalez_2023.parts import Rows, rows_of
 from simrail.report.tables.pivot import cases
 from simrail.scenario.cells import methods
@@ -39,7 +39,7 @@ class OtherSize:
     rows: Rows
 
 
-def other_size(former: FormerResults, *, band: str) -> OtherSize | None:
+def other_size(former: StoredResults, *, band: str) -> OtherSize | None:
     """Rows of former results in the band of that name; None if they have no rail geometry."""
     scenario = former.scenario()
     rows = rows_of(cases(former.scores, former.cells), methods(scenario), band=band)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
+from simrail.campaign.cell import CellResult
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.papers.gonzalez_2023.parts import COLOURS, PARTS, Rows
 from simrail.report.tables.geometry_view import with_rails

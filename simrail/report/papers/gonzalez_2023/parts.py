@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -41,27 +40,9 @@ COLOURS: dict[str, str] = {
 
 
 def part_of(method: Method) -> str:
-    """Part that a method plays, by its class, its options and the words of its name; "" if none."""
-    if method.part.method == "ZeroTrack":
-        return "zero"
-    if method.part.method != "TrajectorySmoother":
-        return ""
-    options, words = method.part.options, method.name.split("_")
-    printed, smoothed = bool(options.get("printed", False)), bool(options.get("smoothed", True))
-    by_hand = "hand" in Path(str(options.get("tuning", ""))).stem.split("_")
-    if by_hand and smoothed and not printed and not options.get("rail_sensor", True):
-        return "blind"
-    if by_hand or ("tuning" not in options and "hyperparameters" not in options):
-        if printed:
-            return "printed" if smoothed else ""
-        return "hand" if smoothed else "filter"
-    if printed or not smoothed:
-        return ""
-    if "cml" in words:
-        return "cml_noise" if NOISE in words else "cml_held" if "held" in words else "cml"
-    if "kom" in words:
-        return next((f"kom_{word}" for word in ("start", "end", "rides") if word in words), "kom")
-    return ""
+    """Part that a method plays, as the scenario says (``stands_for``); "" if none."""
+    said = method.part.stands_for
+    return said if said in PARTS else ""
 
 
 @dataclass(frozen=True)

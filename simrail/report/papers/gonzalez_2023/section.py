@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from markupsafe import Markup
 
-from simrail.campaign.example import CellResult
-from simrail.campaign.stored_results import FormerResults
+from simrail.campaign.cell import CellResult
+from simrail.campaign.stored_results import StoredResults
 from simrail.estimators.tuning.file import Tuning
 from simrail.report.figures.geometry import lines_of
 from simrail.report.papers.claim import Claim
@@ -70,7 +70,7 @@ def paper_view(
     *,
     tunings: Mapping[str, Tuning] | None = None,
     scenario: Scenario | None = None,
-    former: FormerResults | None = None,
+    former: StoredResults | None = None,
 ) -> PaperView | None:
     """Make the section; None if no case has rail geometry.
 
@@ -86,7 +86,7 @@ def paper_view(
         Tunings by the method that names them.
     scenario : Scenario, optional
         What was run: tells which tunings were searched on the ride that is drawn.
-    former : FormerResults, optional
+    former : StoredResults, optional
         Results of the other size, whose rows stand beside ours.
     """
     rows = rows_of(all_cases, methods, band=SCALED.name)

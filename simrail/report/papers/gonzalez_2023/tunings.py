@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from simrail.core.errors import InputError
+from simrail.estimation.user_modules import class_named
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning.file import Tuning
 from simrail.estimators.tuning.space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER
@@ -15,7 +16,7 @@ from simrail.report.papers.claim import Claim
 from simrail.report.papers.gonzalez_2023.parts import PARTS
 from simrail.report.tables.tables import Cell, Row, Table
 from simrail.report.words.sentences import significant
-from simrail.scenario.build_estimator import class_named, construct
+from simrail.scenario.build_estimator import construct
 from simrail.scenario.cells import Method
 
 POSITIONS = ("lateral_position_m2", "vertical_position_m2")

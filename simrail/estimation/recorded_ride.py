@@ -1,0 +1,36 @@
+"""A recorded ride, ready for estimators: its signals, an odometry, and whether all that can be true."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from simrail.core.toml_files import label
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.recording.check_physics import check_plausible
+from simrail.recording.files.ride_reader import read_signals, ride_file
+from simrail.recording.recording import Recording
+
+
+def read_ride(path: Path) -> Recording:
+    """Read a ride, of a real train or one that `write_ride` wrote.
+
+    Where the file has no odometry, the recording gets that of its encoder or odometer
+    (`simrail.estimators.odometry.encoder`); without either it has none.
+
+    Parameters
+    ----------
+    path : Path
+        A ride file, or a folder that holds a ``ride.toml``.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or unreadable, or says something impossible, or the recording passes neither
+        `check_recording` nor `check_plausible`.
+    """
+    recording = read_signals(path)
+    if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
+        source = "encoder" if recording.odometer is None else "odometer"
+        recording = with_odometry(recording, "encoder", source=source)
+    check_plausible(recording, file=label(ride_file(path)))
+    return recording
