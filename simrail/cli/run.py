@@ -59,7 +59,7 @@ def run(
     if plan:
         return _plan(scenario, seed, settings or [], many=yes)
 
-    from simrail.cli.progress_bar import ProgressWatcher
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.score_tables import print_cell, print_scores
     from simrail.results import run as run_scenario
     from simrail.results import run_cell

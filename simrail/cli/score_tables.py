@@ -13,7 +13,7 @@ from simrail.campaign.result import CampaignResult
 from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
 from simrail.report.tables.geometry_tables import baseline_of, behind_baseline
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Figures, cases
+from simrail.report.tables.pivot import Case, cases
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
 from simrail.scoring.table import OK
@@ -123,7 +123,7 @@ def _case(
     return Group(*parts)
 
 
-def _rails(console: Console, case: Figures, styles: list[MethodStyle], band: str) -> Table:
+def _rails(console: Console, case: Case, styles: list[MethodStyle], band: str) -> Table:
     """Standard deviations of the errors of those methods that say what the rails look like."""
     columns = [q for q in RAILS if any(case.get(s.name, q, "sd", band=band).draws for s in styles)]
     heads = [QUANTITIES[q].replace(" ", "\n").replace("cross-", "cross-\n") for q in columns]
@@ -134,7 +134,7 @@ def _rails(console: Console, case: Figures, styles: list[MethodStyle], band: str
     return _table(console, heads, lines)
 
 
-def _attitude(console: Console, case: Figures, styles: list[MethodStyle], beside_rails: bool) -> Table:
+def _attitude(console: Console, case: Case, styles: list[MethodStyle], beside_rails: bool) -> Table:
     """Rms errors of the attitude; the time is told once, with the rails where there are any."""
     columns = []
     for quantity, reference, window in ATTITUDE:
@@ -152,7 +152,7 @@ def _attitude(console: Console, case: Figures, styles: list[MethodStyle], beside
     return _table(console, heads, lines)
 
 
-def _time(case: Figures, style: MethodStyle) -> str:
+def _time(case: Case, style: MethodStyle) -> str:
     time = case.get(style.name, "roll", "us_per_sample")
     return f"{time.value:.2f}" if time.draws else "-"
 
@@ -176,7 +176,7 @@ def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, li
     return table
 
 
-def _lost_rails(case: Figures, styles: list[MethodStyle], band: str) -> list[str]:
+def _lost_rails(case: Case, styles: list[MethodStyle], band: str) -> list[str]:
     """What rails that lie as designed know better than a method, by quantity."""
     floor, lost = baseline_of(case, styles), []
     for quantity in RAILS:
@@ -186,7 +186,7 @@ def _lost_rails(case: Figures, styles: list[MethodStyle], band: str) -> list[str
     return [f"{floor.name}, which uses no IMU, errs less {' and '.join(lost)}"] if floor and lost else []
 
 
-def _lost_attitude(case: Figures, styles: list[MethodStyle]) -> list[str]:
+def _lost_attitude(case: Case, styles: list[MethodStyle]) -> list[str]:
     """Which methods err more in roll in curves than the design angles do."""
     floor = next((style for style in styles if not style.uses_imu), None)
     if floor is None:

@@ -38,9 +38,11 @@ position_m = [0.0, 0.0, 0.6]
 own_bands = { paper = [3.0, 70.0] }
 [[estimator]]
 name = "smoother"
+stands_for = "hand"
 method = "TrajectorySmoother"
 [[estimator]]
 name = "zero_track"
+stands_for = "zero"
 method = "ZeroTrack"
 """
 

@@ -16,11 +16,12 @@ import pytest
 
 from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
-from simrail.report.campaign.figures import _in_two, box_figure, curvature_figure
-from simrail.report.campaign.heat import _short, heat_figure, side_of
+from simrail.report.campaign.figures import box_figure, curvature_figure, in_two
+from simrail.report.campaign.heat import heat_maps, short_number, side_of
 from simrail.report.campaign.rails import rails_figures
+from simrail.report.campaign.section import TABLES
 from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
-from simrail.report.pages.page import TABLES, write_report
+from simrail.report.pages.page import write_report
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.statistics import compare
@@ -216,7 +217,9 @@ def test_heat_maps_show_the_means(
     scores, cells = small
     axes = {axis.column: axis for axis in campaign_axes(cells)}
     across, down = side_of(axes["speed_kmh"], axes["direction"]), side_of(axes["imu"])
-    svg = heat_figure(draws_of(scores, cells, list(axes.values())), styles[1:2], across, down, what="heat")
+    draws = draws_of(scores, cells, list(axes.values()))
+    draws = {"one": draws[draws["estimator"] == styles[1].name]}
+    svg = heat_maps(draws, across, down, unit="\u00b0", what="heat")
     rows = roll(small)
     rows = rows[rows["estimator"] == styles[1].name]
     for grade in GRADES:
@@ -265,13 +268,13 @@ def test_rails_are_mapped_in_the_band_that_counts(
     for speed in SPEEDS:
         at = (plain["speed_kmh"] == speed) & (plain["direction"] == "forward")
         mean = plain.loc[at & (plain["estimator"] == styles[0].name), "value"].mean()
-        assert made[0][1].count(f">{_short(mean)}</text>") >= 3
+        assert made[0][1].count(f">{short_number(mean)}</text>") >= 3
     assert styles[1].label not in made[0][1], "a method that says nothing of rails has no row"
 
 
 def test_long_names_are_told_in_two_lines() -> None:
-    assert _in_two("lord_3dm_gx4_25_noise_added") == "lord_3dm_gx4_\n25_noise_added"
-    assert _in_two("axle_ideal") == "axle_ideal" and _in_two("a" * 30) == "a" * 30
+    assert in_two("lord_3dm_gx4_25_noise_added") == "lord_3dm_gx4_\n25_noise_added"
+    assert in_two("axle_ideal") == "axle_ideal" and in_two("a" * 30) == "a" * 30
 
 
 def test_boxes_and_curvature_are_drawn(

@@ -16,7 +16,7 @@ from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.estimation.estimate import Estimate
 from simrail.report.pages.page import write_report
-from simrail.report.words.ride_words import axis_words
+from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.table import concat_scores, failed_figures, labelled
 

@@ -18,22 +18,22 @@ from simrail.estimation.estimate import Estimate
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.figures.style import fitting_columns, legend_above, look, panels
 from simrail.report.figures.track import profile_figure, profile_words
-from simrail.report.pages.page import _ride, write_report
-from simrail.report.papers.gonzalez_2023.parts import COLOURS
-from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, PaperView, _peak, paper_view
+from simrail.report.pages.page import write_report
+from simrail.report.pages.ride import ride_data
+from simrail.report.pages.section import PageData
+from simrail.report.papers.gonzalez_2023.parts import PAPER
+from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, peak_of, section
 from simrail.report.tables.geometry_bands import JUDGED, band_words, judged_band, waves_words
 from simrail.report.tables.geometry_tables import geometry_table, overview_table
 from simrail.report.tables.geometry_view import geometry_view
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Figure, Figures, cases
+from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.report.tables.tiles import tiles
-from simrail.report.words.alike import alike, one_of_each
-from simrail.report.words.findings import findings
+from simrail.report.words.findings import alike, findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import degrees, significant, unbroken
 from simrail.results import describe
 from simrail.scenario.build import bands_by_name
-from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.track.bands import BANDS, Band, margin_m
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
@@ -99,7 +99,9 @@ class Ran:
         self.styles = list(method_styles(scenario).values())
         self.example: CellResult = result.examples[0]
         self.known = bands_by_name(scenario.spec)
-        self.examples = result.examples
+        self.data = PageData(scenario, result.scores, result.cells, result.examples, {})
+        (paper,) = section(self.data)
+        self.paper = paper.data
 
 
 @pytest.fixture(scope="module")
@@ -124,10 +126,10 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
 # ---- the band that counts ----------------------------------------------------------------------
 
 
-def planted(*bands: str) -> Figures:
+def planted(*bands: str) -> Case:
     """A case with figures in some bands."""
     table = pd.DataFrame({"quantity": "alignment", "band": ["full", *bands], "draws": 2})
-    return Figures({}, table, {})
+    return Case({}, table, {})
 
 
 @pytest.mark.parametrize(
@@ -187,18 +189,18 @@ def test_captions_say_how_long_a_stretch_is(ran: Ran) -> None:
 
 def test_no_figure_of_rails_leaves_the_track(ran: Ran) -> None:
     view = geometry_view(ran.example, ran.cases[0], ran.styles, limits={}, known=ran.known)
-    assert view is not None and len(view.figures) == 3
-    captions = [caption for caption, _ in view.figures]
+    assert view is not None and len(view["rails"]) == 2
+    captions = [stretch for _, stretch, _ in view["rails"]]
     assert "all 88 m of the ride, unfiltered" in captions[0]
     assert "35 m in the middle of the ride in wavelengths of 0.3\u20137 m (paper)" in captions[1]
-    paper = paper_view(ran.cases, methods(ran.scenario), ran.styles, ran.examples)
-    assert isinstance(paper, PaperView) and len(paper.figures) == 2
-    for _, svg in [*view.figures[:2], *paper.figures]:
+    drawings = ran.paper["drawings"]
+    assert len(drawings) == 2
+    for *_, svg in [*view["rails"], *drawings]:
         places = places_of(str(svg))
         assert max(places) > 30.0
         assert min(places) > -20.0 and max(places) < 90.0
-    assert "60 m in the middle of the ride out" in paper.figures[0][0]
-    assert "0.3\u20137 m" in str(view.figures[2][1]), "the panels of the bands tell wavelengths"
+    assert "60 m in the middle of the ride out" in drawings[0][0]
+    assert "0.3\u20137 m" in view["bands"], "the panels of the bands tell wavelengths"
 
 
 def test_a_stretch_that_is_too_long_would_be_seen(ran: Ran) -> None:
@@ -322,25 +324,25 @@ def test_sentences_are_of_the_band_that_counts_and_of_every_method(ran: Ran) -> 
 
 def test_intervals_are_told_of_the_band_that_counts_where_there_are_any() -> None:
     one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
-    found = {("ours", "vertical_profile", "full", "truth", "whole", "sd"): Figure(0.4, 0.0, 2)}
-    found["ours", "alignment", "full", "truth", "whole", "coverage95"] = Figure(0.5, 0.0, 2)
-    case = Figures({"imu": "ideal", "odometry": "truth"}, planted("D1").table, found)
+    found = {("ours", "vertical_profile", "full", "truth", "whole", "sd"): Mean(0.4, 0.0, 2)}
+    found["ours", "alignment", "full", "truth", "whole", "coverage95"] = Mean(0.5, 0.0, 2)
+    case = Case({"imu": "ideal", "odometry": "truth"}, planted("D1").table, found)
     text = "The 95 % interval of ours, of the unfiltered rails, holds the true alignment in 50 %: too small."
     assert text in [said.text for said in geometry_findings(case, [one], [])]
-    found["ours", "alignment", "D1", "truth", "whole", "coverage95"] = Figure(0.95, 0.0, 2)
+    found["ours", "alignment", "D1", "truth", "whole", "coverage95"] = Mean(0.95, 0.0, 2)
     text = "in wavelengths of 3\u201325 m (D1), holds the true alignment in 95 %: about right."
     assert any(said.text.endswith(text) for said in geometry_findings(case, [one], []))
 
 
 def test_a_goal_is_asked_of_d1_alone() -> None:
     found = {
-        ("ours", "alignment", band, "truth", "whole", "sd"): Figure(0.4, 0.0, 2) for band in ("D1", "paper")
+        ("ours", "alignment", band, "truth", "whole", "sd"): Mean(0.4, 0.0, 2) for band in ("D1", "paper")
     }
-    found["ours", "vertical_profile", "full", "truth", "whole", "sd"] = Figure(0.4, 0.0, 2)
+    found["ours", "vertical_profile", "full", "truth", "whole", "sd"] = Mean(0.4, 0.0, 2)
     one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
     labels = {"imu": "ideal", "odometry": "truth"}
     for bands, is_asked in ((("D1", "paper"), True), (("paper",), False)):
-        case = Figures(labels, planted(*bands).table, found)
+        case = Case(labels, planted(*bands).table, found)
         said = geometry_findings(case, [one], [], goals_mm={"alignment": 0.3})
         assert any("Asked were 0.3 mm: missed by 0.100 mm" in f.text for f in said) is is_asked
 
@@ -390,19 +392,17 @@ def test_beside_rails_few_attitudes_are_drawn_and_the_rest_counted(
     ran: Ran, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def drawn() -> tuple[int, bool]:
-        view = _ride(ran.example, ran.cases, ran.styles, ran.scenario.spec)
-        return view.left_out, "smoother and 1 alike" in str(view.attitude)
+        shown = ride_data(ran.data, ran.example)
+        return shown["left_out"], "smoother and 1 alike" in shown["attitude"]
 
     assert drawn() == (0, True)
-    monkeypatch.setattr("simrail.report.pages.page.MOST_DRAWN", 0)
+    monkeypatch.setattr("simrail.report.pages.ride.MOST_DRAWN", 0)
     assert drawn() == (1, False)
 
 
 def test_only_what_is_drawn_beside_the_paper_has_a_colour_in_its_table(ran: Ran) -> None:
-    paper = paper_view(ran.cases, methods(ran.scenario), ran.styles, ran.examples)
-    assert isinstance(paper, PaperView)
-    colours = {row.label: row.colour for row in paper.table.rows if "printed" not in row.label}
-    assert colours["set by hand"] == COLOURS["hand"] and colours["no IMU"] == ""
+    colours = {row.label: row.colour for row in ran.paper["tables"].rows if "printed" not in row.label}
+    assert colours["set by hand"] == PAPER.parts["hand"].colour and colours["no IMU"] == ""
 
 
 def test_methods_are_alike_only_if_every_figure_is(
@@ -476,7 +476,7 @@ def test_the_first_metres_grow_with_the_track(ran: Ran, band: Band, first_m: flo
         wrong = true + 1e-3 * (np.abs(place - START_M - at) < 0.06)
         geometry = estimate.geometry.assign(alignment_m=wrong)
         changed = replace(ran.example, estimates={"smoother": replace(estimate, geometry=geometry)})
-        peak = _peak(changed, style, band)
+        peak = peak_of(changed, style, band)
         assert peak.first_m == pytest.approx(first_m)
         assert (peak.largest_mm > 0.5) is counts and (peak.rest_sd_mm > 1e-3) is not counts
 
@@ -495,7 +495,7 @@ def test_a_twin_without_figures_is_left_out(ran: Ran) -> None:
     elsewhere = replace(ideal, labels={**ideal.labels, "ride": "another"})
     told = geometry_findings(real, ran.styles, [real, elsewhere], known=ran.known)
     assert told and not any("with an ideal IMU" in finding.text for finding in told)
-    lost = Figures(ideal.labels, ideal.table, {})
+    lost = Case(ideal.labels, ideal.table, {})
     told = geometry_findings(real, ran.styles, [real, lost], known=ran.known)
     assert told and not any("with an ideal IMU" in finding.text for finding in told)
 
@@ -519,13 +519,13 @@ def test_a_drawn_interval_in_a_band_is_by_draws_where_there_are_some(ran: Ran) -
 def test_of_many_others_the_best_and_the_worst_are_told(ran: Ran) -> None:
     """The method under test three times over, with errors of one, four and two times its own."""
     case, first = ran.cases[0], ran.styles[0]
-    found, styles = dict(case.found), [first]
+    found, styles = dict(case.scores), [first]
     for name, factor in (("like", 1.0), ("bad", 4.0), ("poor", 2.0)):
         styles.append(replace(first, name=name, label=name))
-        for key, figure in case.found.items():
+        for key, figure in case.scores.items():
             if key[0] == first.name:
                 found[(name, *key[1:])] = figure._replace(value=factor * figure.value)
-    told = geometry_findings(replace(case, found=found), styles, [], known=ran.known)
+    told = geometry_findings(replace(case, scores=found), styles, [], known=ran.known)
     own = case.get(first.name, JUDGED[0], "sd", band="paper").value
     assert (
         f"Of the 3 other methods, that of like is off the least, by {significant(own)} mm, "
@@ -538,9 +538,9 @@ def test_a_method_that_loses_to_no_imu_is_told_in_red(ran: Ran, factor: float, t
     case = ran.cases[0]
     found = {
         key: one._replace(value=factor * one.value) if key[0] == "smoother" else one
-        for key, one in case.found.items()
+        for key, one in case.scores.items()
     }
-    told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
+    told = geometry_findings(replace(case, scores=found), ran.styles, [], known=ran.known)
     of_smoother = [finding for finding in told if "of smoother is off by" in finding.text]
     assert len(of_smoother) == len(JUDGED) and {finding.tone for finding in of_smoother} == {tone}
 
@@ -550,7 +550,7 @@ def test_another_method_that_loses_to_no_imu_is_named(ran: Ran, factor: float, l
     case = ran.cases[0]
     found = {
         key: one._replace(value=factor * one.value) if key[0] == "camera_free" else one
-        for key, one in case.found.items()
+        for key, one in case.scores.items()
     }
-    told = geometry_findings(replace(case, found=found), ran.styles, [], known=ran.known)
+    told = geometry_findings(replace(case, scores=found), ran.styles, [], known=ran.known)
     assert any(finding.text.startswith("No IMU at all beats camera free") for finding in told) is loses

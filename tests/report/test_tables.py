@@ -10,12 +10,12 @@ import pytest
 
 from simrail.campaign.cell import CellResult
 from simrail.report.tables.methods import method_styles
-from simrail.report.tables.pivot import Figures, cases, of_cell
+from simrail.report.tables.pivot import Case, cases, of_cell
 from simrail.report.tables.tables import error_table
 from simrail.scenario.scenario import Scenario, load_scenario
 
 
-def case_of(scores: pd.DataFrame, cells: pd.DataFrame) -> Figures:
+def case_of(scores: pd.DataFrame, cells: pd.DataFrame) -> Case:
     return cases(scores, cells)[0]
 
 

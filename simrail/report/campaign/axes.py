@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from simrail.report.words.sentences import UNITS
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
@@ -24,15 +25,6 @@ _TITLES = {
     "irregularity.scale": "irregularity, times its spectrum",
     "irregularity.spectrum": "irregularity",
 }
-_UNITS = {
-    "kmh": "km/h",
-    "mps2": "m/s\u00b2",
-    "mps3": "m/s\u00b3",
-    "m": "m",
-    "s": "s",
-    "hz": "Hz",
-    "deg": "\u00b0",
-}
 
 
 @dataclass(frozen=True)
@@ -48,8 +40,8 @@ class CampaignAxis:
 def is_campaign(scenario: Scenario) -> bool:
     """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
     spec = scenario.spec
-    found = set(axes_of(spec)) | {name for part in (*spec.ride, *spec.imu) for name in axes_of(part)}
-    return bool(found - {"grade"})
+    names = set(axes_of(spec)) | {name for part in (*spec.ride, *spec.imu) for name in axes_of(part)}
+    return bool(names - {"grade"})
 
 
 def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
@@ -58,11 +50,11 @@ def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     varying = [n for n in named if n in cells and n != "case" and len(cells[n].unique()) > 1]
     others = [name for name in varying if name not in (*_FIRST, *_LAST)]
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
-    kept: list[str] = []
+    columns: list[str] = []
     for name in ordered:
-        if not any(_says_the_same(cells, known, name) for known in kept):
-            kept.append(name)
-    return [_axis(cells, name) for name in kept]
+        if not any(_says_the_same(cells, earlier, name) for earlier in columns):
+            columns.append(name)
+    return [_axis(cells, name) for name in columns]
 
 
 def finest(axes: Sequence[CampaignAxis], cells: pd.DataFrame) -> list[CampaignAxis]:
@@ -96,9 +88,9 @@ def draws_of(
     else:
         chosen &= scores["window"] == window
     columns = ["cell", "estimator", "window", "value", "track_draw", "sensor_draw"]
-    kept = scores.loc[chosen, columns]
+    draws = scores.loc[chosen, columns]
     beside = [axis.column for axis in axes] + [name for name in ("case", "sample") if name in cells]
-    return kept.merge(cells[["cell", *dict.fromkeys(beside)]], on="cell", how="left")
+    return draws.merge(cells[["cell", *dict.fromkeys(beside)]], on="cell", how="left")
 
 
 def cluster_of(draws: pd.DataFrame) -> pd.Series:
@@ -130,8 +122,8 @@ def _title(name: str) -> str:
     if name in _TITLES:
         return _TITLES[name]
     *words, last = name.rpartition(".")[2].split("_")
-    if words and last in _UNITS:
-        return f"{' '.join(words)}, {_UNITS[last]}"
+    if words and last in UNITS:
+        return f"{' '.join(words)}, {UNITS[last]}"
     return " ".join([*words, last])
 
 

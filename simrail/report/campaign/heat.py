@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis
-from simrail.report.figures.style import INK, MUTED, WIDTH_IN, log_ticks, look, to_svg
-from simrail.report.tables.methods import MethodStyle
+from simrail.report.figures.style import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
 
 HEAT = LinearSegmentedColormap.from_list(
     "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64
@@ -53,15 +52,6 @@ def side_of(*axes: CampaignAxis) -> Side:
     )
 
 
-def heat_figure(
-    draws: pd.DataFrame, styles: Sequence[MethodStyle], across: Side, down: Side, *, what: str
-) -> str:
-    """Mean figure, in degrees, of each method over two sides; "" if there is none."""
-    parts = {style.label: draws[draws["estimator"] == style.name] for style in styles}
-    muted = {style.label for style in styles if style.baseline}
-    return heat_maps(parts, across, down, unit="\u00b0", what=what, muted=muted)
-
-
 def heat_maps(
     draws: Mapping[str, pd.DataFrame],
     across: Side,
@@ -94,45 +84,47 @@ def heat_maps(
         return ""
     low, high = float(positive.min()), float(positive.max())
     norm = LogNorm(low, max(high, 1.05 * low))
-    left = 0.35 + 0.075 * max(len(word) for word in down.words)
+    left, right, gap, title_in = 0.35 + 0.075 * max(len(word) for word in down.words), 0.85, 0.22, 0.34
     wide = max(CELL_IN[0], 0.075 * max(len(word) for word in across.words)) * len(across.words)
     tall = CELL_IN[1] * len(down.words)
-    gap, top, bottom, right = 0.22, 0.34, 0.52, 0.85
     room = WIDTH_IN - left - right
     per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
     rows = -(-len(tables) // per_row)
     per_row = -(-len(tables) // rows)
     wide = min((room - gap * (per_row - 1)) / per_row, 1.8 * wide)
-    height = rows * (tall + top) + bottom
+    end = left + per_row * (wide + gap)
     with look():
-        figure = Figure(figsize=(WIDTH_IN, height))
-        for number, (title, table) in enumerate(tables):
-            row, column = divmod(number, per_row)
-            box = (
-                (left + column * (wide + gap)) / WIDTH_IN,
-                (height - (row + 1) * (tall + top)) / height,
-                wide / WIDTH_IN,
-                tall / height,
-            )
-            axis = figure.add_axes(box)
+        figure, axes = panels_beside(
+            len(tables),
+            tall_in=tall,
+            across=per_row,
+            left_in=left,
+            right_in=WIDTH_IN - end + gap,
+            top_in=title_in,
+            gap_in=gap,
+            row_gap_in=title_in,
+        )
+        for number, (axis, (title, table)) in enumerate(zip(axes, tables, strict=True)):
             _draw_heat(axis, table, norm)
             axis.set_title(title, color=MUTED if title in muted else INK, pad=4.0)
-            axis.set_yticks(range(len(down.words)), down.words if column == 0 else [])
-            last = row == rows - 1 or number + per_row >= len(tables)
-            axis.set_xticks(range(len(across.words)), across.words if last else [])
-            if last:
+            is_first, is_last = number % per_row == 0, number + per_row >= len(tables)
+            axis.set_yticks(range(len(down.words)), down.words if is_first else [])
+            axis.set_xticks(range(len(across.words)), across.words if is_last else [])
+            if is_last:
                 axis.set_xlabel(across.title)
-            if column == 0:
+            if is_first:
                 axis.set_ylabel(down.title.partition(",")[0])
-        _colour_bar(figure, norm, unit, left + per_row * (wide + gap), height, min(tall, 1.6))
+        _colour_bar(figure, norm, unit, end, title_in, min(tall, 1.6))
         return to_svg(figure, description=what)
 
 
 def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
     """Mean over the draws of each cell of the map (rows, columns)."""
     means = draws.groupby([*down.columns, *across.columns], observed=True)["value"].mean()
-    found = {key if isinstance(key, tuple) else (key,): value for key, value in means.items()}
-    return np.array([[found.get((*y, *x), np.nan) for x in across.keys] for y in down.keys], dtype=np.float64)
+    by_key = {key if isinstance(key, tuple) else (key,): value for key, value in means.items()}
+    return np.array(
+        [[by_key.get((*y, *x), np.nan) for x in across.keys] for y in down.keys], dtype=np.float64
+    )
 
 
 def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
@@ -151,17 +143,20 @@ def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
             axis.text(j, i, "\u2013", ha="center", va="center", color=MUTED, fontsize=8.0)
             continue
         dark = float(norm(max(value, norm.vmin or value))) > 0.5
-        axis.text(j, i, _short(value), ha="center", va="center", fontsize=8.0, color="white" if dark else INK)
+        axis.text(
+            j, i, short_number(value), ha="center", va="center", fontsize=8.0, color="white" if dark else INK
+        )
 
 
-def _short(value: float) -> str:
+def short_number(value: float) -> str:
     """A number in two or three digits."""
     decimals = 3 if value < 0.0995 else 2 if value < 9.95 else 1
     return f"{value:.{decimals}f}"
 
 
-def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, height: float, tall: float) -> None:
-    box = (left / WIDTH_IN, (height - 0.34 - tall) / height, 0.11 / WIDTH_IN, tall / height)
+def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: float, tall: float) -> None:
+    wide, height = figure.get_size_inches()
+    box = (left / wide, (height - top - tall) / height, 0.11 / wide, tall / height)
     axis = figure.add_axes(box)
     bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
     bar.outline.set_visible(False)

@@ -16,16 +16,14 @@ from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.core.jit import FloatArray
 from simrail.report.figures.decimate import Bins
-from simrail.report.figures.ride import direction_of, limits_of
+from simrail.report.figures.ride import over_distance
 from simrail.report.figures.style import (
-    DESIGN,
-    TRUTH,
-    distance_axis,
+    draw_design,
+    draw_truth,
+    fit_limits,
     legend_above,
     look,
-    pad_limits,
     panels,
-    shade_track,
     to_svg,
 )
 from simrail.report.tables.methods import MethodStyle
@@ -51,24 +49,17 @@ def attitude_figure(example: CellResult, styles: Sequence[MethodStyle], *, what:
         design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
         figure, axes = panels([2.05, 2.05, 1.75])
         for column, (axis, angle, name) in enumerate(zip(axes, ATTITUDE, _NAMES, strict=True)):
-            true = np.rad2deg(example.motion[angle].to_numpy())
-            x, y = bins.line(true)
-            axis.plot(x, y, color=TRUTH, lw=2.2, label="truth", zorder=2)
-            lines = [y, np.rad2deg(design[column])]
-            axis.plot(bins.x, lines[1], color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
+            true = example.motion[angle].to_numpy()
+            lines = [draw_truth(axis, bins, true), draw_design(axis, bins.x, design[column])]
             for order, style in enumerate(styles):
-                error = np.rad2deg(angle_error(example, style.name, column))
-                x, y = bins.line(true + error)
+                x, y = bins.line(np.rad2deg(true + angle_error(example, style.name, column)))
                 depth: dict[str, Any] = {"lw": 1.05, "zorder": 12 - 0.1 * order}
                 axis.plot(x, y, color=style.colour, ls=style.stroke, label=style.label, **depth)
                 lines.append(y)
-            finite = np.concatenate(lines)
-            finite = finite[np.isfinite(finite)]
-            pad_limits(axis, *np.percentile(finite, [0.05, 99.95]), top=0.16 if column == 0 else 0.08)
+            fit_limits(axis, lines, top=0.16 if column == 0 else 0.08)
             axis.set_ylabel(f"{name}, \u00b0")
         legend_above(axes[0])
-        shade_track(axes, example.recording.track, limits=limits_of(example))
-        distance_axis(axes[-1], direction=direction_of(example))
+        over_distance(axes, example)
         return to_svg(figure, description=what)
 
 
@@ -96,14 +87,14 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
                         *bins.line(error[style.name]), lw=1.2, zorder=4 - 0.1 * len(axis.lines), **look_of
                     )
                 elif not style.uses_imu:
-                    found = bins.envelope(error[style.name])
-                    tint: dict[str, Any] = {
-                        "color": "#b9bec7",
-                        "lw": 0,
-                        "alpha": 0.55,
-                        "label": f"{style.label}, range",
-                    }
-                    axis.fill_between(found.x, found.low, found.high, zorder=1.5, **tint)
+                    axis.fill_between(
+                        *bins.envelope(error[style.name]).range,
+                        color="#b9bec7",
+                        lw=0,
+                        alpha=0.55,
+                        label=f"{style.label}, range",
+                        zorder=1.5,
+                    )
                 else:
                     axis.plot(bins.x, bins.envelope(error[style.name]).mean, lw=0.9, zorder=2, **look_of)
                 largest = _percentile(error[style.name], 100.0)
@@ -115,8 +106,7 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
             axis.set_ylabel("yaw drift, \u00b0" if column == 2 else f"{_NAMES[column]} error, \u00b0")
             _note_beyond(axis, beyond)
         legend_above(axes[0])
-        shade_track(axes, example.recording.track, limits=limits_of(example))
-        distance_axis(axes[-1], direction=direction_of(example))
+        over_distance(axes, example)
         return to_svg(figure, description="Errors of roll, pitch and yaw over distance")
 
 

@@ -24,6 +24,11 @@ class Envelope(NamedTuple):
     mean: FloatArray
     high: FloatArray
 
+    @property
+    def range(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where the bins lie, smallest and largest value."""
+        return self.x, self.low, self.high
+
 
 class Bins:
     """Bins along a monotonic axis, made once for many signals.

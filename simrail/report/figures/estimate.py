@@ -13,8 +13,9 @@ from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 from simrail.report.figures.decimate import Bins
 from simrail.report.figures.style import (
-    DESIGN,
     distance_axis,
+    draw_design,
+    fit_limits,
     legend_above,
     look,
     pad_limits,
@@ -58,12 +59,10 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
                 low, high = bins.envelope(angle - wide).mean, bins.envelope(angle + wide).mean
                 axis.fill_between(bins.x, low, high, color=BAND, alpha=0.16, lw=0, label="its own 95 % band")
             axis.plot(place, line, color=ESTIMATE, lw=1.05, zorder=12, label=label)
-            finite = line
+            lines = [line]
             if recording.odometry is not None:
-                planned = np.rad2deg(design[ATTITUDE.index(name)])
-                axis.plot(bins.x, planned, color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
-                finite = np.concatenate([line, planned])
-            pad_limits(axis, *np.percentile(finite[np.isfinite(finite)], [0.05, 99.95]), top=0.16)
+                lines.append(draw_design(axis, bins.x, design[ATTITUDE.index(name)]))
+            fit_limits(axis, lines, top=0.16)
             axis.set_ylabel(f"{name.removesuffix('_rad')}, \u00b0")
         legend_above(axes[0])
         _finish(axes, recording, x)
@@ -82,13 +81,13 @@ def innovation_figure(recording: Recording, estimate: Estimate) -> str:
         figure, axes = panels([1.0] * len(names), top_in=0.15)
         for axis, name in zip(axes, names, strict=True):
             values = np.nan_to_num(estimate.innovations[name].to_numpy(dtype=np.float64))
-            found = bins.envelope(values)
-            axis.fill_between(found.x, found.low, found.high, color="#009E73", alpha=0.28, lw=0)
-            axis.plot(found.x, found.mean, color="#009E73", lw=1.1)
+            envelope = bins.envelope(values)
+            axis.fill_between(*envelope.range, color="#009E73", alpha=0.28, lw=0)
+            axis.plot(bins.x, envelope.mean, color="#009E73", lw=1.1)
             unit = COLUMNS[name].unit.replace("s2", "s\u00b2")
             word = "NIS" if name == "nis" else f"innov. {name.split('_')[1].upper()}\n{unit}"
             axis.set_ylabel(word, fontsize=8.2)
-            pad_limits(axis, np.percentile(found.low, 1.0), np.percentile(found.high, 99.0))
+            pad_limits(axis, np.percentile(envelope.low, 1.0), np.percentile(envelope.high, 99.0))
         _finish(axes, recording, x)
         return to_svg(figure, description="Innovations: measured minus predicted signals")
 

@@ -6,30 +6,29 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray
-from simrail.report.figures.ride import direction_of
+from simrail.report.figures.ride import over_distance
 from simrail.report.figures.style import (
     INK,
     TRUTH,
-    WIDTH_IN,
-    distance_axis,
-    fitting_columns,
+    categories,
+    draw_marks,
+    figure_legend,
     legend_above,
-    log_ticks,
+    log_scale,
     look,
     pad_limits,
     panels,
-    shade_track,
+    panels_beside,
     to_svg,
 )
 from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case
 from simrail.report.tables.geometry_tables import is_zero, mappers
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Figures
+from simrail.report.tables.pivot import Case
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band, band_pass, sd_of_draws, why_not
 
@@ -152,17 +151,16 @@ def rails_figure(
             pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
             axis.set_ylabel(f"{QUANTITIES[quantity]},\nmm")
         legend_above(axes[0])
-        shade_track(axes, example.recording.track, limits=limits)
-        distance_axis(axes[-1], direction=direction_of(example))
+        over_distance(axes, example, limits=limits)
         return to_svg(figure, description=what)
 
 
-def bands_figure(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> str:
+def bands_figure(case: Case, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> str:
     """Standard deviation of the error by band, a panel per quantity, on a logarithmic axis; "" without any.
 
     Parameters
     ----------
-    case, styles : Figures, sequence of MethodStyle
+    case, styles : Case, sequence of MethodStyle
         The case and the scenario's methods.
     known : mapping of str to Band
         Bands whose wavelengths are told, if there is room.
@@ -172,58 +170,18 @@ def bands_figure(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping
     if not bands or not shown:
         return ""
     with look():
-        gap, left, top, bottom = 0.42, 0.62, 0.62, 0.42
-        height = 2.0 + top + bottom
-        figure = Figure(figsize=(WIDTH_IN, height))
-        wide = (WIDTH_IN - left - 0.15 - 2 * gap) / 3
-        step = 0.7 / max(len(shown), 1)
-        for i, quantity in enumerate(JUDGED):
-            box = (
-                (left + i * (wide + gap)) / WIDTH_IN,
-                bottom / height,
-                wide / WIDTH_IN,
-                1.0 - (top + bottom) / height,
-            )
-            axis = figure.add_axes(box)
+        figure, axes = panels_beside(len(JUDGED), tall_in=2.0, left_in=0.62)
+        words = [_tick(band, known if len(bands) <= ROOMY else {}) for band in bands]
+        for axis, quantity in zip(axes, JUDGED, strict=True):
             for order, style in enumerate(shown):
-                found = [case.get(style.name, quantity, "sd", band=band) for band in bands]
-                value, sd = np.array([f.value for f in found]), np.nan_to_num([f.sd for f in found])
-                x = np.arange(len(bands)) + (order + 0.5) * step - 0.35
-                hollow = is_zero(style)
-                axis.errorbar(
-                    x,
-                    value,
-                    [np.minimum(sd, 0.7 * value), sd],
-                    fmt="D" if hollow else _MARKS[order % len(_MARKS)],
-                    ms=5.0,
-                    color=style.colour,
-                    mfc="white" if hollow else style.colour,
-                    mew=1.2,
-                    lw=1.0,
-                    label=style.label,
-                )
-            for at in range(1, len(bands)):
-                axis.axvline(at - 0.5, color="#d0d5dd", lw=0.7)
-            axis.set_yscale("log")
-            log_ticks(axis.yaxis)
-            axis.grid(axis="x", visible=False)
-            axis.grid(axis="y", which="minor", color="#f2f4f7", lw=0.5)
-            axis.set_xlim(-0.5, len(bands) - 0.5)
-            words = [_tick(band, known if len(bands) <= ROOMY else {}) for band in bands]
-            axis.set_xticks(range(len(bands)), words)
-            axis.tick_params(axis="x", length=0)
+                scores = [case.get(style.name, quantity, "sd", band=band) for band in bands]
+                marker = "D" if is_zero(style) else _MARKS[order % len(_MARKS)]
+                draw_marks(axis, scores, style, slot=(order, len(shown)), wide=0.7, marker=marker)
+            categories(axis, words)
+            log_scale(axis.yaxis)
             axis.set_title(QUANTITIES[quantity], color=INK)
-            if i == 0:
-                axis.set_ylabel("sd of the error, mm")
-                handles, labels = axis.get_legend_handles_labels()
-        figure.legend(
-            handles,
-            labels,
-            loc="upper left",
-            bbox_to_anchor=(left / WIDTH_IN - 0.01, 1.0),
-            ncols=fitting_columns(labels, WIDTH_IN - left),
-            borderaxespad=0.1,
-        )
+        axes[0].set_ylabel("sd of the error, mm")
+        figure_legend(figure, *axes[0].get_legend_handles_labels(), left_in=0.62)
         return to_svg(figure, description="Standard deviation of the error of the rail geometry by band")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from simrail.campaign.cell import CellResult
@@ -23,12 +24,21 @@ def direction_of(example: CellResult) -> int:
     return 1 if position[-1] >= position[0] else -1
 
 
-def limits_of(example: CellResult) -> tuple[float, float]:
-    """Limits of the distance axis of a ride."""
-    position = example.motion["position_m"].to_numpy()
-    low, high = float(position.min()), float(position.max())
-    room = 0.01 * max(high - low, 1.0)
-    return low - room, high + room
+def over_distance(
+    axes: Sequence[Axes],
+    example: CellResult,
+    *,
+    limits: tuple[float, float] | None = None,
+    arrow: bool = True,
+) -> None:
+    """Finish panels over the distance of a ride: curves, and the direction of travel below the last."""
+    if limits is None:
+        position = example.motion["position_m"].to_numpy()
+        low, high = float(position.min()), float(position.max())
+        room = 0.01 * max(high - low, 1.0)
+        limits = low - room, high + room
+    shade_track(axes, example.recording.track, limits=limits)
+    distance_axis(axes[-1], direction=direction_of(example) if arrow else None)
 
 
 def speed_figure(example: CellResult, *, conditions: Sequence[RailConditionPart] = ()) -> str:
@@ -44,8 +54,7 @@ def speed_figure(example: CellResult, *, conditions: Sequence[RailConditionPart]
         for at in conditions:
             axis.axvspan(at.start_m, at.end_m, ymax=0.06, color="#b5651d", alpha=0.55, lw=0)
             axis.annotate(at.words, (at.start_m, 0.08), xycoords=axis.get_xaxis_transform(), fontsize=7.2)
-        shade_track([axis], example.recording.track, limits=limits_of(example))
-        distance_axis(axis, direction=direction_of(example))
+        over_distance([axis], example)
         return to_svg(figure, description=f"Speed of ride {example.recording.name} over distance")
 
 
@@ -57,17 +66,16 @@ def imu_figure(example: CellResult) -> str:
         names = [(name, 180.0 / np.pi, "\u00b0/s", "rate") for name in GYRO]
         names += [(name, 1.0, "m/s\u00b2", "accel.") for name in ACCEL]
         for i, (axis, (name, scale, unit, word)) in enumerate(zip(axes, names, strict=True)):
-            found = bins.envelope(scale * recording.imu[name].to_numpy())
+            envelope = bins.envelope(scale * recording.imu[name].to_numpy())
             colour = _TINTS[i % 3]
-            axis.fill_between(found.x, found.low, found.high, color=colour, alpha=0.28, lw=0)
-            axis.plot(found.x, found.mean, color=colour, lw=1.1)
+            axis.fill_between(*envelope.range, color=colour, alpha=0.28, lw=0)
+            axis.plot(bins.x, envelope.mean, color=colour, lw=1.1)
             axis.set_ylabel(f"{word} {name.split('_')[1].upper()}\n{unit}", fontsize=8.2)
-            low, high = np.percentile(found.low, 0.5), np.percentile(found.high, 99.5)
+            low, high = np.percentile(envelope.low, 0.5), np.percentile(envelope.high, 99.5)
             room = 0.12 * max(high - low, 1e-6)
             axis.set_ylim(low - room, high + (2.6 if i == 0 else 1.0) * room)
             axis.yaxis.set_major_locator(MaxNLocator(nbins=3, steps=[1, 2, 2.5, 5, 10]))
-        shade_track(axes, recording.track, limits=limits_of(example))
-        distance_axis(axes[-1], direction=direction_of(example))
+        over_distance(axes, example)
         return to_svg(figure, description=f"Signals of the IMU {recording.mount} over distance")
 
 
@@ -89,6 +97,5 @@ def odometry_figure(example: CellResult) -> str:
         axis.set_ylim(-1.1 * reach, 1.25 * reach)
         axis.set_ylabel("position error, m")
         legend_above(axis)
-        shade_track([axis], recording.track, limits=limits_of(example))
-        distance_axis(axis, direction=direction_of(example))
+        over_distance([axis], example)
         return to_svg(figure, description="Position error of the odometry over distance")

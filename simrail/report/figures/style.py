@@ -16,12 +16,17 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
+from markupsafe import Markup
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from simrail.core.jit import FloatArray
+from simrail.report.figures.decimate import Bins
+from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.pivot import Mean
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
 
 WIDTH_IN = 11.25
@@ -58,7 +63,7 @@ _RC: dict[Any, Any] = {
     "ytick.major.size": 3.0,
     "lines.linewidth": 1.1,
     "lines.solid_joinstyle": "round",
-    "path.simplify_threshold": 0.25,
+    "path.simplify_threshold": 0.75,
     "legend.frameon": False,
     "legend.fontsize": 8.8,
     "legend.handlelength": 1.8,
@@ -70,33 +75,133 @@ def look() -> AbstractContextManager[None]:
     return mpl.rc_context(_RC)
 
 
-def panels(
-    heights_in: Sequence[float], *, left_in: float = LEFT_IN, right_in: float = 0.2, top_in: float = 0.42
-) -> tuple[Figure, list[Axes]]:
+def panels(heights_in: Sequence[float], *, top_in: float = 0.42) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels above each other over one x axis.
 
     Margins are in inches, so that the axes of all figures of the page stand at the same place.
     """
-    gap, bottom = 0.14, 0.5
+    gap, bottom, right = 0.14, 0.5, 0.2
     height = top_in + bottom + sum(heights_in) + gap * (len(heights_in) - 1)
     figure = Figure(figsize=(WIDTH_IN, height))
     axes: list[Axes] = []
     edge = height - top_in
     for tall in heights_in:
         box = (
-            left_in / WIDTH_IN,
+            LEFT_IN / WIDTH_IN,
             (edge - tall) / height,
-            1.0 - (left_in + right_in) / WIDTH_IN,
+            1.0 - (LEFT_IN + right) / WIDTH_IN,
             tall / height,
         )
         axis = figure.add_axes(box, sharex=axes[0] if axes else None)
         # A fixed place, so that no label depends on the width of its tick labels.
-        axis.yaxis.set_label_coords(-0.56 / (WIDTH_IN - left_in - right_in), 0.5)
+        axis.yaxis.set_label_coords(-0.56 / (WIDTH_IN - LEFT_IN - right), 0.5)
         axes.append(axis)
         edge -= tall + gap
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     return figure, axes
+
+
+def panels_beside(
+    count: int,
+    *,
+    tall_in: float,
+    across: int = 3,
+    left_in: float = LEFT_IN,
+    right_in: float = 0.15,
+    top_in: float = 0.62,
+    gap_in: float = 0.42,
+    row_gap_in: float = 0.75,
+    share_y: bool = False,
+) -> tuple[Figure, list[Axes]]:
+    """Make a figure of panels beside each other, in rows; lengths in inches."""
+    bottom = 0.5
+    rows = -(-count // across)
+    height = top_in + rows * tall_in + (rows - 1) * row_gap_in + bottom
+    wide = (WIDTH_IN - left_in - right_in - gap_in * (across - 1)) / across
+    figure = Figure(figsize=(WIDTH_IN, height))
+    axes: list[Axes] = []
+    for number in range(count):
+        row, column = divmod(number, across)
+        low = height - top_in - tall_in - row * (tall_in + row_gap_in)
+        left = left_in + column * (wide + gap_in)
+        box = (left / WIDTH_IN, low / height, wide / WIDTH_IN, tall_in / height)
+        axes.append(figure.add_axes(box, sharey=axes[0] if share_y and axes else None))
+    return figure, axes
+
+
+def categories(axis: Axes, words: Sequence[str], *, size: float | None = None) -> None:
+    """Give each word a slot of the x axis, parted by lines."""
+    for place in range(1, len(words)):
+        axis.axvline(place - 0.5, color="#d0d5dd", lw=0.7)
+    axis.set_xticks(range(len(words)), words, fontsize=size)
+    axis.set_xlim(-0.5, len(words) - 0.5)
+    axis.tick_params(axis="x", length=0)
+    axis.grid(axis="x", visible=False)
+
+
+def draw_marks(
+    axis: Axes,
+    scores: Sequence[Mean],
+    style: MethodStyle,
+    *,
+    slot: tuple[int, int],
+    marker: str,
+    wide: float = 0.8,
+) -> None:
+    """Draw a method's scores by category, with a stroke of one standard deviation between draws.
+
+    Parameters
+    ----------
+    axis : Axes
+        Panel with `categories`.
+    scores : sequence of Mean
+        One per category; what is not positive is left out.
+    style : MethodStyle
+        The method; hollow for a baseline.
+    slot : tuple of int
+        Number of the method and how many there are, which share the width `wide` of a category.
+    marker : str
+        Its mark.
+    """
+    order, count = slot
+    value = np.array([score.value for score in scores])
+    value = np.where(value > 1e-5, value, np.nan)
+    sd = np.nan_to_num([score.sd for score in scores])
+    axis.errorbar(
+        np.arange(len(scores)) + (order + 0.5) * wide / count - 0.5 * wide,
+        value,
+        [np.minimum(sd, 0.7 * value), sd],
+        fmt=marker,
+        ms=5.0,
+        color=style.colour,
+        mfc="white" if style.baseline else style.colour,
+        mew=1.2,
+        lw=1.0,
+        label=style.label,
+    )
+
+
+def draw_truth(axis: Axes, bins: Bins, angle_rad: FloatArray) -> FloatArray:
+    """Draw a true angle (n,) over distance; returns what was drawn, in degrees."""
+    x, y = bins.line(np.rad2deg(angle_rad))
+    axis.plot(x, y, color=TRUTH, lw=2.2, label="truth", zorder=2)
+    return y
+
+
+def draw_design(axis: Axes, x: FloatArray, angle_rad: FloatArray) -> FloatArray:
+    """Draw an angle of the design track at places (n,); returns it in degrees."""
+    y: FloatArray = np.rad2deg(angle_rad)
+    axis.plot(x, y, color=DESIGN, lw=0.9, ls=(0, (4, 2)), label="design", zorder=20)
+    return y
+
+
+def fit_limits(axis: Axes, lines: Sequence[FloatArray], *, top: float = 0.08) -> None:
+    """Set y limits to what lines reach, single spikes left out, with room at the top for names of curves."""
+    finite = np.concatenate(lines)
+    finite = finite[np.isfinite(finite)]
+    low, high = np.percentile(finite, [0.05, 99.95])
+    pad_limits(axis, low, high, top=top)
 
 
 def log_ticks(axis: Axis) -> None:
@@ -105,6 +210,14 @@ def log_ticks(axis: Axis) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60.0 * low else (1.0,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def log_scale(axis: Axis) -> None:
+    """Make an axis logarithmic, after its limits were set."""
+    panel = axis.axes
+    (panel.set_xscale if axis is panel.xaxis else panel.set_yscale)("log")
+    log_ticks(axis)
+    axis.grid(visible=True, which="minor", color="#f2f4f7", lw=0.5)
 
 
 def fitting_columns(labels: Sequence[str], width_in: float) -> int:
@@ -122,18 +235,36 @@ def fitting_columns(labels: Sequence[str], width_in: float) -> int:
     return 1
 
 
-def legend_above(axis: Axes) -> None:
-    """Put the legend of an axis above it, outside of the data; truth and design first."""
-    handles, labels = axis.get_legend_handles_labels()
-    order = sorted(range(len(labels)), key=lambda i: {"truth": 0, "design": 1}.get(labels[i], 2))
-    axis.legend(
-        [handles[i] for i in order],
-        [labels[i] for i in order],
+def legend_above(*axes: Axes) -> None:
+    """Put the legend of some panels above the first, outside of the data; truth and design first."""
+    by_label = {
+        str(label): handle
+        for axis in reversed(axes)
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    labels = sorted(by_label, key=lambda label: {"truth": 0, "design": 1}.get(label, 2))
+    axes[0].legend(
+        [by_label[label] for label in labels],
+        labels,
         loc="lower left",
         bbox_to_anchor=(-0.005, 1.0),
-        ncols=fitting_columns([labels[i] for i in order], WIDTH_IN - LEFT_IN),
+        ncols=fitting_columns(labels, WIDTH_IN - LEFT_IN),
         borderaxespad=0.15,
         columnspacing=1.4,
+    )
+
+
+def figure_legend(
+    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left_in: float = LEFT_IN
+) -> None:
+    """Put a legend at the top of a figure."""
+    figure.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(left_in / WIDTH_IN - 0.01, 1.0),
+        ncols=fitting_columns(labels, WIDTH_IN - left_in),
+        borderaxespad=0.1,
     )
 
 
@@ -173,30 +304,31 @@ def shade_track(axes: Sequence[Axes], track: TrackDesign, *, limits: tuple[float
     axes[0].set_xlim(low, high)
 
 
-def distance_axis(axis: Axes, *, direction: int) -> None:
-    """Label the x axis of a plot over distance, with the direction of travel."""
-    arrow = "travel \u2192" if direction >= 0 else "\u2190 travel"
+def distance_axis(axis: Axes, *, direction: int | None = None) -> None:
+    """Label the x axis of a plot over distance, with the direction of travel where there is one."""
     axis.set_xlabel("distance along the track, m")
-    place = {"ha": "right", "x": 1.0} if direction >= 0 else {"ha": "left", "x": 0.0}
+    if direction is None:
+        return
+    arrow, side, x = ("travel \u2192", "right", 1.0) if direction >= 0 else ("\u2190 travel", "left", 0.0)
     axis.annotate(
         arrow,
-        (place["x"], 0.0),
-        xycoords=("axes fraction", "axes fraction"),
+        (x, 0.0),
+        xycoords="axes fraction",
         xytext=(0, -29),
         textcoords="offset points",
-        ha=place["ha"],
+        ha=side,
         color=INK,
         weight="bold",
     )
 
 
-def pad_limits(axis: Axes, low: float, high: float, *, top: float = 0.14, bottom: float = 0.08) -> None:
+def pad_limits(axis: Axes, low: float, high: float, *, top: float = 0.14) -> None:
     """Set y limits with room at the top for the names of the curves."""
     span = max(high - low, 1e-9)
-    axis.set_ylim(low - bottom * span, high + top * span)
+    axis.set_ylim(low - 0.08 * span, high + top * span)
 
 
-def to_svg(figure: Figure, *, description: str) -> str:
+def to_svg(figure: Figure, *, description: str) -> Markup:
     """Write a figure as an inline SVG element that fills the width of its container.
 
     Parameters
@@ -210,46 +342,18 @@ def to_svg(figure: Figure, *, description: str) -> str:
     figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = out.getvalue()
     text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r' d="([^"]*)"', _shorter, text, flags=re.DOTALL)
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
+    # A tenth of a point is 0.13 pixels.
+    text = re.sub(r"(\.\d)\d{3,}", r"\1", text)
     # Several figures share the page: an id that nothing refers to would only stand there twice.
     used = set(re.findall(r"#([\w-]+)", text))
-    text = re.sub(r' id="([\w-]+)"', lambda m: m.group(0) if m.group(1) in used else "", text)
+    text = re.sub(r' id="([\w.-]+)"', lambda m: m.group(0) if m.group(1) in used else "", text)
     # The page chooses the fonts; matplotlib's versions write them in two ways.
     text = re.sub(r'font-family: [^;"]*;? ?', "", text)
     text = re.sub(r'font: ([\d.]+px) [^;"]*', r"font-size: \1", text)
-    text = re.sub(r' transform="rotate\(-?0 [^"]*"', "", text)
-    text = re.sub(r'^<svg[^>]*?(viewBox="[^"]*")[^>]*>', r"<svg \1 ROLE>", text)
+    view = re.search(r'viewBox="[^"]*"', text)
+    assert view is not None
     link = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
-    text = text.replace("ROLE", f'{link} role="img" aria-label="{escape(description, quote=True)}"', 1)
-    return re.sub(r"\n\s*", "\n", text).strip()
-
-
-def _shorter(match: re.Match[str]) -> str:
-    """A path in tenths of a point (0.13 pixel); long lines as steps from point to point."""
-    path = match.group(1)
-    words = path.split()
-    if len(words) < 30 or set(words[::3]) != {"M", "L"} or words[3::3].count("M"):
-        return f' d="{" ".join(_tenths(word) for word in words)}"'
-    places = np.rint(10.0 * np.array([words[1::3], words[2::3]], dtype=np.float64)).astype(np.int64)
-    steps = np.diff(places, axis=1)
-    start = f"M{places[0, 0] / 10:g} {places[1, 0] / 10:g}l"
-    # Each coordinate with one decimal, without a leading zero: 0.5 is written .5
-    told = [_tenth_texts(row) for row in steps]
-    return f' d="{start}{" ".join(f"{x} {y}" for x, y in zip(*told, strict=True))}"'
-
-
-def _tenths(word: str) -> str:
-    try:
-        return f"{float(word):.1f}".removesuffix(".0")
-    except ValueError:
-        return word
-
-
-def _tenth_texts(tenths: npt.NDArray[np.int64]) -> list[str]:
-    known = {
-        t: f"{t / 10:g}".replace("0.", ".", 1) if abs(t) < 10 and t else f"{t / 10:g}"
-        for t in set(tenths.tolist())
-    }
-    return [known[t] for t in tenths.tolist()]
+    head = f'<svg {view.group()} {link} role="img" aria-label="{escape(description, quote=True)}">'
+    text = re.sub(r"\s*\n\s*", "\n", head + text[text.index(">") + 1 :])
+    return Markup(re.sub(r"\n([MLz\"])", r"\1", text).strip())  # a path in one line

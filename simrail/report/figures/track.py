@@ -116,12 +116,13 @@ def _profile(track: TrackDesign) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _along_the_page(xy: FloatArray) -> FloatArray:
     """Turn a plan so that it runs from left to right; left stays up."""
-    chord = xy[-1] - xy[0]
-    if np.hypot(*chord) < 0.2 * np.abs(np.diff(xy, axis=0)).sum():
-        return xy - xy[0]
+    plan: FloatArray = xy - xy[0]
+    chord = plan[-1]
+    if np.hypot(*chord) < 0.2 * np.abs(np.diff(plan, axis=0)).sum():
+        return plan
     angle = np.arctan2(chord[1], chord[0])
     c, s = np.cos(angle), np.sin(angle)
-    turned: FloatArray = (xy - xy[0]) @ np.array([[c, -s], [s, c]])
+    turned: FloatArray = plan @ np.array([[c, -s], [s, c]])
     return turned
 
 

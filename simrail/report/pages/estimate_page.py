@@ -1,4 +1,4 @@
-"""The page of one estimate on one ride, without scores: one self-contained HTML file."""
+"""The page of one estimate on one ride, without scores."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
 
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
@@ -16,7 +14,8 @@ from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording, odometry_of
 from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves, place_of
 from simrail.report.figures.ride import imu_figure, speed_figure
-from simrail.report.words.ride_words import odometry_words
+from simrail.report.pages.frame import page_text
+from simrail.report.words.sentences import recording_facts
 
 MOST_GAPS = 20
 
@@ -39,32 +38,24 @@ def write_estimate_page(
     us_per_sample : float
         Time that it took.
     """
-    environment = Environment(
-        loader=PackageLoader("simrail.report", "."),
-        autoescape=select_autoescape(default=True),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     # Where there is no truth, the odometry says where the figures of the ride are drawn.
-    moving = moves(recording)
-    ride = CellResult({}, recording, odometry_of(recording), {}) if moving else None
+    ride = CellResult({}, recording, odometry_of(recording), {}) if moves(recording) else None
+    innovations = estimate.innovations
     has_attitude = any(name in estimate.states for name in ATTITUDE)
-    text = environment.get_template("pages/estimate.html.j2").render(
+    text = page_text(
+        "pages/estimate.html.j2",
         recording=recording,
         label=label,
         method=method,
         version=version("simrail"),
         tiles=_tiles(recording, estimate, us_per_sample),
         facts=ride_facts(recording),
-        attitude=Markup(estimated_attitude_figure(recording, estimate, label=label))
-        if has_attitude
-        else None,
-        speed=Markup(speed_figure(ride)) if ride else None,
-        imu=Markup(imu_figure(ride)) if ride else None,
-        innovations=None
-        if estimate.innovations is None or len(estimate.innovations) < 2
-        else Markup(innovation_figure(recording, estimate)),
+        attitude=estimated_attitude_figure(recording, estimate, label=label) if has_attitude else "",
+        speed=speed_figure(ride) if ride else "",
+        imu=imu_figure(ride) if ride else "",
+        innovations=innovation_figure(recording, estimate)
+        if innovations is not None and len(innovations) > 1
+        else "",
         gaps=_gaps(recording),
     )
     path.write_text(text, encoding="utf-8")
@@ -73,7 +64,6 @@ def write_estimate_page(
 def ride_facts(recording: Recording) -> list[str]:
     """What there is to know of a recording, one line each."""
     position, time = place_of(recording), recording.imu.index.to_numpy()
-    x, y, z = recording.mount_position_m
     lost = "no gaps"
     if recording.gaps is not None and len(recording.gaps):
         missing = int(recording.gaps["missing"].sum())
@@ -87,9 +77,7 @@ def ride_facts(recording: Recording) -> list[str]:
     return [
         f"{len(time)} samples at {recording.imu_sheet.rate_hz:g} Hz, {time[-1] - time[0]:.1f} s; {lost}",
         way,
-        f"IMU {recording.imu_sheet.grade} on '{recording.mount_body}', "
-        f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
-        odometry_words(recording),
+        *recording_facts(recording),
     ]
 
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
 
 from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.core.jit import FloatArray
@@ -16,8 +14,8 @@ from simrail.recording.sheets.allan import overlapping_allan
 from simrail.recording.sheets.datasheet import FIGURES
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuHead
-from simrail.report.figures.style import INK, log_ticks, look, panels, to_svg
-from simrail.report.pages.page_file import write_page
+from simrail.report.figures.style import INK, legend_above, log_scale, look, panels, to_svg
+from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.imu_text import device_rows, triad_rows
 from simrail.sensors.imu import sample_imu
 
@@ -27,19 +25,13 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 
 def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 1) -> Path:
     """Write ``<folder>/<grade>.html`` and return its path; the folder is made if it is not there."""
-    environment = Environment(
-        loader=PackageLoader("simrail.report", "."),
-        autoescape=select_autoescape(default=True),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    text = environment.get_template("pages/imu.html.j2").render(
+    text = page_text(
+        "pages/imu.html.j2",
         file=file,
         grade=grade,
         device=device_rows(grade),
         triads=triad_rows(grade),
-        figure=Markup(allan_figure(grade, seed=seed)),
+        allan=allan_figure(grade, seed=seed),
     )
     return write_page(folder, grade.name, text)
 
@@ -67,18 +59,14 @@ def allan_figure(grade: ImuGrade, *, seed: int) -> str:
         for axis, kind, columns in zip(axes, ("gyro", "accel"), (GYRO, ACCEL), strict=True):
             unit = units[kind]
             for colour, column in zip(_COLOURS, columns, strict=True):
-                found = overlapping_allan(frame[column].to_numpy(), grade.rate_hz, tau) / unit.si
-                shown = found > 0.0
-                axis.plot(tau[shown], found[shown], ".", color=colour, label=f"{column[-7:].split('_')[0]}")
+                deviation = overlapping_allan(frame[column].to_numpy(), grade.rate_hz, tau) / unit.si
+                shown = deviation > 0.0
+                axis.plot(tau[shown], deviation[shown], ".", color=colour, label=column.split("_")[1])
             if np.any(analytic[kind] > 0.0):
                 axis.plot(tau, analytic[kind] / unit.si, color=INK, label="closed form")
-                axis.set_yscale("log")
-            axis.set_xscale("log")
+                log_scale(axis.yaxis)
+            log_scale(axis.xaxis)
             axis.set_ylabel(f"{'gyro' if kind == 'gyro' else 'accelerometer'}, {unit.unit}")
-        for axis in axes:
-            if axis.get_yscale() == "log":
-                log_ticks(axis.yaxis)
-        axes[0].legend(loc="lower left", bbox_to_anchor=(-0.005, 1.0), ncols=4, borderaxespad=0.15)
-        log_ticks(axes[1].xaxis)
+        legend_above(axes[0])
         axes[1].set_xlabel("averaging time, s")
         return to_svg(figure, description=f"Allan deviation of {grade.name}, simulated and analytic")

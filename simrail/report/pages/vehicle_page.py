@@ -1,4 +1,4 @@
-"""The page of a vehicle: one self-contained HTML file, in the look of the reports."""
+"""The page of a vehicle, in the look of the reports."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
 
 from simrail.report.figures.vehicle import conicity_figure, locus_figure, pair_figure, shift_figure
-from simrail.report.pages.page_file import write_page
+from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.vehicle_text import amount, critical_words, listed
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import Mode
@@ -20,14 +18,10 @@ from simrail.vehicle.study import Conicity, VehicleStudy
 def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
     """Write ``<folder>/<vehicle>.html`` and return its path; the folder is made if it is not there."""
     model = study.model
-    environment = Environment(
-        loader=PackageLoader("simrail.report", "."),
-        autoescape=select_autoescape(default=True),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    text = environment.get_template("pages/vehicle.html.j2").render(
+    contents = {"masses": "Masses and loads", "contact": "Contact", "modes": "Modes", "locus": "Root locus"}
+    text = page_text(
+        "pages/vehicle.html.j2",
+        contents=[item for item in contents.items() if study.conicity or item[0] != "contact"],
         model=model,
         tiles=_tiles(study),
         bodies=_bodies(model),
@@ -40,7 +34,7 @@ def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
         running=[_row(mode, mode.frequency_hz) for mode in listed(study.running)],
         running_kmh=3.6 * study.running_mps,
         critical=critical_words(study.critical),
-        locus=Markup(locus_figure(study)),
+        locus=locus_figure(study),
     )
     return write_page(folder, model.name, text)
 
@@ -101,8 +95,8 @@ def _contact(model: VehicleModel, contact: Conicity) -> dict[str, Any]:
         for i in range(0, len(rest.y_m), every)
     ]
     return {
-        "pair": Markup(pair_figure(model, contact)),
-        "shift": Markup(shift_figure(contact)),
-        "conicity": Markup(conicity_figure(contact)),
+        "pair": pair_figure(model, contact),
+        "shift": shift_figure(contact),
+        "conicity": conicity_figure(contact),
         "rows": rows,
     }

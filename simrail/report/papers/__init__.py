@@ -1,1 +1,15 @@
-"""The papers' results beside ours, one folder each, by authors and year."""
+"""What publications printed, and our scores beside it: one folder each, see `simrail.report.papers.claim`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from simrail.report.pages.section import PageData, Section
+from simrail.report.papers.briales_2021 import section as briales
+from simrail.report.papers.gonzalez_2023 import section as gonzalez
+
+SECTIONS: dict[str, Callable[[PageData], list[Section]]] = {
+    "briales_2021": briales.section,
+    "gonzalez_2023": gonzalez.section,
+}
+"""By the scenario's key ``paper``, what makes the section beside it."""

@@ -1,40 +1,191 @@
-"""A claim of a publication and its verdict, which is computed, never written down beforehand."""
+"""What publications say, judged by our scores: the claims of every paper, in one form.
+
+A paper is a folder beside this module, called by its authors and year. It holds
+
+* ``paper.toml``, its data: what it printed, the parts that our methods play in it, the limits of its
+  verdicts, and its claims in words (`Statement`);
+* ``judges.py``, a short function per claim: numbers in; whether it holds, and what its sentence needs, out;
+* ``section.py`` with ``section(data) -> list[Section]``, and its page ``section.html.j2``, which shows the
+  claims by the macro ``claims`` of ``papers/claims.html.j2``.
+
+To add one: write these files, name the section in `simrail.report.papers.SECTIONS`, and the paper in the key
+``paper`` of `simrail.scenario.scenario`. Words are Jinja text: ``deg`` and ``mm`` write a number with three
+digits, ``g`` as short as it is, ``listed`` joins words. They see what the judge returned, and ``limit``,
+``printed``, ``figures``, ``words`` and ``label`` of the paper. A verdict is computed, never written down
+beforehand.
+"""
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any, Literal, TypeVar
+
+from jinja2 import Environment, StrictUndefined
+
+from simrail.core.toml_files import Part
+from simrail.report.words.sentences import FILTERS
+from simrail.scenario.cells import Method
+
+Verdict = Literal["reproduced", "beaten", "not reproduced", "not asked"]
+
+WORDS: dict[Verdict, tuple[str, str]] = {
+    "reproduced": ("good", "Reproduces."),
+    "beaten": ("good", "Beaten."),
+    "not reproduced": ("bad", "Does not reproduce."),
+    "not asked": ("note", "Not asked."),
+}
+"""How the page marks a verdict, and says it. What is better than what was printed is beaten."""
 
 
-@dataclass(frozen=True)
-class Claim:
-    """One claim of the paper and what became of it.
+class Role(Part):
+    """What a method can stand for: its label, the row of printed figures beside it, and its colour."""
+
+    label: str
+    row: str = ""
+    colour: str = ""
+
+
+class Statement(Part):
+    """A claim in words.
 
     Attributes
     ----------
     key : str
-        Short name, for tests.
-    said : str
-        What the paper says, and where.
-    holds : bool or None
-        Whether it reproduces; None if the methods that it speaks of were not run.
-    found : str
-        Our figures and the limit that the verdict follows from.
-    cause : str
-        Why it does not reproduce, or what else the figures show; may be empty.
+        Short name.
+    judge : str
+        Function that judges it; the key if not given.
+    needs : tuple of str
+        Parts that it speaks of: without them it is not asked.
+    says, printed : str
+        What the paper says, and where; its figures.
+    ours, rule, cause : str
+        Our figures, in the words of the judge (`Paper.words`) if not given; what the verdict follows from;
+        why it falls, or what else the figures show.
+    unasked : str
+        Why it is not asked where the judge has nothing to go by.
     """
 
     key: str
-    said: str
-    holds: bool | None
-    found: str
+    says: str
+    rule: str
+    ours: str = ""
+    judge: str = ""
+    needs: tuple[str, ...] = ()
+    printed: str = ""
     cause: str = ""
+    unasked: str = "Not run here."
 
-    @property
-    def verdict(self) -> str:
-        """The verdict in words."""
-        return {True: "Reproduces.", False: "Does not reproduce.", None: "Not asked."}[self.holds]
+
+class Paper(Part):
+    """A publication: how it is called, the parts that methods play, its figures, limits and claims."""
+
+    heading: str
+    reference: str
+    parts: dict[str, Role]
+    printed: dict[str, tuple[tuple[float, ...], ...]]
+    figures: dict[str, tuple[float, ...]]
+    limits: dict[str, float]
+    words: dict[str, str]
+    claims: tuple[Statement, ...]
+
+    def names(self, methods: Sequence[Method]) -> dict[str, str]:
+        """By part, the first method that plays it, as the scenario says (``stands_for``)."""
+        names: dict[str, str] = {}
+        for method in methods:
+            if method.part.stands_for in self.parts:
+                names.setdefault(str(method.part.stands_for), method.name)
+        return names
+
+    def label(self, part: str) -> str:
+        """How a part is called."""
+        return self.parts[part].label
+
+
+def read_paper(name: str) -> Paper:
+    """Read the data of a paper, ``papers/<name>/paper.toml``."""
+    text = files("simrail.report.papers").joinpath(name, "paper.toml").read_text(encoding="utf-8")
+    return Paper.model_validate(tomllib.loads(text), strict=False)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim with its verdict: what the paper says and printed, our figures, the rule, and the cause."""
+
+    key: str
+    says: str
+    printed: str
+    ours: str
+    rule: str
+    verdict: Verdict
+    cause: str = ""
 
     @property
     def tone(self) -> str:
         """How the page marks it."""
-        return {True: "good", False: "bad", None: "note"}[self.holds]
+        return WORDS[self.verdict][0]
+
+    @property
+    def words(self) -> str:
+        """The verdict as the page says it."""
+        return WORDS[self.verdict][1]
+
+
+Evidence = TypeVar("Evidence")
+Judgement = tuple[bool | Verdict, Mapping[str, Any]]
+"""Whether a claim holds, or its verdict; and the numbers that its words need."""
+
+
+def judged(
+    paper: Paper,
+    evidence: Evidence,
+    judges: Sequence[Callable[[Evidence, Sequence[str]], Judgement | None]],
+    *,
+    has: Callable[[str], bool],
+) -> list[Claim]:
+    """Judge all claims of a paper, in its order.
+
+    Parameters
+    ----------
+    paper : Paper
+        Its data.
+    evidence : object
+        Our figures, as the judges of the paper take them.
+    judges : sequence of callable
+        Functions of the evidence and of the parts that a claim needs, called as their claims or as
+        `Statement.judge`; they return None where there is nothing to judge by.
+    has : callable
+        Whether a part was run, and has figures throughout.
+    """
+    environment = Environment(undefined=StrictUndefined)
+    environment.filters |= FILTERS
+    common = {
+        "limit": paper.limits,
+        "printed": paper.printed,
+        "figures": paper.figures,
+        "words": paper.words,
+        "label": {part: role.label for part, role in paper.parts.items()},
+    }
+    by_name = {judge.__name__: judge for judge in judges}
+
+    def written(text: str, values: Mapping[str, Any]) -> str:
+        return " ".join(environment.from_string(text).render(common, **values).split())
+
+    claims = []
+    for one in paper.claims:
+        says, printed, rule = (written(text, {}) for text in (one.says, one.printed, one.rule))
+        missing = [paper.label(part) for part in one.needs if not has(part)]
+        judge = one.judge or one.key
+        judgement = None if missing else by_name[judge](evidence, one.needs)
+        if judgement is None:
+            why = f"Not run: {', '.join(missing)}." if missing else one.unasked
+            claims.append(Claim(one.key, says, printed, why, rule, "not asked"))
+            continue
+        verdict, values = judgement
+        if isinstance(verdict, bool):
+            verdict = "reproduced" if verdict else "not reproduced"
+        ours, cause = (written(text, values) for text in (one.ours or paper.words[judge], one.cause))
+        claims.append(Claim(one.key, says, printed, ours, rule, verdict, cause))
+    return claims

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from simrail.report.tables.pivot import Figures
+from simrail.report.tables.pivot import Case
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
 
@@ -24,14 +24,14 @@ BAND = "D1"
 """Band that a case is judged in where its ride is long enough, and that a scenario's limits are of."""
 
 
-def bands_of_case(case: Figures) -> list[str]:
+def bands_of_case(case: Case) -> list[str]:
     """Bands in which a case has rail geometry, ``full`` first; empty without any."""
     table = case.table
     rows = table[table["quantity"].astype(str).isin(QUANTITIES) & (table["draws"] > 0)]
     return [str(name) for name in dict.fromkeys(rows["band"])]
 
 
-def judged_band(case: Figures) -> str:
+def judged_band(case: Case) -> str:
     """Band that a case is judged in: `BAND` where the ride is long enough, else the scenario's own.
 
     Where there is no own band either, the first that has figures, at last ``full``.
@@ -41,7 +41,7 @@ def judged_band(case: Figures) -> str:
     return BAND if BAND in there else next(iter([*own, *there]), FULL)
 
 
-def band_of_all(all_cases: Sequence[Figures]) -> str:
+def band_of_all(all_cases: Sequence[Case]) -> str:
     """Band that most cases are judged in: of those with rail geometry."""
     found = [judged_band(case) for case in all_cases if bands_of_case(case)]
     return max(dict.fromkeys(found), key=found.count, default=FULL)

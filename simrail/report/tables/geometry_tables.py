@@ -9,14 +9,14 @@ import pandas as pd
 
 from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case, judged_band
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Figure, Figures
-from simrail.report.tables.tables import DECIMALS, Cell, Row, Table
+from simrail.report.tables.pivot import NOTHING, Case
+from simrail.report.tables.tables import DECIMALS, NONE, Cell, Row, Table, mean_cell, number_cell
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
 from simrail.track.quality import Limits, section_indicators
 
 
-def mappers(case: Figures, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
+def mappers(case: Case, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
     """Methods that say what the rails look like."""
     return [style for style in styles if case.get(style.name, "vertical_profile", "sd").draws]
 
@@ -26,23 +26,23 @@ def is_zero(style: MethodStyle) -> bool:
     return style.baseline == "no IMU"
 
 
-def baseline_of(case: Figures, styles: Sequence[MethodStyle]) -> MethodStyle | None:
+def baseline_of(case: Case, styles: Sequence[MethodStyle]) -> MethodStyle | None:
     """The baseline, if it was run."""
     return next((style for style in mappers(case, styles) if is_zero(style)), None)
 
 
-def main_of(case: Figures, styles: Sequence[MethodStyle]) -> MethodStyle | None:
+def main_of(case: Case, styles: Sequence[MethodStyle]) -> MethodStyle | None:
     """The scenario's first method under test, which sentences speak of; the tables hold all."""
     return next((style for style in mappers(case, styles) if not is_zero(style)), None)
 
 
-def sd_of(case: Figures, style: MethodStyle, quantity: str, *, band: str) -> float:
+def sd_of(case: Case, style: MethodStyle, quantity: str, *, band: str) -> float:
     """Standard deviation of an error in a band, mm."""
     return case.get(style.name, quantity, "sd", band=band).value
 
 
 def behind_baseline(
-    case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band: str
+    case: Case, styles: Sequence[MethodStyle], quantity: str, *, band: str
 ) -> list[MethodStyle]:
     """Methods that err more than the baseline, which uses no IMU; none if that was not run."""
     floor = baseline_of(case, styles)
@@ -54,13 +54,13 @@ def behind_baseline(
 
 
 def geometry_table(
-    case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS
+    case: Case, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS
 ) -> Table | None:
     """Errors by quantity, method and band; None if the case has no rail geometry.
 
     Parameters
     ----------
-    case, styles : Figures, sequence of MethodStyle
+    case, styles : Case, sequence of MethodStyle
         The case and the scenario's methods.
     known : mapping of str to Band
         Bands whose wavelengths are told.
@@ -90,12 +90,12 @@ def geometry_table(
                 continue
             cells = []
             for band in bands:
-                found = case.get(style.name, quantity, "sd", band=band)
-                mark = "" if is_zero(style) else _mark(case, shown, quantity, band, found.value)
-                cells.append(_cell(found, mark=mark))
-            cells.append(_cell(case.get(style.name, quantity, "mean"), decimals=2))
-            cells.append(_cell(case.get(style.name, quantity, "max", band=judged), decimals=2))
-            cells.append(_cell(case.get(style.name, quantity, "coverage95"), decimals=0, scale=100.0))
+                mean = case.get(style.name, quantity, "sd", band=band)
+                mark = "" if is_zero(style) else _mark(case, shown, quantity, band, mean.value)
+                cells.append(mean_cell(mean, mark=mark))
+            cells.append(mean_cell(case.get(style.name, quantity, "mean"), decimals=2))
+            cells.append(mean_cell(case.get(style.name, quantity, "max", band=judged), decimals=2))
+            cells.append(mean_cell(case.get(style.name, quantity, "coverage95"), decimals=0, scale=100.0))
             rows.append(
                 Row(f"{words}: {style.label}", style.baseline if is_zero(style) else "", style.colour, cells)
             )
@@ -106,7 +106,7 @@ def geometry_table(
     return Table(groups, columns, rows)
 
 
-def _mark(case: Figures, shown: Sequence[MethodStyle], quantity: str, band: str, value: float) -> str:
+def _mark(case: Case, shown: Sequence[MethodStyle], quantity: str, band: str, value: float) -> str:
     """How the error of a method under test is marked: the best of them, worse than without any IMU."""
     tested, floor = (
         [case.get(s.name, quantity, "sd", band=band).value for s in shown if is_zero(s) is baseline]
@@ -120,7 +120,7 @@ def _mark(case: Figures, shown: Sequence[MethodStyle], quantity: str, band: str,
     return " ".join(word for word, holds in (("best", is_best), ("worse", is_worse)) if holds)
 
 
-def _is_base(case: Figures, quantity: str, styles: Sequence[MethodStyle]) -> bool:
+def _is_base(case: Case, quantity: str, styles: Sequence[MethodStyle]) -> bool:
     """Whether twist is left open for its base: it follows from the cross-level, and that is known."""
     return quantity == "twist" and any(case.get(s.name, "cross_level", "sd").draws for s in styles)
 
@@ -129,11 +129,11 @@ def _open(columns: int, *, is_base: bool) -> list[Cell]:
     """Cells of a quantity that is left open."""
     return [
         Cell("not computed" if is_base else "not observable", mark="none"),
-        *[Cell("\u2013", mark="none")] * (columns - 1),
+        *[NONE] * (columns - 1),
     ]
 
 
-def _is_unobservable(case: Figures, quantity: str, name: str = "") -> bool:
+def _is_unobservable(case: Case, quantity: str, name: str = "") -> bool:
     """Whether the unfiltered quantity was left open, which is no failure: by a method, or by all."""
     table = case.table
     rows = table[(table["quantity"].astype(str) == quantity) & (table["band"].astype(str) == FULL)]
@@ -143,7 +143,7 @@ def _is_unobservable(case: Figures, quantity: str, name: str = "") -> bool:
 
 
 def overview_table(
-    all_cases: Sequence[Figures], styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS
+    all_cases: Sequence[Case], styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS
 ) -> Table | None:
     """Error of the first method and of the baseline in the band that a case is judged in, a row per case.
 
@@ -154,10 +154,12 @@ def overview_table(
         cells, band = [], judged_band(case)
         floor, main = baseline_of(case, styles), main_of(case, styles)
         for quantity in JUDGED:
-            found = case.get(main.name, quantity, "sd", band=band) if main else Figure(np.nan, np.nan, 0)
-            zero = case.get(floor.name, quantity, "sd", band=band) if floor else Figure(np.nan, np.nan, 0)
-            mark = "worse" if found.value > zero.value else ""
-            cells += [_cell(found, mark=mark), _cell(zero, decimals=2)]
+            own, zero = (
+                case.get(style.name, quantity, "sd", band=band) if style else NOTHING
+                for style in (main, floor)
+            )
+            mark = "worse" if own.value > zero.value else ""
+            cells += [mean_cell(own, mark=mark), mean_cell(zero, decimals=2)]
         if all(cell.mark == "none" for cell in cells):
             continue
         labels = case.labels
@@ -177,37 +179,25 @@ def indicator_table(
     truth: pd.DataFrame, found: pd.DataFrame, *, limits: Mapping[str, Limits], band: Band
 ) -> Table:
     """Indicators per section of true rails and of an estimate; what is beyond a limit is marked."""
-    lines = {}
-    for name, geometry in (("true", truth), ("found", found)):
-        indicators = section_indicators(geometry, band=band, limits=limits)
-        lines[name] = indicators.set_index(["start_m", "quantity"])
-    both = lines["true"].index.intersection(lines["found"].index)
+    true, own = (
+        section_indicators(rails, band=band, limits=limits).set_index(["start_m", "quantity"])
+        for rails in (truth, found)
+    )
+    both = true.index.intersection(own.index)
     quantities = [q for q in JUDGED if q in both.get_level_values("quantity")]
     rows = []
     for start in sorted(set(both.get_level_values("start_m"))):
         cells = []
-        for quantity in quantities:
-            at = (start, quantity)
-            there = at in both
+        for place in ((start, quantity) for quantity in quantities):
             for what in ("sd_m", "peak_m"):
-                for name in ("true", "found"):
-                    cells.append(_indicator(lines[name].loc[at] if there else None, what))
+                cells += [
+                    _indicator(part.loc[place], what) if place in both else NONE for part in (true, own)
+                ]
         rows.append(Row(f"{start:.0f} to {start + 200.0:.0f} m", "", "", cells))
     groups = [(QUANTITIES[q], 4) for q in quantities]
-    columns = ["sd", "found", "peak", "found"] * len(quantities)
-    return Table(groups, columns, rows)
+    return Table(groups, ["sd", "found", "peak", "found"] * len(quantities), rows)
 
 
-def _indicator(line: pd.Series | None, what: str) -> Cell:
-    if line is None:
-        return Cell("\u2013", mark="none")
+def _indicator(line: pd.Series, what: str) -> Cell:
     beyond = bool(line["sd_exceeded"]) if what == "sd_m" else line["defects"] > 0
-    return Cell(f"{1e3 * float(line[what]):.2f}".replace("-", "\u2212"), mark="worse" if beyond else "")
-
-
-def _cell(found: Figure, *, decimals: int = DECIMALS, mark: str = "", scale: float = 1.0) -> Cell:
-    if found.draws == 0 or not np.isfinite(found.value):
-        return Cell("\u2013", mark="none")
-    spread = f"{scale * found.sd:.{decimals}f}" if found.sd > 0.0 else ""
-    value = round(scale * found.value, decimals) + 0.0
-    return Cell(f"{value:.{decimals}f}".replace("-", "\u2212"), spread, mark)
+    return number_cell(1e3 * float(line[what]), decimals=2, mark="worse" if beyond else "")

@@ -1,4 +1,4 @@
-"""The figures of one case, by method, quantity, metric, window and reference.
+"""The scores of one case, by method, quantity, metric, window and reference.
 
 A case is what cells share that differ in their draws only: one ride, IMU, mount and odometry, and
 one value of every axis.
@@ -17,7 +17,7 @@ from simrail.scoring.table import CURVE_PREFIX, FULL, SCORE_COLUMNS
 CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry")
 
 
-class Figure(NamedTuple):
+class Mean(NamedTuple):
     """Mean over draws, its standard deviation between draws (NaN for one draw), number of draws."""
 
     value: float
@@ -25,12 +25,12 @@ class Figure(NamedTuple):
     draws: int
 
 
-NOTHING = Figure(float("nan"), float("nan"), 0)
+NOTHING = Mean(float("nan"), float("nan"), 0)
 
 
 @dataclass(frozen=True)
-class Figures:
-    """Averaged figures of one case.
+class Case:
+    """Averaged scores of one case.
 
     Attributes
     ----------
@@ -38,13 +38,13 @@ class Figures:
         What the case is: `CASE_COLUMNS` and the axes.
     table : pandas.DataFrame
         Rows of `simrail.scoring.table.aggregate` of this case.
-    found : dict
-        (estimator, quantity, band, reference, window, metric) to `Figure`.
+    scores : dict
+        (estimator, quantity, band, reference, window, metric) to `Mean`.
     """
 
     labels: dict[str, str]
     table: pd.DataFrame
-    found: dict[tuple[str, str, str, str, str, str], Figure]
+    scores: dict[tuple[str, str, str, str, str, str], Mean]
 
     def get(
         self,
@@ -55,9 +55,9 @@ class Figures:
         band: str = FULL,
         window: str = "whole",
         reference: str = "truth",
-    ) -> Figure:
+    ) -> Mean:
         """One figure; NaN and no draws if there is none."""
-        return self.found.get((estimator, quantity, band, reference, window, metric), NOTHING)
+        return self.scores.get((estimator, quantity, band, reference, window, metric), NOTHING)
 
     def estimators(self) -> list[str]:
         """Names of the methods, odometry included, in the order of the table."""
@@ -69,15 +69,15 @@ class Figures:
         names = {str(name) for name in rows["window"].unique() if str(name).startswith(CURVE_PREFIX)}
         return sorted(names, key=_segment_number)
 
-    def metric_of_any(self, estimator: str, metric: str, *, window: str = "whole") -> Figure:
+    def metric_of_any(self, estimator: str, metric: str, *, window: str = "whole") -> Mean:
         """A figure that belongs to a method as a whole (nis, us_per_sample)."""
-        for (name, _, _, reference, where, what), figure in self.found.items():
+        for (name, _, _, reference, where, what), figure in self.scores.items():
             if (name, reference, where, what) == (estimator, "truth", window, metric):
                 return figure
         return NOTHING
 
 
-def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Figures]:
+def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Case]:
     """Split a score table into its cases and average each over its draws."""
     table = aggregate(scores, cell_table)
     if table.empty:
@@ -87,11 +87,11 @@ def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Figures]:
     result = []
     for values, rows in table.groupby(keys, observed=True, dropna=False, sort=False):
         labels = {name: str(value) for name, value in zip(keys, values, strict=True)}
-        result.append(Figures(labels, rows, _index(rows)))
+        result.append(Case(labels, rows, _index(rows)))
     return result
 
 
-def of_cell(all_cases: list[Figures], cell: dict[str, object]) -> Figures | None:
+def of_cell(all_cases: list[Case], cell: dict[str, object]) -> Case | None:
     """The case that a cell belongs to."""
     for case in all_cases:
         if all(str(cell[name]) == value for name, value in case.labels.items() if name in cell):
@@ -99,14 +99,14 @@ def of_cell(all_cases: list[Figures], cell: dict[str, object]) -> Figures | None
     return None
 
 
-def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str, str], Figure]:
+def _index(rows: pd.DataFrame) -> dict[tuple[str, str, str, str, str, str], Mean]:
     keys = ("estimator", "quantity", "band", "reference", "window", "metric")
     names = [rows[name].astype(str) for name in keys]
     # Two levels of draws: what differs between tracks and what differs between sensors add up.
     variance = rows["sd_sensor"].fillna(0.0) ** 2 + rows["sd_track"].fillna(0.0) ** 2
     sd = (variance**0.5).where(rows["draws"] > 1)
     values = zip(rows["value"], sd, rows["draws"], strict=True)
-    return {key: Figure(*value) for key, value in zip(zip(*names, strict=True), values, strict=True)}
+    return {key: Mean(*value) for key, value in zip(zip(*names, strict=True), values, strict=True)}
 
 
 def _segment_number(window: str) -> tuple[int, str]:

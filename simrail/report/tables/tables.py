@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Figure, Figures
+from simrail.report.tables.pivot import Case, Mean
 
 
 @dataclass(frozen=True)
@@ -62,17 +63,37 @@ _ERRORS = (
     ("yaw_debiased", "rms", "whole", "whole"),
     ("yaw_debiased", "final", "whole", "final"),
 )
-_GROUPS = (
-    ("roll error, rms", 4),
-    ("", 1),
-    ("pitch error, rms", 2),
-    ("", 1),
-    ("yaw error\u00b9, rms", 1),
-    ("", 1),
-)
+NONE = Cell("\u2013", mark="none")
+"""Where there is no figure."""
 
 
-def error_table(case: Figures, styles: Sequence[MethodStyle], *, reference: str) -> Table:
+def signed(text: str) -> str:
+    """A number with the sign that is as wide as a plus."""
+    return text.replace("-", "\u2212")
+
+
+def number_cell(value: float, *, decimals: int = DECIMALS, spread: float = math.nan, mark: str = "") -> Cell:
+    """A number, and the spread behind it where there is one; a dash if it is not finite."""
+    if not math.isfinite(value):
+        return NONE
+    behind = f"{spread:.{decimals}f}" if math.isfinite(spread) else ""
+    return Cell(signed(f"{round(value, decimals) + 0.0:.{decimals}f}"), behind, mark)  # no negative zero
+
+
+def mean_cell(mean: Mean, *, decimals: int = DECIMALS, mark: str = "", scale: float = 1.0) -> Cell:
+    """A mean over draws, and its standard deviation between them where it has one."""
+    if mean.draws == 0:
+        return NONE
+    spread = scale * mean.sd if mean.sd > 0.0 else math.nan
+    return number_cell(scale * mean.value, decimals=decimals, spread=spread, mark=mark)
+
+
+def method_row(style: MethodStyle, cells: list[Cell]) -> Row:
+    """The row of a method."""
+    return Row(style.label, style.baseline, style.colour, cells)
+
+
+def error_table(case: Case, styles: Sequence[MethodStyle], *, reference: str) -> Table:
     """Errors of every method in degrees; the best method under test and losses to 'design angles' marked."""
     design = next((style.name for style in styles if not style.uses_imu), None)
     columns = [c for c in _ERRORS if _is_there(case, styles, *c[:3], reference)]
@@ -96,31 +117,31 @@ def error_table(case: Figures, styles: Sequence[MethodStyle], *, reference: str)
     for style in styles:
         cells = []
         for (quantity, metric, window, _), mark in zip(columns, marks, strict=True):
-            found = case.get(style.name, quantity, metric, window=window, reference=reference)
-            cells.append(_cell(found, decimals=DECIMALS, mark=mark.get(style.name, "")))
-        rows.append(Row(style.label, style.baseline, style.colour, cells))
+            mean = case.get(style.name, quantity, metric, window=window, reference=reference)
+            cells.append(mean_cell(mean, mark=mark.get(style.name, "")))
+        rows.append(method_row(style, cells))
     return Table(_group_spans(columns), [word for *_, word in columns], rows)
 
 
-def consistency_table(case: Figures, styles: Sequence[MethodStyle]) -> Table:
+def consistency_table(case: Case, styles: Sequence[MethodStyle]) -> Table:
     """NEES, coverage, NIS and time per sample."""
     rows = []
     for style in styles:
         cells = [
-            _cell(case.get(style.name, quantity, metric), decimals=decimals, scale=scale)
+            mean_cell(case.get(style.name, quantity, metric), decimals=decimals, scale=scale)
             for metric, decimals, scale in (("nees", 2, 1.0), ("coverage95", 1, 100.0))
             for quantity in ("roll", "pitch", "yaw")
         ]
-        cells.append(_cell(case.metric_of_any(style.name, "nis"), decimals=2))
-        cells.append(_cell(case.metric_of_any(style.name, "us_per_sample"), decimals=3))
-        rows.append(Row(style.label, style.baseline, style.colour, cells))
+        cells.append(mean_cell(case.metric_of_any(style.name, "nis"), decimals=2))
+        cells.append(mean_cell(case.metric_of_any(style.name, "us_per_sample")))
+        rows.append(method_row(style, cells))
     groups = [("NEES (1 is right)", 3), ("inside the 95 % interval, %", 3), ("NIS", 1), ("time", 1)]
     return Table(
         groups, ["roll", "pitch", "yaw", "roll", "pitch", "yaw", "(1 is right)", "\u00b5s per sample"], rows
     )
 
 
-def odometry_table(all_cases: Sequence[Figures]) -> Table:
+def odometry_table(all_cases: Sequence[Case]) -> Table:
     """Position and speed errors of the odometry, one row per case that differs."""
     rows, seen = [], set()
     for case in all_cases:
@@ -128,11 +149,11 @@ def odometry_table(all_cases: Sequence[Figures]) -> Table:
             if not name.startswith("odometry:"):
                 continue
             cells = [
-                _cell(case.get(name, "position", "rms"), decimals=3),
-                _cell(case.get(name, "position", "max"), decimals=3),
-                _cell(case.get(name, "distance_relative", "final"), decimals=3, scale=100.0),
-                _cell(case.get(name, "speed", "rms", window="moving"), decimals=4),
-                _cell(case.get(name, "position", "coverage95"), decimals=1, scale=100.0),
+                mean_cell(case.get(name, "position", "rms")),
+                mean_cell(case.get(name, "position", "max")),
+                mean_cell(case.get(name, "distance_relative", "final"), scale=100.0),
+                mean_cell(case.get(name, "speed", "rms", window="moving"), decimals=4),
+                mean_cell(case.get(name, "position", "coverage95"), decimals=1, scale=100.0),
             ]
             label = (
                 f"{case.labels['ride']} \u00b7 {case.labels['mount']} ({case.labels['imu']}) \u00b7 "
@@ -146,16 +167,8 @@ def odometry_table(all_cases: Sequence[Figures]) -> Table:
     return Table(groups, ["rms", "max", "final, %", "rms, moving", "interval, %"], rows)
 
 
-def _cell(found: Figure, *, decimals: int, mark: str = "", scale: float = 1.0) -> Cell:
-    if found.draws == 0 or found.value != found.value:
-        return Cell("\u2013", mark="none")
-    spread = f"{scale * found.sd:.{decimals}f}" if found.sd > 0.0 else ""
-    value = round(scale * found.value, decimals) + 0.0  # no negative zero
-    return Cell(f"{value:.{decimals}f}".replace("-", "\u2212"), spread, mark)
-
-
 def _is_there(
-    case: Figures, styles: Sequence[MethodStyle], quantity: str, metric: str, window: str, reference: str
+    case: Case, styles: Sequence[MethodStyle], quantity: str, metric: str, window: str, reference: str
 ) -> bool:
     return any(case.get(s.name, quantity, metric, window=window, reference=reference).draws for s in styles)
 

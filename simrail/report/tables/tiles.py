@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
 from simrail.report.tables.geometry_tables import baseline_of, is_zero, mappers, sd_of
 from simrail.report.tables.methods import MethodStyle, attitude_methods
-from simrail.report.tables.pivot import Figures
+from simrail.report.tables.pivot import Case
 from simrail.report.words.sentences import degrees, significant
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
@@ -17,8 +17,7 @@ WITHOUT_IMU = "design angles only"
 """Title of the roll error of a method that uses no IMU."""
 
 
-@dataclass(frozen=True)
-class Tile:
+class Tile(NamedTuple):
     """A number with its meaning above and its context below."""
 
     title: str
@@ -26,12 +25,12 @@ class Tile:
     note: str
 
 
-def tiles(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> list[Tile]:
+def tiles(case: Case, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> list[Tile]:
     """Errors of the rails where they are scored, of roll, and of the odometry, beside what no IMU gives.
 
     Parameters
     ----------
-    case, styles : Figures, sequence of MethodStyle
+    case, styles : Case, sequence of MethodStyle
         The case and the scenario's methods.
     known : mapping of str to Band
         Bands whose wavelengths are told.
@@ -46,7 +45,7 @@ def tiles(case: Figures, styles: Sequence[MethodStyle], *, known: Mapping[str, B
     return [*rails, *roll, *_odometry(case)]
 
 
-def _rails(case: Figures, styles: Sequence[MethodStyle], known: Mapping[str, Band]) -> list[Tile]:
+def _rails(case: Case, styles: Sequence[MethodStyle], known: Mapping[str, Band]) -> list[Tile]:
     """Per quantity, the method that errs least in the band that the case is judged in, beside no IMU."""
     band, floor = judged_band(case), baseline_of(case, styles)
     result = []
@@ -66,7 +65,7 @@ def _rails(case: Figures, styles: Sequence[MethodStyle], known: Mapping[str, Ban
     return result
 
 
-def _roll(case: Figures, styles: Sequence[MethodStyle]) -> list[Tile]:
+def _roll(case: Case, styles: Sequence[MethodStyle]) -> list[Tile]:
     """Roll error in curves of the best method, of its uncompensated twin, of the design angles."""
     in_curves = any(case.get(style.name, "roll", "rms", window="curve").draws for style in styles)
     window, where = ("curve", "in curves") if in_curves else ("whole", "over the whole ride")
@@ -90,7 +89,7 @@ def _roll(case: Figures, styles: Sequence[MethodStyle]) -> list[Tile]:
     return result
 
 
-def _odometry(case: Figures) -> list[Tile]:
+def _odometry(case: Case) -> list[Tile]:
     """Position error of every odometry that was scored."""
     result = []
     for name in case.estimators():

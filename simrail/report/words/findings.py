@@ -7,10 +7,13 @@ so, and where compensation does not help it says that.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
+
+from simrail.core.jit import FloatArray
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Figures
-from simrail.report.words.alike import ALIKE, alike
+from simrail.report.tables.pivot import Case
 from simrail.report.words.sentences import Finding, degrees, interval_verdict, listed, significant
 
 _QUANTITIES = {"roll": "roll", "pitch": "pitch", "yaw_debiased": "yaw without its initial offset"}
@@ -21,23 +24,26 @@ _WINDOWS = {
     "standstill": "at standstill",
 }
 
+ALIKE = 0.01
+"""Methods are alike if no figure of their attitude differs by more than this share of it."""
+
+_COMPARED = ("roll", "pitch", "yaw_debiased")
+_EVERYWHERE = ("whole", "straight", "transition", "curve", "standstill")
 
 MOST_NAMED = 3
 """So many methods have a sentence each; of more, sentences tell together."""
 
 
-def findings(
-    case: Figures, styles: Sequence[MethodStyle], *, others: Sequence[Figures] = ()
-) -> list[Finding]:
+def findings(case: Case, styles: Sequence[MethodStyle], *, others: Sequence[Case] = ()) -> list[Finding]:
     """Everything that is worth saying of a case.
 
     Parameters
     ----------
-    case : Figures
+    case : Case
         The case.
     styles : sequence of MethodStyle
         The methods of the scenario.
-    others : sequence of Figures
+    others : sequence of Case
         All cases of the scenario: the one with an ideal IMU is looked for among them.
     """
     groups = alike(case, styles)
@@ -69,7 +75,7 @@ def _alike(groups: Sequence[Sequence[MethodStyle]]) -> list[Finding]:
     return result
 
 
-def _compensation(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
+def _compensation(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
     result = []
     for style in styles:
         if not (style.compensated and style.twin):
@@ -93,7 +99,7 @@ def _compensation(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]
     return result
 
 
-def _design_angles(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
+def _design_angles(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
     design = next((style for style in styles if not style.uses_imu), None)
     if design is None:
         text = "'Design angles only' was not run: whether a filter beats no IMU at all is not known."
@@ -132,7 +138,7 @@ def _design_angles(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding
     return result
 
 
-def _many_beaten(case: Figures, styles: Sequence[MethodStyle], design: MethodStyle) -> list[Finding]:
+def _many_beaten(case: Case, styles: Sequence[MethodStyle], design: MethodStyle) -> list[Finding]:
     """Where the design angles win over many methods: a sentence per quantity, without the sizes."""
     result = []
     for quantity, word in _QUANTITIES.items():
@@ -148,7 +154,7 @@ def _many_beaten(case: Figures, styles: Sequence[MethodStyle], design: MethodSty
     return result
 
 
-def _loss(case: Figures, style: MethodStyle, design: MethodStyle, quantity: str, word: str) -> str:
+def _loss(case: Case, style: MethodStyle, design: MethodStyle, quantity: str, word: str) -> str:
     """Where a method loses to the design angles in one quantity, in words; "" if nowhere."""
     own = {
         window: case.get(style.name, quantity, "rms", window=window).value for window in ("whole", *_WINDOWS)
@@ -162,7 +168,7 @@ def _loss(case: Figures, style: MethodStyle, design: MethodStyle, quantity: str,
     return f"{word} ({degrees(floor['whole'])} against {degrees(own['whole'])} rms{inside})"
 
 
-def _general_purpose(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
+def _general_purpose(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
     result = []
     tested = [s for s in styles if not s.baseline and case.get(s.name, "roll", "rms").draws]
     if not tested:
@@ -185,7 +191,7 @@ _OF_THE_IMU = ("imu", "imu.grade", "mount", "case")
 """Labels in which the case of the ideal IMU differs by its nature; it may be an IMU of its own."""
 
 
-def _floor(case: Figures, styles: Sequence[MethodStyle], others: Sequence[Figures]) -> list[Finding]:
+def _floor(case: Case, styles: Sequence[MethodStyle], others: Sequence[Case]) -> list[Finding]:
     if case.labels["imu"] == "ideal":
         return []
     # The same ride in every other respect: speed, irregularity and whatever else there is an axis for.
@@ -217,7 +223,7 @@ def _floor(case: Figures, styles: Sequence[MethodStyle], others: Sequence[Figure
     return [Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {told}")]
 
 
-def _consistency(case: Figures, styles: Sequence[MethodStyle]) -> list[Finding]:
+def _consistency(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
     shares = {}
     for style in styles:
         covered = {q: case.get(style.name, q, "coverage95") for q in ("roll", "pitch")}
@@ -246,7 +252,7 @@ def _many_intervals(shares: dict[str, float]) -> list[Finding]:
     ]
 
 
-def _odometry(case: Figures) -> list[Finding]:
+def _odometry(case: Case) -> list[Finding]:
     result = []
     for name in case.estimators():
         if name.startswith("odometry:"):
@@ -270,7 +276,42 @@ def _odometry(case: Figures) -> list[Finding]:
     return result
 
 
-def _failures(case: Figures) -> list[Finding]:
+def _failures(case: Case) -> list[Finding]:
     empty = case.table[(case.table["failed"] > 0) & (case.table["window"].astype(str) == "whole")]
     names = [str(name) for name in empty["estimator"].unique()]
     return [Finding("bad", f"{name} has no value for some figures; see 'What failed'.") for name in names]
+
+
+def alike(case: Case, styles: Sequence[MethodStyle]) -> list[list[MethodStyle]]:
+    """Methods under test in groups that are alike, in their order; most groups are of one.
+
+    What is compared are rms errors by quantity and kind of track, and what the 95 % intervals hold.
+    """
+    groups: list[list[MethodStyle]] = []
+    for style in styles:
+        if style.baseline:
+            continue
+        own = _figures(case, style)
+        for group in groups:
+            first = _figures(case, group[0])
+            if np.isfinite(own).any() and np.allclose(own, first, rtol=ALIKE, atol=0.0, equal_nan=True):
+                group.append(style)
+                break
+        else:
+            groups.append([style])
+    return groups
+
+
+def one_of_each(case: Case, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
+    """Methods without those that lie upon an earlier one in a figure, which says how many they are."""
+    like, labels = set(), {}
+    for first, *rest in alike(case, styles):
+        like |= {style.name for style in rest}
+        labels[first.name] = f"{first.label} and {len(rest)} alike" if rest else first.label
+    return [replace(s, label=labels.get(s.name, s.label)) for s in styles if s.name not in like]
+
+
+def _figures(case: Case, style: MethodStyle) -> FloatArray:
+    errors = [case.get(style.name, q, "rms", window=w).value for q in _COMPARED for w in _EVERYWHERE]
+    held = [case.get(style.name, quantity, "coverage95").value for quantity in _COMPARED]
+    return np.array([*errors, *held])

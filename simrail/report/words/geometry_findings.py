@@ -16,7 +16,7 @@ from simrail.report.tables.geometry_tables import (
     sd_of,
 )
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Figures
+from simrail.report.tables.pivot import Case
 from simrail.report.words.sentences import Finding, interval_verdict, listed, significant
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
@@ -26,9 +26,9 @@ MOST_OTHERS = 2
 
 
 def geometry_findings(
-    case: Figures,
+    case: Case,
     styles: Sequence[MethodStyle],
-    others: Sequence[Figures],
+    others: Sequence[Case],
     *,
     goals_mm: Mapping[str, float] | None = None,
     known: Mapping[str, Band] = BANDS,
@@ -39,9 +39,9 @@ def geometry_findings(
 
     Parameters
     ----------
-    case, styles : Figures, sequence of MethodStyle
+    case, styles : Case, sequence of MethodStyle
         The case and the scenario's methods.
-    others : sequence of Figures
+    others : sequence of Case
         All cases: those with the true position and an ideal IMU say what the error is of.
     goals_mm : mapping of str to float, optional
         By quantity: what its error in `BAND` is asked to be at most, sd; nothing is asked in other bands.
@@ -88,7 +88,7 @@ def geometry_findings(
     return result + _lost(case, styles, band) + _coverage(case, main, band, known)
 
 
-def _beside(case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band: str) -> str:
+def _beside(case: Case, styles: Sequence[MethodStyle], quantity: str, *, band: str) -> str:
     """What the other methods under test err by: all of a few, else the best and the worst."""
     _, *rest = [style for style in mappers(case, styles) if not is_zero(style)]
     sds = {style.label: sd_of(case, style, quantity, band=band) for style in rest}
@@ -106,7 +106,7 @@ def _beside(case: Figures, styles: Sequence[MethodStyle], quantity: str, *, band
     )
 
 
-def _lost(case: Figures, styles: Sequence[MethodStyle], band: str) -> list[Finding]:
+def _lost(case: Case, styles: Sequence[MethodStyle], band: str) -> list[Finding]:
     """Which of the other methods lose to no IMU at all; the first says so itself."""
     first, lost = main_of(case, styles), []
     for quantity in JUDGED:
@@ -117,7 +117,7 @@ def _lost(case: Figures, styles: Sequence[MethodStyle], band: str) -> list[Findi
     return [Finding("bad", f"No IMU at all beats {'; '.join(lost)}.")] if lost else []
 
 
-def _coverage(case: Figures, main: MethodStyle, band: str, known: Mapping[str, Band]) -> list[Finding]:
+def _coverage(case: Case, main: MethodStyle, band: str, known: Mapping[str, Band]) -> list[Finding]:
     """What the 95 % intervals of the first method hold, in one sentence as bad as the worst of them.
 
     Those of the band that counts where the method has them, else those of the unfiltered rails.
@@ -140,7 +140,7 @@ def _coverage(case: Figures, main: MethodStyle, band: str, known: Mapping[str, B
     return [Finding(worst, text)]
 
 
-def _twin(case: Figures, others: Sequence[Figures], what: str) -> Figures | None:
+def _twin(case: Case, others: Sequence[Case], what: str) -> Case | None:
     """The case that differs in an ideal IMU, the true odometry, or both; None if there is none."""
     if case.labels["imu"] == "ideal" or case.labels["odometry"] == "truth":
         return None

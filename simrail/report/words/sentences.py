@@ -1,11 +1,13 @@
-"""What a sentence of the page is, and how it says numbers and lists."""
+"""What a sentence of the page is, and how it says numbers, lists, axes and recordings."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+from simrail.recording.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -56,3 +58,48 @@ def unbroken(text: str) -> str:
 def listed(words: Sequence[str]) -> str:
     """Words as a person lists them: a, b and c."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+
+
+UNITS = {
+    "kmh": "km/h",
+    "mps2": "m/s\u00b2",
+    "mps3": "m/s\u00b3",
+    "m": "m",
+    "s": "s",
+    "hz": "Hz",
+    "deg": "\u00b0",
+}
+"""Units by the ends of names."""
+
+
+def axis_words(name: str, value: object) -> str:
+    """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
+    *words, last = name.rpartition(".")[2].split("_")
+    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    if words and last in UNITS:
+        return f"{' '.join(words)} {shown} {UNITS[last]}"
+    return f"{' '.join([*words, last])} {shown}"
+
+
+def recording_facts(recording: Recording) -> list[str]:
+    """IMU and odometry of a recording, a line each."""
+    x, y, z = recording.mount_position_m
+    odometry = "no odometry: where the train is, no method knows"
+    if recording.odometry is not None:
+        ablation = " (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""
+        odometry = f"position and speed from the odometry '{recording.odometry_source}'{ablation}"
+    return [
+        f"IMU {recording.imu_sheet.grade} at {recording.imu_sheet.rate_hz:g} Hz on '{recording.mount_body}', "
+        f"{x:g}, {y:g}, {z:g} m (forward, left, up)",
+        odometry,
+    ]
+
+
+FILTERS: dict[str, Callable[..., str]] = {
+    "deg": degrees,
+    "mm": significant,
+    "g": "{:g}".format,
+    "listed": listed,
+    "unbroken": unbroken,
+}
+"""How the words of templates write what they are given."""

@@ -11,7 +11,7 @@ from simrail.estimators.tuning.file import Tuning
 from simrail.core.toml_files import shipped
 from simrail.report.papers.gonzalez_2023.own_ride import own_ride_note, searched_on
 from simrail.report.papers.gonzalez_2023.parts import Rows
-from simrail.report.tables.pivot import Figure, Figures
+from simrail.report.tables.pivot import Case, Mean
 from simrail.scenario.scenario import Scenario, load_scenario
 
 FIRST = {"ride": "out", "mount": "body", "track_draw": 0, "sensor_draw": 0}
@@ -40,11 +40,11 @@ def test_the_own_ride_is_told_by_the_command(scenario: Scenario) -> None:
 
 def rows(sds: dict[str, float], *, draws: int = 20, tracks: int = 4) -> Rows:
     found = {
-        (part, quantity, "paper", "truth", "whole", "sd"): Figure(sd, 0.1, draws)
+        (part, quantity, "paper", "truth", "whole", "sd"): Mean(sd, 0.1, draws)
         for part, sd in sds.items()
         for quantity in ("cross_level", "alignment", "vertical_profile")
     }
-    case = Figures({}, pd.DataFrame({"track_draws": [tracks]}), found)
+    case = Case({}, pd.DataFrame({"track_draws": [tracks]}), found)
     return Rows(case, None, {part: part for part in sds}, "paper")
 
 

@@ -8,50 +8,31 @@ from typing import Any
 
 import numpy as np
 
-from simrail.report.tables.pivot import Figures
+from simrail.report.papers.claim import read_paper
+from simrail.report.tables.pivot import Case
 from simrail.scenario.cells import Method
 
-PARTS: dict[str, tuple[str, str]] = {
-    "vqf_magnetometer": ("commercial AHRS: VQF with magnetometer", "commercial"),
-    "vqf": ("commercial AHRS: VQF without", "commercial"),
-    "imufusion": ("commercial AHRS: imufusion without", "commercial"),
-    "sabatini": ("EKF with gravity only, after Sabatini", ""),
-    "yuan": ("EKF that doubts long or short forces, after Yuan", ""),
-    "gda_uncompensated": ("GDA uncompensated", ""),
-    "gda_paper": ("GDA, the paper's settings", "madgwick"),
-    "gda": ("GDA, recommended settings", "madgwick"),
-    "gda_printed": ("GDA, compensation as printed", ""),
-    "ekf_per_step": ("EKF, the paper's settings, Q per step", "ekf"),
-    "ekf_intensity": ("EKF, the paper's settings, Q an intensity", "ekf"),
-    "ekf": ("EKF, recommended settings", "ekf"),
-    "ekf_printed": ("EKF, compensation as printed", ""),
-    "design": ("design angles only", ""),
-}
-"""Parts that a method can play: its label, and the row of `TABLE_3` that it stands beside."""
+PAPER = read_paper("briales_2021")
+
+QUANTITIES = ("roll", "pitch", "yaw")
 
 GENERAL_PURPOSE = ("vqf_magnetometer", "vqf", "imufusion", "sabatini", "yuan", "gda_uncompensated")
 """Parts that do not know the track."""
 
 
-def part_of(method: Method) -> str:
-    """Part that a method plays, as the scenario says (``stands_for``); "" if none."""
-    said = method.part.stands_for
-    return said if said in PARTS else ""
-
-
 @dataclass(frozen=True)
 class Rides:
-    """Figures of all rides by the part that a method plays.
+    """Case of all rides by the part that a method plays.
 
     Attributes
     ----------
-    cases : list of Figures
+    cases : list of Case
         One per ride.
     names : dict of str to str
         The scenario's name of the method that plays a part.
     """
 
-    cases: list[Figures]
+    cases: list[Case]
     names: dict[str, str]
 
     def has(self, *parts: str) -> bool:
@@ -71,7 +52,7 @@ class Rides:
         return [self.one(case, part, quantity, window=window, reference=reference) for case in self.cases]
 
     def one(
-        self, case: Figures, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"
+        self, case: Case, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"
     ) -> float:
         """Rms on one ride, mean over its draws."""
         return case.get(self.names.get(part, ""), quantity, "rms", window=window, reference=reference).value
@@ -86,14 +67,18 @@ class Rides:
             return float("nan"), float("nan")
         return float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else float("nan")
 
-    def where(self, *, forward: bool, fast: bool) -> list[Figures]:
-        """Rides of one direction and one class of speed."""
-        direction = "forward" if forward else "backward"
-        return [
-            case
-            for case in self.cases
-            if case.labels["direction"] == direction and is_fast(case.labels) == fast
-        ]
+    def as_printed(self, part: str, quantity: str) -> float:
+        """Mean over the rides as in Table 3: against the design angles, cropped."""
+        return self.mean(part, quantity, window="cropped", reference="design")[0]
+
+    def by_speed(self) -> dict[str, list[Case]]:
+        """Rides by their class of speed, km/h; a class without any is left out."""
+        classes = {"20": False, "70": True}
+        groups = {
+            kmh: [case for case in self.cases if is_fast(case.labels) == fast]
+            for kmh, fast in classes.items()
+        }
+        return {kmh: group for kmh, group in groups.items() if group}
 
 
 FAST_KMH = 45.0
@@ -105,13 +90,9 @@ def is_fast(labels: dict[str, Any]) -> bool:
     return float(labels["speed_kmh"]) > FAST_KMH
 
 
-def rides_of(all_cases: Sequence[Figures], methods: Sequence[Method]) -> Rides:
+def rides_of(all_cases: Sequence[Case], methods: Sequence[Method]) -> Rides:
     """Gather the first case of every ride, an ideal IMU last, and the parts that the methods play."""
-    first: dict[str, Figures] = {}
+    first: dict[str, Case] = {}
     for case in sorted(all_cases, key=lambda case: case.labels["imu"] == "ideal"):
         first.setdefault(case.labels["ride"], case)
-    names: dict[str, str] = {}
-    for method in methods:
-        names.setdefault(part_of(method), method.name)
-    names.pop("", None)
-    return Rides(list(first.values()), names)
+    return Rides(list(first.values()), PAPER.names(methods))

@@ -47,15 +47,9 @@ def other_size(former: StoredResults, *, band: str) -> OtherSize | None:
         return None
     _, longest_m = scenario.spec.geometry.own_bands.get(band, (0.0, np.inf))
     started = str(former.manifest.get("started_utc", "an unknown day"))[:10]
-    return OtherSize(scenario.name, started, where(rows), size_of(longest_m), rows)
+    return OtherSize(scenario.name, started, rows.where, size_of(longest_m), rows)
 
 
 def size_of(longest_m: float) -> str:
     """`MODEL` or `FULL`, by the longest wave of the scenario's own band."""
     return MODEL if longest_m < LONGEST_OF_MODEL_M else FULL
-
-
-def where(rows: Rows) -> str:
-    """Which case the rows are of, in words."""
-    labels = rows.case.labels
-    return f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), odometry {labels['odometry']}"

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from markupsafe import Markup
-
 from simrail.campaign.cell import CellResult
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
-from simrail.report.papers.gonzalez_2023.parts import COLOURS, PARTS, Rows
+from simrail.report.papers.gonzalez_2023.parts import PAPER, Rows
 from simrail.report.tables.geometry_view import with_rails
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.words.sentences import listed
@@ -18,13 +16,11 @@ DRAWN_M = 300.0
 """Stretch that is drawn: of a model's ride, all."""
 
 
-def tuning_figures(
-    looks: dict[str, MethodStyle], example: CellResult, band: Band
-) -> list[tuple[str, Markup]]:
+def tuning_figures(looks: dict[str, MethodStyle], example: CellResult, band: Band) -> list[tuple[str, str]]:
     """Our versions of Figs. A1 and A3."""
     there = {part: style for part, style in looks.items() if part != "zero" and with_rails(example, [style])}
     ride = example.recording.name
-    figures: list[tuple[str, Markup]] = []
+    figures: list[tuple[str, str]] = []
     first = [there[part] for part in ("cml", "kom", "hand") if part in there]
     if first:
         limits = stretch_of(example, first[0].name, band=band, length_m=DRAWN_M)
@@ -34,24 +30,25 @@ def tuning_figures(
             f"find{'s' * (len(first) == 1)} them."
         )
         svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
-        figures.append((text, Markup(svg)))
+        figures.append((text, svg))
         drawn = example.estimates[first[0].name].geometry_draws is not None
         how = "which follows from draws of its error" if drawn else "that of unfiltered rails"
         text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}."
         svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
-        figures.append((text, Markup(svg)))
+        figures.append((text, svg))
     return figures
 
 
 def noise_figure(
     rows: Rows, looks: dict[str, MethodStyle], example: CellResult, noisy: CellResult, band: Band
-) -> list[tuple[str, Markup]]:
+) -> list[tuple[str, str]]:
     """Our version of Fig. A2: CML without and with noise added to the IMU; [] where one is missing."""
     quiet, loud = looks.get("cml"), looks.get(rows.played_by("cml_noise"))
     if quiet is None or loud is None or not (with_rails(example, [quiet]) and with_rails(noisy, [loud])):
         return []
     # The two are of two recordings: for one figure, the second goes beside the first under its own name.
-    added = replace(loud, name="noise added", label=PARTS["cml_noise"], colour=COLOURS["cml_noise"])
+    role = PAPER.parts["cml_noise"]
+    added = replace(loud, name="noise added", label=role.label, colour=role.colour)
     estimates = {quiet.name: example.estimates[quiet.name], added.name: noisy.estimates[loud.name]}
     limits = stretch_of(example, quiet.name, band=band, length_m=DRAWN_M)
     text = (
@@ -60,4 +57,4 @@ def noise_figure(
     )
     both = replace(example, estimates=estimates)
     svg = rails_figure(both, [quiet, added], band=band, limits=limits, with_interval=False, what=text)
-    return [(text, Markup(svg))]
+    return [(text, svg)]

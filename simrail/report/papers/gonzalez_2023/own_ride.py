@@ -8,16 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from simrail.estimators.tuning.file import Tuning
-from simrail.report.papers.gonzalez_2023.parts import PARTS, Rows
-from simrail.report.papers.gonzalez_2023.printed import COLUMNS
-from simrail.report.tables.geometry_tables import QUANTITIES
+from simrail.report.papers.gonzalez_2023.parts import FILTERED, PAPER, Rows
+from simrail.report.tables.geometry_bands import QUANTITIES
 from simrail.report.words.sentences import significant
 from simrail.scenario.scenario import Scenario
-
-FILTERED = tuple(quantity for quantity, filtered in COLUMNS if filtered)
-
-OVERFITTED_FACTOR = 1.5
-"""An error on other rides that is so many times that on the own ride was fitted to the ride."""
 
 
 def searched_on(tuning: Tuning, scenario: Scenario, cell: Mapping[str, object]) -> bool:
@@ -48,19 +42,19 @@ def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:
     own : mapping of str to sequence of float
         Sd of the filtered error on the own ride, mm, by part, in the order of `FILTERED`.
     """
-    told, worst, draws = [], 0.0, 0
+    sentences, worst, draws = [], 0.0, 0
     for part, sds in own.items():
-        found = [rows.get(part, quantity, "sd", filtered=True) for quantity in FILTERED]
-        factors = [figure.value / sd for figure, sd in zip(found, sds, strict=True)]
-        if not np.isfinite(factors).all() or found[0].draws < 2:
+        means = [rows.get(part, quantity, "sd", filtered=True) for quantity in FILTERED]
+        factors = [mean.value / sd for mean, sd in zip(means, sds, strict=True)]
+        if not np.isfinite(factors).all() or means[0].draws < 2:
             continue
         at = int(np.argmax(factors))
-        worst, draws = max(worst, factors[at]), found[at].draws
-        told.append(
-            f"{PARTS[part]}, {QUANTITIES[FILTERED[at]]} {significant(sds[at])} there and "
-            f"{significant(found[at].value)} mm on the mean"
+        worst, draws = max(worst, factors[at]), means[at].draws
+        sentences.append(
+            f"{PAPER.label(part)}, {QUANTITIES[FILTERED[at]]} {significant(sds[at])} there and "
+            f"{significant(means[at].value)} mm on the mean"
         )
-    if not told:
+    if not sentences:
         return ""
     tracks = int(rows.case.table["track_draws"].max())
     if tracks < 2:
@@ -70,7 +64,7 @@ def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:
     return (
         f"Sd of the filtered error on the ride that was searched on, and on the mean of {draws} draws over "
         f"{tracks} lay{'s' * (tracks > 1)} of the rails, of the quantity that differs most: "
-        f"{'; '.join(told)}. {verdict}."
+        f"{'; '.join(sentences)}. {verdict}."
     )
 
 
@@ -78,7 +72,7 @@ def _verdict(worst: float) -> str:
     return (
         f"A search over one ride fits that ride: over all, itself among them, an error is up to {worst:.1f} "
         "times as large"
-        if worst > OVERFITTED_FACTOR
+        if worst > PAPER.limits["overfitted_factor"]
         else "None was fitted to its ride alone: over all, itself among them, no error is more than "
         f"{worst:.1f} times as large"
     )

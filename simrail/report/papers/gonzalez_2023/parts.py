@@ -7,53 +7,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simrail.report.tables.pivot import Figure, Figures
+from simrail.report.papers.claim import read_paper
+from simrail.report.tables.geometry_bands import QUANTITIES
+from simrail.report.tables.pivot import NOTHING, Case, Mean
 from simrail.scenario.cells import Method
 from simrail.scenario.tables import NOISE
 
-PARTS: dict[str, str] = {
-    "cml": "CML",
-    "kom": "KOM",
-    "kom_start": "KOM on part 1",
-    "kom_end": "KOM on part 2",
-    "cml_noise": "CML, noise added",
-    "kom_rides": "KOM on several rides",
-    "cml_held": "CML, virtual positions held",
-    "hand": "set by hand",
-    "blind": "by hand, no sight of the rails",
-    "filter": "by hand, filter alone",
-    "printed": "by hand, misprints kept",
-    "zero": "no IMU",
-}
-"""Parts that a method can play, in the order of the table. The first five have rows in the paper."""
+PAPER = read_paper("gonzalez_2023")
 
-COLOURS: dict[str, str] = {
-    "cml": "#0072B2",
-    "kom": "#D55E00",
-    "kom_start": "#E69F00",
-    "kom_end": "#CC79A7",
-    "cml_noise": "#000000",
-    "cml_held": "#56B4E9",
-    "hand": "#009E73",
-}
-"""Of the parts, which are all the same smoother: Okabe and Ito's. Fig. A2 is without KOM."""
+COLUMNS = (
+    ("cross_level", False),
+    ("cross_level", True),
+    ("alignment", True),
+    ("vertical_profile", True),
+)
+"""Quantities of its Tables 1 and 2, and whether they are filtered."""
+
+FILTERED = tuple(quantity for quantity, filtered in COLUMNS if filtered)
 
 
-def part_of(method: Method) -> str:
-    """Part that a method plays, as the scenario says (``stands_for``); "" if none."""
-    said = method.part.stands_for
-    return said if said in PARTS else ""
+def column_words(comma: str = ", ") -> list[str]:
+    """`COLUMNS` in words: ``cross-level, filtered``."""
+    return [f"{QUANTITIES[q]}{comma}{'filtered' if filtered else 'unfiltered'}" for q, filtered in COLUMNS]
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Figures by the part that a method plays.
+    """Case by the part that a method plays.
 
     Attributes
     ----------
-    case : Figures
+    case : Case
         The case that is looked at.
-    noisy : Figures or None
+    noisy : Case or None
         The same with noise added to the IMU.
     names : dict of str to str
         The scenario's name of the method that plays a part.
@@ -61,17 +47,17 @@ class Rows:
         Band that stands for the paper's filter.
     """
 
-    case: Figures
-    noisy: Figures | None
+    case: Case
+    noisy: Case | None
     names: dict[str, str]
     band: str
 
-    def get(self, part: str, quantity: str, metric: str, *, filtered: bool) -> Figure:
+    def get(self, part: str, quantity: str, metric: str, *, filtered: bool) -> Mean:
         """One figure; NaN and no draws if it was not run."""
         case = self.noisy if part == "cml_noise" else self.case
         name = self.names.get(self.played_by(part), "")
         if case is None:
-            return Figure(float("nan"), float("nan"), 0)
+            return NOTHING
         return case.get(name, quantity, metric, band=self.band if filtered else "full")
 
     def played_by(self, part: str) -> str:
@@ -85,17 +71,22 @@ class Rows:
         )
 
     @property
+    def where(self) -> str:
+        """Which case is looked at, in words."""
+        labels = self.case.labels
+        return (
+            f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), odometry {labels['odometry']}"
+        )
+
+    @property
     def main(self) -> str:
         """The part that figures are drawn of: the paper's own tuning where it was run."""
         return next((part for part in ("cml", "kom", "hand") if self.has(part)), "")
 
 
-def rows_of(all_cases: Sequence[Figures], methods: Sequence[Method], *, band: str) -> Rows | None:
+def rows_of(all_cases: Sequence[Case], methods: Sequence[Method], *, band: str) -> Rows | None:
     """Find the first case of a real IMU with rail geometry; None if there is none."""
-    names: dict[str, str] = {}
-    for method in methods:
-        names.setdefault(part_of(method), method.name)
-    names.pop("", None)
+    names = PAPER.names(methods)
     real = [case for case in all_cases if case.labels["imu"] != "ideal"]
     plain = [case for case in real if not _is_noisy(case)]
     for case in [*plain, *all_cases]:
@@ -106,5 +97,5 @@ def rows_of(all_cases: Sequence[Figures], methods: Sequence[Method], *, band: st
     return None
 
 
-def _is_noisy(case: Figures) -> bool:
+def _is_noisy(case: Case) -> bool:
     return NOISE in case.labels["imu"] or NOISE in case.labels["mount"]

@@ -1,10 +1,33 @@
-"""Where a page of a part is written, with one message if it cannot be."""
+"""The frame of every page: one self-contained HTML file, in which nothing is fetched when it is opened."""
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from simrail.core.errors import InputError
+from simrail.report.words.sentences import FILTERS
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("simrail.report", "."),
+        autoescape=select_autoescape(default=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= FILTERS
+    return environment
+
+
+def page_text(template: str, **data: Any) -> str:
+    """Fill a template, which extends ``pages/frame.html.j2``."""
+    return _environment().get_template(template).render(data)
 
 
 def write_page(folder: Path, name: str, text: str) -> Path:

@@ -1,0 +1,108 @@
+"""The sections of single rides: how each was driven, what was concluded from it, and how it errs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from simrail.campaign.cell import CellResult
+from simrail.report.figures.attitude import attitude_figure, error_figure
+from simrail.report.figures.ride import direction_of, imu_figure, odometry_figure, speed_figure
+from simrail.report.figures.score import curves_figure, rms_figure
+from simrail.report.pages.section import PageData, Section
+from simrail.report.tables.geometry_view import MOST_DRAWN, geometry_view
+from simrail.report.tables.pivot import of_cell
+from simrail.report.tables.tiles import tiles
+from simrail.report.words.findings import findings, one_of_each
+from simrail.report.words.geometry_findings import geometry_findings
+from simrail.report.words.sentences import axis_words, recording_facts
+from simrail.scenario.build import goals_mm, limits_of
+
+MOST_RIDES = 6
+"""Rides that are drawn; the tables hold all."""
+
+
+def ride_sections(data: PageData) -> list[Section]:
+    """A section for each ride that is drawn."""
+    drawn = data.examples[:MOST_RIDES]
+    titles = [ride_title(example) for example in drawn]
+    if len(set(titles)) < len(titles):
+        # One ride may be drawn as two IMUs recorded it.
+        titles = [f"{title} \u00b7 {e.recording.mount}" for title, e in zip(titles, drawn, strict=True)]
+    sections = []
+    for example, title in zip(drawn, titles, strict=True):
+        name = f"{example.recording.name}-{example.cell.get('cell', '')}"
+        anchor = "ride-" + "".join(letter if letter.isalnum() else "-" for letter in name)
+        shown = ride_data(data, example)
+        sections.append(Section(anchor, f"Ride {title}", "pages/sections/ride.html.j2", shown))
+    if sections:
+        sections[-1].data["rides_left_out"] = max(len(data.examples) - MOST_RIDES, 0)
+    return sections
+
+
+def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
+    """What the template shows of a ride."""
+    spec, styles, name = data.scenario.spec, data.attitude_styles, example.recording.name
+    case = of_cell(data.cases, example.cell)
+    geometry = geometry_view(example, case, data.styles, limits=limits_of(spec), known=data.bands)
+    drawn = [style for style in styles if style.name in example.estimates]
+    drawn = one_of_each(case, drawn) if case else drawn
+    left_out = [style for style in drawn if not style.baseline][MOST_DRAWN:] if geometry else []
+    drawn = [style for style in drawn if style not in left_out]
+    first = [s for s in drawn if not s.baseline] + [s for s in drawn if s.baseline == "general purpose"]
+    comparisons = []
+    for style in drawn:
+        twin = next((other for other in drawn if other.name == style.twin), None)
+        if style.compensated and twin:
+            title = f"{style.kind}, with and without compensation"
+            comparisons.append((title, attitude_figure(example, [style, twin], what=f"{title}, {name}")))
+    of_scores: dict[str, Any] = {"tiles": [], "findings": [], "rms": "", "curves": ""}
+    if case:
+        of_scores = {
+            "tiles": tiles(case, data.styles, known=data.bands),
+            "findings": [
+                # Where rails are scored, they are what the ride was for.
+                *geometry_findings(case, data.styles, data.cases, goals_mm=goals_mm(spec), known=data.bands),
+                *findings(case, styles, others=data.cases),
+            ],
+            "rms": rms_figure(case, styles),
+            "curves": curves_figure(case, styles),
+        }
+    return of_scores | {
+        "scenario": data.scenario,
+        "styles": data.styles,
+        "facts": ride_facts(example),
+        "speed": speed_figure(example, conditions=spec.rail_condition),
+        "imu": imu_figure(example),
+        "attitude": attitude_figure(example, first or drawn, what=f"Attitude, {name}") if drawn else "",
+        "comparisons": comparisons,
+        "errors": error_figure(example, drawn) if drawn else "",
+        "odometry": "" if example.recording.odometry is None else odometry_figure(example),
+        "geometry": geometry,
+        "left_out": len(left_out),
+        "rides_left_out": 0,
+    }
+
+
+def ride_title(example: CellResult) -> str:
+    """Name of a ride, and the values of its axes."""
+    axes = [
+        axis_words(name, value) for name, value in example.cell.items() if "." in name and name != "imu.grade"
+    ]
+    return " \u00b7 ".join([example.recording.name, *axes])
+
+
+def ride_facts(example: CellResult) -> list[str]:
+    """Length, speed, IMU and odometry of a ride, a line each."""
+    motion, recording = example.motion, example.recording
+    position, speed = motion["position_m"].to_numpy(), np.abs(motion["speed_mps"].to_numpy())
+    moving = speed > 0.01
+    way = "increasing" if direction_of(example) > 0 else "decreasing"
+    mean = 3.6 * float(speed[moving].mean()) if moving.any() else 0.0
+    duration = float(motion.index[-1] - motion.index[0])
+    return [
+        f"{abs(position[-1] - position[0]):.0f} m towards {way} distance, {duration:.0f} s",
+        f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
+        *recording_facts(recording),
+    ]

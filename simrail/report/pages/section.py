@@ -1,0 +1,102 @@
+"""What a page is made of: the campaign that it shows, and sections, each a title, a template and its data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from simrail.campaign.cell import CellResult
+from simrail.campaign.stored_results import StoredResults
+from simrail.report.tables.geometry_bands import band_of_all
+from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
+from simrail.report.tables.pivot import Case, cases
+from simrail.scenario.build import bands_by_name
+from simrail.scenario.cells import Method, methods
+from simrail.scenario.scenario import Scenario
+from simrail.track.bands import Band
+
+
+@dataclass(frozen=True)
+class PageData:
+    """A campaign as its page shows it.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What was run.
+    scores : pandas.DataFrame
+        The score table.
+    cells : pandas.DataFrame
+        One row per cell: labels and values of the axes.
+    examples : sequence of CellResult
+        Rides to draw, first draw of each.
+    manifest : mapping
+        What the campaign noted of itself: command, versions, times; plain values.
+    beside : StoredResults, optional
+        Results of another scenario of the same publication.
+    """
+
+    scenario: Scenario
+    scores: pd.DataFrame
+    cells: pd.DataFrame
+    examples: Sequence[CellResult]
+    manifest: Mapping[str, Any]
+    beside: StoredResults | None = None
+
+    @cached_property
+    def cases(self) -> list[Case]:
+        """Scores by case, averaged over the draws."""
+        return cases(self.scores, self.cells)
+
+    @cached_property
+    def methods(self) -> list[Method]:
+        """Methods of the scenario."""
+        return methods(self.scenario)
+
+    @cached_property
+    def styles(self) -> list[MethodStyle]:
+        """How they look."""
+        return list(method_styles(self.scenario).values())
+
+    @property
+    def attitude_styles(self) -> list[MethodStyle]:
+        """How those look that are told apart by their attitude."""
+        return attitude_methods(self.styles)
+
+    @cached_property
+    def bands(self) -> dict[str, Band]:
+        """Bands of the scenario by name."""
+        return bands_by_name(self.scenario.spec)
+
+    @property
+    def judged_band(self) -> str:
+        """Band that most cases with rail geometry are judged in."""
+        return band_of_all(self.cases)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page.
+
+    Attributes
+    ----------
+    anchor, title : str
+        How it is found and called.
+    template : str
+        What shows it.
+    data : dict
+        What the template shows.
+    write_beside : callable, optional
+        Writes files into the folder of the page.
+    """
+
+    anchor: str
+    title: str
+    template: str
+    data: dict[str, Any]
+    write_beside: Callable[[Path], None] | None = None
