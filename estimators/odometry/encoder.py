@@ -193,8 +193,8 @@ def _ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: Flo
     ahead_x, ahead_p = x.copy(), p.copy()
     if lead > 0.0:
         _predict(ahead_x, ahead_p, lead, intensity)
-    out[:3] = ahead_x
-    for i in range(3):
+    for i in range(3):  # by elements: numba compiles the assignment of a whole array for seconds
+        out[i] = ahead_x[i]
         out[3 + i] = ahead_p[i, i]
 
 

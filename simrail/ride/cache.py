@@ -52,7 +52,7 @@ def key_of(description: dict[str, Any]) -> str:
 
 def rides() -> list[CachedRide]:
     """Every complete ride in the cache, the most recently used first."""
-    found = []
+    cached = []
     for place in folder().glob("[!.]*/truth.json"):
         with suppress(OSError):  # another process may drop it meanwhile
             size = sum(file.stat().st_size for file in place.parent.iterdir())
@@ -61,8 +61,8 @@ def rides() -> list[CachedRide]:
                 name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
             except (ValueError, KeyError):
                 name = "damaged"
-            found.append(CachedRide(place.parent.name, name, size, used))
-    return sorted(found, key=lambda ride: -ride.last_used_s)
+            cached.append(CachedRide(place.parent.name, name, size, used))
+    return sorted(cached, key=lambda ride: -ride.last_used_s)
 
 
 def clear() -> int:
@@ -113,9 +113,9 @@ def _drop_leftovers() -> None:
 
 
 def _make_room(size: int) -> None:
-    kept = rides()
-    total = size + sum(ride.size_bytes for ride in kept)
-    while kept and total > limit_bytes():
-        oldest = kept.pop()
+    stored = rides()
+    total = size + sum(ride.size_bytes for ride in stored)
+    while stored and total > limit_bytes():
+        oldest = stored.pop()
         drop(oldest.key)
         total -= oldest.size_bytes

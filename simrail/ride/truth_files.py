@@ -160,8 +160,8 @@ def load_truth(folder: Path) -> Truth:
 
 def _crc32(file: Path) -> int:
     """Checksum of a file: a disk, or a copy between machines, may change bits in silence."""
-    found = 0
+    checksum = 0
     with file.open("rb") as stream:
         while block := stream.read(1 << 20):
-            found = zlib.crc32(block, found)
-    return found
+            checksum = zlib.crc32(block, checksum)
+    return checksum

@@ -218,7 +218,7 @@ def mean_square_vibration(
         (m/s2)^2.
     """
     gain = 1.0 - np.exp(-1.0 / (rate_hz * averaging_s))
-    found = np.zeros((len(at), 3))
+    variances = np.zeros((len(at), 3))
     mx, my, mz = force[0, 0], force[0, 1], force[0, 2]
     sx, sy, sz = 0.0, 0.0, 0.0
     done = 0
@@ -233,8 +233,8 @@ def mean_square_vibration(
             sy += gain * (dy * (1.0 - gain) * dy - sy)
             sz += gain * (dz * (1.0 - gain) * dz - sz)
             done += 1
-        found[k, 0], found[k, 1], found[k, 2] = sx, sy, sz
-    return found
+        variances[k, 0], variances[k, 1], variances[k, 2] = sx, sy, sz
+    return variances
 
 
 def digitise(samples: FloatArray, terms: Triad, *, increments: bool) -> FloatArray:

@@ -114,7 +114,7 @@ def rails_seen(
         rail base.
     """
     body = rotation_matrix(angles)
-    found = []
+    sides = []
     for side, first in ((0.5, 0), (-0.5, 2)):
         s, seen = guess, np.empty((len(guess), 3))
         for _ in range(4):
@@ -130,8 +130,8 @@ def rails_seen(
             s = s - seen[:, 0]
             if np.abs(seen[:, 0]).max() < 1e-6:
                 break
-        found.append(seen[:, 1:])
-    return found[0], found[1]
+        sides.append(seen[:, 1:])
+    return sides[0], sides[1]
 
 
 def check_rail_sensor(spec: RailSensorSpec) -> None:

@@ -209,5 +209,5 @@ def sd_of_draws(draws: FloatArray) -> FloatArray:
     """
     m = len(draws)
     widened = float(stdtrit(m, 0.975) / ndtri(0.975))
-    found: FloatArray = widened * np.sqrt(np.square(draws).sum(axis=0) / m)
-    return found
+    limits: FloatArray = widened * np.sqrt(np.square(draws).sum(axis=0) / m)
+    return limits

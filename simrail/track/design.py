@@ -205,8 +205,8 @@ class TrackDesign:
     def segment(self, s: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Index of the element at places s; at a joint, of the one that begins there."""
         starts = self._shape.starts_m
-        found = np.searchsorted(starts, self.on_track(s), side="right") - 1
-        return np.minimum(found, len(self.elements) - 1)
+        index = np.searchsorted(starts, self.on_track(s), side="right") - 1
+        return np.minimum(index, len(self.elements) - 1)
 
     def kind(self, s: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """`STRAIGHT`, `TRANSITION` or `CURVE` at places s; shaped like s."""

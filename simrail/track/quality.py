@@ -86,12 +86,12 @@ def section_indicators(
         return pd.DataFrame(columns=list(INDICATORS))
     step = float(position[1] - position[0])
     values = {name.removesuffix("_m"): geometry[name].to_numpy(dtype=np.float64) for name in IRREGULARITY}
-    known = {name: line for name, line in values.items() if np.isfinite(line).all()}
-    lines = known
+    finite = {name: line for name, line in values.items() if np.isfinite(line).all()}
+    lines = finite
     if band is not None:
-        lines = {name: band_pass(line, band.edges_m(name), step_m=step) for name, line in known.items()}
-    if twist_base_m is not None and "cross_level" in known:
-        lines = {**lines, "twist": twist(known["cross_level"], base_m=twist_base_m, step_m=step)}
+        lines = {name: band_pass(line, band.edges_m(name), step_m=step) for name, line in finite.items()}
+    if twist_base_m is not None and "cross_level" in finite:
+        lines = {**lines, "twist": twist(finite["cross_level"], base_m=twist_base_m, step_m=step)}
     for name in limits or {}:
         if name not in (*values, "twist"):
             raise InputError(

@@ -162,9 +162,9 @@ class TractionEntry(Part):
         for name, share in given.items():
             spins = list(dict.fromkeys(w.spin for w in wheels if name in (w.axle, w.name)))
             if not spins:
-                known = dict.fromkeys([w.axle for w in wheels] + [w.name for w in wheels])
+                names = dict.fromkeys([w.axle for w in wheels] + [w.name for w in wheels])
                 raise InputError(
-                    "no such axle or wheel", field=kind, value=name, limit="one of " + ", ".join(known)
+                    "no such axle or wheel", field=kind, value=name, limit="one of " + ", ".join(names)
                 )
             for spin in spins:
                 if spin in shares:

@@ -232,8 +232,8 @@ class RunningVehicle:
         free = tuple(i for i in range(self.bodies) if i not in axles)
         first = np.concatenate([np.arange(6 * i, 6 * i + 6) for i in free]) if free else np.zeros(0, int)
         creep = 12 * self.bodies + len(self.data.spins) + 4 * len(self.model.wheels)
-        kept = np.concatenate([first, 6 * self.bodies + first, np.arange(creep, self.size)]).astype(int)
-        return matrix[np.ix_(kept, kept)], free
+        states = np.concatenate([first, 6 * self.bodies + first, np.arange(creep, self.size)]).astype(int)
+        return matrix[np.ix_(states, states)], free
 
     def _inverse(self, state: FloatArray, speed_mps: float) -> FloatArray:
         """Inverse of the Jacobian, scaled by the difference steps and by rows before it is inverted."""

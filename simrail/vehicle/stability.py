@@ -59,8 +59,8 @@ class Mode:
     def words(self, *, most: int = 3, least: float = 0.1) -> str:
         """What moves, the largest share first: ``"body lateral 70 %, body roll 20 %"``."""
         ranked = sorted(self.shares.items(), key=lambda item: -item[1])
-        told = [f"{b} {d} {100 * share:.0f} %" for (b, d), share in ranked[:most] if share >= least]
-        return ", ".join(told)
+        texts = [f"{b} {d} {100 * share:.0f} %" for (b, d), share in ranked[:most] if share >= least]
+        return ", ".join(texts)
 
 
 def modes_of(
@@ -83,7 +83,7 @@ def modes_of(
     weight = np.array(
         [[vehicle.model.bodies[i].mass_kg] * 3 + [*vehicle.model.bodies[i].inertia_kgm2] for i in of]
     )
-    found = []
+    modes = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag > 2.0 * np.pi * 1e-3:
             energy = weight.ravel() * np.abs(vector[n : 2 * n]) ** 2
@@ -91,8 +91,8 @@ def modes_of(
             shares = {
                 (vehicle.model.bodies[of[k // 6]].name, DIRECTIONS[k % 6]): float(energy[k]) for k in range(n)
             }
-            found.append(Mode(complex(value), shares))
-    return sorted(found, key=lambda mode: mode.natural_frequency_hz)
+            modes.append(Mode(complex(value), shares))
+    return sorted(modes, key=lambda mode: mode.natural_frequency_hz)
 
 
 def standstill_modes(vehicle: RunningVehicle) -> list[Mode]:
@@ -207,8 +207,8 @@ def first_crossing(
         return max(growth_1ps(eigenvalues(v)), -1e3)
 
     low, high = float(speeds_mps[i - 1]), float(speeds_mps[i])
-    found = low if growth(low) >= 0.0 else float(brentq(growth, low, high, xtol=1e-7, rtol=1e-9))
-    return CriticalSpeed(found, _fastest_growing_hz(eigenvalues(found)), searched)
+    speed_mps = low if growth(low) >= 0.0 else float(brentq(growth, low, high, xtol=1e-7, rtol=1e-9))
+    return CriticalSpeed(speed_mps, _fastest_growing_hz(eigenvalues(speed_mps)), searched)
 
 
 def _fastest_growing_hz(eigenvalues: ComplexArray) -> float:

@@ -76,11 +76,16 @@ def test_natural_frequencies_with_the_wheelsets_held():
 
 @pytest.mark.parametrize(
     ("conicity", "kmh", "hz"),
-    [(0.10, 299.0, 3.75), (0.15, 280.0, 4.53), (0.20, 261.0, 5.12), (0.30, 227.0, 5.96)],
+    [
+        (0.10, 299.0, 3.75),
+        pytest.param(0.15, 280.0, 4.53, marks=pytest.mark.slow),
+        pytest.param(0.20, 261.0, 5.12, marks=pytest.mark.slow),
+        (0.30, 227.0, 5.96),
+    ],
 )
 def test_critical_speed(conicity, kmh, hz):
     """Within 5 % in speed and 2 % in frequency (measured: 1.3 and 0.6 %)."""
     vehicle = running_vehicle(simplified(conicity))
-    critical = critical_speed(vehicle, root_locus(vehicle, np.linspace(20.0, 100.0, 9)))
+    critical = critical_speed(vehicle, root_locus(vehicle, np.linspace(20.0, 100.0, 5)))
     assert critical.speed_mps * 3.6 == pytest.approx(kmh, rel=0.05)
     assert critical.frequency_hz == pytest.approx(hz, rel=0.02)

@@ -1,4 +1,8 @@
-"""The bogie's ride obeys mechanics: loads, rest, steady running, and truths that integrate to themselves."""
+"""The bogie's ride obeys mechanics: loads, rest, steady running, and truths that integrate to themselves.
+
+Long rides are driven by the compiled engine; that Exudyn makes the same motion is what
+`test_engines_agree` shows.
+"""
 
 import numpy as np
 import pytest
@@ -39,7 +43,9 @@ def track(name):
 def rough_ride():
     """75 s on the irregular line at 40 km/h: a transition, the sharp curve, the smooth one, a stop."""
     profile = SpeedProfile(330.0, 930.0, 40.0 / 3.6, rest_s=3.0, final_rest_s=5.0, acceleration_mps2=0.9)
-    return simulate(Ride("closure", track("condequinto_olivar"), ROUGH, 5, vehicle(), profile))
+    return simulate(
+        Ride("closure", track("condequinto_olivar"), ROUGH, 5, vehicle(), profile, engine="compiled")
+    )
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +115,9 @@ def test_static_wheel_loads_carry_the_weight():
 def test_level_smooth_straight_is_silent():
     """After 10 s at constant speed the axle feels less than 1e-6 m/s2; at standstill less than 1e-4."""
     profile = SpeedProfile(20.0, 620.0, 15.0, rest_s=3.0, final_rest_s=1.0, acceleration_mps2=1.0)
-    truth = simulate(Ride("silent", track("level_straight"), SMOOTH, 0, vehicle(), profile))
+    truth = simulate(
+        Ride("silent", track("level_straight"), SMOOTH, 0, vehicle(), profile, engine="compiled")
+    )
     motion = truth.motion(MOUNTS[0])
     felt = motion[list(ACCEL)].to_numpy() - [0.0, 0.0, 9.81]
     tilt = motion["pitch_rad"].to_numpy()
@@ -129,7 +137,8 @@ def test_halving_the_step_changes_little():
     profile = SpeedProfile(640.0, 840.0, 50.0 / 3.6, rest_s=1.0, final_rest_s=1.0, acceleration_mps2=1.0)
     line = track("condequinto_olivar")
     coarse, fine = (
-        simulate(Ride("step", line, ROUGH, 5, vehicle(), profile, step_s=step)) for step in (0.5e-3, 0.25e-3)
+        simulate(Ride("step", line, ROUGH, 5, vehicle(), profile, engine="compiled", step_s=step))
+        for step in (0.5e-3, 0.25e-3)
     )
     motion = coarse.motion(Mount("axle", "front", (0.0, 0.0, 0.29)))
     rails = lay(line, ROUGH, seed=5).irregularities(motion["position_m"].to_numpy())
@@ -143,4 +152,4 @@ def test_derailment_is_said():
     """A curve far too fast for its cant throws the bogie out: one clear error, not a wrong ride."""
     profile = SpeedProfile(20.0, 560.0, 75.0, rest_s=0.5, acceleration_mps2=30.0, jerk_mps3=200.0)
     with pytest.raises(DerailedError, match=r"axle (front|rear) left the rail at s = "):
-        simulate(Ride("derailed", track("smooth_curve"), SMOOTH, 0, vehicle(), profile))
+        simulate(Ride("derailed", track("smooth_curve"), SMOOTH, 0, vehicle(), profile, engine="compiled"))

@@ -15,8 +15,13 @@ from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
 from simrail.vehicle.engines.force_data import memory_of, pack, states_of
 from simrail.vehicle.engines.forces import forces
-from simrail.vehicle.engines.records import LAW, POSE, SERIES, SPRING, STOP, TURN, WRENCH
-from simrail.vehicle.engines.suspension_forces import series_forces, spring_forces, stop_forces, turn_forces
+from simrail.vehicle.engines.records import LAW, POSE, ROTATION, SERIES, SPRING, STOP, WRENCH
+from simrail.vehicle.engines.suspension_forces import (
+    rotation_forces,
+    series_forces,
+    spring_forces,
+    stop_forces,
+)
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -63,8 +68,8 @@ ELEMENTS = {
     ),
     "stop": lambda pose, w: stop_forces(np.array([(*ENDS, 2, 0, 0, 2)], STOP), PIECES, pose, w),
     "rate law": lambda pose, w: stop_forces(np.array([(*ENDS, 0, 1, 0, 2)], STOP), PIECES, pose, w),
-    "rotation": lambda pose, w: turn_forces(
-        np.array([(0, 1, (1e3, 2e3, 3e3), (10.0, 20.0, 30.0))], TURN), pose, w
+    "rotation": lambda pose, w: rotation_forces(
+        np.array([(0, 1, (1e3, 2e3, 3e3), (10.0, 20.0, 30.0))], ROTATION), pose, w
     ),
 }
 
@@ -124,7 +129,7 @@ def test_anti_roll_bar_is_a_moment_by_angle():
     """940 kN m/rad and 10 mrad give 9.4 kN m about X, and nothing else."""
     pose, wrenches = still(), two(WRENCH)
     pose["rotation"][1] = Turn.from_rotvec([0.010, 0.0, 0.0]).as_matrix()
-    turn_forces(np.array([(0, 1, (940e3, 0.0, 0.0), (0.0, 0.0, 0.0))], TURN), pose, wrenches)
+    rotation_forces(np.array([(0, 1, (940e3, 0.0, 0.0), (0.0, 0.0, 0.0))], ROTATION), pose, wrenches)
     wrench = flat(wrenches)
     np.testing.assert_allclose(wrench[0], [0, 0, 0, 9400.0, 0, 0], rtol=2e-5, atol=1e-9)
     np.testing.assert_allclose(wrench[1], -wrench[0])

@@ -243,13 +243,14 @@ def wheel_force(
         # A yawed wheel touches ahead of its axle, so that the normal force still meets the axle.
         lead = r * psi * (side * t - phi) * (1.0 - side * t * phi)
 
-        # Slip of the wheel's point on the rail's in the track frame; then in the contact's plane.
+        # Slip of the wheel's point on the rail's in the track frame; then in the contact's plane, and the
+        # rate at which the two turn on each other about its normal (over V it is the spin creepage).
         slip_x = motion.v_x - motion.kappa_h * V * Y - psi_dot * Y - W * r
         slip_y = motion.y_dot - V * rail.dy + (phi_dot - W * psi) * r + psi_dot * lead
         slip_z = motion.z_dot - V * rail.dz + phi_dot * Y - W * lead
         v_n = cd * slip_z - side * sd * slip_y
         v_2 = cd * slip_y + side * sd * slip_z
-        spin = cd * (psi_dot + motion.kappa_h * V + W * phi) - side * sd * W
+        spin_slip = cd * (psi_dot + motion.kappa_h * V + W * phi) - side * sd * W
 
         # Hertz: N = hertz d^1.5 (1 - chi v_n), with d the approach along the normal.
         d = pen * cd
@@ -266,7 +267,7 @@ def wheel_force(
 
         # Creep states: see the notes. A wheel that lands grips gradually, up to its touch load.
         bound = fallen(rail.friction, const.friction_floor, const.friction_decay_spm, slip_x, v_2) * N
-        turn = f23 * spin * per_speed
+        turn = f23 * spin_slip * per_speed
         share = turn / f22
         l1 = f11 * z1
         l2 = f22 * z2 + turn
@@ -285,7 +286,7 @@ def wheel_force(
         if const.creep_law == FASTSIM:
             a = value(patch.semi_axis_along, x) * root
             b = value(patch.semi_axis_across, x) * root
-            twist = f23 * spin * abs(per_speed)
+            twist = f23 * spin_slip * abs(per_speed)
             T1, T2, along, across = fastsim(
                 f11 * x1 / bound, f22 * x2 / bound, turn / bound, twist / bound, b / a
             )
@@ -295,7 +296,7 @@ def wheel_force(
         else:
             T1 = -f11 * x1
             T2 = -f22 * x2 - turn
-            M = direction * f23 * x2 - f33 * spin * abs(per_speed)
+            M = direction * f23 * x2 - f33 * spin_slip * abs(per_speed)
             q = np.sqrt(T1 * T1 + T2 * T2) / bound
             factor = saturation(q, const.creep_law, const.polach_adhesion, const.polach_slip)
             T1 *= factor

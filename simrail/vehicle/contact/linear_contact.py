@@ -47,7 +47,7 @@ def linear_wheel_force(
     # Creep states: zeta' = (slip - |V| zeta)/(L0 + tau |V|).
     slip_x = motion.v_x - (motion.kappa_h * V + psi_dot) * Y - W * (r0 + side * linear.conicity * shift)
     slip_y = motion.y_dot - V * rail.dy - W * r0 * motion.psi
-    spin = psi_dot + motion.kappa_h * V
+    spin_slip = psi_dot + motion.kappa_h * V
     zeta_dot[0] = (slip_x - speed * zeta[0]) / length
     zeta_dot[1] = (slip_y - speed * zeta[1]) / length
     x1 = zeta[0] + const.creep_damping_s * zeta_dot[0]
@@ -55,8 +55,8 @@ def linear_wheel_force(
     # Kalker's linear forces and spin moment, and the gravitational stiffness.
     per_speed = rolling(V, const.spin_speed_mps)
     T1 = -linear.f11 * x1
-    T2 = -linear.f22 * x2 - linear.f23 * spin * per_speed
-    M = speed * per_speed * linear.f23 * x2 - linear.f33 * spin * abs(per_speed)
+    T2 = -linear.f22 * x2 - linear.f23 * spin_slip * per_speed
+    M = speed * per_speed * linear.f23 * x2 - linear.f33 * spin_slip * abs(per_speed)
     fy = T2 - linear.gravitational_stiffness * shift
     my = -r0 * T1
     # The larger rolling radius moves the point where the longitudinal force drives the wheel.

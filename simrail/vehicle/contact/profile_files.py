@@ -82,13 +82,13 @@ def wheel_profile(name_or_path: str | Path, beside: Path | None = None) -> Wheel
     text = str(name_or_path)
     if text == "S1002":
         return s1002()
-    if found := re.fullmatch(r"cone_(\d+)_(\d+)", text):
-        rise, run = int(found[1]), int(found[2])
+    if match := re.fullmatch(r"cone_(\d+)_(\d+)", text):
+        rise, run = int(match[1]), int(match[2])
         return conical_wheel(rise / run if run else np.inf)
-    if found := re.fullmatch(r"cone_(\d*\.\d+)", text):
-        return conical_wheel(float(found[1]))
-    if found := re.fullmatch(r"S1002_worn_(\d*\.?\d+)", text):
-        return worn(s1002(), wear_m=float(found[1]) * 1e-3)
+    if match := re.fullmatch(r"cone_(\d*\.\d+)", text):
+        return conical_wheel(float(match[1]))
+    if match := re.fullmatch(r"S1002_worn_(\d*\.?\d+)", text):
+        return worn(s1002(), wear_m=float(match[1]) * 1e-3)
     path = _path(text, beside, ".prw", field="wheel_profile", names=_WHEEL_NAMES)
     y, z, line = read_points(path, kind=1)
     tip = int(np.argmax(z))

@@ -109,19 +109,19 @@ def thinned(y: FloatArray, z: FloatArray, path: Path) -> tuple[FloatArray, Float
     InputError
         If too few stay.
     """
-    kept = [0]
+    apart = [0]
     for i in range(1, y.size):
-        if np.hypot(y[i] - y[kept[-1]], z[i] - z[kept[-1]]) >= _LEAST_DISTANCE_M:
-            kept.append(i)
-    if len(kept) < _FEWEST_POINTS:
+        if np.hypot(y[i] - y[apart[-1]], z[i] - z[apart[-1]]) >= _LEAST_DISTANCE_M:
+            apart.append(i)
+    if len(apart) < _FEWEST_POINTS:
         raise InputError(
             "too few different points for a profile",
             file=path,
             field="points",
-            value=len(kept),
+            value=len(apart),
             limit=f"at least {_FEWEST_POINTS}, {_LEAST_DISTANCE_M * 1e3:g} mm apart",
         )
-    return y[kept], z[kept]
+    return y[apart], z[apart]
 
 
 def _parse(path: Path, *, kind: int) -> _Points:

@@ -28,8 +28,8 @@ class ForceData(NamedTuple):
 
     Attributes
     ----------
-    bodies, springs, series, turns, stops, laws, wheels, spins, axles, drive : ndarray of records
-        One record each: `BODY`, `SPRING`, `SERIES`, `TURN`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
+    bodies, springs, series, rotations, stops, laws, wheels, spins, axles, drive : ndarray of records
+        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
     guide, traction, options : ndarray of records (1,)
         `GUIDE`, `TRACTION`, `OPTIONS`.
     track : ndarray of records
@@ -41,7 +41,7 @@ class ForceData(NamedTuple):
     bodies: RecordArray
     springs: RecordArray
     series: RecordArray
-    turns: RecordArray
+    rotations: RecordArray
     stops: RecordArray
     laws: RecordArray
     wheels: RecordArray
@@ -119,12 +119,12 @@ def pack(
             [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series],
             records.SERIES,
         ),
-        turns=np.array(
+        rotations=np.array(
             [
                 (index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad)
                 for e in model.rotations
             ],
-            records.TURN,
+            records.ROTATION,
         ),
         stops=stops,
         laws=laws,

@@ -73,7 +73,7 @@ BODY = _record("mass_kg", inertia=_VECTOR)
 SPRING = _record("sag_m", **_ENDS, stiffness=_VECTOR, damping=_VECTOR)
 """``sag_m``: deflection at rest along z."""
 SERIES = _record("stiffness damping", **_ENDS, axis=_INDEX)
-TURN = _record("", inner=_INDEX, outer=_INDEX, stiffness=_VECTOR, damping=_VECTOR)
+ROTATION = _record("", inner=_INDEX, outer=_INDEX, stiffness=_VECTOR, damping=_VECTOR)
 """A spring and damper of the rotation between two bodies."""
 STOP = _record("", **_ENDS, axis=_INDEX, over_rate=_INDEX, first=_INDEX, pieces=_INDEX)
 """An element with a tabled law: the pieces from ``first`` on, over its deflection or its rate."""

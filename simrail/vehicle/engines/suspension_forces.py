@@ -131,14 +131,14 @@ def stop_forces(stops: RecordArray, laws: RecordArray, pose: RecordArray, wrench
 
 
 @njit_borrowed
-def turn_forces(turns: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
+def rotation_forces(rotations: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
     """Add rotational springs and dampers, of the small rotation of the outer body in the inner body's axes.
 
     The rotation is the antisymmetric part of A^T B.
     """
-    for m in range(turns.shape[0]):
-        turn = turns[m]
-        a, b, wa, wb = pose[turn.inner], pose[turn.outer], wrench[turn.inner], wrench[turn.outer]
+    for m in range(rotations.shape[0]):
+        spring = rotations[m]
+        a, b, wa, wb = pose[spring.inner], pose[spring.outer], wrench[spring.inner], wrench[spring.outer]
         A, B = a.rotation, b.rotation
         for k in range(3):
             q, u = (k + 1) % 3, (k + 2) % 3
@@ -146,7 +146,7 @@ def turn_forces(turns: RecordArray, pose: RecordArray, wrench: RecordArray) -> N
             for n in range(3):
                 angle += 0.5 * (A[n, u] * B[n, q] - A[n, q] * B[n, u])
             rate = A[0, k] * (b.wx - a.wx) + A[1, k] * (b.wy - a.wy) + A[2, k] * (b.wz - a.wz)
-            moment = turn.stiffness[k] * angle + turn.damping[k] * rate
+            moment = spring.stiffness[k] * angle + spring.damping[k] * rate
             wa.mx += A[0, k] * moment
             wa.my += A[1, k] * moment
             wa.mz += A[2, k] * moment
