@@ -1,7 +1,5 @@
 """General-purpose AHRS: what a good filter that knows nothing of trains makes of the same signals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import imufusion

@@ -3,8 +3,6 @@
 A method that loses to `DesignAngles` is better replaced by the track's drawing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -19,8 +19,6 @@ Stochastic Processes, Wiley 1968 (block update); F. C. Schweppe, IEEE Trans. Inf
 (likelihood); J. Durbin and S. J. Koopman, Biometrika 89 (2002) 603-615 (draws by mean corrections).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

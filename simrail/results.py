@@ -6,8 +6,6 @@ complete; an interrupted run leaves the former results as they were, and what it
 to make the results again, and nothing of the machine's folders or users.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

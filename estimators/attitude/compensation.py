@@ -8,8 +8,6 @@ It assumes that the body's axes are those of the track frame and that the body d
 what is neglected is the body's own relative motion.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

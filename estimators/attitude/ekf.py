@@ -4,8 +4,6 @@ Three states: roll, pitch, yaw. The gyro predicts, gravity corrects (EQUATIONS 2
 assumes is chosen in `simrail.estimators.attitude.noise`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

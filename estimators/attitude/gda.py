@@ -6,8 +6,6 @@ makes the lateral acceleration lopsided, mean and median differ, and the roll go
 no covariance.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ The three-state extended Kalman filter and the gradient descent algorithm of Bri
 (`simrail.estimators.attitude.compensation`), so nothing here knows of tracks, recordings or data frames.
 """
 
-from __future__ import annotations
-
 import math
 
 from simrail.core.jit import FloatArray, njit, njit_inline

@@ -36,8 +36,6 @@ NIS of a ride is well below 3 at low speed and is a test of the matched model on
 variance ("considered"), and likewise the yaw that the residual gyro bias adds up to.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Quaternions (a, b, c, d), scalar first, body to global, to and from ZYX Euler angles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import FloatArray

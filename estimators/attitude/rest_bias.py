@@ -20,8 +20,6 @@ rest counts fully: what the sheet says of the bias at switch-on is no match for 
 A sheet prints B but not tau; `CORRELATION_S` stands for it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

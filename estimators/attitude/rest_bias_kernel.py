@@ -4,8 +4,6 @@ It goes forward over the samples and knows of the future nothing, so the result 
 prefix of the result. What it computes is derived in `simrail.estimators.attitude.rest_bias`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

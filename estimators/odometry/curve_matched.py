@@ -34,8 +34,6 @@ steps (`simrail.estimators.odometry.trace`), and odometry from the encoder alone
 (`simrail.estimators.odometry.encoder`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -15,8 +15,6 @@ of pulses per reading the count's error is a slow sawtooth, which the filter fol
 An odometer that shows the speed, in place of a counter, runs through the same model.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

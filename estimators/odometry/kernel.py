@@ -4,8 +4,6 @@ Arrays in, arrays out; nothing here knows of recordings or data frames. What the
 noise is chosen, stands in `simrail.estimators.odometry.curve_matched`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ made here, since a train's own acceleration changes slowly, and the acceleromete
 Not here: the filter (`simrail.estimators.odometry.curve_matched`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple

@@ -17,8 +17,6 @@ it hangs together:
 A draw is the truth minus the estimate: added to the estimate it is rails that the recording allows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

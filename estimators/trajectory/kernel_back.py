@@ -7,8 +7,6 @@ place: a ride of an hour then needs no second copy of its covariances. Random nu
 Not here: the geometry of the rails that follows from a draw (`simrail.estimators.trajectory.draws`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from simrail.estimators.kalman import chain, chain_back, chain_information, withdraw, withdraw_information
 from simrail.estimators.trajectory.kernel_equations import (

@@ -5,8 +5,6 @@ of the Jacobian apart. What happens along the track comes as `TERMS` of each sam
 `simrail.estimators.trajectory.model`, so nothing here knows of tracks, recordings or data frames.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import FloatArray, njit_borrowed

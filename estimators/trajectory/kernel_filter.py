@@ -8,8 +8,6 @@ Not here: the equations (`simrail.estimators.trajectory.kernel_equations`) and t
 (`simrail.estimators.trajectory.kernel_back`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ Not here: the loops (`simrail.estimators.trajectory.kernel_filter`), and the noi
 (`simrail.estimators.trajectory.noise`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Not here: what the samples are of (`simrail.estimators.trajectory.track_geometry
 (`simrail.track.bands`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

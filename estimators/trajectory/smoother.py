@@ -19,8 +19,6 @@ soft show there as a peak of the alignment over some metres, such as paper 001 f
 The model stands in `simrail.estimators.trajectory.model`, the noise in `simrail.estimators.trajectory.noise`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -10,8 +10,6 @@ It has no filter of its own: the trajectory is smoothed before, its samples are 
 `simrail.estimators.trajectory.over_space`, and wavelength bands are cut out after (`simrail.track.bands`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ parameter on a logarithmic scale is searched in its logarithm.
 Not here: the search (`simrail.estimators.tuning.search`), what it minimises (a tunable estimator's own).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ covariance of the estimate (Cramer-Rao); on a real ride the model is not true an
 Not here: how the optimum was found (`simrail.estimators.tuning.tune`).
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping

@@ -15,8 +15,6 @@ finds for the other parameters makes the signals likely under a model that the t
 Not here: the search (`simrail.estimators.tuning.tune`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any

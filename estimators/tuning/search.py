@@ -11,8 +11,6 @@ An interrupted search goes on where it was, bit by bit: what it does depends on 
 alone, so it is run again from the start on the values that are on record (`Record`).
 """
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress

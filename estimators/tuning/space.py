@@ -3,8 +3,6 @@
 Gonzalez-Carbajal et al. 2023 (paper 001), Eqs. 17 and 19. As a cube: `simrail.estimators.tuning.cube`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass, fields
 

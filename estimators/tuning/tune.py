@@ -5,8 +5,6 @@ Not here: what is minimised (the estimator's own, see `simrail.estimation.tunabl
 the file of a result (`simrail.estimators.tuning.file`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence

@@ -5,8 +5,6 @@ a cell do not depend on which cells ran before it, or with it. Who runs which ce
 where, is decided in `simrail.campaign.campaign`.
 """
 
-from __future__ import annotations
-
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence

@@ -9,8 +9,6 @@ When all is done the results are made of these files, and the folder goes. This 
 what a batch means.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

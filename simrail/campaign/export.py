@@ -4,8 +4,6 @@ Simulates (or finds in the cache) the rides of a scenario, draws the sensors as 
 what they recorded. Nothing is estimated here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path

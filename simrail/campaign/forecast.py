@@ -6,8 +6,6 @@ campaign finds it. A machine that is busy, rides on other engines and vehicles, 
 make them differ: they are an estimate, no promise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby

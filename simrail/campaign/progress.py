@@ -1,7 +1,5 @@
 """Who is told how a campaign, an export or a tuning goes, and what the command line shows of it."""
 
-from __future__ import annotations
-
 import time
 from datetime import timedelta
 from types import TracebackType

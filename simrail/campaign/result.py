@@ -4,8 +4,6 @@ Scores come from the batches only. The examples for figures are cells run once m
 estimates is large, and no batch hands it on.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress

@@ -4,8 +4,6 @@ For what sets new results beside former ones, or goes on with them. It judges th
 belong together, not whether the code that made them is today's: who needs that compares the keys.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

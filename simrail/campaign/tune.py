@@ -5,8 +5,6 @@ a known output are those that were laid: a measured reference without error. Wha
 that says what there is to search (`simrail.estimation.tunable`).
 """
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence

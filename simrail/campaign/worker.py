@@ -6,8 +6,6 @@ Nothing here knows which batches there are, nor who runs them: see `simrail.camp
 `simrail.campaign.executors`.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import pickle

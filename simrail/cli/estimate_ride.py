@@ -1,7 +1,5 @@
 """One estimator on one recorded ride: what ``simrail estimate`` does. There is no truth, so no scores."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

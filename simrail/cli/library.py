@@ -3,8 +3,6 @@
 What there is, is read without importing any of it, so that the answer comes at once.
 """
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from importlib.metadata import EntryPoint, entry_points

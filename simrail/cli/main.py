@@ -4,8 +4,6 @@ Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 13
 imports stand inside the commands, so that those that need little answer at once.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """What commands share: exit codes, options and words."""
 
-from __future__ import annotations
-
 import sys
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """``simrail export | estimate``: recordings as files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The scores as the command line shows them at the end of a run: tables of each case, and notes."""
 
-from __future__ import annotations
-
 import pandas as pd
 from rich import box
 from rich.console import Console, Group, RenderableType

@@ -1,7 +1,5 @@
 """Folders and files that appear whole or not at all: written under another name beside, then moved."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import time

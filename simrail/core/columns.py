@@ -8,8 +8,6 @@ left side up (`estimators/EQUATIONS.md`, section 0; Briales et al. 2021, Eq. 2).
 This module knows names only. It holds no data and reads no files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

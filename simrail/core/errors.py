@@ -6,8 +6,6 @@ The command line prints it and ends with exit code 2. Faults of the program itse
 exceptions and are not wrapped.
 """
 
-from __future__ import annotations
-
 
 class InputError(ValueError):
     """Input that cannot be used, said so that its author can mend it.

@@ -4,8 +4,6 @@ A C++ solver that calls back into Python turns a `KeyboardInterrupt` into an err
 interrupt is remembered, and raised again wherever a loop has caught an exception.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator

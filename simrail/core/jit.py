@@ -5,8 +5,6 @@ silently hold old physics. Here the cache folder is named after a hash of every 
 simrail and of numba's version: a changed source is a new folder.
 """
 
-from __future__ import annotations
-
 import hashlib
 import multiprocessing
 import sys

@@ -11,8 +11,6 @@ know what happened in it. Time stamps are believed; what the clock did wrong is 
 samples low-passed for a slower grid.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

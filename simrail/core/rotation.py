@@ -1,7 +1,5 @@
 """Rotation matrices and ZYX Euler angles (EQUATIONS section 0), for arrays of samples."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import FloatArray

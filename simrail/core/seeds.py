@@ -4,8 +4,6 @@ A stream is found by its name, never by the order in which streams are asked for
 to a scenario changes no other sensor's samples, and two draws never share a stream.
 """
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hashes of source code: what was computed by other code is found, or gone on with, by nobody."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 from importlib.resources import files

@@ -6,8 +6,6 @@ the recording. The true odometry, an ablation, is no estimator's work: it comes 
 (`simrail.sensors.measure`), labelled, or not at all.
 """
 
-from __future__ import annotations
-
 import difflib
 from dataclasses import replace
 from pathlib import Path

@@ -9,8 +9,6 @@ the right columns at the right times, finite, repeatable, no look-ahead, nothing
 changed, running backwards and standing still, doing without what it does not say it needs.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import replace

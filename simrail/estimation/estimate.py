@@ -4,8 +4,6 @@ An `Estimate` holds numbers only: it neither plots nor saves itself. Scores agai
 made in `simrail.scoring.score`, the only place where truth and estimate meet.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """A recorded ride, ready for estimators: its signals, an odometry, and whether all that can be true."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from simrail.core.toml_files import label

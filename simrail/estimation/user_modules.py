@@ -4,8 +4,6 @@ A file becomes a module named after its content, so two files, or two versions o
 module. An instance of a class in it can be unpickled where `install` has been called with the file.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
 from importlib.util import module_from_spec, spec_from_loader

@@ -5,8 +5,6 @@ place of the fault. Whether what it says can be true (units, axes) is judged by
 `simrail.recording.check_physics`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ test has a limit far from what a sound recording does and far from what the faul
 (columns, stamps, numbers) are judged by `simrail.recording.check_form`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

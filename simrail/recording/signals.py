@@ -4,8 +4,6 @@ Reading and writing go over this list, so a new signal of `Recording` is one ent
 `simrail.recording.files.ride_file.RideFile`. No data here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

@@ -9,8 +9,6 @@ Used for averaging the gyro bias at rest (`simrail.estimators.attitude.rest_bias
 anything itself.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -5,8 +5,6 @@ is complete, so an interrupted or killed run leaves nothing that looks like a ri
 may use it at once. The cache keeps below a size limit by dropping the rides that were used longest ago.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -5,8 +5,6 @@ poses), and to show how fast the errors of a real IMU grow when nothing corrects
 estimator: it starts from a known pose.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation

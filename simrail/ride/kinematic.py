@@ -6,8 +6,6 @@ integrated. It has no suspension and no wheel-rail contact; use an engine of `si
 vehicle that moves by itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

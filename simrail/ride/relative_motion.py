@@ -5,8 +5,6 @@ the motion of the body in that frame is what they neglect (their Eq. 14 and sect
 exactly from the true motion, without differentiating any signal. No estimator uses this.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ mount follows from them by rigid-body kinematics, exactly; no engine is asked ag
 Nothing here is seen by an estimator.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

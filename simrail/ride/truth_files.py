@@ -4,8 +4,6 @@ Large arrays are mapped, not copied, so a long ride neither needs nor takes memo
 is said in `simrail.ride.truth`; which rides are kept, in `simrail.ride.cache`.
 """
 
-from __future__ import annotations
-
 import json
 import mmap
 import os

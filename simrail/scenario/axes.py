@@ -8,8 +8,6 @@ Fields that are lists by nature (positions, stops) are not annotated so and stay
 This module neither reads files nor knows what the fields mean.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from typing import Annotated, Any, TypeVar

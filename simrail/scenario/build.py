@@ -6,8 +6,6 @@ or the file of the part and its field. Nothing is simulated here. Estimators are
 `simrail.scenario.build_estimator`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable

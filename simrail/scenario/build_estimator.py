@@ -8,8 +8,6 @@ path, seen from its own folder first, then from here, then among what is shipped
 finds its files wherever it lies. Nothing is estimated here.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 from pathlib import Path

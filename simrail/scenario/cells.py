@@ -13,8 +13,6 @@ Nothing depends on the order: seeds are found by name (`ride_seed`, `sensor_seed
 the same scores alone, among others, or in another order.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

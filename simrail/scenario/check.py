@@ -6,8 +6,6 @@ returns a `Plan` that says what will be run, with warnings. Each ride is judged 
 (`simrail.scenario.check_sensors`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -5,8 +5,6 @@ lateral acceleration is warned of and one above 1.5 m/s2 is refused. Sensors are
 `simrail.scenario.check_sensors`. Faults name no file: the caller knows the scenario's.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.errors import InputError

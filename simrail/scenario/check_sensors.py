@@ -5,8 +5,6 @@ What a sensor may be at all is judged where it is read (`simrail.recording.sheet
 scenario's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from simrail.core.errors import InputError

@@ -5,8 +5,6 @@ name (``ride.go20A.speed_kmh``); without either the setting goes to every table 
 value is read as TOML, or else as text. What the values mean is judged by the models afterwards.
 """
 
-from __future__ import annotations
-
 import copy
 import difflib
 import re

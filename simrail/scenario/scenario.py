@@ -7,8 +7,6 @@ Only the form of each field is judged here; whether track, vehicle, rides and se
 is judged by `simrail.scenario.check`, and what is run is listed by `simrail.scenario.cells`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

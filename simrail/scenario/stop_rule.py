@@ -14,8 +14,6 @@ out, so that the interval at the stop holds the true mean less often than its 95
 `least_draws` keep the loss small; the tests measure it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass
 from typing import Any

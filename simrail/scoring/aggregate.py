@@ -1,7 +1,5 @@
 """A score table averaged over its draws: one row per figure of a case, and how sure it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -14,8 +14,6 @@ would be too narrow by as much as the track matters.
 Resamples come from streams of their own names, so the same table gives the same intervals.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

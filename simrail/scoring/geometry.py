@@ -10,8 +10,6 @@ the track, which these do not say: coverage95 is told where the estimate has dra
 Windows are those of the track (whole, straight, transition, curve and each curve): a place has no speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from typing import Protocol
 

@@ -12,8 +12,6 @@ What cannot be computed is a row without a value whose status says why. This mod
 where the errors come from; `simrail.scoring.score` does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

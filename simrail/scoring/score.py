@@ -8,8 +8,6 @@ Figures go into the score table of `simrail.scoring.table`. Nothing here knows s
 the other metrics mean stands in `simrail.scoring.metrics`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol

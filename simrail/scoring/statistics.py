@@ -4,8 +4,6 @@ Numbers in, numbers out; intervals are those of `simrail.scoring.bootstrap`, tab
 `simrail.scoring.aggregate`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

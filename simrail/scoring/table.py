@@ -5,8 +5,6 @@ words may drift: a word that is not in the vocabulary here is refused. This modu
 only; what the figures mean and how they are computed is in `simrail.scoring.score`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any

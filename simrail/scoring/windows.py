@@ -1,7 +1,5 @@
 """Windows of a ride and the choice among windows and metrics, for every score alike."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 
 import numpy as np

@@ -5,8 +5,6 @@ The motion at the true time is that behind the sampling filter, interpolated by 
 is lost on the way to the logger: `lose_samples` says which samples those are, it fills nothing in.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

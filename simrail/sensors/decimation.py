@@ -11,8 +11,6 @@ half a filter length inside the truth, as it does on a device that has just been
 Only filters live here; what a device adds to the signal is in `simrail.sensors.imu`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -14,8 +14,6 @@ Not here: what a logger makes of the counts (`simrail.recording.wheel_speed`,
 `simrail.estimators.odometry.encoder`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

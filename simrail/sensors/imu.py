@@ -14,8 +14,6 @@ The motion (rates and specific force at the mount) comes from the truth; this mo
 vehicle nor track.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

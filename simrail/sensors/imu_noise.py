@@ -5,8 +5,6 @@ no sample of another. The numbers are drawn in blocks that stay in the processor
 pass. The closed forms of these processes are in `simrail.recording.sheets.allan`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

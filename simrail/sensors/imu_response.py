@@ -4,8 +4,6 @@ The coefficients are constants of one device: drawn once, uniform within the bou
 kind from its own stream.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

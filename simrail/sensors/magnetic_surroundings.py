@@ -8,8 +8,6 @@ Everything is in the track frame: X along the track in the direction of increasi
 the rails.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

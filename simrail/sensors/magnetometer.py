@@ -10,8 +10,6 @@ that of the commercial IMU in Briales et al. 2021 was (rms 52 deg, Table 3). Wha
 `simrail.sensors.magnetic_surroundings`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -4,8 +4,6 @@ The only place where sensors meet the truth. Signals are recorded here, and noth
 out holds no true value, unless the true odometry is asked for by name (an ablation, labelled in every table).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

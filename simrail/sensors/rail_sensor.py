@@ -6,8 +6,6 @@ such as those of paper 001 (Gonzalez-Carbajal et al. 2023) deliver; the size of 
 axes are those of the body without error, and it samples with the IMU.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -8,8 +8,6 @@ This module knows nothing of gradients (`simrail.track.vertical`), angles or irr
 elements that `check_elements` has passed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

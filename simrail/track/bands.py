@@ -6,8 +6,6 @@ above all for D0, which its edition of 2019 is said to have added.
 Functions of values over a uniform grid of places: nothing here knows an estimator or the truth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ in permil. Signs do not: radius positive to the left, cant positive with the out
 positive uphill in the direction of s.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal, Self
 

@@ -3,8 +3,6 @@
 Values and the one piece of algebra between them; where they come from is `simrail.track.design`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ remain. The four irregularities have independent streams.
 This module knows nothing of rails or splines: see `simrail.track.laid_track`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

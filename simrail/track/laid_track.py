@@ -8,8 +8,6 @@ the rails: truth and references are read from the same table.
 This module knows nothing of wheels.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

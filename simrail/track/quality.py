@@ -4,8 +4,6 @@ They are computed alike from estimated and from true geometry. Limits are the ca
 since the standard's own were not at hand.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

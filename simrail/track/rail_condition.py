@@ -5,8 +5,6 @@ train knows of it. The coefficients of the named conditions are nominal values o
 to tell dry, poor and very poor adhesion apart; they are not from a source.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

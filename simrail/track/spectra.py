@@ -9,8 +9,6 @@ angle over the half base b = 0.75 m, taken here as a height over 2 b) and gauge;
 is the least certain, +-30 %. FRA (AAR form) with k = 0.25.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 This module knows nothing of the plan, and nothing of the pitch angle that belongs to a slope.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

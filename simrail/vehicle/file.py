@@ -1,7 +1,5 @@
 """A vehicle file: bodies, springs, wheels and guide in one TOML, judged and made a `VehicleModel`."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Self

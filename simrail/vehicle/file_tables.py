@@ -1,7 +1,5 @@
 """The tables of a vehicle file: what each may hold, one by one. How they fit is judged in `vehicle_file`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 

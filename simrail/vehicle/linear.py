@@ -14,8 +14,6 @@ a ride takes part: it stands for the neighbouring modules and the motors.
 Not here: loci over the speed and critical speeds (`simrail.vehicle.stability`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -6,8 +6,6 @@ stands centred on level track: X forward, Y left, Z up from the rail plane, orig
 point. Statics (preload of the springs, wheel loads) follow from the description here; dynamics do not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

@@ -5,8 +5,6 @@ seven-piece ramp), so s(t) is a piecewise cubic: exact, with continuous accelera
 every stop to rounding. The track's own limits are judged in `simrail.scenario`, not here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -4,8 +4,6 @@ An eigenvalue ``lambda`` of the state matrix (`simrail.vehicle.linear`) is a mot
 frequency |Im|/2 pi, damping ratio -Re/|lambda|. A vehicle hunts where an oscillatory one has Re > 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

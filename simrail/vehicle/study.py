@@ -3,8 +3,6 @@
 Computes; how it is shown is in `simrail.report.tables.vehicle_text` and `simrail.report.pages.vehicle_page`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

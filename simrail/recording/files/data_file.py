@@ -5,8 +5,6 @@ or no number, with the line of the file. What the columns mean is said by the ri
 (`simrail.recording.files.signal_part`).
 """
 
-from __future__ import annotations
-
 import csv
 import difflib
 import re

@@ -5,8 +5,6 @@ column names in SI and needs no map. The models judge the text, `simrail.recordi
 of each signal; `simrail.recording.files.ride_reader` reads the data.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 

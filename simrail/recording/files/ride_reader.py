@@ -9,8 +9,6 @@ Not here: an odometry, where the file has none, and whether the ride can be true
 `simrail.estimation.choose_odometry.read_ride`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

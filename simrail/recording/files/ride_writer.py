@@ -4,8 +4,6 @@ What `simrail.recording.files.ride_reader` reads: the same form as a ride of a r
 columns or units. Numbers survive the round trip bit by bit, in CSV as in Parquet.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal

@@ -5,8 +5,6 @@ and a device as one can be mounted. Which signals there are, and what each says 
 `simrail.recording.files.ride_file`; the data are read by `simrail.recording.files.signal_reader`.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator

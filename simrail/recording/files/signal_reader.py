@@ -4,8 +4,6 @@ Nothing is resampled or filled in: a missing value is refused with its line. How
 together is the matter of `simrail.recording.files.ride_reader`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

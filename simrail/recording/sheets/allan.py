@@ -6,8 +6,6 @@ where the averaging time is many samples long. Which process a device has is sai
 (`simrail.recording.sheets.grades`); samples are drawn by `simrail.sensors.imu_noise`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

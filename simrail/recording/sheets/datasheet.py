@@ -3,8 +3,6 @@
 The only place in simrail where degrees per hour, milli-g, ppm and their like are turned into SI units.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 from typing import Any, Literal, NamedTuple

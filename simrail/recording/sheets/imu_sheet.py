@@ -1,7 +1,5 @@
 """From the error terms of a device to what its data sheet tells an estimator."""
 
-from __future__ import annotations
-
 import math
 
 from simrail.recording.recording import ImuSheet

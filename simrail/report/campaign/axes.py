@@ -1,7 +1,5 @@
 """Axes of a campaign as its report shows them, and the draws of a figure along them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

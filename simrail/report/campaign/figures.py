@@ -1,7 +1,5 @@
 """Figures over the axes of a campaign: box plots, and the error against curvature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Heat maps over the axes of a campaign."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 

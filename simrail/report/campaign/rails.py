@@ -1,7 +1,5 @@
 """Rail geometry over the axes of a campaign: what every method errs by, in the band that counts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import pandas as pd

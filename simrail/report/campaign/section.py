@@ -1,7 +1,5 @@
 """The section itself: tables and figures over the axes of a campaign, gathered for the template."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ alike; tracks are the clusters of every interval, the same track draw in all cas
 cases meet the same draws.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ They follow Figs. 11, 13 and 14 of Briales et al. 2021, with the truth added, wh
 not have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ A plot is about a thousand pixels wide; a ride has a hundred thousand samples. S
 into bins and each bin keeps its smallest and largest value, so a single spike is still seen.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of an estimate on a ride without a truth: attitude beside the design, and innovations."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of rail geometry: true and estimated rails with their 95 % band, and error by band."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

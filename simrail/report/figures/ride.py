@@ -1,7 +1,5 @@
 """Figures of one ride: how it was driven, what the IMU felt, and where the odometry thought it was."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of the scores: rms per method and window, and curve by curve (Fig. 12 of Briales et al. 2021)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from matplotlib.lines import Line2D

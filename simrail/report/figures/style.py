@@ -4,8 +4,6 @@ Figures are `matplotlib.figure.Figure` objects made under `look()`; pyplot and i
 not used. Text stays text, so it is set in the page's own fonts and can be searched.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """Figures of the track: its plan, profile, curvature and cant (as Figs. 8 to 10 of Briales et al. 2021)."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """Figures of a vehicle: profile pair, contact over the lateral shift, conicity, root locus."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

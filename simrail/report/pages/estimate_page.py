@@ -1,7 +1,5 @@
 """The page of one estimate on one ride, without scores."""
 
-from __future__ import annotations
-
 from importlib.metadata import version
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The frame of every page: one self-contained HTML file, in which nothing is fetched when it is opened."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

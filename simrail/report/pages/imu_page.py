@@ -1,7 +1,5 @@
 """The page of an IMU: its figures, and analytic beside simulated Allan deviation; one self-contained file."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 What it says is computed from the scores (`simrail.report.words.findings`); how it looks is in the templates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The sections of single rides: how each was driven, what was concluded from it, and how it errs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

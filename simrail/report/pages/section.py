@@ -1,7 +1,5 @@
 """What a page is made of: the campaign that it shows, and sections, each a title, a template and its data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The page of a vehicle, in the look of the reports."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

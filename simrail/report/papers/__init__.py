@@ -1,7 +1,5 @@
 """What publications printed, and our scores beside it: one folder each, see `simrail.report.papers.claim`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from simrail.report.pages.section import PageData, Section

@@ -15,8 +15,6 @@ digits, ``g`` as short as it is, ``listed`` joins words. They see what the judge
 beforehand.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Bands of wavelengths as page and terminal speak of them: which a case has, in which one it is judged."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from simrail.report.tables.pivot import Case

@@ -1,7 +1,5 @@
 """Tables of rail geometry: errors by band beside the baseline, and indicators against limits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rail geometry of a ride as the page shows it: figures, and indicators against limits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

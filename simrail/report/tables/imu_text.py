@@ -1,7 +1,5 @@
 """An IMU grade in the units of data sheets, as a table for the terminal and the page."""
 
-from __future__ import annotations
-
 import math
 
 from rich.console import Console

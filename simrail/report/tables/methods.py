@@ -3,8 +3,6 @@
 Estimators say themselves what they are (`simrail.estimation.estimate.Description`); no name is looked into.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ A case is what cells share that differ in their draws only: one ride, IMU, mount
 one value of every axis.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Where the numbers of a campaign come from: which parts are synthetic, and how to make it again."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Tables of the page: the subset of the score table that a person reads first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

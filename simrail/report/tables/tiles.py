@@ -1,7 +1,5 @@
 """The few numbers that a reader sees first."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What ``simrail vehicle`` prints: a study of a vehicle as tables for a terminal."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

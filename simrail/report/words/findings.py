@@ -4,8 +4,6 @@ A sentence is written whether it flatters or not: where 'design angles only' bea
 so, and where compensation does not help it says that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

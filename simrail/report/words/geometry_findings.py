@@ -1,7 +1,5 @@
 """What the scores say of the rails, in sentences: looked up in the scores, whether they flatter or not."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a sentence of the page is, and how it says numbers, lists, axes and recordings."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Sequence

@@ -10,8 +10,6 @@ Not here: making the table, integrating the states, conicity and other readings 
 (`simrail.vehicle.contact.wheelset`).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

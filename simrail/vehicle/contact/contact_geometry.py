@@ -12,8 +12,6 @@ jump by more than 0.5 in slope. Roll and yaw enter by the derivatives of the sof
 Not here: forces (`simrail.vehicle.contact.contact`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ function g(s) = wheel depth - rail depth(e) says how deep the two interpenetrate
 Not here: tables, elasticity (`simrail.vehicle.contact.contact_geometry`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

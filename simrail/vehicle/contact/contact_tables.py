@@ -6,8 +6,6 @@ under a heavy engine and one under a light end need different tables. Loads with
 Not here: making one table (`simrail.vehicle.contact.contact_geometry`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

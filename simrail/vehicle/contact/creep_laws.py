@@ -17,8 +17,6 @@ Friction falls with the sliding speed w (Polach 2005):
 Not here: linear forces and spin, whose part of the lateral force q holds (`simrail.vehicle.contact.contact`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

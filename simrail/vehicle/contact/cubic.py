@@ -1,7 +1,5 @@
 """A cubic ``((c0 x + c1) x + c2) x + c3`` and its derivative, compiled: how kernels read their tables."""
 
-from __future__ import annotations
-
 from simrail.core.jit import FloatArray, njit_inner
 
 

@@ -26,8 +26,6 @@ pi/32 a f22 in place of f23 (three quarters of it for a circle).
 Not here: linear forces, relaxation and the falling of friction (`simrail.vehicle.contact.contact`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import njit_borrowed, njit_inner

@@ -4,8 +4,6 @@ Used when contact tables are built, never inside an integration step. Everything
 equal elastic bodies.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ in place of the profile table, and leaves out what the closed forms leave out: s
 angle, the axle's roll in the creepages. Creep forces build up over the same relaxation states.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from simrail.core.jit import FloatArray, njit_borrowed

@@ -9,8 +9,6 @@ Not here: formulas of standard profiles (`simrail.vehicle.contact.profiles`), an
 (`simrail.vehicle.contact.profile_points`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from pathlib import Path

@@ -4,8 +4,6 @@ The points are those of the file, after what its header asks for; whether they a
 which way round, is found by `simrail.vehicle.contact.profile_files`. Nothing is smoothed.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import NamedTuple

@@ -9,8 +9,6 @@ Not here: where the rail lies in the track (gauge, inclination) and where wheel 
 that is `simrail.vehicle.contact.contact_geometry`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeVar

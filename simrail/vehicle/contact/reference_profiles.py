@@ -9,8 +9,6 @@ Not here: profiles that vehicles run on (`simrail.vehicle.contact.profiles`), co
 (`simrail.vehicle.contact.wheelset`).
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

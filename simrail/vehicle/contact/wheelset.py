@@ -6,8 +6,6 @@ rest, so that what is read is what acts.
 Not here: making tables, forces in motion.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ integrates differs (`simrail.vehicle.engines.stepper`). At the same step both ag
 m/s2, so each is the test of the other. It needs no Exudyn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -10,8 +10,6 @@ stiff contact makes systematic (2e-4 m/s2 in a sharp curve at 0.5 ms: 0.4 m in a
 reckoning); the velocities are three orders better, and one evaluation in five is saved.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal

@@ -19,8 +19,6 @@ rotation vectors is exact to rounding; near zero it loses ten digits, which a st
 into noise.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from typing import Any, Literal

@@ -5,8 +5,6 @@ forces are those of `simrail.vehicle.engines.forces`. What the nodes are, and wh
 `simrail.vehicle.engines.exudyn_engine`.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ What a vehicle or a ride decides travels to the kernel in these arrays, never as
 cache does not notice when a global of another module changes.
 """
 
-from __future__ import annotations
-
 from dataclasses import astuple
 from typing import Any, Literal, NamedTuple
 

@@ -5,8 +5,6 @@ velocities in the global frame. Engines bring their own coordinates and integrat
 integrated here. The constants are `simrail.vehicle.engines.force_data.ForceData`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner

@@ -3,8 +3,6 @@
 Not here: forces. The same splines, without compilation, are `simrail.track.laid_track.LaidTrack`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import njit_inner

@@ -8,8 +8,6 @@ Fields are 8 bytes each, floats or whole numbers, so that records lie in a float
 (`simrail.vehicle.engines.exudyn_forces.spread`).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

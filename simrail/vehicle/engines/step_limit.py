@@ -9,8 +9,6 @@ chatters, which looks like a ride.
 Not here: judging a scenario by it (`simrail.scenario.check_ride`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ step goes with the fifth power of the small angle turned in it, and unlike a rot
 place where its composition loses digits.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner

@@ -6,8 +6,6 @@ its attachment point to the outer body's, an element sees the deflection A^T u a
 records are those of `simrail.vehicle.engines.records`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner

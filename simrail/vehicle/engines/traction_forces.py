@@ -17,8 +17,6 @@ protection takes torque back by ``1/(1 + (creepage/limit)^4)``.
 Not here: what the rails give (`simrail.vehicle.contact.contact`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner

@@ -1,7 +1,5 @@
 """Our versions of the paper's Figs. 12 to 22: rms per ride, compensation, and repeatability of roll."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

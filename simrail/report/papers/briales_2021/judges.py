@@ -1,7 +1,5 @@
 """Whether what Briales et al. 2021 say holds in our scores: a function for each claim of ``paper.toml``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

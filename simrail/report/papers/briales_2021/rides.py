@@ -1,7 +1,5 @@
 """Which of our methods stand for which of the paper's, and access to their figures ride by ride."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

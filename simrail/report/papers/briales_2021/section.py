@@ -3,8 +3,6 @@
 Everything of ours is looked up in the scores, or computed from the first draw of each ride.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

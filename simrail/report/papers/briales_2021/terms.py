@@ -1,7 +1,5 @@
 """The terms that the paper neglects (its section 8), on our rides, beside its own figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

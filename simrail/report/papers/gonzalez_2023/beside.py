@@ -1,7 +1,5 @@
 """The other size beside ours: rows of Tables 1 and 2 from the results of another run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

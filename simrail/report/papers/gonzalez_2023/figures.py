@@ -1,7 +1,5 @@
 """Our versions of the paper's Figs. A1 to A3, from the rides that a page draws."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from simrail.campaign.cell import CellResult

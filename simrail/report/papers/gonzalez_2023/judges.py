@@ -1,7 +1,5 @@
 """Whether what Gonzalez-Carbajal et al. 2023 say holds in our scores: a function for each kind of claim."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A search's own ride beside all others: what was found on one ride may be true of that one only."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Which of our methods stand for which of the paper's, and in which of our cases they are looked at."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

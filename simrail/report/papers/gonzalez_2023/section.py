@@ -3,8 +3,6 @@
 Everything of ours is looked up in the scores, or computed from the first draw of the ride that is drawn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a search of hyper-parameters knows of each: read from the tunings that a scenario names."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
