@@ -69,33 +69,6 @@ def decimation_factor(truth_rate_hz: float, output_rate_hz: float) -> int:
     return factor
 
 
-def decimate(samples: FloatArray, factor: int) -> tuple[FloatArray, int]:
-    """Low-pass and take every `factor`-th sample.
-
-    Parameters
-    ----------
-    samples : ndarray (n, m)
-        Uniform samples of m channels.
-    factor : int
-        Input rate over output rate; 1 leaves the samples as they are.
-
-    Returns
-    -------
-    output : ndarray (k, m)
-        Output sample j belongs to the time of input sample ``delay + j * factor``.
-    delay : int
-        Delay of the filter in input samples, a multiple of `factor`: how much later an output sample
-        can be known, and how much of the input is lost at either end.
-
-    Raises
-    ------
-    InputError
-        If the input is shorter than the filter.
-    """
-    taps = decimation_taps(factor)
-    return sample_on_time(samples, Sampling(factor, taps, len(taps) // 2))
-
-
 @dataclass(frozen=True)
 class Sampling:
     """How a device takes one output sample out of the truth's samples.
@@ -152,13 +125,26 @@ def sampling_of(truth_rate_hz: float, output_rate_hz: float, oversampling: int =
 
 
 def sample_on_time(samples: FloatArray, sampling: Sampling) -> tuple[FloatArray, int]:
-    """Sample at the very stamps; see `decimate`, which this is without oversampling.
+    """Sample at the very stamps.
+
+    Parameters
+    ----------
+    samples : ndarray (n, m)
+        Uniform samples of m channels of the truth.
+    sampling : Sampling
+        How the device samples.
 
     Returns
     -------
     output : ndarray (k, m)
         Output sample j is stamped at input sample ``first + j * factor``.
     first : int
+        How much of the input is lost at its start.
+
+    Raises
+    ------
+    InputError
+        If the input is shorter than the filter.
     """
     taps, factor = sampling.taps, sampling.factor
     if len(taps) == 1 and factor == 1:

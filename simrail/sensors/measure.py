@@ -13,8 +13,7 @@ from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.resample import resample
 from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
-from simrail.recording.sheets.grades import ImuGrade
-from simrail.recording.sheets.imu_sheet import imu_sheet
+from simrail.recording.sheets.grades import ImuGrade, imu_sheet
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.imu import EarthRate, arrived, sample_imu

@@ -1,8 +1,10 @@
 """A vehicle file: bodies, springs, wheels and guide in one TOML, judged and made a `VehicleModel`."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
@@ -10,31 +12,75 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import Part, blame
 from simrail.vehicle.contact.creep_laws import CreepLaw
 from simrail.vehicle.contact.profile_files import profile_place, rail_profile, wheel_profile
-from simrail.vehicle.file_tables import (
-    AxleEntry,
-    BodyEntry,
-    CreepEntry,
-    GuideEntry,
-    LinearContactEntry,
-    RotationEntry,
-    SuspensionEntry,
-    TabledEntry,
-    TractionEntry,
-    ends_of,
-)
 from simrail.vehicle.model import (
     Body,
     Guide,
+    Inertia,
     LinearContact,
+    NotNegative,
+    Point,
+    Positive,
     Rotation,
     SeriesDamper,
     Suspension,
     Tabled,
     Traction,
+    Triple,
     VehicleModel,
     Wheel,
     WheelRail,
 )
+
+
+class AxleEntry(Part):
+    """An axle with its two wheels; the bridge is what does not turn.
+
+    Of a conventional wheelset ("fixed") only sums matter: bridge and wheels turn together about the
+    vertical and the longitudinal axis, and the spin inertia of both wheels is that of the wheelset.
+    """
+
+    name: str
+    x_m: float
+    wheels: Literal["independent", "fixed"]
+    wheel_radius_m: Annotated[float, Field(ge=0.01, le=1.0)]
+    wheel_y_m: tuple[float, float] = (0.75, -0.75)
+    bridge_mass_kg: Positive
+    bridge_inertia_kgm2: Inertia
+    wheel_mass_kg: Positive
+    wheel_spin_inertia_kgm2: Positive
+    wheel_transverse_inertia_kgm2: Positive
+
+
+class SuspensionEntry(Part):
+    """Equal springs at one or several points between two bodies."""
+
+    name: str
+    between: tuple[str, str]
+    positions_m: Annotated[list[Point], Field(min_length=1)]
+    stiffness_npm: Triple
+    damping_nspm: Triple
+    series_stiffness_npm: Triple = (0.0, 0.0, 0.0)
+    """Stiffness in series with the damper of each axis; 0: the damper is mounted rigidly."""
+
+
+class RotationEntry(Part):
+    """Springs and dampers of the rotation between two bodies (roll, pitch, yaw)."""
+
+    name: str
+    between: tuple[str, str]
+    stiffness_nmprad: Triple
+    damping_nmsprad: Triple
+
+
+class TabledEntry(Part):
+    """Equal bump stops or nonlinear dampers at one or several points: force over deflection or speed."""
+
+    name: str
+    between: tuple[str, str]
+    positions_m: Annotated[list[Point], Field(min_length=1)]
+    axis: Literal["x", "y", "z"]
+    over: Literal["deflection_m", "speed_mps"]
+    points: Annotated[list[tuple[Positive, NotNegative]], Field(min_length=2)]
 
 
 class VehicleFile(Part):
@@ -51,15 +97,15 @@ class VehicleFile(Part):
     contact_smoothing: Annotated[float, Field(ge=0.1, le=5.0)] = 0.22
     friction: Annotated[float, Field(gt=0, le=1.0)]
     axle: Annotated[list[AxleEntry], Field(min_length=1)]
-    body: tuple[BodyEntry, ...] = ()
+    body: tuple[Body, ...] = ()
     suspension: tuple[SuspensionEntry, ...] = ()
     rotation: tuple[RotationEntry, ...] = ()
     tabled: tuple[TabledEntry, ...] = ()
-    creep: CreepEntry = CreepEntry()
-    linear_contact: LinearContactEntry | None = None
+    creep: CreepLaw = CreepLaw()
+    linear_contact: LinearContact | None = None
     gyroscopic: bool = True
-    guide: GuideEntry
-    traction: TractionEntry | None = None
+    guide: Guide
+    traction: Traction | None = None
     _folder: Path | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
@@ -92,6 +138,8 @@ class VehicleFile(Part):
                     value=inertia,
                     limit="the largest at most the sum of the other two",
                 )
+        with blame(None, "creep"):
+            self.creep.constants()
         self._check_elements()
         self._check_wheels()
         self._check_held(names)
@@ -165,7 +213,7 @@ class VehicleFile(Part):
         wheels, _ = self._wheels()
         with blame(None, "traction"):
             for kind in ("driven", "braked"):
-                self.traction.shares(kind, wheels)
+                _shares(self.traction, kind, wheels)
             if self.traction.reaction not in ("axle", *names):
                 raise InputError(
                     "no such body",
@@ -188,16 +236,6 @@ class VehicleFile(Part):
                 )
         return wheels, spins
 
-    def _traction(self, wheels: list[Wheel]) -> Traction | None:
-        made = self.traction
-        if made is None:
-            return None
-        return Traction(
-            driven=tuple(made.shares("driven", wheels).items()),
-            braked=tuple(made.shares("braked", wheels).items()),
-            **made.model_dump(exclude={"driven", "braked"}),
-        )
-
     def model(self, name: str) -> VehicleModel:
         """Build the vehicle that the file describes."""
         bodies: list[Body] = []
@@ -214,13 +252,13 @@ class VehicleFile(Part):
                     position_m=(axle.x_m, 0.0, axle.wheel_radius_m),
                 )
             )
-        bodies += [Body(**entry.model_dump()) for entry in self.body]
+        bodies += self.body
         springs: list[Suspension] = []
         series: list[SeriesDamper] = []
         for entry in self.suspension:
             elastic = entry.series_stiffness_npm
             rigid = [0.0 if k > 0.0 else c for k, c in zip(elastic, entry.damping_nspm, strict=True)]
-            for ends in ends_of(entry):
+            for ends in _ends(entry):
                 springs.append(
                     Suspension(
                         **ends,
@@ -233,7 +271,10 @@ class VehicleFile(Part):
                     for k in range(3)
                     if elastic[k] > 0.0
                 ]
-        linear = self.linear_contact
+        traction = self.traction
+        if traction is not None:
+            driven, braked = (_shares(traction, kind, wheels) for kind in ("driven", "braked"))
+            traction = replace(traction, driven=driven, braked=braked)
         return VehicleModel(
             name=name,
             title=self.title,
@@ -243,7 +284,7 @@ class VehicleFile(Part):
             suspensions=tuple(springs),
             wheels=tuple(wheels),
             spin_inertia_kgm2=spins,
-            guide=Guide(**self.guide.model_dump()),
+            guide=self.guide,
             wheel_rail=WheelRail(
                 wheel_profile=profile_place(self.wheel_profile, self._folder),
                 rail_profile=profile_place(self.rail_profile, self._folder),
@@ -252,19 +293,13 @@ class VehicleFile(Part):
                 gauge_m=self.gauge_m,
                 rail_inclination=self.rail_inclination,
                 friction=self.friction,
-                creep=CreepLaw(name=self.creep.law, **self.creep.model_dump(exclude={"law"})),
+                creep=self.creep,
                 tape_circle_half_m=self.axle[0].wheel_y_m[0],
-                linear=None if linear is None else LinearContact(**linear.model_dump()),
+                linear=self.linear_contact,
             ),
             series=tuple(series),
             rotations=tuple(
-                Rotation(
-                    name=entry.name,
-                    inner=entry.between[0],
-                    outer=entry.between[1],
-                    stiffness_nmprad=entry.stiffness_nmprad,
-                    damping_nmsprad=entry.damping_nmsprad,
-                )
+                Rotation(entry.name, *entry.between, entry.stiffness_nmprad, entry.damping_nmsprad)
                 for entry in self.rotation
             ),
             tabled=tuple(
@@ -275,8 +310,49 @@ class VehicleFile(Part):
                     points=tuple(entry.points),
                 )
                 for entry in self.tabled
-                for ends in ends_of(entry)
+                for ends in _ends(entry)
             ),
             gyroscopic=self.gyroscopic,
-            traction=self._traction(wheels),
+            traction=traction,
         )
+
+
+def _shares(traction: Traction, kind: str, wheels: Sequence[Wheel]) -> dict[str, float]:
+    """Share of each spin of a vehicle; ``kind`` is "driven" or "braked".
+
+    Raises
+    ------
+    InputError
+        For an axle or a wheel that is none, a wheelset that is given twice, or shares that do not
+        sum to 1.
+    """
+    given: dict[str, float] = getattr(traction, kind)
+    shares: dict[str, float] = {}
+    for name, share in given.items():
+        spins = list(dict.fromkeys(w.spin for w in wheels if name in (w.axle, w.name)))
+        if not spins:
+            names = dict.fromkeys([w.axle for w in wheels] + [w.name for w in wheels])
+            raise InputError(
+                "no such axle or wheel", field=kind, value=name, limit="one of " + ", ".join(names)
+            )
+        for spin in spins:
+            if spin in shares:
+                raise InputError("a wheel has its share twice", field=kind, value=name, remedy="name it once")
+            shares[spin] = share / len(spins)
+    total = sum(shares.values())
+    if abs(total - 1.0) > 1e-6:
+        raise InputError("the shares do not sum to 1", field=kind, value=f"{total:g}", limit="1")
+    return shares
+
+
+def _ends(entry: SuspensionEntry | TabledEntry) -> list[dict[str, Any]]:
+    """Name, bodies and place of each of an entry's equal elements."""
+    return [
+        {
+            "name": entry.name if len(entry.positions_m) == 1 else f"{entry.name} {i + 1}",
+            "inner": entry.between[0],
+            "outer": entry.between[1],
+            "position_m": position,
+        }
+        for i, position in enumerate(entry.positions_m)
+    ]

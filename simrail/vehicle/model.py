@@ -3,17 +3,26 @@
 Both the Exudyn model and the force kernel are built from a `VehicleModel`, so there is one
 description and one bushing definition. The vehicle's coordinates are those of the track frame when it
 stands centred on level track: X forward, Y left, Z up from the rail plane, origin at its reference
-point. Statics (preload of the springs, wheel loads) follow from the description here; dynamics do not.
+point. A vehicle file (`simrail.vehicle.file`) holds several of these parts as they are; their limits are
+judged there. Statics (preload of the springs, wheel loads) follow from the description here; dynamics do not.
 """
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.vehicle.contact.creep_laws import CreepLaw
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Point = tuple[float, float, float]
+Triple = tuple[NotNegative, NotNegative, NotNegative]
+Inertia = tuple[Positive, Positive, Positive]
 
 
 @dataclass(frozen=True)
@@ -25,9 +34,9 @@ class Body:
     """
 
     name: str
-    mass_kg: float
-    inertia_kgm2: tuple[float, float, float]
-    position_m: tuple[float, float, float]
+    mass_kg: Positive
+    inertia_kgm2: Inertia
+    position_m: Point
 
 
 @dataclass(frozen=True)
@@ -41,9 +50,9 @@ class Suspension:
     name: str
     inner: str
     outer: str
-    position_m: tuple[float, float, float]
-    stiffness_npm: tuple[float, float, float]
-    damping_nspm: tuple[float, float, float]
+    position_m: Point
+    stiffness_npm: Triple
+    damping_nspm: Triple
 
 
 @dataclass(frozen=True)
@@ -53,7 +62,7 @@ class SeriesDamper:
     name: str
     inner: str
     outer: str
-    position_m: tuple[float, float, float]
+    position_m: Point
     axis: int
     stiffness_npm: float
     damping_nspm: float
@@ -66,8 +75,8 @@ class Rotation:
     name: str
     inner: str
     outer: str
-    stiffness_nmprad: tuple[float, float, float]
-    damping_nmsprad: tuple[float, float, float]
+    stiffness_nmprad: Triple
+    damping_nmsprad: Triple
 
 
 @dataclass(frozen=True)
@@ -81,7 +90,7 @@ class Tabled:
     name: str
     inner: str
     outer: str
-    position_m: tuple[float, float, float]
+    position_m: Point
     axis: int
     over: str
     points: tuple[tuple[float, float], ...]
@@ -107,18 +116,18 @@ class Guide:
     """
 
     body: str
-    stiffness_npm: float
-    damping_nspm: float
-    pitch_stiffness_nmprad: float
-    pitch_damping_nmsprad: float
-    yaw_stiffness_nmprad: float
-    yaw_damping_nmsprad: float
-    lateral_stiffness_npm: float = 0.0
-    lateral_damping_nspm: float = 0.0
-    vertical_stiffness_npm: float = 0.0
-    vertical_damping_nspm: float = 0.0
-    roll_stiffness_nmprad: float = 0.0
-    roll_damping_nmsprad: float = 0.0
+    stiffness_npm: Positive
+    damping_nspm: NotNegative
+    pitch_stiffness_nmprad: NotNegative
+    pitch_damping_nmsprad: NotNegative
+    yaw_stiffness_nmprad: NotNegative
+    yaw_damping_nmsprad: NotNegative
+    lateral_stiffness_npm: NotNegative = 0.0
+    lateral_damping_nspm: NotNegative = 0.0
+    vertical_stiffness_npm: NotNegative = 0.0
+    vertical_damping_nspm: NotNegative = 0.0
+    roll_stiffness_nmprad: NotNegative = 0.0
+    roll_damping_nmsprad: NotNegative = 0.0
 
 
 @dataclass(frozen=True)
@@ -127,8 +136,9 @@ class Traction:
 
     Attributes
     ----------
-    driven, braked : tuple of (str, float)
-        Spins and their shares of the tractive and of the braking effort; each set sums to 1.
+    driven, braked : dict of str to float
+        Spins and their shares of the tractive and of the braking effort; each set sums to 1. In a file axles
+        (both wheels alike) or single wheels.
     tractive_effort_n, power_w, braking_effort_n : float
         Greatest tractive effort and power, greatest braking effort, of the whole vehicle at the rims.
     speed_gain_nspm : float
@@ -139,25 +149,21 @@ class Traction:
         Creepage at which half of the torque is taken back; 0 for none.
     reaction : str
         Body that carries motors and brakes, ``"axle"`` for each axle itself.
-    brake_windup_rad, brake_damping_s : float
-        Angle over which a brake's torque builds up, and the damping time of its mounting.
     """
 
-    driven: tuple[tuple[str, float], ...]
-    braked: tuple[tuple[str, float], ...]
-    tractive_effort_n: float
-    power_w: float
-    braking_effort_n: float
-    speed_gain_nspm: float
-    position_gain_1ps: float
-    catch_up_mps: float
-    slide_protection_creepage: float = 0.0
+    driven: Annotated[dict[str, Positive], Field(min_length=1)]
+    braked: Annotated[dict[str, Positive], Field(min_length=1)]
+    tractive_effort_n: Positive
+    power_w: Positive
+    braking_effort_n: Positive
+    speed_gain_nspm: Positive
+    position_gain_1ps: Positive
+    catch_up_mps: Positive
+    slide_protection_creepage: NotNegative = 0.0
     reaction: str = "axle"
-    brake_windup_rad: float = 5e-3
-    brake_damping_s: float = 0.02
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LinearContact:
     """Prescribed linear wheel-rail contact of the textbooks, per wheel, in place of the profiles.
 
@@ -166,15 +172,15 @@ class LinearContact:
     stiffnesses are those of a whole wheelset (lateral N/m, yaw N m/rad), half of them at each wheel.
     """
 
-    f11_n: float
-    f22_n: float
-    f23_nm: float
-    f33_nm2: float
-    conicity: float
-    vertical_stiffness_npm: float
-    vertical_damping_nspm: float
-    gravitational_stiffness_npm: float
-    gravitational_yaw_stiffness_nmprad: float
+    f11_n: Positive
+    f22_n: Positive
+    f23_nm: float = 0.0
+    f33_nm2: NotNegative = 0.0
+    conicity: Annotated[float, Field(ge=0.0, le=0.5)]
+    vertical_stiffness_npm: Positive
+    vertical_damping_nspm: NotNegative
+    gravitational_stiffness_npm: float = 0.0
+    gravitational_yaw_stiffness_nmprad: float = 0.0
 
 
 @dataclass(frozen=True)

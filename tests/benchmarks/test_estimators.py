@@ -16,6 +16,7 @@ from functools import lru_cache
 import imufusion
 import numpy as np
 import pytest
+from channels import harmonic
 from simrail.estimators.attitude.compensation import gravity_force, track_acceleration
 from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
@@ -32,7 +33,7 @@ from vqf import VQF
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.ride.kinematic import harmonic, kinematic_truth
+from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.measure import measure

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from channels import harmonic
 from simrail.estimators.ahrs import Imufusion, Vqf
 from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
@@ -25,7 +26,7 @@ from simrail.estimation.estimate import Estimate, Estimator
 from simrail.estimation.user_modules import class_named
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.ride.kinematic import harmonic, kinematic_truth
+from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.measure import measure

@@ -6,11 +6,11 @@ Long rides are driven by the compiled engine; that Exudyn makes the same motion 
 
 import numpy as np
 import pytest
+from dead_reckoning import dead_reckon
 
 from simrail.core.columns import ACCEL, ATTITUDE, POSITION
 from simrail.core.toml_files import load
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.ride.dead_reckoning import dead_reckon
 from simrail.ride.ride import Ride, simulate
 from simrail.ride.truth import Mount
 from simrail.sensors.imu import sample_imu

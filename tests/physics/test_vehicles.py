@@ -15,8 +15,7 @@ from simrail.track.laid_track import lay
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
 from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.engines.step_limit import contact_resonance
-from simrail.vehicle.file import VehicleFile
-from simrail.vehicle.file_tables import RotationEntry
+from simrail.vehicle.file import RotationEntry, VehicleFile
 from simrail.vehicle.model import LinearContact
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -112,7 +111,7 @@ def loose_axle(wheel_profile, wheels):
         for entry in file.suspension
     ]
     held = {"lateral_stiffness_npm": 1e7, "lateral_damping_nspm": 1e5, "roll_stiffness_nmprad": 1e7}
-    guide = file.guide.model_copy(update=held | {"roll_damping_nmsprad": 1e5})
+    guide = replace(file.guide, **held, roll_damping_nmsprad=1e5)
     yaw = RotationEntry(
         name="yaw",
         between=("axle", "body"),

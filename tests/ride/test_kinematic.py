@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from channels import harmonic
 
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import load
-from simrail.ride.kinematic import harmonic, kinematic_truth, rail_following
+from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Mount
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from channels import harmonic
 
-from simrail.ride.kinematic import harmonic, kinematic_truth
+from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.relative_motion import acceleration_terms, below
 from simrail.ride.truth import Mount
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition

@@ -5,7 +5,6 @@ import pytest
 
 from simrail.core.errors import InputError
 from simrail.sensors.decimation import (
-    decimate,
     decimation_factor,
     decimation_taps,
     sample_on_time,
@@ -14,6 +13,11 @@ from simrail.sensors.decimation import (
 )
 
 FACTORS = (2, 4, 10, 40)
+
+
+def decimate(samples, factor):
+    """Low-pass and take every `factor`-th sample: the output, and which sample the first one stands for."""
+    return sample_on_time(samples, sampling_of(float(factor), 1.0))
 
 
 def gain(factor: int, frequency: float) -> complex:

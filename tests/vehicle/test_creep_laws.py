@@ -139,7 +139,7 @@ def test_friction_is_an_argument_and_falls_with_the_sliding_of_the_wheel():
 @pytest.mark.parametrize(
     "field, values",
     [
-        ("creep_law", {"name": "kalker"}),
+        ("creep_law", {"law": "kalker"}),
         ("adhesion", {"adhesion": 0.0}),
         ("slip", {"adhesion": 0.5, "slip": 0.6}),
         ("friction_floor", {"friction_floor": 1.2}),

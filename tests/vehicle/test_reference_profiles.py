@@ -5,13 +5,13 @@ The figures are those of EN 15302:2021 (Annexes I, J, K) as given by github.com/
 
 import numpy as np
 import pytest
+from reference_profiles import GAUGE_M, en15302_rail_a, en15302_wheel
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
 from simrail.vehicle.contact.contact_geometry import build_contact
 from simrail.vehicle.contact.contact_pair import ContactPair, incline
 from simrail.vehicle.contact.profiles import wheel_depth
-from simrail.vehicle.contact.reference_profiles import GAUGE_M, en15302_rail_a, en15302_wheel
 from simrail.vehicle.contact.wheelset import conicity
 
 # Annex J: rolling radius difference (mm) at lateral shifts (mm) of the wheelset.

@@ -28,7 +28,7 @@ from simrail.vehicle.model import Traction
 from simrail.vehicle.speed_profile import SpeedProfile
 
 SMOOTH = Irregularity("none", fade_m=0.0)
-ALL = (("axle.left", 0.5), ("axle.right", 0.5))
+ALL = {"axle.left": 0.5, "axle.right": 0.5}
 PULL = Traction(
     driven=ALL,
     braked=ALL,

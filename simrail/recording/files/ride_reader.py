@@ -31,8 +31,8 @@ from simrail.recording.check_form import check_recording
 from simrail.recording.files.ride_file import ImuSignalPart, RideFile
 from simrail.recording.files.signal_reader import SignalReader
 from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording
+from simrail.recording.sheets.grades import imu_sheet
 from simrail.recording.sheets.imu_file import load_grade
-from simrail.recording.sheets.imu_sheet import imu_sheet
 from simrail.track.file import TrackFile
 
 RIDE_FILE = "ride.toml"

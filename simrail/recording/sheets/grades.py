@@ -20,6 +20,7 @@ import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.recording.recording import ImuSheet
 from simrail.recording.sheets.allan import (
     bias_sd,
     flicker_stages,
@@ -31,28 +32,10 @@ from simrail.recording.sheets.allan import (
 REFERENCE_TEMPERATURE_C = 25.0
 """Where a device has no temperature error: that of its calibration."""
 
-TRIAD_TERMS: dict[str, tuple[str, str]] = {
-    "noise": ("radpsqrts", "mpsqrts"),
-    "bias_instability": ("radps", "mps2"),
-    "bias_correlation": ("s", "s"),
-    "random_walk": ("radpspsqrts", "mps2psqrts"),
-    "turn_on_bias": ("radps", "mps2"),
-    "scale_error": ("", ""),
-    "nonlinearity": ("", ""),
-    "nonorthogonality": ("rad", "rad"),
-    "g_sensitivity": ("radspm", ""),
-    "vibration_rectification": ("rads3pm2", "s2pm"),
-    "bias_temperature": ("radpspk", "mps2pk"),
-    "scale_temperature": ("1pk", "1pk"),
-    "range": ("radps", "mps2"),
-    "resolution": ("radps", "mps2"),
-}
-"""Terms that both triads have, and the units at the end of their names, of gyro and accelerometer."""
-
 
 @dataclass(frozen=True)
 class Triad:
-    """The terms of one triad of a grade, without their units: see `ImuGrade`."""
+    """The terms that both triads of a grade may have, without their units: see `ImuGrade`."""
 
     noise: float
     bias_instability: float
@@ -191,8 +174,9 @@ class ImuGrade:
             value = getattr(self, field.name)
             if isinstance(value, int | float):
                 _judge(self.name, field.name, value)
-        _one_of(self.name, "bias_process", self.bias_process, ("gauss_markov", "flicker"))
-        _one_of(self.name, "output", self.output, ("rates", "increments"))
+        here = f"imu grade {self.name}: "
+        judge_choice(here + "bias_process", self.bias_process, ("gauss_markov", "flicker"))
+        judge_choice(here + "output", self.output, ("rates", "increments"))
         _judge_together(self)
 
     @classmethod
@@ -207,12 +191,8 @@ class ImuGrade:
 
     def triad(self, kind: str) -> Triad:
         """Terms of the triad ``"gyro"`` or ``"accel"``; those that it does not have are 0."""
-        side = ("gyro", "accel").index(kind)
-        values: dict[str, float] = {}
-        for term, units in TRIAD_TERMS.items():
-            name = "_".join(part for part in (kind, term, units[side]) if part)
-            values[term] = getattr(self, name, 0.0)
-        return Triad(**values)
+        values = {term: getattr(self, name) for term, name in _FIELDS[kind].items()}
+        return Triad(**dict.fromkeys(_TERMS, 0.0) | values)
 
     @property
     def lag_s(self) -> float:
@@ -265,6 +245,28 @@ class ImuGrade:
         return found
 
 
+_TERMS = [term.name for term in fields(Triad)]
+_FIELDS = {
+    kind: {
+        term: field.name
+        for term in _TERMS
+        for field in fields(ImuGrade)
+        if field.name.startswith(f"{kind}_{term}")
+    }
+    for kind in ("gyro", "accel")
+}
+"""Field of a grade that holds a term, by triad and term."""
+
+
+def imu_sheet(grade: ImuGrade, *, delay_s: float) -> ImuSheet:
+    """What the data sheet of a grade tells an estimator: the figures that both have, None for no range."""
+    shared = {
+        field.name: getattr(grade, field.name) for field in fields(ImuSheet) if hasattr(grade, field.name)
+    }
+    unlimited = {name: None for name, value in shared.items() if value == math.inf}
+    return ImuSheet(grade=grade.name, delay_s=delay_s, **shared | unlimited)
+
+
 _POSITIVE = ("rate_hz", "correlation_s", "bandwidth_hz", "averaging_s")
 _SMALL = ("scale_error", "nonlinearity", "misalignment_rad", "nonorthogonality_rad", "1pk", "clock_drift")
 
@@ -284,14 +286,11 @@ def _judge(grade: str, name: str, value: float) -> None:
         raise InputError("is out of range", field=f"imu grade {grade}: {name}", value=value, limit=limit)
 
 
-def _one_of(grade: str, name: str, value: Any, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise InputError(
-            "is not one of the possible values",
-            field=f"imu grade {grade}: {name}",
-            value=value,
-            limit="one of " + ", ".join(known),
-        )
+def judge_choice(field: str, value: Any, choices: tuple[str, ...]) -> None:
+    """Refuse a word that is none of the possible ones."""
+    if value not in choices:
+        limit = "one of " + ", ".join(choices)
+        raise InputError("is not one of the possible values", field=field, value=value, limit=limit)
 
 
 def _judge_together(grade: ImuGrade) -> None:

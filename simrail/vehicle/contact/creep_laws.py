@@ -41,7 +41,7 @@ class CreepLaw:
 
     Attributes
     ----------
-    name : {"she", "polach", "fastsim"}
+    law : {"she", "polach", "fastsim"}
         See the module.
     adhesion, slip : float
         Polach's k_A and k_S, 0 < k_S <= k_A <= 1.
@@ -51,7 +51,7 @@ class CreepLaw:
         How fast it falls, s/m; 0 for constant friction.
     """
 
-    name: Literal["she", "polach", "fastsim"] = "she"
+    law: Literal["she", "polach", "fastsim"] = "she"
     adhesion: float = 1.0
     slip: float = 1.0
     friction_floor: float = 1.0
@@ -65,8 +65,8 @@ class CreepLaw:
         InputError
             For a value out of its range, naming the field.
         """
-        if self.name not in LAWS:
-            raise InputError("no such creep law", field="creep_law", value=self.name, limit=", ".join(LAWS))
+        if self.law not in LAWS:
+            raise InputError("no such creep law", field="creep_law", value=self.law, limit=", ".join(LAWS))
         for field, value, low, high in (
             ("adhesion", self.adhesion, 0.0, 1.0),
             ("slip", self.slip, 0.0, self.adhesion),
@@ -79,14 +79,14 @@ class CreepLaw:
                 "out of range", field="friction_decay_spm", value=self.friction_decay_spm, limit=">= 0 s/m"
             )
         return {
-            "creep_law": float(LAWS.index(self.name)),
+            "creep_law": float(LAWS.index(self.law)),
             "polach_adhesion": self.adhesion,
             "polach_slip": self.slip,
             "friction_floor": self.friction_floor,
             "friction_decay_spm": self.friction_decay_spm,
             # The cubic law's force is at its end there, Polach's within 1e-3 of it. FASTSIM's is from
             # 32/(3 pi) on, unless there is spin, which still turns it.
-            "windup_onset": {"she": 3.0, "polach": 10.0 / self.slip, "fastsim": 10.0}[self.name],
+            "windup_onset": {"she": 3.0, "polach": 10.0 / self.slip, "fastsim": 10.0}[self.law],
         }
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from simrail.core.errors import InputError
+from simrail.core.toml_files import blame
 from simrail.vehicle.contact.profile_points import TEXTS, read_points, refuse_folded, thinned
 from simrail.vehicle.contact.profiles import (
     RailProfile,
@@ -88,6 +89,12 @@ def wheel_profile(name_or_path: str | Path, beside: Path | None = None) -> Wheel
     if match := re.fullmatch(r"S1002_worn_(\d*\.?\d+)", text):
         return worn(s1002(), wear_m=float(match[1]) * 1e-3)
     path = _path(text, beside, ".prw", field="wheel_profile", names=_WHEEL_NAMES)
+    with blame(path):
+        return _wheel_of(path)
+
+
+def _wheel_of(path: Path) -> WheelProfile:
+    """The wheel profile of a file."""
     y, z, line = read_points(path, kind=1)
     tip = int(np.argmax(z))
     if y[tip] > 0.0:
@@ -98,19 +105,17 @@ def wheel_profile(name_or_path: str | Path, beside: Path | None = None) -> Wheel
     if not y[0] < 0.0 < y[-1]:
         raise InputError(
             "the points do not reach over the tape circle, where lateral position is 0",
-            file=path,
             field="lateral position",
             value=(float(y[0]), float(y[-1])),
             limit="flange tip < 0 m < field side",
             remedy="shift the points so that the tape circle is at 0",
         )
-    refuse_folded(y, line, path, least=0.0)
-    y, z = thinned(y, z, path)
+    refuse_folded(y, line, least=0.0)
+    y, z = thinned(y, z)
     spline = CubicSpline(y, z)
     if spline(y[0]) - spline(0.0) < 0.1 * (y[-1] - y[0]):
         raise InputError(
             "the profile has no flange",
-            file=path,
             field="depth",
             value=float(z[0] - spline(0.0)),
             limit="deepest at the flange tip, a tenth of the width below the tape circle",
@@ -144,16 +149,21 @@ def rail_profile(name_or_path: str | Path, beside: Path | None = None) -> RailPr
     if text == "60E1":
         return rail_60e1()
     path = _path(text, beside, ".prr", field="rail_profile", names=_RAIL_NAMES)
+    with blame(path):
+        return _rail_of(path)
+
+
+def _rail_of(path: Path) -> RailProfile:
+    """The rail profile of a file."""
     y, z, line = read_points(path, kind=0)
     y, z, line = (a[:: 1 if y[-1] > y[0] else -1] for a in (y, z, line))
     # The side of a head may be upright.
-    refuse_folded(y, line, path, least=-1e-12)
-    y, z = thinned(y, z, path)
+    refuse_folded(y, line, least=-1e-12)
+    y, z = thinned(y, z)
     top = int(np.argmin(z))
     if min(z[0], z[-1]) - z[top] < 0.01 * (y[-1] - y[0]):
         raise InputError(
             "the rail's head has no highest point between its sides",
-            file=path,
             field="depth",
             value=float(z[top]),
             limit="least in the middle, greater to both sides",

@@ -1,12 +1,12 @@
 """Points of a profile from a file: SIMPACK's ``.prw`` and ``.prr``, and two columns of text, in metres.
 
 The points are those of the file, after what its header asks for; whether they are a wheel or a rail, and
-which way round, is found by `simrail.vehicle.contact.profile_files`. Nothing is smoothed.
+which way round, is found by `simrail.vehicle.contact.profile_files`, which also says in a refusal which file
+it was. Nothing is smoothed.
 """
 
 import re
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,15 +20,6 @@ _LEAST_DISTANCE_M = 5e-5
 """Points closer than this say nothing more, and their rounding would bend the spline."""
 _WIDTH_M = (0.005, 0.25)
 """A profile's width, from a 1:20 model to a wheel with its rim; anything else is a unit mistaken."""
-
-
-class _Points(NamedTuple):
-    """Points of a file in its own unit and order, the lines that they stand in, and the header."""
-
-    y: FloatArray
-    z: FloatArray
-    line: FloatArray
-    header: dict[str, float]
 
 
 def read_points(path: Path, *, kind: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -54,18 +45,16 @@ def read_points(path: Path, *, kind: int) -> tuple[FloatArray, FloatArray, Float
         If the file is unreadable or of the other kind, or holds too few points, or what is no number,
         no unit or no width of a profile.
     """
-    return _in_metres(_parse(path, kind=kind), path)
+    return _in_metres(*_parse(path, kind=kind))
 
 
-def refuse_folded(y: FloatArray, line: FloatArray, path: Path, *, least: float) -> None:
+def refuse_folded(y: FloatArray, line: FloatArray, *, least: float) -> None:
     """Refuse points that do not go outward.
 
     Parameters
     ----------
     y, line : ndarray (n,)
         As of `read_points`, from flange or gauge side outward.
-    path : Path
-        Their file, for messages.
     least : float
         Steps of y must be greater than this.
 
@@ -79,7 +68,6 @@ def refuse_folded(y: FloatArray, line: FloatArray, path: Path, *, least: float) 
         i = int(back[0])
         raise InputError(
             "the profile folds back or its points are out of order",
-            file=path,
             field=f"line {int(line[i + 1])}",
             value=float(y[i + 1]),
             limit=f"> {float(y[i])} m (line {int(line[i])})",
@@ -87,15 +75,13 @@ def refuse_folded(y: FloatArray, line: FloatArray, path: Path, *, least: float) 
         )
 
 
-def thinned(y: FloatArray, z: FloatArray, path: Path) -> tuple[FloatArray, FloatArray]:
+def thinned(y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Points no closer to each other than what a spline can use.
 
     Parameters
     ----------
     y, z : ndarray (n,)
         Points, m.
-    path : Path
-        Their file, for messages.
 
     Returns
     -------
@@ -114,7 +100,6 @@ def thinned(y: FloatArray, z: FloatArray, path: Path) -> tuple[FloatArray, Float
     if len(apart) < _FEWEST_POINTS:
         raise InputError(
             "too few different points for a profile",
-            file=path,
             field="points",
             value=len(apart),
             limit=f"at least {_FEWEST_POINTS}, {_LEAST_DISTANCE_M * 1e3:g} mm apart",
@@ -122,12 +107,12 @@ def thinned(y: FloatArray, z: FloatArray, path: Path) -> tuple[FloatArray, Float
     return y[apart], z[apart]
 
 
-def _parse(path: Path, *, kind: int) -> _Points:
-    """Points and header."""
+def _parse(path: Path, *, kind: int) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, float]]:
+    """Points in the file's own unit and order, the lines that they stand in, and the header."""
     try:
         lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
-        raise InputError("the profile cannot be read", file=path, value=error.strerror) from error
+        raise InputError("the profile cannot be read", value=error.strerror) from error
     simpack = path.suffix.lower() not in TEXTS
     header: dict[str, float] = {} if simpack else {"units.len.f": 1e3}
     rows: list[tuple[float, float, int]] = []
@@ -137,7 +122,7 @@ def _parse(path: Path, *, kind: int) -> _Points:
         line = raw.strip()
         if not simpack and (unit := re.fullmatch(r"[#!%]\s*unit\s*[=:]\s*(\S+)", line)):
             if unit[1] not in ("m", "mm"):
-                raise InputError("unknown unit", file=path, field="unit", value=unit[1], limit="m or mm")
+                raise InputError("unknown unit", field="unit", value=unit[1], limit="m or mm")
             header["units.len.f"] = 1.0 if unit[1] == "m" else 1e3
         line = re.split(r"[!]" if simpack else r"[#!%]", line)[0].strip()
         if not line:
@@ -151,21 +136,16 @@ def _parse(path: Path, *, kind: int) -> _Points:
             field = f"line {number}"
             if len(cells) not in ((2, 3) if simpack else (2,)):
                 raise InputError(
-                    "a point is a lateral position and a depth",
-                    file=path,
-                    field=field,
-                    value=line,
-                    limit="2 numbers",
+                    "a point is a lateral position and a depth", field=field, value=line, limit="2 numbers"
                 )
-            rows.append((_number(cells[0], path, field), _number(cells[1], path, field), number))
+            rows.append((_number(cells[0], field), _number(cells[1], field), number))
         elif "=" in line:
             key, value = (part.strip() for part in line.split("=", 1))
             if not value.startswith("'") and key not in ("file.mtime", "version"):
-                header[f"{section}.{key}" if key == "type" else key] = _number(value, path, key)
+                header[f"{section}.{key}" if key == "type" else key] = _number(value, key)
     if len(rows) < _FEWEST_POINTS:
         raise InputError(
             "too few points for a profile",
-            file=path,
             field="point.begin ... point.end" if simpack else "points",
             value=len(rows),
             limit=f"at least {_FEWEST_POINTS}",
@@ -173,7 +153,6 @@ def _parse(path: Path, *, kind: int) -> _Points:
     if simpack and header.get("header.type", kind) != kind:
         raise InputError(
             "this is the other kind of profile",
-            file=path,
             field="header.type",
             value=header["header.type"],
             limit=f"{kind} (0 rail, 1 wheel)",
@@ -184,33 +163,30 @@ def _parse(path: Path, *, kind: int) -> _Points:
         i = int(bad[0])
         raise InputError(
             "a profile's points must be finite numbers",
-            file=path,
             field=f"line {int(at[i])}",
             value=(float(y[i]), float(z[i])),
             remedy="leave out points that were not measured",
         )
-    return _Points(y, z, at, header)
+    return y, z, at, header
 
 
-def _number(text: str, path: Path, field: str) -> float:
+def _number(text: str, field: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError(
-            "not a number", file=path, field=field, value=text, remedy="decimals have a point"
-        ) from None
+        raise InputError("not a number", field=field, value=text, remedy="decimals have a point") from None
 
 
-def _in_metres(points: _Points, path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _in_metres(
+    y: FloatArray, z: FloatArray, line: FloatArray, header: dict[str, float]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Points in metres and their lines, after what SIMPACK's header asks for, in the order that it numbers.
 
     Shift, rotation about x (y towards z), bounds, mirrors; the order of the points does not matter here.
     """
-    y, z, line, header = points
     if header.get("approx.smooth", 0.0) != 0.0:
         raise InputError(
             "smoothing by the reader is SIMPACK's own and not done here",
-            file=path,
             field="approx.smooth",
             value=header["approx.smooth"],
             limit="0",
@@ -219,9 +195,7 @@ def _in_metres(points: _Points, path: Path) -> tuple[FloatArray, FloatArray, Flo
     unit, angle_unit = header.get("units.len.f", 1.0), header.get("units.ang.f", 1.0)
     for field, value in (("units.len.f", unit), ("units.ang.f", angle_unit)):
         if not (np.isfinite(value) and value > 0.0):
-            raise InputError(
-                "not a unit", file=path, field=field, value=value, limit="> 0, 1000 for mm, 1 for m"
-            )
+            raise InputError("not a unit", field=field, value=value, limit="> 0, 1000 for mm, 1 for m")
     y, z = y + header.get("shift.y", 0.0), z + header.get("shift.z", 0.0)
     angle = header.get("rotate", 0.0) / angle_unit
     y, z = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
@@ -233,7 +207,6 @@ def _in_metres(points: _Points, path: Path) -> tuple[FloatArray, FloatArray, Flo
     if keep.sum() < _FEWEST_POINTS:
         raise InputError(
             "the bounds leave too few points",
-            file=path,
             field="bound",
             value=int(keep.sum()),
             limit=f"at least {_FEWEST_POINTS}",
@@ -247,7 +220,6 @@ def _in_metres(points: _Points, path: Path) -> tuple[FloatArray, FloatArray, Flo
     if not _WIDTH_M[0] < width < _WIDTH_M[1]:
         raise InputError(
             "no profile is that wide: the unit is another one",
-            file=path,
             field="units.len.f" if "shift.y" in header else "unit",
             value=f"{width:g} m",
             limit=f"{_WIDTH_M[0]:g} to {_WIDTH_M[1]:g} m",

@@ -1,4 +1,4 @@
-"""Readings of a contact table for two wheels on one axle: conicity, rolling radii, gravity's push.
+"""Readings of a contact table for two wheels on one axle: conicity, rolling radii, and the push of gravity.
 
 For plots, reports and checks. Everything here asks the same compiled kernel that a ride uses, at
 rest, so that what is read is what acts.
@@ -175,13 +175,3 @@ def conicity(table: ContactTable, amplitude_m: float) -> float:
     root = amplitude_m * np.cos(q) * np.sqrt(half * radius / fall)
     wavelength = 4.0 * 0.25 * np.pi * float(weights @ root)
     return float(half * radius * (2.0 * np.pi / wavelength) ** 2)
-
-
-def gravitational_stiffness(table: ContactTable, amplitude_m: float) -> float:
-    """Secant lateral stiffness (N/m) that gravity gives a wheelset at a displacement.
-
-    The two normal forces lean inward by the contact angles; displaced, the outer one leans more. For
-    independently rotating wheels this is all that centres the axle.
-    """
-    push = push_sideways(table, np.array([-amplitude_m, amplitude_m])).lateral_n
-    return float((push[0] - push[1]) / (2.0 * amplitude_m))

@@ -5,12 +5,6 @@ generic node with a diagonal mass; one object without mass on all nodes calls th
 (`simrail.vehicle.engines.exudyn_forces`). There are no joints and no constraints, so the explicit RK44
 integrates it from standstill to standstill. This is the only file that imports exudyn.
 
-The springs can be Exudyn's own instead (``suspension="native"``): one `RigidBodySpringDamper` per spring,
-taken out of the kernel. That is a test of the kernel's definition of a spring against independent code,
-not another way to run: it is slower, and the motion is the same. Rotations, stops and series dampers stay
-in the kernel: Exudyn's rotational springs work on Tait-Bryan angles, another definition, and the other
-two are no item of its.
-
 Two choices make it fast and exact. The nodes are `NodeRigidBodyRotVecLG`: their rates are body rates, so
 the mass matrix is constant and factorised once (a third of the time per step of Rxyz nodes, whose
 matrix is factorised at every evaluation). And the nodes' axes are the body's axes turned by half a turn
@@ -21,18 +15,16 @@ into noise.
 
 import struct
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any
 
 import exudyn as exu
 import numba
 import numpy as np
 from exudyn.itemInterface import (
-    MarkerBodyRigid,
     NodeGenericODE2,
     NodeRigidBodyRotVecLG,
     ObjectGenericODE2,
     ObjectRigidBody,
-    RigidBodySpringDamper,
     SensorUserFunction,
 )
 from scipy.spatial.transform import Rotation
@@ -60,16 +52,11 @@ class ExudynEngine:
     ----------
     setup : Setup
         What runs, where and how.
-    suspension : {"hook", "native"}
-        Who computes the springs: the kernel, or Exudyn's own items (see the module).
     """
 
-    def __init__(self, setup: Setup, *, suspension: Literal["hook", "native"] = "hook") -> None:
+    def __init__(self, setup: Setup) -> None:
         self.setup, model = setup, setup.model
         data = setup.pack()
-        self._native = data.springs[:0]
-        if suspension == "native":
-            self._native, data = data.springs, data._replace(springs=data.springs[:0])
         self._states = states_of(data)
         self._spins = data.spins["inertia"]
         self.size = 6 * len(model.bodies) + len(data.spins) + self._states
@@ -121,22 +108,15 @@ class ExudynEngine:
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._nodes = []
-        objects = []
         poses = start_poses(self.setup)
         for body, (position, rotation) in zip(model.bodies, poses, strict=True):
             turn = Rotation.from_matrix(rotation * HALF_TURN).as_rotvec()
             node = self.mbs.AddNode(
                 NodeRigidBodyRotVecLG(initialCoordinates=[*position, *turn], initialVelocities=[0.0] * 6)
             )
-            objects.append(
-                self.mbs.AddObject(
-                    ObjectRigidBody(
-                        mass=body.mass_kg, inertia=[*body.inertia_kgm2, 0.0, 0.0, 0.0], nodeNumber=node
-                    )
-                )
-            )
+            inertia = [*body.inertia_kgm2, 0.0, 0.0, 0.0]
+            self.mbs.AddObject(ObjectRigidBody(mass=body.mass_kg, inertia=inertia, nodeNumber=node))
             self._nodes.append(node)
-        self._add_springs(objects)
         aux = len(self._spins) + self._states
         lumped = self.mbs.AddNode(
             NodeGenericODE2(
@@ -165,32 +145,6 @@ class ExudynEngine:
         self._settings.solution.file.write = False
         # At every step: half a step, lest rounding lets one slip.
         self._settings.solution.sensors.writePeriod = self.setup.step_s / 2.0
-
-    def _add_springs(self, objects: list[Any]) -> None:
-        """Exudyn's own springs in place of the kernel's: rows as in `ForceData.springs`.
-
-        Markers and axes are given in the axes of the nodes, from which half a turn leads to the body's.
-        """
-        for row in self._native:
-            markers = [
-                self.mbs.AddMarker(
-                    MarkerBodyRigid(
-                        bodyNumber=objects[int(body)],
-                        localHT=exu.HT(  # type: ignore[call-arg]  # its stub has no constructor
-                            rotation=np.diag(HALF_TURN), translation=arm * HALF_TURN
-                        ),
-                    )
-                )
-                for body, arm in ((row["inner"], row["inner_arm"]), (row["outer"], row["outer_arm"]))
-            ]
-            self.mbs.AddObject(
-                RigidBodySpringDamper(
-                    markerNumbers=markers,
-                    stiffness=np.diag([*row["stiffness"], 0.0, 0.0, 0.0]),
-                    damping=np.diag([*row["damping"], 0.0, 0.0, 0.0]),
-                    offset=[0.0, 0.0, row["sag_m"], 0.0, 0.0, 0.0],
-                )
-            )
 
     def _callback(self) -> Any:
         """The force user function: everything bound in a closure, lists packed by struct.

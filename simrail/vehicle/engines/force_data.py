@@ -20,6 +20,9 @@ from simrail.vehicle.engines.records import RecordArray
 from simrail.vehicle.model import SeriesDamper, Suspension, Tabled, VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
+_BRAKE_WINDUP_RAD, _BRAKE_DAMPING_S = 5e-3, 0.02
+"""Angle over which a brake's torque builds up, and the damping time of its mounting."""
+
 
 class ForceData(NamedTuple):
     """Constants of `forces`: arrays of the records of `simrail.vehicle.engines.records`.
@@ -182,15 +185,14 @@ def _traction(model: VehicleModel, profile: SpeedProfile, drive: str) -> tuple[R
         means.position_gain_1ps,
         means.catch_up_mps,
         means.slide_protection_creepage,
-        means.brake_windup_rad,
-        means.brake_damping_s,
+        _BRAKE_WINDUP_RAD,
+        _BRAKE_DAMPING_S,
     )
-    driven_share, braked_share = dict(means.driven), dict(means.braked)
     for i, (spin, inertia) in enumerate(model.spin_inertia_kgm2.items()):
         wheel = next(w for w in model.wheels if w.spin == spin)
         axle = model.body_names.index(wheel.axle)
         carrier = axle if means.reaction == "axle" else model.body_names.index(means.reaction)
-        shares = driven_share.get(spin, 0.0), braked_share.get(spin, 0.0)
+        shares = means.driven.get(spin, 0.0), means.braked.get(spin, 0.0)
         spins[i] = (axle, carrier, inertia, wheel.radius_m, *shares)
     return traction, spins
 

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import twins.trajectory
+from channels import harmonic
 from simrail.estimators.trajectory.model import beyond_first_order
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
@@ -16,7 +17,7 @@ from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.rotation import rotation_matrix
 from simrail.recording.recording import ImuSheet, Recording
-from simrail.ride.kinematic import harmonic, kinematic_truth
+from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
 from simrail.track.design import Straight, TrackDesign
 from simrail.vehicle.speed_profile import SpeedProfile

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 import pytest
+from channels import harmonic
 from simrail.estimators.trajectory.over_space import over_space
 from simrail.estimators.trajectory.track_geometry import track_geometry, trusted
 
@@ -20,7 +21,7 @@ from simrail.core.columns import (
 from simrail.core.errors import InputError
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, RailSensorSheet, Recording
-from simrail.ride.kinematic import harmonic, kinematic_truth, rail_following
+from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Mount
 from simrail.sensors.rail_sensor import RailSensorSpec, sample_rails
 from simrail.track.bands import BANDS, band_pass

@@ -1,8 +1,7 @@
 """Pose from rates and specific force alone: the integration that a perfect IMU would allow.
 
-Used to prove that a truth is consistent with itself (its rates and accelerations integrate back to its
-poses), and to show how fast the errors of a real IMU grow when nothing corrects them. It is no
-estimator: it starts from a known pose.
+Proves that a truth is consistent with itself: its rates and accelerations integrate back to its poses. It
+is no estimator: it starts from a known pose.
 """
 
 import numpy as np
