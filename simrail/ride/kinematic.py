@@ -114,7 +114,7 @@ def kinematic_truth(
         name: np.array(channels[name](t, s, v, a)) if channels and name in channels else zero
         for name in CHANNELS
     }
-    design = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
+    design = frame.rotation
     k, dk = frame.k, frame.dk
     omega_t = v[:, None] * k
     alpha_t = a[:, None] * k + (v**2)[:, None] * dk

@@ -68,9 +68,7 @@ def acceleration_terms(
     """
     position, speed, speed_rate = motion[list(ODOMETRY)].to_numpy(dtype=np.float64).T
     frame = track.frame(position)
-    to_track = np.swapaxes(
-        rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad])), 1, 2
-    )
+    to_track = np.swapaxes(frame.rotation, 1, 2)
     body = rotation_matrix(motion[list(ATTITUDE)].to_numpy(dtype=np.float64))
     felt = np.einsum("nij,nj->ni", body, motion[list(ACCEL)].to_numpy(dtype=np.float64))
     a = np.einsum("nij,nj->ni", to_track, felt - np.array([0.0, 0.0, gravity_mps2]))

@@ -191,7 +191,7 @@ class Truth:
         guess = self.reference_position_m + body.offset_m + mount.position_m[0]
         frame, speed, speed_rate, beside = _along_track(self.track, guess, position, velocity, acceleration)
         angles = euler_angles(rotation) if np.any(misalignment) else body.angles
-        relative = euler_angles(np.swapaxes(_track_rotation(frame), 1, 2) @ rotation)
+        relative = euler_angles(np.swapaxes(frame.rotation, 1, 2) @ rotation)
         data = np.column_stack(
             [
                 position,
@@ -212,10 +212,6 @@ class Truth:
 def _rotate(rotation: FloatArray, vectors: FloatArray) -> FloatArray:
     rotated: FloatArray = np.einsum("nij,nj->ni", rotation, vectors)
     return rotated
-
-
-def _track_rotation(frame: TrackFrame) -> FloatArray:
-    return rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
 
 
 def abeam(
@@ -248,7 +244,7 @@ def abeam(
     for _ in range(4):
         s = np.clip(s, track.start_m, track.end_m)
         frame = track.frame(s)
-        rotation = _track_rotation(frame)
+        rotation = frame.rotation
         rho = np.einsum("nji,nj->ni", rotation, position - frame.position)
         stretch = 1.0 / np.cos(frame.pitch_rad) - frame.k[:, 2] * rho[:, 1] + frame.k[:, 1] * rho[:, 2]
         step = rho[:, 0] / stretch

@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray, njit
 from simrail.recording.sheets.grades import ImuGrade
-from simrail.sensors.decimation import Sampling
+from simrail.sensors.decimation import Sampling, too_short
 from simrail.sensors.imu_noise import Streams
 
 SHIFTS = 256
@@ -68,13 +67,7 @@ def sample_by_clock(
     drift = grade.clock_drift * streams("clock_drift").uniform(-1.0, 1.0)
     count = int(np.floor(((len(samples) - 1 - ahead - factor) / (1.0 + drift) - first) / factor)) + 1
     if count < 1:
-        raise InputError(
-            "the ride is too short for the sensor's filter",
-            field="rate_hz",
-            value=f"{len(samples)} samples",
-            limit=f"at least {first + ahead + factor + 2} samples",
-            remedy="simulate a longer ride or choose a faster sensor",
-        )
+        raise too_short(len(samples), first + ahead + factor + 2)
     places: FloatArray = (first + factor * np.arange(count, dtype=np.float64)) * (1.0 + drift)
     if grade.clock_jitter_s > 0.0:
         places += streams("clock_jitter").standard_normal(count) * (grade.clock_jitter_s * truth_rate_hz)

@@ -27,9 +27,10 @@ STOP_DB = 63.0
 
 
 @lru_cache(maxsize=32)
-def _taps(factor: int) -> tuple[float, ...]:
+def decimation_taps(factor: int) -> FloatArray:
+    """Coefficients of the filter before taking every `factor`-th sample; odd in number, sum 1, read-only."""
     if factor == 1:
-        return (1.0,)
+        return np.ones(1)
     width = (STOP_EDGE - PASS_EDGE) / factor
     order = (STOP_DB - 7.95) / (2.285 * 2.0 * np.pi * width)
     # Half the length is a whole number of output samples: the delay is one, too.
@@ -40,12 +41,9 @@ def _taps(factor: int) -> tuple[float, ...]:
         window=("kaiser", signal.kaiser_beta(STOP_DB)),
         fs=2.0 * factor,
     )
-    return tuple(taps / np.sum(taps))
-
-
-def decimation_taps(factor: int) -> FloatArray:
-    """Coefficients of the filter before taking every `factor`-th sample; odd in number, sum 1."""
-    return np.array(_taps(factor))
+    taps = taps / np.sum(taps)
+    taps.flags.writeable = False
+    return taps
 
 
 def decimation_factor(truth_rate_hz: float, output_rate_hz: float) -> int:
@@ -152,7 +150,7 @@ def sample_on_time(samples: FloatArray, sampling: Sampling) -> tuple[FloatArray,
     first = sampling.first
     count = (len(samples) - 1 - sampling.delay - first) // factor + 1
     if count < 1:
-        raise _too_short(len(samples), len(taps))
+        raise too_short(len(samples), len(taps))
     # A filter delayed by whole output samples can be evaluated at those only.
     later = -sampling.delay % factor
     filtered = signal.upfirdn(np.pad(taps, (later, 0)), samples, up=1, down=factor, axis=0)
@@ -160,7 +158,8 @@ def sample_on_time(samples: FloatArray, sampling: Sampling) -> tuple[FloatArray,
     return np.ascontiguousarray(filtered[begin : begin + count]), first
 
 
-def _too_short(found: int, needed: int) -> InputError:
+def too_short(found: int, needed: int) -> InputError:
+    """What is said of a ride that has fewer samples than a filter needs."""
     return InputError(
         "the ride is too short for the sensor's filter",
         field="rate_hz",

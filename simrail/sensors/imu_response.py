@@ -5,7 +5,7 @@ kind from its own stream.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -138,20 +138,11 @@ def respond(
         return
     shaking = np.zeros((0, 3)) if vibration is None else vibration
     warmth = np.zeros(0) if above_k is None else above_k
-    both = (gyro, accel)
-    _respond(
-        samples,
-        np.array([triad.axes for triad in both]),
-        np.array([triad.scale for triad in both]),
-        np.array([triad.scale_per_k for triad in both]),
-        np.array([triad.bias_per_k for triad in both]),
-        np.array([triad.bend for triad in both]),
-        np.array([triad.rectification for triad in both]),
-        np.array([triad.force_gain for triad in both]),
-        np.array([triad.full_scale for triad in both]),
-        shaking,
-        warmth,
-    )
+    # The coefficients of both triads in the order of their fields, which is that of the kernel's arguments.
+    columns = [
+        np.array([getattr(triad, field.name) for triad in (gyro, accel)]) for field in fields(TriadResponse)
+    ]
+    _respond(samples, *columns, shaking, warmth)
 
 
 @njit

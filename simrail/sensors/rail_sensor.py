@@ -118,11 +118,10 @@ def rails_seen(
         for _ in range(4):
             s = np.clip(s, rails.design.start_m, rails.design.end_m)
             frame = rails.design.frame(s)
-            track = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
             place = np.zeros((len(s), 3))
             place[:, 1:] = rails.rails(s)[:, first : first + 2]
             place[:, 1] += side * rails.design.rail_base_m
-            head = frame.position + np.einsum("nij,nj->ni", track, place)
+            head = frame.position + np.einsum("nij,nj->ni", frame.rotation, place)
             seen = np.einsum("nji,nj->ni", body, head - position)
             # A metre of s carries the rail about a metre along the body: the rest is for the next turn.
             s = s - seen[:, 0]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simrail.core.jit import FloatArray
+from simrail.core.rotation import rotation_matrix
 
 
 class TrackFrame(NamedTuple):
@@ -40,6 +41,11 @@ class TrackFrame(NamedTuple):
     second: FloatArray
     k: FloatArray
     dk: FloatArray
+
+    @property
+    def rotation(self) -> FloatArray:
+        """From the axes of the frame to the global ones, (n, 3, 3) at n places."""
+        return rotation_matrix(np.column_stack([self.roll_rad, self.pitch_rad, self.yaw_rad]))
 
 
 def stack(*parts: FloatArray) -> FloatArray:

@@ -146,7 +146,6 @@ def lay(
     irregularity: Irregularity,
     *,
     seed: int,
-    table_step_m: float | None = None,
     conditions: Sequence[RailCondition] = (),
 ) -> LaidTrack:
     """Draw the irregularities and lay the track.
@@ -159,8 +158,6 @@ def lay(
         What to draw.
     seed : int
         Root seed; another seed is another track.
-    table_step_m : float, optional
-        Distance of the spline knots, a divisor of 65536 m; `knot_step_m` if not given.
     conditions : sequence of RailCondition
         What lies on the rails, and where.
 
@@ -172,7 +169,7 @@ def lay(
     """
     design.check()
     irregularity.check()
-    table_step_m = table_step_m or knot_step_m(irregularity)
+    table_step_m = knot_step_m(irregularity)
     check_conditions(conditions, design.start_m, design.end_m)
     if not 2.0 * irregularity.fade_m <= design.length_m <= PERIOD_M:
         raise InputError(
@@ -198,7 +195,7 @@ def lay(
     table = np.ascontiguousarray(table)
     table.flags.writeable = False
     start = float(s[0])
-    return LaidTrack(design, irregularity, int(seed), start, float(table_step_m), table, tuple(conditions))
+    return LaidTrack(design, irregularity, int(seed), start, table_step_m, table, tuple(conditions))
 
 
 def _rails(drawn: FloatArray) -> FloatArray:

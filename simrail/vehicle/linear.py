@@ -76,19 +76,14 @@ class RunningVehicle:
     data : ForceData
         Its constants; the driver's point moves at V = 1 m/s (`rates` puts in the speed that it is asked
         for).
-    gravity_mps2 : float
-        Gravity.
     inner_states : int
         Number d of first-order states.
     """
 
     model: VehicleModel
     data: ForceData
-    gravity_mps2: float
     inner_states: int
     _nominal: FloatArray = field(repr=False)
-    _mass: FloatArray = field(repr=False)
-    _inertia: FloatArray = field(repr=False)
     _drops_m: FloatArray = field(repr=False)
 
     @property
@@ -153,11 +148,12 @@ class RunningVehicle:
         moment = np.einsum("bji,bj->bi", rotation, loads[:, 3:])
         omega = np.einsum("bji,bj->bi", rotation, motion[:, 3:])
         # The cross product by columns: np.cross takes a third of the time of everything here.
-        turned = self._inertia * omega
+        inertia = self.data.bodies["inertia"]
+        turned = inertia * omega
         gyro = omega[:, [1, 2, 0]] * turned[:, [2, 0, 1]] - omega[:, [2, 0, 1]] * turned[:, [1, 2, 0]]
-        slope = (moment - gyro) / self._inertia
+        slope = (moment - gyro) / inertia
         out = np.empty((b, 6))
-        out[:, :3] = loads[:, :3] / self._mass[:, None]
+        out[:, :3] = loads[:, :3] / self.data.bodies["mass_kg"][:, None]
         out[:, 3:] = np.einsum("bij,bj->bi", rotation, slope)
         return np.concatenate([motion.ravel(), out.ravel(), torque / self.data.spins["inertia"], inner])
 
@@ -268,10 +264,7 @@ def running_vehicle(model: VehicleModel, *, gravity_mps2: float = 9.81) -> Runni
     return RunningVehicle(
         model=model,
         data=data,
-        gravity_mps2=gravity_mps2,
         inner_states=states_of(data),
         _nominal=nominal,
-        _mass=np.array([body.mass_kg for body in model.bodies]),
-        _inertia=np.array([body.inertia_kgm2 for body in model.bodies]),
         _drops_m=rest_drops_m(model, gravity_mps2=gravity_mps2),
     )

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import simrail.scenarios
+from wheel_loads import wheel_loads_n
 
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import load
@@ -47,7 +48,7 @@ def run(
     solver = engine(Setup(model, laid, profile, settle_s=1.0, step_s=step_s, drive=drive))
     segments = list(solver.run(duration_s, segment_s=3.0))
     joined = {name: np.concatenate([getattr(part, name) for part in segments]) for name in FIELDS}
-    return SimpleNamespace(**joined, loads_n=solver.wheel_loads_n(), model=model, laid=laid)
+    return SimpleNamespace(**joined, loads_n=wheel_loads_n(solver), model=model, laid=laid)
 
 
 def both(vehicle, track, profile, *, duration_s=None, **options):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wheel_loads import wheel_loads_n
 
 from simrail.core.toml_files import load
 from simrail.track.design import Straight, TrackDesign
@@ -40,7 +41,7 @@ def at_rest(model):
     engine = CompiledEngine(Setup(model, laid, SpeedProfile(20.0, 40.0, 5.0, rest_s=5.0), settle_s=8.0))
     segment = next(iter(engine.run(0.5)))
     nominal = [model.body(name).position_m[2] for name in model.axle_names]
-    return segment.position[-1, : len(nominal), 2] - nominal, engine.wheel_loads_n()
+    return segment.position[-1, : len(nominal), 2] - nominal, wheel_loads_n(engine)
 
 
 def test_two_axle_loads_stand_at_their_own_heights_with_their_own_loads_to_1e_3():
@@ -52,7 +53,7 @@ def test_two_axle_loads_stand_at_their_own_heights_with_their_own_loads_to_1e_3(
     light, heavy = contacts.tables
     np.testing.assert_allclose([light.static_load_n, heavy.static_load_n], loads[[2, 0]])
     assert light.coef.shape == heavy.coef.shape
-    for name in ("first_shift_m", "intervals_per_m", "least_shift_m", "derailed_shift_m"):
+    for name in ("first_shift_m", "intervals_per_m", "derailed_shift_m"):
         assert light.const[name] == heavy.const[name]  # one grid
     heights, found = at_rest(model)
     np.testing.assert_allclose(found, loads, rtol=1e-3)

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from simrail.core.errors import InputError
-from simrail.core.toml_files import Part, find, judge, label, read_toml
+from simrail.core.toml_files import Part, blame, find, judge, label, read_toml
 from simrail.recording.sheets.datasheet import FIGURES, grade_from_datasheet
 from simrail.recording.sheets.grades import ImuGrade
 
@@ -77,8 +76,5 @@ def load_imu(name: str, *, folder: Path | None = None) -> tuple[ImuHead, ImuGrad
     """IMU file and its grade; see `load_grade`."""
     path = find("imu", name, folder=folder)
     file = judge(ImuFile, read_toml(path), file=label(path))
-    try:
+    with blame(label(path)):
         return file, file.grade(path.stem)
-    except InputError as error:
-        error.file = label(path) if error.file is None else error.file
-        raise

@@ -316,6 +316,6 @@ def wheel_force(
         my -= side * sd * M
         mz += cd * M
         normal += N
-    if u < const.least_shift_m or u > const.derailed_shift_m:
+    if u < const.first_shift_m or u > const.derailed_shift_m:
         flag = -1
     return WheelForce(flag, fx, fy, fz, mx, my, mz, normal, deepest)

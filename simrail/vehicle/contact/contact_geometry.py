@@ -22,23 +22,10 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.vehicle.contact.contact_pair import ContactPair, SoftContact, incline
 from simrail.vehicle.contact.creep_laws import CreepLaw
-from simrail.vehicle.contact.hertz import POISSON_RATIO, SHEAR_MODULUS_PA, hertz_ellipse, kalker_coefficients
+from simrail.vehicle.contact.hertz import SHEAR_MODULUS_PA, hertz_ellipse, kalker_coefficients
 from simrail.vehicle.contact.profiles import RailProfile, WheelProfile, wheel_depth
 
-COLUMNS = (
-    "penetration",
-    "roll_rise",
-    "spread",
-    "yaw_rise",
-    "abscissa",
-    "depth",
-    "f11",
-    "f22",
-    "f23",
-    "f33",
-    "semi_axis_along",
-    "semi_axis_across",
-)
+COLUMNS = (*SoftContact._fields[:6], "f11", "f22", "f23", "f33", "semi_axis_along", "semi_axis_across")
 """What a patch's table holds, in the order of its columns (see `ContactTable.coef`)."""
 CONSTANTS = (
     "first_shift_m",
@@ -53,15 +40,9 @@ CONSTANTS = (
     "creep_damping_s",
     "spin_speed_mps",
     "windup_rate_1ps",
-    "least_shift_m",
     "derailed_shift_m",
     "touch_load_n",
-    "creep_law",
-    "polach_adhesion",
-    "polach_slip",
-    "friction_floor",
-    "friction_decay_spm",
-    "windup_onset",
+    *CreepLaw().constants(),
 )
 """What `ContactTable.const` holds."""
 PATCH = np.dtype([(name, "f8", (4,)) for name in COLUMNS], align=True)
@@ -148,8 +129,6 @@ def build_contact(
     relaxation_time_s: float = 3e-4,
     creep_damping_s: float = 1e-4,
     creep_law: CreepLaw | None = None,
-    shear_modulus_pa: float = SHEAR_MODULUS_PA,
-    poisson_ratio: float = POISSON_RATIO,
 ) -> ContactTable:
     """Tabulate the contact of a wheel on a rail (about 0.3 s).
 
@@ -182,8 +161,6 @@ def build_contact(
         Voigt time of the tangential contact spring.
     creep_law : CreepLaw, optional
         How creep forces saturate, and how friction falls with sliding; Shen-Hedrick-Elkins if none.
-    shear_modulus_pa, poisson_ratio : float
-        Of wheel and rail.
 
     Returns
     -------
@@ -208,7 +185,6 @@ def build_contact(
         ("tape_circle_half_m", tape_circle_half_m),
         ("friction", friction),
         ("smoothing", smoothing),
-        ("shear_modulus_pa", shear_modulus_pa),
     ):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("must be a positive number", field=field, value=value, limit="> 0")
@@ -223,13 +199,7 @@ def build_contact(
         offset_m=tape_circle_half_m - 0.5 * gauge_m + head.gauge_abscissa_m,
         radius_m=wheel_radius_m,
     )
-    ball = hertz_ellipse(
-        0.5 / wheel_radius_m,
-        0.5 * _K0_1PM / scale,
-        shear_modulus_pa=shear_modulus_pa,
-        poisson_ratio=poisson_ratio,
-    )
-    hertz = float(ball.approach) ** -1.5
+    hertz = float(hertz_ellipse(0.5 / wheel_radius_m, 0.5 * _K0_1PM / scale).approach) ** -1.5
     eps = smoothing * (static_load_n / hertz) ** (2.0 / 3.0)
 
     derailed, split_at = _limits(pair, scale)
@@ -245,9 +215,7 @@ def build_contact(
     for k, mask in enumerate(masks):
         factor = 1.0 if k == 0 else _FLANGE_SMOOTHING
         contact = pair.soften(u, mask, eps_m=factor * eps, k0_1pm=_K0_1PM / scale)
-        creep = _creep_factors(
-            contact, pair, hertz=hertz, scale=scale, modulus=shear_modulus_pa, poisson=poisson_ratio
-        )
+        creep = _creep_factors(contact, pair, hertz=hertz, scale=scale)
         columns = np.stack([*contact[:6], *creep], axis=1)
         coef[k] = np.moveaxis(CubicSpline(u, columns).c, 0, -1)
     values = {
@@ -263,7 +231,6 @@ def build_contact(
         "creep_damping_s": creep_damping_s,
         "spin_speed_mps": _SPIN_SPEED_MPS,
         "windup_rate_1ps": _WINDUP_RATE_1PS,
-        "least_shift_m": u[0],
         "derailed_shift_m": derailed,
         "touch_load_n": 0.01 * static_load_n,
         **(creep_law or CreepLaw()).constants(),
@@ -306,7 +273,7 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
 
 
 def _creep_factors(
-    contact: SoftContact, pair: ContactPair, *, hertz: float, scale: float, modulus: float, poisson: float
+    contact: SoftContact, pair: ContactPair, *, hertz: float, scale: float
 ) -> tuple[FloatArray, ...]:
     """Kalker's linear creep coefficients and the ellipse's semi-axes per power of the normal approach d.
 
@@ -315,14 +282,10 @@ def _creep_factors(
     """
     cosine = 1.0 / np.sqrt(1.0 + contact.slope**2)
     curvature = np.clip(contact.curvature * cosine**3, 0.2 / scale, 3000.0 / scale)
-    ellipse = hertz_ellipse(
-        0.5 * cosine / (pair.radius_m + contact.depth),
-        0.5 * curvature,
-        shear_modulus_pa=modulus,
-        poisson_ratio=poisson,
-    )
+    ellipse = hertz_ellipse(0.5 * cosine / (pair.radius_m + contact.depth), 0.5 * curvature)
     c11, c22, c23, c33 = kalker_coefficients(ellipse.a / ellipse.b)
     a, b = ellipse.a * np.cbrt(hertz), ellipse.b * np.cbrt(hertz)
     area = a * b
+    modulus = SHEAR_MODULUS_PA
     forces = modulus * area * c11, modulus * area * c22, modulus * area**1.5 * c23, modulus * area**2 * c33
     return *forces, a, b

@@ -41,9 +41,6 @@ class Ellipse(NamedTuple):
 def hertz_ellipse(
     longitudinal: FloatArray | float,
     lateral: FloatArray | float,
-    *,
-    shear_modulus_pa: float = SHEAR_MODULUS_PA,
-    poisson_ratio: float = POISSON_RATIO,
 ) -> Ellipse:
     """Contact ellipse of two bodies whose gap is ``longitudinal x^2 + lateral y^2`` (Hertz 1882).
 
@@ -51,8 +48,6 @@ def hertz_ellipse(
     ----------
     longitudinal, lateral : ndarray or float
         Half the relative curvatures along and across the rail, 1/m, positive.
-    shear_modulus_pa, poisson_ratio : float
-        Of both bodies.
 
     Returns
     -------
@@ -76,7 +71,7 @@ def hertz_ellipse(
     log_ratio = np.concatenate([[0.0], np.log((e * np.exp(-2.0 * log_g[1:]) - k) / (k - e))])
     g = np.exp(CubicSpline(log_ratio, log_g)(np.log(ratio)))
     k2 = 1.0 - g**2
-    modulus = shear_modulus_pa * (1.0 + poisson_ratio) / (1.0 - poisson_ratio**2)
+    modulus = SHEAR_MODULUS_PA * (1.0 + POISSON_RATIO) / (1.0 - POISSON_RATIO**2)
     e, k = ellipe(k2), ellipk(k2)
     large = np.cbrt(3.0 * e / (2.0 * np.pi * g**2 * (along + across) * modulus))
     approach = 3.0 * k / (2.0 * np.pi * large * modulus)

@@ -18,7 +18,6 @@ from simrail.vehicle.engines.engine import (
     start_memory,
     start_poses,
     stretches,
-    wheel_loads_n,
 )
 from simrail.vehicle.engines.force_data import states_of
 from simrail.vehicle.engines.records import POSE, WRENCH
@@ -78,10 +77,6 @@ class CompiledEngine:
                 spin_rad=rows[:, self._turned : self._turned + len(self.data.spins)],
                 states=rows[:, self._first_state :],
             )
-
-    def wheel_loads_n(self) -> FloatArray:
-        """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-        return wheel_loads_n(self.memory)
 
     def _bodies(self, states: FloatArray) -> FloatArray:
         """The bodies' part of states (..., n), as (..., b, 13)."""

@@ -146,11 +146,6 @@ def start_memory(setup: Setup) -> Memory:
     return memory
 
 
-def wheel_loads_n(memory: Memory) -> FloatArray:
-    """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-    return np.column_stack([memory.axle_memos["load_left_n"], memory.axle_memos["load_right_n"]]).ravel()
-
-
 def refuse_derailed(memory: Memory, model: VehicleModel) -> None:
     """Raise `DerailedError` if a wheel has left its rail."""
     for axle, memo in zip(model.axle_names, memory.axle_memos, strict=True):

@@ -37,7 +37,6 @@ from simrail.vehicle.engines.engine import (
     start_memory,
     start_poses,
     stretches,
-    wheel_loads_n,
 )
 from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces
 from simrail.vehicle.engines.force_data import states_of
@@ -97,10 +96,6 @@ class ExudynEngine:
                 spin_rad=rows[:, 0, 6 * bodies : 6 * bodies + spins],
                 states=rows[:, 1, 6 * bodies + spins :],
             )
-
-    def wheel_loads_n(self) -> FloatArray:
-        """Vertical contact force (track frame) of each wheel (w,) at the last evaluation, N."""
-        return wheel_loads_n(self.memory)
 
     def _build(self) -> None:
         model = self.setup.model

@@ -175,19 +175,8 @@ def _traction(model: VehicleModel, profile: SpeedProfile, drive: str) -> tuple[R
             field="traction",
             remedy='give it a [traction], or ride with drive = "guide"',
         )
-    traction[0] = (
-        1,
-        profile.direction,
-        means.tractive_effort_n,
-        means.power_w,
-        means.braking_effort_n,
-        means.speed_gain_nspm,
-        means.position_gain_1ps,
-        means.catch_up_mps,
-        means.slide_protection_creepage,
-        _BRAKE_WINDUP_RAD,
-        _BRAKE_DAMPING_S,
-    )
+    _, _, *limits, _ = astuple(means)  # in the order of TRACTION
+    traction[0] = (1, profile.direction, *limits, _BRAKE_WINDUP_RAD, _BRAKE_DAMPING_S)
     for i, (spin, inertia) in enumerate(model.spin_inertia_kgm2.items()):
         wheel = next(w for w in model.wheels if w.spin == spin)
         axle = model.body_names.index(wheel.axle)

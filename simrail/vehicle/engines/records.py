@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simrail.core.jit import FloatArray, njit_inner
+from simrail.track.laid_track import CHANNELS
 
 RecordArray = npt.NDArray[np.void]
 """Array of records, one per body, element, wheel, ...; C-contiguous."""
@@ -55,16 +56,7 @@ FRAME = np.dtype(
 )
 """The track at one s: place and axes of its frame, its curvatures about these axes (1/m), 1/cos(pitch),
 deviations of both rails (m) and their derivatives by s, friction factors."""
-TRACK = np.dtype(
-    [
-        (name, "f8", (4,))
-        for name in (
-            *("x", "y", "z", "yaw", "pitch", "roll"),
-            *("y_left", "z_left", "y_right", "z_right", "friction_left", "friction_right"),
-        )
-    ],
-    align=True,
-)
+TRACK = np.dtype([(name, "f8", (4,)) for name in CHANNELS])
 """Cubics, highest power first, over one interval of `simrail.track.laid_track.LaidTrack.table`."""
 
 BODY = _record("mass_kg", inertia=_VECTOR)
