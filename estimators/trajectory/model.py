@@ -24,8 +24,7 @@ from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray, IntArray
 from simrail.recording.recording import Recording, odometry_of
-from simrail.track.design import STRAIGHT
-from simrail.track.frame import TrackFrame
+from simrail.track.design import STRAIGHT, TrackFrame
 
 
 class Model(NamedTuple):

@@ -52,3 +52,15 @@ class InputError(ValueError):
         if self.remedy is not None:
             parts.append(f"; remedy: {self.remedy}")
         return "".join(parts)
+
+
+def refuse_unless(good: bool, field: str, value: object, limit: str) -> None:
+    """Refuse a value of a specification that cannot be.
+
+    Raises
+    ------
+    InputError
+        Naming field, value and limit.
+    """
+    if not good:
+        raise InputError("is impossible", field=field, value=value, limit=limit)

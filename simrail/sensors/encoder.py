@@ -15,6 +15,7 @@ Not here: what a logger makes of the counts (`simrail.recording.wheel_speed`,
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -25,6 +26,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 from simrail.sensors.decimation import decimation_factor
+from simrail.sensors.imu_noise import Streams
 
 IntArray = npt.NDArray[np.int64]
 
@@ -168,24 +170,24 @@ def sample_encoder(
     time = np.asarray(time_s, dtype=np.float64)
     truth_rate = float(round((len(time) - 1) / (time[-1] - time[0]), 6))
     factor = decimation_factor(truth_rate, spec.rate_hz)
-    identity = (seed, draw, spec.wheel)
+    streams = _streams(spec, seed=seed, draw=draw)
     angle = np.asarray(wheel_angle, dtype=np.float64)
     if spec.slip:
         angle = angle + slipped_angle(angle, time, spec.slip)
     scale = spec.counts_per_revolution
-    phase = _stream(identity, "phase").uniform() if spec.phase is None else spec.phase
+    phase = streams("phase").uniform() if spec.phase is None else spec.phase
     turned = (angle - angle[0]) / (2.0 * np.pi) * scale + phase
     nearest = np.rint(turned)
     rounding = 4.0 * np.finfo(np.float64).eps * (np.abs(turned) + np.abs(angle) * scale + 1.0)
     turned = np.where(np.abs(turned - nearest) <= rounding, nearest, turned)
-    edges = _displaced_edges(turned, spec, identity)
+    edges = _displaced_edges(turned, spec, streams)
     if edges is None:
         passed = np.floor(turned).astype(np.int64)
     else:
         first, places = edges
         passed = first - 1 + np.searchsorted(places, turned, side="right").astype(np.int64)
     change = np.diff(passed, prepend=passed[0])
-    seen = change - _missed(change, spec, identity)
+    seen = change - _missed(change, spec, streams)
     columns = {"pulse_count": np.cumsum(seen)[::factor]}
     if spec.edge_times:
         # Forward, the last edge passed is the highest one at or below the wheel; backward, the lowest above.
@@ -213,7 +215,7 @@ def nominal_radius(near_m: float, spec: EncoderSpec, *, seed: int, draw: int) ->
     """Wheel radius that the train believes in: near_m times 1 + error, fixed or N(0, sd)."""
     error = spec.radius_error
     if error is None:
-        error = spec.radius_error_sd * _stream((seed, draw, spec.wheel), "radius").normal()
+        error = spec.radius_error_sd * _streams(spec, seed=seed, draw=draw)("radius").normal()
     return near_m * (1.0 + error)
 
 
@@ -250,13 +252,13 @@ def check_encoder(spec: EncoderSpec) -> None:
             refuse("no wheel slips so", f"slip[{i}].creepage", event.creepage, "-1 (locked) to 10")
 
 
-def _stream(identity: tuple[int, int, str], term: str) -> np.random.Generator:
-    seed, draw, wheel = identity
-    return stream(seed, "sensor", draw, "encoder", wheel, term)
+def _streams(spec: EncoderSpec, *, seed: int, draw: int) -> Streams:
+    """Random streams of one encoder, by the name of the term."""
+    return partial(stream, seed, "sensor", draw, "encoder", spec.wheel)
 
 
 def _displaced_edges(
-    turned: FloatArray, spec: EncoderSpec, identity: tuple[int, int, str]
+    turned: FloatArray, spec: EncoderSpec, streams: Streams
 ) -> tuple[int, FloatArray] | None:
     """Number of the first edge, and sorted places of all edges that the ride may pass, in counts.
 
@@ -271,16 +273,16 @@ def _displaced_edges(
     numbers = np.arange(first, last + 1)
     places = numbers.astype(np.float64)
     if sd[0] > 0.0:
-        pattern = _stream(identity, "edge_pattern").normal(0.0, sd[0], spec.counts_per_revolution)
+        pattern = streams("edge_pattern").normal(0.0, sd[0], spec.counts_per_revolution)
         places += pattern[numbers % spec.counts_per_revolution]
     if sd[1] > 0.0:
-        places[-first:] += _stream(identity, "edge_jitter").normal(0.0, sd[1], last + 1)
-        places[:-first] += _stream(identity, "edge_jitter_back").normal(0.0, sd[1], -first)[::-1]
+        places[-first:] += streams("edge_jitter").normal(0.0, sd[1], last + 1)
+        places[:-first] += streams("edge_jitter_back").normal(0.0, sd[1], -first)[::-1]
     places.sort()
     return first, places
 
 
-def _missed(change: IntArray, spec: EncoderSpec, identity: tuple[int, int, str]) -> IntArray:
+def _missed(change: IntArray, spec: EncoderSpec, streams: Streams) -> IntArray:
     """Change of the count (n,) that went unseen, signed."""
     lost = np.zeros_like(change)
     if spec.missed_rate == 0.0:
@@ -289,7 +291,7 @@ def _missed(change: IntArray, spec: EncoderSpec, identity: tuple[int, int, str])
     per_pulse = spec.counts_per_pulse
     pulses = int(passages[-1]) // per_pulse + 1
     # From one missed pulse to the next: geometric.
-    generator = _stream(identity, "missed")
+    generator = streams("missed")
     numbers = np.zeros(0, dtype=np.int64)
     while len(numbers) == 0 or numbers[-1] <= pulses:
         start = numbers[-1] if len(numbers) else 0

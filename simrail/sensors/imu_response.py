@@ -73,11 +73,8 @@ class TriadResponse:
     def is_perfect(self) -> bool:
         """Whether it changes nothing."""
         errors = (self.scale, self.scale_per_k, self.bias_per_k, self.bend, self.rectification)
-        return (
-            not any(np.any(error) for error in errors)
-            and not np.any(self.force_gain)
-            and np.array_equal(self.axes, np.eye(3))
-        )
+        absent = not any(np.any(error) for error in (*errors, self.force_gain))
+        return absent and np.array_equal(self.axes, np.eye(3))
 
 
 def draw_response(grade: ImuGrade, kind: str, streams: Streams) -> TriadResponse:

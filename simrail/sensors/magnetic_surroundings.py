@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from simrail.core.errors import InputError
+from simrail.core.errors import refuse_unless
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 
@@ -183,25 +183,20 @@ def check_traction(traction: Traction) -> None:
     """Refuse traction without voltage, mass or a possible efficiency; raises `InputError`."""
     for field in ("voltage_v", "mass_kg", "share"):
         value = getattr(traction, field)
-        _require(0.0 < value < np.inf, f"traction.{field}", value, "> 0")
+        refuse_unless(0.0 < value < np.inf, f"traction.{field}", value, "> 0")
     for field in ("auxiliary_w", "resistance_n"):
         value = getattr(traction, field)
-        _require(0.0 <= value < np.inf, f"traction.{field}", value, ">= 0")
-    _require(
+        refuse_unless(0.0 <= value < np.inf, f"traction.{field}", value, ">= 0")
+    refuse_unless(
         0.0 < traction.efficiency <= 1.0, "traction.efficiency", traction.efficiency, "above 0, at most 1"
     )
 
 
 def check_steel(steel: Steel) -> None:
     """Refuse structures within the vehicle's way, or none; raises `InputError`."""
-    _require(steel.spacing_m >= 1.0, "steel.spacing_m", steel.spacing_m, ">= 1 m")
-    _require(steel.moment_sd_am2 >= 0.0, "steel.moment_sd_am2", steel.moment_sd_am2, ">= 0")
+    refuse_unless(steel.spacing_m >= 1.0, "steel.spacing_m", steel.spacing_m, ">= 1 m")
+    refuse_unless(steel.moment_sd_am2 >= 0.0, "steel.moment_sd_am2", steel.moment_sd_am2, ">= 0")
     near, far = steel.beside_m
-    _require(1.5 <= near <= far, "steel.beside_m", steel.beside_m, ">= 1.5 m, least first")
+    refuse_unless(1.5 <= near <= far, "steel.beside_m", steel.beside_m, ">= 1.5 m, least first")
     low, high = steel.height_m
-    _require(low <= high, "steel.height_m", steel.height_m, "least first")
-
-
-def _require(good: bool, field: str, value: object, limit: str) -> None:
-    if not good:
-        raise InputError("is impossible", field=field, value=value, limit=limit)
+    refuse_unless(low <= high, "steel.height_m", steel.height_m, "least first")

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from simrail.core.columns import ATTITUDE, MAGNETIC, RELATIVE_ATTITUDE, RELATIVE_POSITION
-from simrail.core.errors import InputError
+from simrail.core.errors import refuse_unless
 from simrail.core.jit import FloatArray
 from simrail.core.resample import interpolated
 from simrail.core.rotation import rotation_matrix
@@ -168,9 +168,7 @@ def sample_magnetometer(
     if spec.iron is not None:
         field += field @ np.asarray(spec.iron.soft_iron).T + np.asarray(spec.iron.hard_iron_t)
 
-    def term(stem: str) -> np.random.Generator:
-        return stream(seed, "sensor", draw, "magnetometer", name, stem)
-
+    term = partial(stream, seed, "sensor", draw, "magnetometer", name)
     rate_hz = (len(wanted) - 1) / (wanted[-1] - wanted[0])
     field += term("bias").uniform(-1.0, 1.0, 3) * spec.bias_t
     field += term("white").standard_normal(field.shape) * (spec.noise_tpsqrthz * np.sqrt(rate_hz))
@@ -188,21 +186,15 @@ def check_magnetometer(spec: MagnetometerSpec) -> None:
     InputError
         Naming the field.
     """
-
-    def require(good: bool, field: str, value: object, limit: str) -> None:
-        if not good:
-            raise InputError("is impossible", field=field, value=value, limit=limit)
-
-    earth = spec.field
-    require(0.0 < earth.intensity_t < 1e-4, "intensity_t", earth.intensity_t, "above 0, below 100 uT: tesla")
-    dip = abs(earth.inclination_rad)
-    require(dip < np.radians(89.0), "inclination_rad", earth.inclination_rad, "within 89 deg of level")
+    intensity, dip = spec.field.intensity_t, spec.field.inclination_rad
+    refuse_unless(0.0 < intensity < 1e-4, "intensity_t", intensity, "above 0, below 100 uT: tesla")
+    refuse_unless(abs(dip) < np.radians(89.0), "inclination_rad", dip, "within 89 deg of level")
     for field in ("noise_tpsqrthz", "bias_t", "resolution_t"):
-        require(0.0 <= getattr(spec, field) < np.inf, field, getattr(spec, field), ">= 0")
-    require(spec.range_t > 0.0, "range_t", spec.range_t, "> 0")
+        refuse_unless(0.0 <= getattr(spec, field) < np.inf, field, getattr(spec, field), ">= 0")
+    refuse_unless(spec.range_t > 0.0, "range_t", spec.range_t, "> 0")
     if spec.iron is not None:
         soft = np.eye(3) + np.asarray(spec.iron.soft_iron, dtype=np.float64)
-        require(
+        refuse_unless(
             bool(np.linalg.det(soft) > 0.0), "soft_iron", spec.iron.soft_iron, "1 + soft_iron keeps its hand"
         )
     if spec.traction is not None:

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from simrail.core.columns import ATTITUDE, POSITION, RAIL_DISPLACEMENT
-from simrail.core.errors import InputError
+from simrail.core.errors import refuse_unless
 from simrail.core.jit import FloatArray
 from simrail.core.resample import interpolated
 from simrail.core.rotation import rotation_matrix
@@ -87,9 +87,7 @@ def sample_rails(
     left, right = rails_seen(position, angles, guess, rails)
     values = np.column_stack([left, right])
 
-    def term(stem: str) -> np.random.Generator:
-        return stream(seed, "sensor", draw, "rail_sensor", name, stem)
-
+    term = partial(stream, seed, "sensor", draw, "rail_sensor", name)
     values += term("white").standard_normal(values.shape) * spec.noise_m
     struck = term("outlier_place").random(values.shape) < spec.outlier_fraction
     values += struck * term("outlier_size").standard_normal(values.shape) * spec.outlier_m
@@ -139,11 +137,7 @@ def check_rail_sensor(spec: RailSensorSpec) -> None:
     InputError
         Naming the field.
     """
-
-    def require(good: bool, field: str, limit: str) -> None:
-        if not good:
-            raise InputError("is impossible", field=field, value=getattr(spec, field), limit=limit)
-
-    require(0.0 <= spec.noise_m < 0.1, "noise_m", "0 to 0.1 m")
-    require(0.0 <= spec.outlier_fraction <= 0.2, "outlier_fraction", "0 to 0.2: beyond it no median helps")
-    require(0.0 <= spec.outlier_m < 1.0, "outlier_m", "0 to 1 m")
+    noise, share, outlier = spec.noise_m, spec.outlier_fraction, spec.outlier_m
+    refuse_unless(0.0 <= noise < 0.1, "noise_m", noise, "0 to 0.1 m")
+    refuse_unless(0.0 <= share <= 0.2, "outlier_fraction", share, "0 to 0.2: beyond it no median helps")
+    refuse_unless(0.0 <= outlier < 1.0, "outlier_m", outlier, "0 to 1 m")

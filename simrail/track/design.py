@@ -21,6 +21,7 @@ from scipy.interpolate import PPoly
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.rotation import rotation_matrix
 from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
 from simrail.track.elements import (
     CURVE,
@@ -37,7 +38,6 @@ from simrail.track.elements import (
     element_to_dict,
     require_number,
 )
-from simrail.track.frame import TrackFrame, darboux, stack
 from simrail.track.vertical import build_vertical, check_gradients
 
 __all__ = [
@@ -56,6 +56,43 @@ __all__ = [
 
 RAIL_BASE_LIMITS_M = (0.05, 2.0)
 """From a model railway to a track of 1880 mm: beyond lies a wrong unit."""
+
+
+class TrackFrame(NamedTuple):
+    """The design track frame at places s; every array has the shape of s, vectors a last axis of 3.
+
+    Attributes
+    ----------
+    s_m : ndarray (...)
+        Arc length of the horizontal projection.
+    position : ndarray (..., 3)
+        Centreline in the rail plane, global, m.
+    roll_rad, pitch_rad, yaw_rad : ndarray (...)
+        ZYX Euler angles of the track frame; yaw is unwrapped.
+    rates, second : ndarray (..., 3)
+        First and second derivative of (roll, pitch, yaw) with respect to s, rad/m and rad/m^2.
+    k, dk : ndarray (..., 3)
+        Darboux vector (twist, vertical, horizontal) in the track frame, rad/m, and its derivative with
+        respect to s: the frame that moves at V = ds/dt turns at V k.
+
+    At a joint, derivatives that step have the value of what begins there; the impulse in `dk` where a
+    linear cant ramp or a bare parabola makes `k` step is left out.
+    """
+
+    s_m: FloatArray
+    position: FloatArray
+    roll_rad: FloatArray
+    pitch_rad: FloatArray
+    yaw_rad: FloatArray
+    rates: FloatArray
+    second: FloatArray
+    k: FloatArray
+    dk: FloatArray
+
+    @property
+    def rotation(self) -> FloatArray:
+        """From the axes of the frame to the global ones, (n, 3, 3) at n places."""
+        return rotation_matrix(np.column_stack([self.roll_rad, self.pitch_rad, self.yaw_rad]))
 
 
 class _Shape(NamedTuple):
@@ -194,9 +231,9 @@ class TrackDesign:
         flat = 1.0 / (1.0 + z1 * z1)
         pitch, pitch1 = -np.arctan(z1), -z2 * flat
         pitch2 = -z3 * flat + 2.0 * z1 * (z2 * flat) ** 2
-        rates, second = stack(roll1, pitch1, yaw1), stack(roll2, pitch2, yaw2)
-        k, dk = darboux(roll, pitch, rates, second)
-        return TrackFrame(s, stack(x, y, z), roll, pitch, yaw, rates, second, k, dk)
+        rates, second = _stack(roll1, pitch1, yaw1), _stack(roll2, pitch2, yaw2)
+        k, dk = _darboux(roll, pitch, rates, second)
+        return TrackFrame(s, _stack(x, y, z), roll, pitch, yaw, rates, second, k, dk)
 
     def curvature(self, s: npt.ArrayLike) -> FloatArray:
         """Plan curvature d yaw / ds at places s, 1/m, positive to the left; shaped like s."""
@@ -229,13 +266,9 @@ class TrackDesign:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data (str, float, bool, list, dict); `from_dict` returns an equal design."""
+        """Plain data (str, float, bool, list, tuple, dict); `from_dict` returns an equal design."""
         data = asdict(self)
         data["elements"] = [element_to_dict(element) for element in self.elements]
-        data["gradients"] = [asdict(gradient) for gradient in self.gradients]
-        data["start_position_m"] = list(self.start_position_m)
-        if isinstance(self.vertical_radius_m, tuple):
-            data["vertical_radius_m"] = list(self.vertical_radius_m)
         return data
 
     @classmethod
@@ -263,3 +296,32 @@ class TrackDesign:
                 remedy="shorten the ride or lengthen the track",
             )
         return s
+
+
+def _stack(*parts: FloatArray) -> FloatArray:
+    """Join arrays of the same or broadcastable shape along a new last axis."""
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def _darboux(
+    roll: FloatArray, pitch: FloatArray, rates: FloatArray, second: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Darboux vector of a ZYX frame and its derivative, both per metre and in the frame's components.
+
+    k1 = roll' - sin(pitch) yaw'
+    k2 = cos(roll) pitch' + sin(roll) cos(pitch) yaw'
+    k3 = -sin(roll) pitch' + cos(roll) cos(pitch) yaw'
+
+    (EQUATIONS section 1.1; the tests derive both from the rotation matrix.)
+    """
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    r1, p1, y1 = np.moveaxis(rates, -1, 0)
+    r2, p2, y2 = np.moveaxis(second, -1, 0)
+    across, across1 = cp * y1, cp * y2 - sp * p1 * y1  # cos(pitch) yaw', and its derivative
+    k = _stack(r1 - sp * y1, cr * p1 + sr * across, cr * across - sr * p1)
+    dk = _stack(
+        r2 - sp * y2 - cp * p1 * y1,
+        cr * p2 + sr * across1 + r1 * k[..., 2],
+        cr * across1 - sr * p2 - r1 * k[..., 1],
+    )
+    return k, dk

@@ -213,15 +213,9 @@ def require_number(
     """
     fits = above < value and least <= value and abs(value) <= within and (zero or value != 0.0)
     if not (math.isfinite(value) and fits):
-        limits = [
-            text
-            for text, active in (
-                ("a finite number", True),
-                (f"> {above:g}", above > -math.inf),
-                (f">= {least:g}", least > -math.inf),
-                (f"magnitude <= {within:g}", within < math.inf),
-                ("not 0", not zero),
-            )
-            if active
-        ]
+        limits = ["a finite number"]
+        limits += [f"> {above:g}"] if above > -math.inf else []
+        limits += [f">= {least:g}"] if least > -math.inf else []
+        limits += [f"magnitude <= {within:g}"] if within < math.inf else []
+        limits += [] if zero else ["not 0"]
         raise InputError("is out of range", field=field, value=value, limit=", ".join(limits))

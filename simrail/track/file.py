@@ -24,6 +24,12 @@ from simrail.track.design import (
 
 Length = Annotated[float, Field(gt=0.0)]
 
+_SHARED = (
+    *("source", "synthetic", "start_m", "start_position_m", "start_yaw_rad"),
+    *("cant_ramp", "vertical_radius_m", "vertical_ramp_m"),
+)
+"""Fields that file and design share, in the order in which a file is written."""
+
 
 class SegmentPart(Part):
     """``[[segment]]``: a straight, a curve, or a transition that joins its two neighbours."""
@@ -126,20 +132,12 @@ class TrackFile(Part):
         name : str
             What to call it if the file does not say; its stem.
         """
-        elements: tuple[Element, ...] = tuple(part.element() for part in self.segment)
         return TrackDesign(
             name if self.name is None else self.name,
-            self.start_m,
-            elements,
+            elements=tuple(part.element() for part in self.segment),
             gradients=tuple(part.gradient() for part in self.gradient),
-            vertical_radius_m=self.vertical_radius_m,
-            vertical_ramp_m=self.vertical_ramp_m,
-            cant_ramp=self.cant_ramp,
             rail_base_m=self.rail_base_mm / 1000.0,
-            source=self.source,
-            synthetic=self.synthetic,
-            start_position_m=self.start_position_m,
-            start_yaw_rad=self.start_yaw_rad,
+            **{field: getattr(self, field) for field in _SHARED},
         )
 
 
@@ -165,15 +163,8 @@ def track_text(design: TrackDesign) -> str:
     """
     head = {
         "title": f"Track {design.name}",
-        "source": design.source,
-        "synthetic": design.synthetic,
         "name": design.name,
-        "start_m": design.start_m,
-        "start_position_m": design.start_position_m,
-        "start_yaw_rad": design.start_yaw_rad,
-        "cant_ramp": design.cant_ramp,
-        "vertical_radius_m": design.vertical_radius_m,
-        "vertical_ramp_m": design.vertical_ramp_m,
+        **{field: getattr(design, field) for field in _SHARED},
         "rail_base_mm": _thousandths(design.rail_base_m, "rail_base_mm"),
     }
     segments = []

@@ -36,7 +36,7 @@ def build_vertical(
     slope, changes = _slope_changes(gradients, start_m)
     radii = _radii(radius_m, len(changes))
     breaks, bends = [start_m], [np.zeros(6)]  # bend z'' per piece, highest power first
-    for i, (centre, change, radius) in enumerate(zip(*_columns(changes), radii, strict=True)):
+    for i, ((centre, change), radius) in enumerate(zip(changes, radii, strict=True)):
         if change == 0.0:
             continue
         length = max(radius * abs(change), ramp_m)
@@ -83,10 +83,6 @@ def _slope_changes(gradients: Sequence[Gradient], start_m: float) -> tuple[float
         changes.append((gradient.from_m, gradient.slope - slope))
         slope = gradient.slope
     return first, changes
-
-
-def _columns(changes: list[tuple[float, float]]) -> tuple[list[float], list[float]]:
-    return [place for place, _ in changes], [change for _, change in changes]
 
 
 def _radii(radius_m: float | Sequence[float], n: int) -> list[float]:

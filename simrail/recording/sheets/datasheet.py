@@ -78,6 +78,9 @@ FIGURES: dict[str, Figure] = {
 }
 """Every figure of a data sheet, by its name in IMU files. Several may stand for one field of a grade."""
 
+_OPTIONS = ("source", "bias_process", "flicker_range_s", "oversampling", "output")
+"""What a grade says beside its figures."""
+
 _DENSITIES = ("gyro_noise_degpsqrthz", "accel_noise_ugpsqrthz")
 
 
@@ -86,13 +89,8 @@ def grade_from_datasheet(
     rate_hz: float,
     *,
     noise_reading: Literal["allan", "one_sided_density"] = "allan",
-    source: str = "",
     assumed: str = "",
-    bias_process: Literal["gauss_markov", "flicker"] = "gauss_markov",
-    flicker_range_s: tuple[float, float] = (1.0, 1000.0),
-    oversampling: int = 1,
-    output: Literal["rates", "increments"] = "rates",
-    **figures: float | None,
+    **figures: Any,
 ) -> ImuGrade:
     """Build a grade from the figures of a data sheet, in the units that data sheets print.
 
@@ -106,12 +104,11 @@ def grade_from_datasheet(
         How a printed noise density (deg/s/sqrt(Hz), ug/sqrt(Hz)) is read: as the Allan coefficient N, or
         as a one-sided density, of which one sample has the standard deviation density sqrt(rate / 2), so
         that N = density / sqrt(2). Random walks (deg/sqrt(h), m/s/sqrt(h)) are N by definition.
-    source, assumed : str
-        Where the figures come from, and what else was assumed.
-    bias_process, flicker_range_s, oversampling, output
-        As in `ImuGrade`.
+    assumed : str
+        What else was assumed.
     **figures : float, optional
-        Keys of `FIGURES`, e.g. ``gyro_noise_degpsqrthz=0.005``; None is a figure that is not printed.
+        ``source``, ``bias_process``, ``flicker_range_s``, ``oversampling`` and ``output`` as in `ImuGrade`,
+        and keys of `FIGURES`, e.g. ``gyro_noise_degpsqrthz=0.005``; None is a figure that is not printed.
 
     Returns
     -------
@@ -125,7 +122,7 @@ def grade_from_datasheet(
         If a figure is unknown, stands there in two units, or is impossible.
     """
     judge_choice("noise_reading", noise_reading, ("allan", "one_sided_density"))
-    values: dict[str, Any] = {}
+    values = {name: figures.pop(name) for name in _OPTIONS if name in figures}
     said: dict[str, str] = {}
     for key, number in figures.items():
         if key not in FIGURES:
@@ -155,11 +152,6 @@ def grade_from_datasheet(
     return ImuGrade(
         name=name,
         rate_hz=rate_hz,
-        bias_process=bias_process,
-        flicker_range_s=flicker_range_s,
-        oversampling=oversampling,
-        output=output,
-        source=source,
         assumed=(*([assumed.strip()] if assumed.strip() else []), *_assumptions(said, noise_reading)),
         **values,
     )
