@@ -135,16 +135,18 @@ def respond(
         return
     shaking = np.zeros((0, 3)) if vibration is None else vibration
     warmth = np.zeros(0) if above_k is None else above_k
-    # The coefficients of both triads in the order of their fields, which is that of the kernel's arguments.
+    # The coefficients of both triads in the order of their fields, as the kernel takes them.
     columns = [
         np.array([getattr(triad, field.name) for triad in (gyro, accel)]) for field in fields(TriadResponse)
     ]
-    _respond(samples, *columns, shaking, warmth)
+    _respond(samples, shaking, warmth, *columns)
 
 
 @njit
 def _respond(
     samples: FloatArray,
+    vibration: FloatArray,
+    above_k: FloatArray,
     axes: FloatArray,
     scale: FloatArray,
     scale_per_k: FloatArray,
@@ -153,8 +155,6 @@ def _respond(
     rectification: FloatArray,
     force_gain: FloatArray,
     full_scale: FloatArray,
-    vibration: FloatArray,
-    above_k: FloatArray,
 ) -> None:
     shaken, warm = vibration.shape[0] > 0, above_k.shape[0] > 0
     for k in range(samples.shape[0]):

@@ -11,7 +11,7 @@ length of the horizontal projection of the centreline.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -254,16 +254,6 @@ class TrackDesign:
         element = self.elements[index]
         radius = f" R{element.radius_m:g}" if isinstance(element, Curve) else ""
         return f"{element.word} {index + 1}{radius}"
-
-    def mirrored(self) -> TrackDesign:
-        """The same track with left and right exchanged (y -> -y)."""
-        x, y, z = self.start_position_m
-        return replace(
-            self,
-            elements=tuple(element.mirrored() for element in self.elements),
-            start_position_m=(x, -y, z),
-            start_yaw_rad=-self.start_yaw_rad,
-        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data (str, float, bool, list, tuple, dict); `from_dict` returns an equal design."""

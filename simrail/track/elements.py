@@ -5,8 +5,6 @@ line is the matter of `simrail.track.alignment` and `simrail.track.vertical`; wh
 at a place is that of `simrail.track.design`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -48,10 +46,6 @@ class Straight:
     curvature_1pm = 0.0
     cross_slope_m = 0.0
 
-    def mirrored(self) -> Straight:
-        """Itself: a straight has no side."""
-        return self
-
 
 @dataclass(frozen=True)
 class Curve:
@@ -84,10 +78,6 @@ class Curve:
         """Height of the left above the right rail; a left curve has its right rail raised."""
         return -self.cant_m if self.radius_m > 0 else self.cant_m
 
-    def mirrored(self) -> Curve:
-        """The curve to the other side."""
-        return Curve(self.length_m, -self.radius_m, self.cant_m)
-
 
 @dataclass(frozen=True)
 class Transition:
@@ -103,10 +93,6 @@ class Transition:
 
     kind = TRANSITION
     word = "transition"
-
-    def mirrored(self) -> Transition:
-        """Itself: a transition takes its sides from its neighbours."""
-        return self
 
 
 Element = Straight | Curve | Transition
