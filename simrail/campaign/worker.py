@@ -29,7 +29,7 @@ from simrail.ride.ride import Progress, is_cached, simulate
 from simrail.ride.truth import Mount, Truth
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
-from simrail.scoring.table import labelled_all
+from simrail.scoring.table import labelled
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ def _result(
     return BatchResult(
         cells=tuple(cell.number for cell in cells),
         ride_number=ride_number,
-        scores=labelled_all(tally.figures) if cells else pd.DataFrame(),
+        scores=labelled(tally.figures) if cells else pd.DataFrame(),
         failures=tuple(tally.failures),
         ride=facts,
         wall_s=tally.wall_s,

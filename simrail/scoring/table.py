@@ -191,21 +191,14 @@ def in_order(scores: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def labelled(figures: pd.DataFrame, labels: dict[str, object]) -> pd.DataFrame:
-    """Put the campaign's labels before the figures of one estimate.
+def labelled(pairs: Sequence[tuple[pd.DataFrame, Mapping[str, object]]]) -> pd.DataFrame:
+    """Stack the figures of many estimates, with the campaign's labels before them.
 
     Parameters
     ----------
-    figures : pandas.DataFrame
-        What `simrail.scoring.score.score` returned.
-    labels : dict
-        A value for each of `LABEL_COLUMNS`.
+    pairs : sequence of (pandas.DataFrame, mapping)
+        What `simrail.scoring.score.score` returned, and a value for each of `LABEL_COLUMNS`.
     """
-    return labelled_all([(figures, labels)])
-
-
-def labelled_all(pairs: Sequence[tuple[pd.DataFrame, Mapping[str, object]]]) -> pd.DataFrame:
-    """Figures of many estimates stacked, each with its labels; see `labelled`."""
     for _, labels in pairs:
         missing = [name for name in LABEL_COLUMNS if name not in labels]
         if missing or len(labels) != len(LABEL_COLUMNS):
