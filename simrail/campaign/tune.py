@@ -18,11 +18,11 @@ import pandas as pd
 
 from simrail.campaign.cell import record_cell
 from simrail.campaign.progress import Watcher
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, one_of
 from simrail.core.interrupts import interruptible
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
-from simrail.estimation.tunable import METHODS, tunables_of
+from simrail.estimation.tunable import tunables_of
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
 from simrail.estimators.tuning.identify import Identification, identify
@@ -111,15 +111,16 @@ def tune_scenario(
     """
     chosen_settings = dict(settings or {})
     band, step_m = chosen_settings.get("band"), float(chosen_settings.get("step_m", STEP_M))
-    if method not in METHODS:
-        raise InputError("no such method", field="--method", value=method, limit=" or ".join(METHODS))
     if method == "cml" and (band is not None or within_m is not None):
         field = "--band" if band is not None else "--within"
         raise InputError("belongs to a known output", field=field, remedy="use --method kom, or leave it out")
-    if evaluations < 0:
-        raise InputError("is out of range", field="--evaluations", value=evaluations, limit=">= 0")
-    if at_most is not None and at_most < 1:
-        raise InputError("is out of range", field="--at-most", value=at_most, limit=">= 1")
+    for field, number, least in (
+        ("--evaluations", evaluations, 0),
+        ("--at-most", at_most, 1),
+        ("--draws", draws, 1),
+    ):
+        if number is not None and number < least:
+            raise InputError("is out of range", field=field, value=number, limit=f">= {least}")
     _judge_file(out)
     watcher = watcher or Watcher()
     scenario = alone(scenario, estimator)
@@ -237,14 +238,7 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
         ("--imu", [] if imu is None else [imu], [part.name for part in spec.imu]),
     ):
         for name in wanted:
-            if name not in named:
-                raise InputError(
-                    "the scenario has none of this name",
-                    file=scenario.file,
-                    field=field,
-                    value=name,
-                    limit="one of " + ", ".join(named),
-                )
+            one_of(name, named, "the scenario has none of this name", field=field, file=scenario.file)
     names = set(rides) or {part.name for part in spec.ride}
     mount = spec.imu[0].name if imu is None else imu
     by_ride: dict[str, list[Cell]] = {}
@@ -253,8 +247,6 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
             of_ride = by_ride.setdefault(cell.ride.name, [])
             if not of_ride or cell.case == of_ride[0].case:
                 of_ride.append(cell)
-    if draws < 1:
-        raise InputError("is out of range", field="--draws", value=draws, limit=">= 1")
     least = min(len(of_ride) for of_ride in by_ride.values())
     if draws > least:
         raise InputError(
@@ -289,8 +281,7 @@ def reference_of(
 
 def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
     by_name = {band.name: band for band in bands}
-    if name not in by_name:
-        raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(by_name))
+    one_of(name, by_name, "no such band", field="--band")
     coarsest = by_name[name].shortest_m / SAMPLES_PER_WAVE
     if step_m > coarsest:
         raise InputError(

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from simrail.cli.options import DONE, Scenario, Seed, Settings
+from simrail.core.errors import InputError, one_of
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -25,12 +28,13 @@ OPTIONS = {
 }
 """Options that are settings of an estimator's own search, by the setting."""
 
+CONSTRAINED = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
+"""Axes that are constrained, by the words of ``--constrain``."""
+
 
 def tune(
     context: typer.Context,
-    scenario: Annotated[
-        str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")
-    ],
+    scenario: Scenario,
     estimator: Annotated[
         str,
         typer.Option(
@@ -98,17 +102,12 @@ def tune(
         int | None,
         typer.Option("--at-most", metavar="N", help="Evaluations after which the search ends as it is."),
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Replace the scenario's seed.")] = None,
+    seed: Seed = None,
     rides: Annotated[
         list[str] | None,
         typer.Option("--ride", metavar="NAME", help="Ride to fit on; all if none is named. Repeatable."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Replace a value, e.g. --set ride.speed_kmh=70. Repeatable."
-        ),
-    ] = None,
+    settings: Settings = None,
     by_kind: Annotated[
         bool,
         typer.Option("--by-kind", help="Smoother: one set for straights, one for transitions and curves."),
@@ -119,14 +118,15 @@ def tune(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.tune import tune_scenario, unfinished
-    from simrail.core.errors import InputError
     from simrail.scenario.scenario import load_scenario
 
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
+    if constrain is not None:
+        one_of(constrain, CONSTRAINED, "no such constraint", field="--constrain")
     file = out or Path(f"{read.name}_{method}.toml")
     own = {
         "box": box,
-        "constrained": _axes(constrain),
+        "constrained": constrain and CONSTRAINED[constrain],
         "position_m2": position,
         "band": band,
         "step_m": step,
@@ -160,7 +160,7 @@ def tune(
             print(f"the best so far is in {best}; the same command goes on from there")
         raise
     _show(Console(), done)
-    return 0
+    return DONE
 
 
 def _command(context: typer.Context) -> str:
@@ -178,23 +178,6 @@ def _command(context: typer.Context) -> str:
         else:
             words += [*option, *(map(repr, value) if isinstance(value, tuple) else [str(value)])]
     return shlex.join(words)
-
-
-def _axes(constrain: str | None) -> tuple[str, ...] | None:
-    """Axes that are constrained, by the option's words."""
-    from simrail.core.errors import InputError
-
-    axes: dict[str | None, tuple[str, ...] | None] = {
-        None: None,
-        "y": ("y",),
-        "z": ("z",),
-        "yz": ("y", "z"),
-        "none": (),
-    }
-    if constrain not in axes:
-        words = ", ".join(word for word in axes if word is not None)
-        raise InputError("no such constraint", field="--constrain", value=constrain, limit=f"one of {words}")
-    return axes[constrain]
 
 
 def _show(console: Console, done: Tuned) -> None:

@@ -6,6 +6,9 @@ The command line prints it and ends with exit code 2. Faults of the program itse
 exceptions and are not wrapped.
 """
 
+import difflib
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """Input that cannot be used, said so that its author can mend it.
@@ -52,3 +55,25 @@ class InputError(ValueError):
         if self.remedy is not None:
             parts.append(f"; remedy: {self.remedy}")
         return "".join(parts)
+
+
+def one_of(
+    word: object,
+    words: Iterable[str],
+    problem: str,
+    *,
+    field: str | None = None,
+    file: object = None,
+    remedy: str | None = None,
+) -> None:
+    """Refuse a word that is none of the possible ones, which the message lists."""
+    possible = tuple(words)
+    if word not in possible:
+        limit = "one of " + ", ".join(possible)
+        raise InputError(problem, file=file, field=field, value=word, limit=limit, remedy=remedy)
+
+
+def did_you_mean(word: object, words: Iterable[str], *, cutoff: float = 0.6) -> str | None:
+    """A guess at what a misspelt word was to be, as a remedy; None if no word is near enough."""
+    near = difflib.get_close_matches(str(word), words, n=1, cutoff=cutoff)
+    return f"did you mean {near[0]}?" if near else None
