@@ -7,13 +7,14 @@ what they recorded. Nothing is estimated here.
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
+from typing import cast
 
 import pandas as pd
 
 from simrail.campaign.cell import record_cell
 from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
-from simrail.core.errors import InputError
+from simrail.core.errors import one_of
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
 from simrail.ride.ride import simulate
@@ -131,8 +132,5 @@ def _record(name: str, cell: Cell, draw: int) -> dict[str, object]:
 
 def format_of(word: str) -> Format:
     """Judge the word for a format."""
-    if word == "csv":
-        return "csv"
-    if word == "parquet":
-        return "parquet"
-    raise InputError("no such format", field="--format", value=word, limit="csv or parquet")
+    one_of(word, ("csv", "parquet"), "no such format", field="--format")
+    return cast("Format", word)

@@ -8,14 +8,13 @@ milliseconds that jitter, and a few samples lost.
 
 from __future__ import annotations
 
-import difflib
 import re
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean, one_of
 from simrail.core.toml_files import label, shipped
 
 if TYPE_CHECKING:
@@ -59,15 +58,8 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     InputError
         If there is no such kind, the name is none, or the file exists.
     """
-    if kind not in KINDS:
-        near = difflib.get_close_matches(kind, KINDS, n=1)
-        raise InputError(
-            "there is no template of this kind",
-            field="KIND",
-            value=kind,
-            limit="one of " + ", ".join(KINDS),
-            remedy=f"did you mean {near[0]}?" if near else None,
-        )
+    guess = did_you_mean(kind, KINDS)
+    one_of(kind, KINDS, "there is no template of this kind", field="KIND", remedy=guess)
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(
             "is no name for a file",

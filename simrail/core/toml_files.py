@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import tomli_w
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -243,8 +243,7 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
     if kind == "literal_error":
         expected = str(context.get("expected", ""))
         words = expected.replace("'", "").replace(" or ", ", ").split(", ")
-        near = difflib.get_close_matches(str(fault["input"]), words, n=1)
-        guess = f"did you mean {near[0]}?" if near else None
+        guess = did_you_mean(fault["input"], words)
         return _Message("is not one of the possible values", f"one of {expected}", guess)
     if kind in ("too_short", "too_long"):
         return _Message("has the wrong number of items", fault["msg"].split(" after ")[0])
@@ -258,10 +257,10 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
 
 def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
     allowed = _fields_at(model, place[:-1])
-    near = difflib.get_close_matches(str(place[-1]), allowed, n=1)
+    guess = did_you_mean(place[-1], allowed)
     # A guess is worth more than a list that nobody reads.
-    limit = "one of " + ", ".join(allowed) if allowed and not (near and len(allowed) > 25) else None
-    return _Message("unknown key", limit, f"did you mean {near[0]}?" if near else "remove it")
+    limit = "one of " + ", ".join(allowed) if allowed and not (guess and len(allowed) > 25) else None
+    return _Message("unknown key", limit, guess or "remove it")
 
 
 def _wrong_type(kind: str, value: Any) -> _Message:

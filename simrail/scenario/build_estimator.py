@@ -9,14 +9,13 @@ finds its files wherever it lies. Nothing is estimated here.
 """
 
 import dataclasses
-import difflib
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 from simrail.core.toml_files import blame, existing_file, shipped_folder
 from simrail.estimation.choose_odometry import NONE, TRUTH, odometry_named
 from simrail.estimation.estimate import Estimator, description_of
@@ -137,13 +136,12 @@ def construct(
     values: dict[str, Any] = {}
     for name, value in options.items():
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
             raise InputError(
                 f"{known_class.__name__} has no such option",
                 field=name,
                 value=value,
                 limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
-                remedy=REMOVED.get(name) or (f"did you mean {near[0]}?" if near else "remove it"),
+                remedy=REMOVED.get(name) or did_you_mean(name, known) or "remove it",
             )
         values[name] = _option(types.get(name, Any), name, value, folder)
     try:
