@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from simrail.campaign.cell import STAGES
-from simrail.campaign.worker import forget, pack, run_batch, run_ride
+from simrail.campaign.worker import BatchResult, forget, pack, run_batch, run_ride
 from simrail.core.interrupts import interruptible
 from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, is_cached
@@ -72,17 +72,6 @@ class Forecast:
         return sum(self.stages_s.values())
 
 
-@dataclass(frozen=True)
-class _CellCost:
-    """What one cell took: simulated time, processor time by stage, disk of its ride, rows, failures."""
-
-    duration_s: float
-    stages_s: dict[str, float]
-    ride_bytes: float
-    rows: int
-    failed: dict[str, str]
-
-
 def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     """Judge a scenario, and say what it will run and about what that takes.
 
@@ -111,18 +100,18 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
         if not look:
             break
     assert shortest is not None  # there is no scenario without a ride
-    cost = _cost_of(shortest[2], plan.parts)
-    mean_s = plan.simulated_s / plan.rides
-    stages = {stage: plan.cells * mean_s * cost.stages_s[stage] / cost.duration_s for stage in STAGES}
-    left_s = plan.simulated_s - cached_s
+    duration_s, cost, ride_bytes = _cost_of(shortest[2], plan.parts)
+    cells_s = plan.cells * plan.simulated_s / plan.rides
+    seconds = dict.fromkeys(STAGES, cells_s) | {"simulate": plan.simulated_s - cached_s}
+    rows = plan.cells * len(cost.scores)
     return Forecast(
         plan=plan,
         cached=int(cached) if look else None,
-        rows=plan.cells * cost.rows,
-        stages_s=stages | {"simulate": left_s * cost.stages_s["simulate"] / cost.duration_s},
-        ride_bytes=plan.simulated_s * cost.ride_bytes / cost.duration_s,
-        score_bytes=SCORE_ROW_BYTES * plan.cells * cost.rows,
-        failed=cost.failed,
+        rows=rows,
+        stages_s={stage: seconds[stage] * cost.cpu_s[stage] / duration_s for stage in STAGES},
+        ride_bytes=plan.simulated_s * ride_bytes / duration_s,
+        score_bytes=SCORE_ROW_BYTES * rows,
+        failed={failure.estimator: failure.reason for failure in cost.failures},
     )
 
 
@@ -135,8 +124,12 @@ def _rides(scenario: Scenario, parts: Parts) -> Iterator[tuple[Cell, Ride]]:
             yield cell, parts.ride(cell)
 
 
-def _cost_of(cell: Cell, parts: Parts) -> _CellCost:
-    """Run a cell as the campaign does, a second time where kernels are compiled, and take the time."""
+def _cost_of(cell: Cell, parts: Parts) -> tuple[float, BatchResult, float]:
+    """Run a cell as the campaign does, a second time where kernels are compiled.
+
+    Returns the simulated time, what came of the cell with the processor time of its stages, and the disk
+    that its ride takes.
+    """
     packed, ride = pack(parts), parts.ride(cell)
     duration = max(ride.profile.duration_s, 1e-3)
     with interruptible():
@@ -149,13 +142,8 @@ def _cost_of(cell: Cell, parts: Parts) -> _CellCost:
     place = ride_cache.folder() / ride_cache.key_of(ride.describe())
     engine = result.ride.get("real_time_factor")
     seconds = duration / engine + result.ride["setup_s"] if engine else simulated.cpu_s["simulate"]
-    return _CellCost(
-        duration_s=duration,
-        stages_s=result.cpu_s | {"simulate": seconds},
-        ride_bytes=sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0,
-        rows=len(result.scores),
-        failed={failure.estimator: failure.reason for failure in result.failures},
-    )
+    size = sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0
+    return duration, replace(result, cpu_s=result.cpu_s | {"simulate": seconds}), size
 
 
 def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
