@@ -109,34 +109,17 @@ class BatchTally:
             self.wall_s[stage] += time.perf_counter() - begun
             self.cpu_s[stage] += time.process_time() - worked
 
-    def fail(self, cell: Cell, estimator: str, error: Exception) -> None:
-        """Note a failure as a row with its reason."""
-        self.fail_for(cell, estimator, _reason_of(error), "".join(traceback.format_exception(error)))
-
-    def fail_for(self, cell: Cell, estimator: str, reason: str, trace: str) -> None:
-        """Note a failure whose reason is known in words."""
+    def fail(self, cell: Cell, estimator: str, error: Exception | str) -> None:
+        """Note a failure as a row with its reason: what was raised, or words."""
+        reason = error if isinstance(error, str) else _reason_of(error)
+        trace = f"{error}\n" if isinstance(error, str) else "".join(traceback.format_exception(error))
         self.failures.append(Failure(cell.number, estimator, reason, trace))
         self.add(cell, estimator, failed_figures(reason))
 
     def add(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
         """Note the figures of one estimator, or of the odometry, on a cell."""
-        self.figures.append((figures, self.labels(cell, estimator)))
-
-    def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
-        """Labels of a row of the score table."""
-        return {
-            "cell": cell.number,
-            "scenario": self.scenario,
-            "ride": cell.ride.name,
-            "vehicle": cell.spec.vehicle,
-            "mount": cell.imu.name,
-            "imu": cell.imu.grade,
-            "odometry": cell.spec.odometry,
-            "tuning": self.tunings.get(estimator, "default"),
-            "track_draw": cell.track_draw,
-            "sensor_draw": cell.sensor_draw,
-            "estimator": estimator,
-        }
+        labels = _labels(cell) | {"scenario": self.scenario, "estimator": estimator}
+        self.figures.append((figures, labels | {"tuning": self.tunings.get(estimator, "default")}))
 
 
 @dataclass(frozen=True)
@@ -218,24 +201,29 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
             (estimates[name],) = estimate_many(estimator, [recording])
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
-    labels = {**tally.labels(cell, ""), **cell_record(cell)}
-    del labels["estimator"], labels["tuning"]
+    labels = {"scenario": tally.scenario, **cell_record(cell)}
     return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails)
 
 
-def cell_record(cell: Cell) -> dict[str, object]:
-    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
-    record: dict[str, object] = {
+def _labels(cell: Cell) -> dict[str, object]:
+    """What tells the rows of a cell from those of others."""
+    return {
         "cell": cell.number,
-        "case": cell.case,
         "ride": cell.ride.name,
         "vehicle": cell.spec.vehicle,
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
-        "sample": cell.sample,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
+    }
+
+
+def cell_record(cell: Cell) -> dict[str, object]:
+    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
+    record: dict[str, object] = _labels(cell) | {
+        "case": cell.case,
+        "sample": cell.sample,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
         "speed_kmh": cell.ride.speed_kmh or 0.0,

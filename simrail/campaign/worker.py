@@ -187,7 +187,7 @@ def fail_batch(packed: bytes, cells: tuple[Cell, ...], reason: str) -> BatchResu
         tally = worker.tally(cells[0].sample)
         for cell in cells:
             for name in tally.estimators:
-                tally.fail_for(cell, name, reason, reason + "\n")
+                tally.fail(cell, name, reason)
     return _result(cells[0].ride_number, cells, tally, {}, [])
 
 

@@ -42,19 +42,10 @@ class InputError(ValueError):
         super().__init__(problem)
 
     def __str__(self) -> str:
-        parts = []
-        if self.file is not None:
-            parts.append(f"{self.file}: ")
-        if self.field is not None:
-            parts.append(f"{self.field}: ")
-        parts.append(self.problem)
-        if self.value is not None:
-            parts.append(f"; found {self.value!r}")
-        if self.limit is not None:
-            parts.append(f"; limit: {self.limit}")
-        if self.remedy is not None:
-            parts.append(f"; remedy: {self.remedy}")
-        return "".join(parts)
+        value = None if self.value is None else repr(self.value)
+        more = (("found", value), ("limit:", self.limit), ("remedy:", self.remedy))
+        text = "".join(f"{place}: " for place in (self.file, self.field) if place is not None)
+        return text + self.problem + "".join(f"; {word} {words}" for word, words in more if words is not None)
 
 
 def one_of(
