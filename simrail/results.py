@@ -16,7 +16,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -242,6 +242,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
     """Make the manifest: plain values that say what was run, with what, and how long it took."""
     factors = [ride["real_time_factor"] for ride in campaign.rides if "real_time_factor" in ride]
     spec = scenario.spec
+    versions = {package: version(package) for package in PACKAGES}
     settings = "".join(f" --set '{setting}'" for setting in scenario.overrides)
     return {
         "scenario": scenario.name,
@@ -265,7 +266,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
         "warnings": list(campaign.plan.warnings),
         "wall_s": dict(campaign.wall_s),
         "cpu_s": dict(campaign.cpu_s),
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": {"python": platform.python_version(), **versions},
         "git_revision": git_revision(),
         "platform": {
             "system": platform.system(),
@@ -281,16 +282,12 @@ def git_revision() -> str | None:
     source = Path(__file__).resolve().parents[1]
     if not (source / ".git").exists():
         return None
-    answers = []
-    for arguments in (["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
-        try:
-            done = subprocess.run(
-                ["git", "-C", str(source), *arguments], capture_output=True, text=True, timeout=10, check=True
-            )
-        except (OSError, subprocess.SubprocessError):
-            return None
-        answers.append(done.stdout.strip())
-    return answers[0] + ("+" if answers[1] else "")
+    # No tag, whatever its name, stands in the place of the hash.
+    command = ["git", "-C", str(source), "describe", "--always", "--exclude=*", "--abbrev=12", "--dirty=+"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return None
 
 
 def _judge_folder(folder: Path) -> None:
@@ -314,16 +311,6 @@ def _judge_folder(folder: Path) -> None:
         above = above.parent
     if not above.is_dir() or not os.access(above, os.W_OK):
         raise InputError("the folder cannot be written", field="--out", value=str(folder), remedy=remedy)
-
-
-def _versions() -> dict[str, str]:
-    versions = {}
-    for package in PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "not installed"
-    return versions
 
 
 def _failures(campaign: CampaignResult) -> str:
