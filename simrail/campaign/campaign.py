@@ -15,7 +15,7 @@ import hashlib
 import inspect
 import json
 import tempfile
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
@@ -116,6 +116,8 @@ class _Batch(NamedTuple):
 
     ride_only: bool
     cells: tuple[Cell, ...]
+    lost: int = 0
+    """How often a worker has died over it."""
 
     @property
     def words(self) -> str:
@@ -124,11 +126,6 @@ class _Batch(NamedTuple):
         return (
             f"ride {first.ride.name} is" if self.ride_only else f"cells {first.number} to {last.number} are"
         )
-
-    @property
-    def key(self) -> tuple[bool, int, int]:
-        """What tells it from others."""
-        return self.ride_only, self.cells[0].number, len(self.cells)
 
 
 class _Loop:
@@ -154,7 +151,6 @@ class _Loop:
         self.simulated: dict[int, BatchResult] = {}
         self.ready: deque[_Batch] = deque()
         self.suspects: deque[_Batch] = deque()
-        self.tries: Counter[tuple[bool, int, int]] = Counter()
         if checkpoint.damaged:
             self._tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
         if self.done:
@@ -263,16 +259,14 @@ class _Loop:
 
     def _lost(self, batch: _Batch, *, given_up: bool) -> None:
         """A worker died over a batch: run it again, alone; in the end, its cells have failed."""
-        self.tries[batch.key] += 1
+        batch = batch._replace(lost=batch.lost + 1)
         single = batch.ride_only or len(batch.cells) == 1
-        if not given_up and self.tries[batch.key] < (_MOST_TRIES if single else _MOST_TRIES - 1):
+        if not given_up and batch.lost < (_MOST_TRIES if single else _MOST_TRIES - 1):
             self._tell(f"a worker died: {batch.words} run again")
             self.suspects.append(batch)
         elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it.
-            singles = [_Batch(False, (cell,)) for cell in batch.cells]
-            self.tries.update({one.key: _MOST_TRIES - 1 for one in singles})
-            self.suspects.extend(singles)
+            self.suspects.extend(_Batch(False, (cell,), _MOST_TRIES - 1) for cell in batch.cells)
         else:
             reason = "the worker died, killed or out of memory, each time this was run"
             self._keep(fail_batch(self.packed, batch.cells, reason))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from rich.console import Console
+from rich.filesize import decimal
 from rich.table import Table
 
 from simrail.campaign.cell import STAGES
@@ -161,8 +162,8 @@ def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
         "rides to simulate", f"{new:,}", f"of {plan.rides:,}, {_time(plan.simulated_s)} of riding; {cache}"
     )
     table.add_row("cells", f"{plan.cells:,}", f"recordings, {len(plan.estimators)} estimators on each")
-    table.add_row("score rows", f"about {expected.rows:,}", _bytes(expected.score_bytes))
-    table.add_row("disk", _bytes(expected.ride_bytes), _cache_words(expected.ride_bytes))
+    table.add_row("score rows", f"about {expected.rows:,}", decimal(round(expected.score_bytes)))
+    table.add_row("disk", decimal(round(expected.ride_bytes)), _cache_words(expected.ride_bytes))
     table.add_section()
     for stage, words in _STAGE_WORDS.items():
         table.add_row(stage, _time(expected.stages_s[stage]), words)
@@ -185,13 +186,6 @@ def _cache_words(size: float) -> str:
     limit = ride_cache.limit_bytes()
     words = f"of rides; the cache keeps {limit / 1e9:g} GB"
     return words if size <= limit else f"of rides, more than the {limit / 1e9:g} GB that the cache keeps"
-
-
-def _bytes(size: float) -> str:
-    for unit, scale in (("GB", 1e9), ("MB", 1e6)):
-        if size >= scale:
-            return f"{size / scale:.3g} {unit}"
-    return f"{size / 1e3:.3g} kB"
 
 
 def _time(seconds: float) -> str:

@@ -8,7 +8,7 @@ that says what there is to search (`simrail.estimation.tunable`).
 import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -40,15 +40,6 @@ STEP_M = 0.25
 """Distance of the places of a reference, unless another is given."""
 
 
-@dataclass(frozen=True)
-class Tuned:
-    """What a search found, the file that it was written into, and what it knows, by set of parameters."""
-
-    result: TuningResult
-    file: Path
-    identified: dict[str, Identification]
-
-
 def tune_scenario(
     scenario: Scenario,
     out: Path,
@@ -64,7 +55,7 @@ def tune_scenario(
     at_most: int | None = None,
     command: str = "",
     watcher: Watcher | None = None,
-) -> Tuned:
+) -> tuple[TuningResult, dict[str, Identification]]:
     """Tune an estimator of a scenario and write the result.
 
     Parameters
@@ -100,6 +91,13 @@ def tune_scenario(
         What to write into the file as the command that makes it.
     watcher : Watcher, optional
         Is told how it goes.
+
+    Returns
+    -------
+    result : TuningResult
+        What the search found, as it was written into the file.
+    identified : dict of str to Identification
+        What it knows of each parameter, by set of parameters.
 
     Raises
     ------
@@ -153,7 +151,7 @@ def tune_scenario(
         }
     result = replace(result, status=tuple(dict(one.table["status"]) for one in identified.values()))
     result.write(out)
-    return Tuned(result, out, identified)
+    return result, identified
 
 
 def _rides(
@@ -291,14 +289,11 @@ def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
 
 
 def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:
+    first = cell.track_draw == cell.sensor_draw == 0
     return (
         f"{scenario.name}: {cell.ride.name}, {cell.imu.name} on {cell.imu.body}, "
         f"{Path(cell.imu.grade).stem}, odometry {recording.odometry_source}, {len(recording.imu)} samples"
-        + (
-            f", draw {cell.sensor_draw} on track {cell.track_draw}"
-            if cell.track_draw or cell.sensor_draw
-            else ""
-        )
+        + ("" if first else f", draw {cell.sensor_draw} on track {cell.track_draw}")
     )
 
 

@@ -15,7 +15,8 @@ from simrail.core.errors import InputError, one_of
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from simrail.campaign.tune import Tuned
+    from simrail.estimators.tuning.file import TuningResult
+    from simrail.estimators.tuning.identify import Identification
 
 
 OPTIONS = {
@@ -137,7 +138,7 @@ def tune(
         print(f"going on from {best}")
     try:
         with ProgressWatcher(Console(stderr=True)) as watcher:
-            done = tune_scenario(
+            result, identified = tune_scenario(
                 read,
                 file,
                 estimator=estimator,
@@ -159,7 +160,8 @@ def tune(
         if best.is_file():
             print(f"the best so far is in {best}; the same command goes on from there")
         raise
-    _show(Console(), done)
+    _show(Console(), result, identified)
+    print(f"{result.evaluations} evaluations; wrote {file}")
     return DONE
 
 
@@ -180,16 +182,15 @@ def _command(context: typer.Context) -> str:
     return shlex.join(words)
 
 
-def _show(console: Console, done: Tuned) -> None:
-    """Print what was found, one table per set, and where it was written."""
+def _show(console: Console, search: TuningResult, identified: dict[str, Identification]) -> None:
+    """Print what was found, one table per set of parameters."""
     from rich import box as boxes
     from rich.table import Table
 
     from simrail.estimators.tuning.identify import TOLERANCE
 
-    search = done.result
     lower: list[str] = []
-    for (name, identification), reached in zip(done.identified.items(), search.objective, strict=True):
+    for (name, identification), reached in zip(identified.items(), search.objective, strict=True):
         table = Table(box=boxes.SIMPLE_HEAD, padding=0, show_edge=False)
         columns = (name, "value,\nSI", "", "a tenth\ncosts", "tenfold\ncosts", "known to\ndecades")
         for number, column in enumerate(columns):
@@ -221,4 +222,3 @@ def _show(console: Console, done: Tuned) -> None:
             "let it search longer (--evaluations, --at-most)",
             highlight=False,
         )
-    print(f"{search.evaluations} evaluations; wrote {done.file}")

@@ -42,7 +42,6 @@ EDGE_TIME = "edge_time_s"
 RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
 MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
 MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
-GYRO_BIAS = ("gyro_bias_x_radps", "gyro_bias_y_radps", "gyro_bias_z_radps")
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
 RATE_INNOVATION = ("innovation_x_radps", "innovation_y_radps", "innovation_z_radps")
 IRREGULARITY = ("alignment_m", "vertical_profile_m", "cross_level_m", "gauge_m")

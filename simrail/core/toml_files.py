@@ -182,9 +182,14 @@ def blame(file: object, field: str = "") -> Iterator[None]:
         yield
     except InputError as error:
         if error.file is None:
-            error.file = file
-            error.field = ".".join(part for part in (field, error.field) if part) or None
+            _place(error, file, field)
         raise
+
+
+def _place(error: InputError, file: object, field: str) -> None:
+    """Put a file and the field that it arose in before what an error says of its own."""
+    error.file = error.file or file
+    error.field = ".".join(part for part in (field, error.field) if part) or None
 
 
 class _Message(NamedTuple):
@@ -206,8 +211,7 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
     inner = first.get("ctx", {}).get("error")
     if isinstance(inner, InputError):
-        inner.file = file if inner.file is None else inner.file
-        inner.field = ".".join(part for part in (field, inner.field) if part) or None
+        _place(inner, file, field)
         return inner
     if first["type"] == "string_pattern_mismatch":
         field = field.removesuffix(".[key]")

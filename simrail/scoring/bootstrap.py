@@ -115,10 +115,8 @@ def _means(total: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatAr
     return mean, low, high
 
 
-def interval(
-    values: npt.ArrayLike, clusters: npt.ArrayLike | None = None, *, confidence: float = CONFIDENCE
-) -> Interval:
-    """Mean of all draws with its confidence interval.
+def interval(values: npt.ArrayLike, clusters: npt.ArrayLike | None = None) -> Interval:
+    """Mean of all draws with its 95 % interval.
 
     Parameters
     ----------
@@ -127,15 +125,13 @@ def interval(
     clusters : array_like (n,), optional
         What belongs together (the track); without, or where there is one cluster only, each value is one
         of its own and the interval speaks of this track.
-    confidence : float
-        Of the interval, two-sided.
     """
     finite, labels = clustered(values, clusters)
     if len(finite) == 0:
         return Interval(np.nan, np.nan, np.nan)
     sums = np.bincount(labels, finite).astype(np.float64)
     counts = np.bincount(labels).astype(np.float64)
-    value, low, high = mean_interval(sums, counts, confidence=confidence)
+    value, low, high = mean_interval(sums, counts)
     return Interval(float(value[0]), float(low[0]), float(high[0]))
 
 

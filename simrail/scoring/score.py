@@ -10,6 +10,7 @@ the other metrics mean stands in `simrail.scoring.metrics`.
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Protocol
 
 import numpy as np
@@ -150,9 +151,7 @@ def score(
     chosen = chosen_windows(against.windows, windows)
     keep = chosen_metrics(metrics)
     rows: list[Row] = []
-    for series in _attitude_series(states, against):
-        rows += figures(series, chosen, keep)
-    for series in _other_series(states, against.motion):
+    for series in chain(_attitude_series(states, against), _other_series(states, against.motion)):
         rows += figures(series, chosen, keep)
     first = rows[0][0] if rows else "roll"
     if estimate.innovations is not None and "nis" in keep:

@@ -92,8 +92,6 @@ def compare(
     first: npt.ArrayLike,
     second: npt.ArrayLike,
     clusters: npt.ArrayLike | None = None,
-    *,
-    confidence: float = CONFIDENCE,
 ) -> Comparison:
     """Compare two methods over the same draws: whatever both suffer from alike drops out.
 
@@ -102,9 +100,7 @@ def compare(
     first, second : array_like (n,)
         Figures of the two, draw by draw; smaller is better. A draw that one of them lacks is left out.
     clusters : array_like (n,), optional
-        See `interval`.
-    confidence : float
-        Of the intervals. That of the win rate is Wilson's, with as many trials as there are clusters.
+        See `interval`. The interval of the win rate is Wilson's, with as many trials as there are clusters.
     """
     difference = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     paired, labels = clustered(difference, clusters)
@@ -113,12 +109,12 @@ def compare(
         return Comparison(nothing, nothing, np.nan, 0)
     won = (paired < 0.0) + 0.5 * (paired == 0.0)
     rate, trials = float(won.mean()), int(labels.max()) + 1
-    z = float(ndtri(0.5 * (1.0 + confidence)))
+    z = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
     middle = (rate + z * z / (2 * trials)) / (1.0 + z * z / trials)
     reach = z / (1.0 + z * z / trials) * np.sqrt(rate * (1.0 - rate) / trials + z * z / (4 * trials**2))
     spread = float(paired.std(ddof=1)) if len(paired) > 1 else np.nan
     return Comparison(
-        difference=interval(paired, labels, confidence=confidence),
+        difference=interval(paired, labels),
         win_rate=Interval(rate, float(middle - reach), float(middle + reach)),
         effect_size=float(paired.mean()) / spread if spread > 0.0 else np.nan,
         pairs=len(paired),
