@@ -15,19 +15,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError
-from simrail.core.interrupts import Check
+from simrail.core.interrupts import Check, interruptible
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
+from simrail.ride.ride import simulate
 from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
 from simrail.scenario.tables import RidePart
-from simrail.scoring.geometry import HasRails, score_geometry
+from simrail.scoring.geometry import score_geometry
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
+from simrail.track.laid_track import LaidTrack
 
 STAGES = ("simulate", "measure", "estimate", "score")
 
@@ -65,7 +68,7 @@ class CellResult:
     recording: Recording
     motion: pd.DataFrame
     estimates: dict[str, Estimate]
-    rails: HasRails | None = None
+    rails: LaidTrack | None = None
 
 
 @dataclass
@@ -190,6 +193,19 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
     if resolved.odometry is None:
         return recording
     return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
+
+
+def simulated(cell: Cell, parts: Parts, watcher: Watcher, number: int, count: int) -> Truth:
+    """Ride ``number`` of ``count``, that of a cell, for what is no campaign: simulated, or from the cache."""
+    watcher.ride_begins(number, count, cell.ride.name)
+    with interruptible() as check:
+        try:
+            truth = simulate(parts.ride(cell), progress=watcher.ride_goes)
+        except Exception:
+            check()  # an engine in C++ may have made an error of its own of Ctrl-C
+            raise
+    watcher.ride_ends()
+    return truth
 
 
 def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellResult:

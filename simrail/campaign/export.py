@@ -10,12 +10,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.campaign.cell import cell_record, record_cell
+from simrail.campaign.cell import cell_record, record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
-from simrail.ride.ride import simulate
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -71,16 +70,10 @@ def export(
     rides = len({cell.ride_number for cell in chosen})
     names = _names(chosen)
     records = []
-    with interruptible() as check, draft_of(folder) as draft:
+    with interruptible(), draft_of(folder) as draft:
         for number, (_, group) in enumerate(groupby(chosen, key=lambda cell: cell.ride_number), start=1):
             ride_cells = list(group)
-            watcher.ride_begins(number, rides, ride_cells[0].ride.name)
-            try:
-                motion = simulate(parts.ride(ride_cells[0]), progress=watcher.ride_goes)
-            except Exception:
-                check()  # an engine in C++ may have made an error of its own of Ctrl-C
-                raise
-            watcher.ride_ends()
+            motion = simulated(ride_cells[0], parts, watcher, number, rides)
             for cell in ride_cells:
                 recording = record_cell(cell, motion, parts)
                 name = names[cell.number]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.campaign.cell import record_cell
+from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError, one_of
 from simrail.core.interrupts import interruptible
@@ -28,7 +28,6 @@ from simrail.estimators.tuning.file import TuningResult
 from simrail.estimators.tuning.identify import Identification, identify
 from simrail.estimators.tuning.tune import objective_of, tune
 from simrail.recording.recording import Recording
-from simrail.ride.ride import simulate
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import judge_scenario
@@ -164,17 +163,10 @@ def _rides(
 ) -> tuple[list[Recording], list[pd.DataFrame]]:
     """Recordings of cells, and the rails below them."""
     recordings, references = [], []
-    with interruptible() as check:
-        for number, cell in enumerate(chosen, start=1):
-            watcher.ride_begins(number, len(chosen), cell.ride.name)
-            references.append(reference_of(cell, parts, within_m, step_m))
-            try:
-                truth = simulate(parts.ride(cell), progress=watcher.ride_goes)
-            except Exception:
-                check()  # an engine in C++ may have made an error of its own of Ctrl-C
-                raise
-            watcher.ride_ends()
-            recordings.append(record_cell(cell, truth, parts))
+    for number, cell in enumerate(chosen, start=1):
+        references.append(reference_of(cell, parts, within_m, step_m))
+        truth = simulated(cell, parts, watcher, number, len(chosen))
+        recordings.append(record_cell(cell, truth, parts))
     return recordings, references
 
 

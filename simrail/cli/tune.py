@@ -19,16 +19,6 @@ if TYPE_CHECKING:
     from simrail.estimators.tuning.identify import Identification
 
 
-OPTIONS = {
-    "box": "--box",
-    "constrained": "--constrain",
-    "position_m2": "--position",
-    "by_kind": "--by-kind",
-    "band": "--band",
-    "step_m": "--step",
-}
-"""Options that are settings of an estimator's own search, by the setting."""
-
 CONSTRAINED = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
 """Axes that are constrained, by the words of ``--constrain``."""
 
@@ -125,13 +115,14 @@ def tune(
     if constrain is not None:
         one_of(constrain, CONSTRAINED, "no such constraint", field="--constrain")
     file = out or Path(f"{read.name}_{method}.toml")
-    own = {
-        "box": box,
-        "constrained": constrain and CONSTRAINED[constrain],
-        "position_m2": position,
-        "band": band,
-        "step_m": step,
-        "by_kind": by_kind or None,
+    # Settings of an estimator's own search: the option of each, and its value if it was given.
+    own: dict[str | None, tuple[str, Any]] = {
+        "box": ("--box", box),
+        "constrained": ("--constrain", constrain and CONSTRAINED[constrain]),
+        "position_m2": ("--position", position),
+        "by_kind": ("--by-kind", by_kind or None),
+        "band": ("--band", band),
+        "step_m": ("--step", step),
     }
     best = unfinished(file)
     if best.is_file():
@@ -147,14 +138,14 @@ def tune(
                 draws=draws,
                 imu=imu,
                 within_m=within,
-                settings={name: value for name, value in own.items() if value is not None},
+                settings={str(name): value for name, (_, value) in own.items() if value is not None},
                 evaluations=evaluations,
                 at_most=at_most,
                 command=_command(context),
                 watcher=watcher,
             )
     except InputError as error:
-        error.field = OPTIONS.get(str(error.field), error.field)
+        error.field = own.get(error.field, (error.field,))[0]
         raise
     except KeyboardInterrupt:
         if best.is_file():

@@ -17,12 +17,11 @@ from pydantic import WrapValidator
 from simrail.core.toml_files import Part
 from simrail.scenario.distributions import Distribution, Value, distributions_of, leaves, read_distribution
 
-Scalar = Value
 _T = TypeVar("_T")
 _Part = TypeVar("_Part", bound=Part)
 
 
-class Axis(tuple[Scalar, ...]):
+class Axis(tuple[Value, ...]):
     """Values that a field takes in turn."""
 
     __slots__ = ()
@@ -75,7 +74,7 @@ def axes_of(model: Part, *, prefix: str = "", fields: Iterable[str] | None = Non
 
 def expand(
     model: _Part, *, prefix: str = "", fields: Iterable[str] | None = None
-) -> list[tuple[dict[str, Scalar], _Part]]:
+) -> list[tuple[dict[str, Value], _Part]]:
     """Return every combination of a model's axes.
 
     Parameters
@@ -104,8 +103,8 @@ def expand(
 
 
 def drawn(
-    model: _Part, values: Mapping[str, Scalar], *, prefix: str = "", fields: Iterable[str] | None = None
-) -> tuple[dict[str, Scalar], _Part]:
+    model: _Part, values: Mapping[str, Value], *, prefix: str = "", fields: Iterable[str] | None = None
+) -> tuple[dict[str, Value], _Part]:
     """Put the values of one sample in the place of a model's distributions.
 
     Parameters
@@ -132,7 +131,7 @@ def drawn(
     return settings, model
 
 
-def _with(model: Any, path: list[str], value: Scalar) -> Any:
+def _with(model: Any, path: list[str], value: Value) -> Any:
     """Return a copy of a model with one (nested) field set."""
     head, rest = path[0], path[1:]
     if isinstance(model, dict):

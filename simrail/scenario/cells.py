@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
-from simrail.scenario.axes import Scalar, axes_of, drawn, expand
-from simrail.scenario.distributions import sample_count, samples_of
+from simrail.scenario.axes import axes_of, drawn, expand
+from simrail.scenario.distributions import Value, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 
@@ -65,7 +65,7 @@ class Cell:
     sample: int
     track_draw: int
     sensor_draw: int
-    settings: dict[str, Scalar]
+    settings: dict[str, Value]
 
     @property
     def ride_seed(self) -> int:
@@ -153,12 +153,12 @@ class _World:
     """What decides the motion, of one case and sample."""
 
     case: int
-    settings: dict[str, Scalar]
+    settings: dict[str, Value]
     spec: ScenarioFile
     ride: RidePart
     ride_index: int
     sample: int
-    values: dict[str, Scalar]
+    values: dict[str, Value]
 
 
 def _worlds(spec: ScenarioFile) -> Iterator[_World]:
@@ -210,7 +210,7 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
         )
 
 
-def _prefixed(prefix: str, settings: dict[str, Scalar]) -> dict[str, Scalar]:
+def _prefixed(prefix: str, settings: dict[str, Value]) -> dict[str, Value]:
     return {prefix + name: value for name, value in settings.items()}
 
 

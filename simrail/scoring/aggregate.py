@@ -114,12 +114,10 @@ def _bounds(
     if len(rows) == 0:
         return low, high
     which, group_rows = np.unique(group[rows], return_inverse=True)
-    order = np.argsort(group_rows, kind="stable")
-    first = np.concatenate([[0], np.flatnonzero(np.diff(group_rows[order])) + 1])
-    place = np.arange(len(rows)) - np.repeat(first, np.diff([*first, len(rows)]))
+    place = pd.Series(group_rows).groupby(group_rows).cumcount().to_numpy()
     sums = np.zeros((len(which), int(place.max()) + 1))
     counts = np.zeros_like(sums)
-    sums[group_rows[order], place] = total[rows[order]]
-    counts[group_rows[order], place] = count[rows[order]]
+    sums[group_rows, place] = total[rows]
+    counts[group_rows, place] = count[rows]
     _, low[which], high[which] = mean_interval(sums, counts)
     return low, high
