@@ -91,7 +91,9 @@ def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iter
             remedy="leave out --workers, or --cluster",
         )
     if workers is None:
-        workers = 1 if cells <= FEW_CELLS else _cores()
+        from joblib import cpu_count  # those that this process may use; slow to import
+
+        workers = 1 if cells <= FEW_CELLS else cpu_count()
     executor: Executor
     if cluster is not None:
         executor = _Cluster(cluster)
@@ -257,10 +259,3 @@ def _begin_worker(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -291,25 +291,21 @@ def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:
 
 def _judge_file(out: Path) -> None:
     """Refuse to replace what is no tuning, or to write where nothing can be written."""
+    folder = out.absolute().parent
+
+    def refusal(problem: str, *, limit: str | None = None, remedy: str | None = None) -> InputError:
+        return InputError(problem, field="--out", value=str(out), limit=limit, remedy=remedy)
+
     if out.suffix != ".toml":
-        raise InputError(
-            "is no TOML file", field="--out", value=str(out), limit="a name that ends with .toml"
-        )
-    if not out.absolute().parent.is_dir():
-        raise InputError("no such folder", field="--out", value=str(out), remedy="make the folder first")
-    if not os.access(out.absolute().parent, os.W_OK):
-        raise InputError(
-            "the folder cannot be written", field="--out", value=str(out), remedy="choose another"
-        )
+        raise refusal("is no TOML file", limit="a name that ends with .toml")
+    if not folder.is_dir():
+        raise refusal("no such folder", remedy="make the folder first")
+    if not os.access(folder, os.W_OK):
+        raise refusal("the folder cannot be written", remedy="choose another")
     if out.exists():
         try:
             is_tuning = "hyperparameters" in tomllib.loads(out.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
             is_tuning = False
         if not is_tuning:
-            raise InputError(
-                "is no tuning, and would be replaced",
-                field="--out",
-                value=str(out),
-                remedy="choose another file with --out",
-            )
+            raise refusal("is no tuning, and would be replaced", remedy="choose another file with --out")
