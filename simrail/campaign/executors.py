@@ -84,12 +84,8 @@ def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iter
         If both are given, dask is not installed, or the scheduler or its workers do not answer.
     """
     if cluster is not None and workers is not None:
-        raise InputError(
-            "a cluster has its own workers",
-            field="--workers",
-            value=workers,
-            remedy="leave out --workers, or --cluster",
-        )
+        remedy = "leave out --workers, or --cluster"
+        raise InputError("a cluster has its own workers", field="--workers", value=workers, remedy=remedy)
     if workers is None:
         from joblib import cpu_count  # those that this process may use; slow to import
 

@@ -6,9 +6,10 @@ campaign finds it. A machine that is busy, rides on other engines and vehicles, 
 make them differ: they are an estimate, no promise.
 """
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, islice
 
 from rich.console import Console
 from rich.filesize import decimal
@@ -90,24 +91,19 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     """
     plan = judge_scenario(scenario, many=many)
     look = plan.rides <= MOST_LOOKED_UP
-    cached = cached_s = 0.0
-    shortest: tuple[bool, float, Cell] | None = None
-    for first, ride in _rides(scenario, plan.parts):
-        duration = ride.profile.duration_s
-        in_cache = look and is_cached(ride)
-        cached, cached_s = cached + in_cache, cached_s + in_cache * duration
-        if shortest is None or (not in_cache, duration) < shortest[:2]:
-            shortest = (not in_cache, duration, first)
-        if not look:
-            break
-    assert shortest is not None  # there is no scenario without a ride
-    duration_s, cost, ride_bytes = _cost_of(shortest[2], plan.parts)
+    rides = [
+        (not (look and is_cached(ride)), ride.profile.duration_s, first)
+        for first, ride in islice(_rides(scenario, plan.parts), None if look else 1)
+    ]
+    cached = [duration for is_new, duration, _ in rides if not is_new]
+    *_, cheapest = min(rides, key=lambda ride: ride[:2])
+    duration_s, cost, ride_bytes = _cost_of(cheapest, plan.parts)
     cells_s = plan.cells * plan.simulated_s / plan.rides
-    seconds = dict.fromkeys(STAGES, cells_s) | {"simulate": plan.simulated_s - cached_s}
+    seconds = dict.fromkeys(STAGES, cells_s) | {"simulate": plan.simulated_s - sum(cached)}
     rows = plan.cells * len(cost.scores)
     return Forecast(
         plan=plan,
-        cached=int(cached) if look else None,
+        cached=len(cached) if look else None,
         rows=rows,
         stages_s={stage: seconds[stage] * cost.cpu_s[stage] / duration_s for stage in STAGES},
         ride_bytes=plan.simulated_s * ride_bytes / duration_s,
@@ -147,7 +143,7 @@ def _cost_of(cell: Cell, parts: Parts) -> tuple[float, BatchResult, float]:
     return duration, replace(result, cpu_s=result.cpu_s | {"simulate": seconds}), size
 
 
-def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
+def print_forecast(console: Console, expected: Forecast) -> None:
     """Print a forecast as a table."""
     plan = expected.plan
     new = plan.rides if expected.cached is None else plan.rides - expected.cached
@@ -168,7 +164,7 @@ def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
     for stage, words in _STAGE_WORDS.items():
         table.add_row(stage, _time(expected.stages_s[stage]), words)
     total = f"[bold]{_time(expected.total_s)}[/bold]"
-    table.add_row("[bold]about[/bold]", total, f"on one of {cores} cores; an estimate from one cell")
+    table.add_row("[bold]about[/bold]", total, f"on one of {os.cpu_count()} cores; an estimate from one cell")
     console.print(table)
     rule = stop_rule_of(plan.scenario)
     if rule is not None:

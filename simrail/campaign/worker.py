@@ -171,7 +171,8 @@ def _run(
                 truth, facts = worker.truth(cells[0], notes, progress)
         except Exception as error:
             check()
-            _raise_full_disk(error)
+            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise  # no property of a cell: it ends the campaign, which goes on when there is room
             for cell in cells:
                 for name in tally.estimators:
                     tally.fail(cell, name, error)
@@ -238,12 +239,6 @@ def _result(
         notes=tuple(notes),
         worker=_name(),
     )
-
-
-def _raise_full_disk(error: Exception) -> None:
-    """A full disk is no property of a cell: it ends the campaign, which goes on when there is room."""
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        raise error
 
 
 def _name() -> str:

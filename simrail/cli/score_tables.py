@@ -19,13 +19,10 @@ from simrail.scenario.build import bands_by_name
 from simrail.scoring.table import OK
 from simrail.track.bands import Band
 
-ATTITUDE = (
-    ("roll", "truth", "whole"),
-    ("roll", "truth", "curve"),
-    ("roll", "design", "curve"),
-    ("pitch", "truth", "whole"),
-    ("pitch", "truth", "curve"),
-    ("pitch", "design", "curve"),
+ATTITUDE = tuple(
+    (quantity, reference, window)
+    for quantity in ("roll", "pitch")
+    for reference, window in (("truth", "whole"), ("truth", "curve"), ("design", "curve"))
 )
 """Columns of the attitude. Beside rails, those against the design are left out: the design is no goal."""
 

@@ -235,12 +235,9 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
     if kind in _SIGNS:
         # A count has no unit.
         key, sign = _SIGNS[kind]
-        is_count = isinstance(context[key], int)
-        remedy = (
-            "give a number within the limit"
-            if is_count
-            else "mind the unit, which is in the name of the field"
-        )
+        remedy = "mind the unit, which is in the name of the field"
+        if isinstance(context[key], int):
+            remedy = "give a number within the limit"
         return _Message("is out of range", f"{sign} {context[key]}", remedy)
     if kind in _TYPES:
         return _wrong_type(kind, fault["input"])

@@ -60,9 +60,7 @@ def levels(values: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[float, float
     return float(np.sqrt(sensor)), float(np.sqrt(max(between - noise, 0.0) / size))
 
 
-def anees_bounds(
-    independent: int, *, dimension: int = 1, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
+def anees_bounds(independent: int, *, dimension: int = 1) -> tuple[float, float]:
     """Between which bounds a consistent method's NEES, averaged over independent draws, lies.
 
     N d times the average of d-dimensional NEES divided by d is chi-square with N d degrees of freedom
@@ -71,20 +69,16 @@ def anees_bounds(
     alarm, and shorter ones are given more room than they need.
     """
     freedom = independent * dimension
-    tail = 0.5 * (1.0 - confidence)
-    low, high = stats.chi2(freedom).ppf([tail, 1.0 - tail]) / freedom
+    low, high = stats.chi2(freedom).interval(CONFIDENCE) / np.float64(freedom)
     return float(low), float(high)
 
 
-def coverage_bounds(
-    independent: int, *, claimed: float = 0.95, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
-    """Between which bounds the share of errors inside a consistent method's interval lies.
+def coverage_bounds(independent: int) -> tuple[float, float]:
+    """Between which bounds the share of errors inside a consistent method's 95 % interval lies.
 
     Binomial, with as many trials as there are independent draws; see `anees_bounds`.
     """
-    tail = 0.5 * (1.0 - confidence)
-    low, high = stats.binom(independent, claimed).ppf([tail, 1.0 - tail]) / independent
+    low, high = stats.binom(independent, 0.95).interval(CONFIDENCE) / np.float64(independent)
     return float(low), float(high)
 
 
