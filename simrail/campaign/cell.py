@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -125,8 +125,7 @@ class BatchTally:
         self.figures.append((figures, labels | {"tuning": self.tunings.get(estimator, "default")}))
 
 
-@dataclass(frozen=True)
-class _Recorded:
+class _Recorded(NamedTuple):
     """A cell with its recording and what its estimates are compared with."""
 
     cell: Cell

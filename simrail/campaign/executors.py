@@ -44,9 +44,11 @@ class Executor(Protocol):
 
     def renew(self) -> None:
         """Go on after workers were lost; nothing to do unless there is a pool of one's own."""
+        return
 
     def close(self) -> None:
         """End all work, also what is under way."""
+        return
 
 
 def error_of(future: Future[Any]) -> BaseException | None:

@@ -58,13 +58,10 @@ def estimate_ride(
         estimator = construct(estimator_class, override({}, settings))
     recording = read_ride(ride)
     if recording.odometry is None and "odometry" in description_of(estimator).needs:
-        raise InputError(
-            f"{method} needs to know where the train is, and the ride does not say",
-            file=label(ride),
-            field="encoder",
-            limit="[encoder], [odometer] or [odometry]",
-            remedy="add the table of the one that was recorded, or choose an estimator that needs none",
-        )
+        problem = f"{method} needs to know where the train is, and the ride does not say"
+        limit = "[encoder], [odometer] or [odometry]"
+        remedy = "add the table of the one that was recorded, or choose an estimator that needs none"
+        raise InputError(problem, file=label(ride), field="encoder", limit=limit, remedy=remedy)
     begun = time.perf_counter()
     estimate = estimator.estimate(recording)
     us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)

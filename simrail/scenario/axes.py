@@ -103,7 +103,12 @@ def expand(
 
 
 def drawn(
-    model: _Part, values: Mapping[str, Value], *, prefix: str = "", fields: Iterable[str] | None = None
+    model: _Part,
+    values: Mapping[str, Value],
+    *,
+    prefix: str = "",
+    shown: str = "",
+    fields: Iterable[str] | None = None,
 ) -> tuple[dict[str, Value], _Part]:
     """Put the values of one sample in the place of a model's distributions.
 
@@ -115,20 +120,22 @@ def drawn(
         Of the sample, by the names that the distributions have with the prefix.
     prefix : str, optional
         Stands before the model's names in ``values``, e.g. ``"ride.out."``.
+    shown : str, optional
+        Put before every name in the settings that are returned.
     fields : iterable of str, optional
         These fields only.
 
     Returns
     -------
     settings : dict
-        Name (without the prefix) -> value.
+        Name -> value.
     concrete : Part
         The model that has them.
     """
     settings = {name: values[prefix + name] for name in distributions_of(model, fields=fields)}
     for name, value in settings.items():
         model = _with(model, name.split("."), value)
-    return settings, model
+    return {shown + name: value for name, value in settings.items()}, model
 
 
 def _with(model: Any, path: list[str], value: Value) -> Any:

@@ -23,7 +23,7 @@ from simrail.ride.ride import Ride, rails_of
 from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
-from simrail.scenario.distributions import Distribution
+from simrail.scenario.distributions import distributions_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import ImuPart, RidePart
 from simrail.sensors.encoder import EncoderSpec
@@ -247,10 +247,7 @@ class Parts:
         first = self._estimators.get(0, {})
         listed = methods(self.scenario, sample=sample)
         for method in listed:
-            is_drawn = any(
-                isinstance(option, Distribution)
-                for option in self.scenario.spec.estimator[method.index].options.values()
-            )
+            is_drawn = bool(distributions_of(self.scenario.spec.estimator[method.index]))
             if method.name in estimators:
                 raise InputError(
                     "two estimators have this name",

@@ -93,7 +93,7 @@ def odometry_estimator(scenario: Scenario, name: str) -> Estimator | None:
     return estimator
 
 
-def option_files(estimator: Estimator) -> dict[str, str]:
+def option_files(estimator: object) -> dict[str, str]:
     """What was read from files that options named, as text, by option."""
     if not dataclasses.is_dataclass(estimator):
         return {}

@@ -69,8 +69,8 @@ def anees_bounds(independent: int, *, dimension: int = 1) -> tuple[float, float]
     alarm, and shorter ones are given more room than they need.
     """
     freedom = independent * dimension
-    low, high = stats.chi2(freedom).interval(CONFIDENCE) / np.float64(freedom)
-    return float(low), float(high)
+    low, high = stats.chi2(freedom).interval(CONFIDENCE)
+    return float(low) / freedom, float(high) / freedom
 
 
 def coverage_bounds(independent: int) -> tuple[float, float]:
@@ -78,8 +78,8 @@ def coverage_bounds(independent: int) -> tuple[float, float]:
 
     Binomial, with as many trials as there are independent draws; see `anees_bounds`.
     """
-    low, high = stats.binom(independent, 0.95).interval(CONFIDENCE) / np.float64(independent)
-    return float(low), float(high)
+    low, high = stats.binom(independent, 0.95).interval(CONFIDENCE)
+    return float(low) / independent, float(high) / independent
 
 
 def compare(
