@@ -16,7 +16,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -189,23 +189,21 @@ def _other_results(folder: Path, scenario: Scenario, out: Path) -> StoredResults
     """Results to stand beside those of a scenario; of the same publication, or the page has no place."""
     remedy = "run that scenario first, and name the folder of its results"
     if folder.resolve() == out.resolve():
-        raise InputError(
-            "these results would be replaced by those that they are to stand beside",
-            field="--beside",
-            value=str(folder),
-            remedy=f"{remedy}, or choose another folder with --out",
-        )
+        problem = "these results would be replaced by those that they are to stand beside"
+        raise _refusal("--beside", folder, problem, f"{remedy}, or choose another folder with --out")
     results = read_results(folder, field="--beside", remedy=remedy)
     paper = scenario.spec.paper
     if paper not in SETS_BESIDE or results.scenario().spec.paper != paper:
-        raise InputError(
-            f"the page of {scenario.name} has no place for results of {results.manifest['scenario']}",
-            field="--beside",
-            value=str(folder),
-            limit=f"two scenarios with the same paper, one of {', '.join(SETS_BESIDE)}",
-            remedy="run it without --beside; each page stands for itself",
-        )
+        problem = f"the page of {scenario.name} has no place for results of {results.manifest['scenario']}"
+        limit = f"two scenarios with the same paper, one of {', '.join(SETS_BESIDE)}"
+        remedy = "run it without --beside; each page stands for itself"
+        raise _refusal("--beside", folder, problem, remedy, limit=limit)
     return results
+
+
+def _refusal(option: str, folder: Path, problem: str, remedy: str, *, limit: str | None = None) -> InputError:
+    """What is wrong with a folder that an option names."""
+    return InputError(problem, field=option, value=str(folder), limit=limit, remedy=remedy)
 
 
 def _write(
@@ -242,6 +240,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
     """Make the manifest: plain values that say what was run, with what, and how long it took."""
     factors = [ride["real_time_factor"] for ride in campaign.rides if "real_time_factor" in ride]
     spec = scenario.spec
+    versions = {package: version(package) for package in PACKAGES}
     settings = "".join(f" --set '{setting}'" for setting in scenario.overrides)
     return {
         "scenario": scenario.name,
@@ -265,7 +264,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
         "warnings": list(campaign.plan.warnings),
         "wall_s": dict(campaign.wall_s),
         "cpu_s": dict(campaign.cpu_s),
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": {"python": platform.python_version(), **versions},
         "git_revision": git_revision(),
         "platform": {
             "system": platform.system(),
@@ -281,16 +280,12 @@ def git_revision() -> str | None:
     source = Path(__file__).resolve().parents[1]
     if not (source / ".git").exists():
         return None
-    answers = []
-    for arguments in (["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
-        try:
-            done = subprocess.run(
-                ["git", "-C", str(source), *arguments], capture_output=True, text=True, timeout=10, check=True
-            )
-        except (OSError, subprocess.SubprocessError):
-            return None
-        answers.append(done.stdout.strip())
-    return answers[0] + ("+" if answers[1] else "")
+    # No tag, whatever its name, stands in the place of the hash.
+    command = ["git", "-C", str(source), "describe", "--always", "--exclude=*", "--abbrev=12", "--dirty=+"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return None
 
 
 def _judge_folder(folder: Path) -> None:
@@ -298,32 +293,16 @@ def _judge_folder(folder: Path) -> None:
     remedy = "choose another folder with --out"
     if folder.exists():
         if not folder.is_dir():
-            raise InputError(
-                "the results need a folder, this is a file", field="--out", value=str(folder), remedy=remedy
-            )
+            raise _refusal("--out", folder, "the results need a folder, this is a file", remedy)
         if any(folder.iterdir()) and not (folder / MANIFEST).is_file():
-            raise InputError(
-                "the folder holds other things than results, and would be replaced",
-                field="--out",
-                value=str(folder),
-                limit=f"a new or empty folder, or one that holds a {MANIFEST}",
-                remedy=remedy,
-            )
+            problem = "the folder holds other things than results, and would be replaced"
+            limit = f"a new or empty folder, or one that holds a {MANIFEST}"
+            raise _refusal("--out", folder, problem, remedy, limit=limit)
     above = folder.absolute()
     while not above.exists():
         above = above.parent
     if not above.is_dir() or not os.access(above, os.W_OK):
-        raise InputError("the folder cannot be written", field="--out", value=str(folder), remedy=remedy)
-
-
-def _versions() -> dict[str, str]:
-    versions = {}
-    for package in PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "not installed"
-    return versions
+        raise _refusal("--out", folder, "the folder cannot be written", remedy)
 
 
 def _failures(campaign: CampaignResult) -> str:
@@ -353,20 +332,16 @@ def keep_good(results: Path, plan: Plan, key: str, checkpoint: Checkpoint) -> No
     InputError
         If there are no results of this plan, or nothing in them failed.
     """
-
-    def refuse(problem: str, remedy: str) -> InputError:
-        return InputError(problem, field="--retry-failed", value=str(results), remedy=remedy)
-
-    former = read_results(results, field="--retry-failed", remedy="run it without --retry-failed")
+    option = "--retry-failed"
+    former = read_results(results, field=option, remedy="run it without --retry-failed")
     manifest, scores = former.manifest, former.scores
     if manifest.get("key") != key:
-        raise refuse(
-            "the results there are of another plan, or were made by other code",
-            "run it without --retry-failed; rows of different code do not belong together",
-        )
+        problem = "the results there are of another plan, or were made by other code"
+        remedy = "run it without --retry-failed; rows of different code do not belong together"
+        raise _refusal(option, results, problem, remedy)
     failed = {failure["cell"] for failure in manifest["failures"]}
     if not failed:
-        raise refuse("nothing failed there", "there is nothing to do")
+        raise _refusal(option, results, "nothing failed there", "there is nothing to do")
     good = set(scores["cell"]) - failed  # a run that its stop rule ended has not all cells
     rides = {ride["number"]: ride for ride in manifest["rides"]}
     good_of_ride: dict[int, list[int]] = {}

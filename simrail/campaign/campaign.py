@@ -15,7 +15,7 @@ import hashlib
 import inspect
 import json
 import tempfile
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
@@ -27,7 +27,7 @@ from typing import NamedTuple
 from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.executors import Executor, broken, error_of, executor_of, lost
 from simrail.campaign.progress import Watcher
-from simrail.campaign.result import CampaignResult, chosen_cells, gather, stop_state
+from simrail.campaign.result import CampaignResult, chosen_cells, gather
 from simrail.campaign.worker import BatchResult, fail_batch, forget, pack, run_batch, run_ride
 from simrail.core.interrupts import interruptible
 from simrail.core.source_hash import score_code_hash
@@ -101,11 +101,11 @@ def run_campaign(
     packed = pack(plan.parts)
     with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
         checkpoint = Checkpoint(Path(spare)) if checkpoint is None else checkpoint
-        loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only)
+        loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only, batch_cells)
         with interruptible():
             try:
                 with executor_of(workers, cluster if loop.left else None, cells=loop.left) as executor:
-                    stopped = loop.run(executor, batch_cells)
+                    stopped = loop.run(executor)
                 return gather(plan, packed, checkpoint, only=only, stopped=stopped)
             finally:
                 forget()
@@ -116,6 +116,8 @@ class _Batch(NamedTuple):
 
     ride_only: bool
     cells: tuple[Cell, ...]
+    lost: int = 0
+    """How often a worker has died over it."""
 
     @property
     def words(self) -> str:
@@ -125,19 +127,22 @@ class _Batch(NamedTuple):
             f"ride {first.ride.name} is" if self.ride_only else f"cells {first.number} to {last.number} are"
         )
 
-    @property
-    def key(self) -> tuple[bool, int, int]:
-        """What tells it from others."""
-        return self.ride_only, self.cells[0].number, len(self.cells)
-
 
 class _Loop:
     """The loop over the cells that are not kept yet; with a stop rule, from one of its stages to the next."""
 
+    executor: Executor
+
     def __init__(
-        self, plan: Plan, packed: bytes, checkpoint: Checkpoint, watcher: Watcher, only: int | None
+        self,
+        plan: Plan,
+        packed: bytes,
+        checkpoint: Checkpoint,
+        watcher: Watcher,
+        only: int | None,
+        batch_cells: int | None,
     ) -> None:
-        self.plan, self.packed, self.only = plan, packed, only
+        self.plan, self.packed, self.only, self.batch_cells = plan, packed, only, batch_cells
         self.checkpoint, self.watcher = checkpoint, watcher
         self.done = checkpoint.cells()
         self.total = plan.cells if only is None else 1
@@ -146,49 +151,48 @@ class _Loop:
         self.simulated: dict[int, BatchResult] = {}
         self.ready: deque[_Batch] = deque()
         self.suspects: deque[_Batch] = deque()
-        self.tries: Counter[tuple[bool, int, int]] = Counter()
         if checkpoint.damaged:
             self._tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
         if self.done:
             self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
-    def run(self, executor: Executor, batch_cells: int | None) -> StopState | None:
+    def run(self, executor: Executor) -> StopState | None:
         """Run what is left, or as much as the stop rule asks for; its last state."""
+        self.executor = executor
         rule = stop_rule_of(self.plan.scenario) if self.only is None else None
         if rule is None:
-            self._run(executor, batch_cells)
+            self._run()
             return None
         for draws in rule.stages:
             numbers = {cell.number for cell in chosen_cells(self.plan, draws=draws)}
             self.total, self.left = len(numbers), len(numbers - self.done)
-            self._run(executor, batch_cells, draws=draws)
-            state = stop_state(self.plan, self.checkpoint, rule, draws)
+            self._run(draws=draws)
+            tables = (result.scores for result in self.checkpoint.results())
+            state = rule.state(chosen_cells(self.plan), tables, draws)
             self._tell(state.words)
             if state.reached:
                 break
         return state
 
-    def _run(self, executor: Executor, batch_cells: int | None, *, draws: int | None = None) -> None:
+    def _run(self, *, draws: int | None = None) -> None:
         """Run what is left of these draws; each batch is kept before its worker gets another."""
         if not self.left:
             return
-        self.checkpoint.log(f"{self.left} cells to run, {executor.workers()} at once")
+        self.checkpoint.log(f"{self.left} cells to run, {self.executor.workers()} at once")
         self.watcher.cells_begin(self.total - self.left, self.total)
         waiting: dict[Future[BatchResult], _Batch] = {}
         rides = self._rides(draws)
         while True:
-            while len(waiting) < (1 if self.suspects else executor.workers()):
-                batch = self._next(rides, executor, batch_cells)
+            while len(waiting) < (1 if self.suspects else self.executor.workers()):
+                batch = self._next(rides)
                 if batch is None:
                     break
-                waiting[self._submit(executor, batch)] = batch
+                waiting[self._submit(batch)] = batch
             if not waiting:
                 return
-            self._collect(waiting, executor, batch_cells)
+            self._collect(waiting)
 
-    def _collect(
-        self, waiting: dict[Future[BatchResult], _Batch], executor: Executor, batch_cells: int | None
-    ) -> None:
+    def _collect(self, waiting: dict[Future[BatchResult], _Batch]) -> None:
         """Wait until something is done, and take it.
 
         No future that has been taken is held on to from here: a cluster keeps a result for as long as
@@ -198,9 +202,9 @@ class _Loop:
         if any(broken(error_of(future)) for future in done):
             done = set(waiting)  # all that were under way are lost; which one it was, is not known
             wait(done)
-            executor.renew()
+            self.executor.renew()
         for future in done:
-            self._take(waiting.pop(future), future, executor, batch_cells)
+            self._take(waiting.pop(future), future)
 
     def _rides(self, draws: int | None) -> Iterator[tuple[Cell, ...]]:
         """The cells left of each ride."""
@@ -210,9 +214,7 @@ class _Loop:
             if left:
                 yield left
 
-    def _next(
-        self, rides: Iterator[tuple[Cell, ...]], executor: Executor, batch_cells: int | None
-    ) -> _Batch | None:
+    def _next(self, rides: Iterator[tuple[Cell, ...]]) -> _Batch | None:
         """What to run next: suspects, alone; then batches of rides that are there; then another ride."""
         if self.suspects:
             return self.suspects.popleft()
@@ -220,27 +222,25 @@ class _Loop:
             self.watcher.ride_begins(ride[0].ride_number + 1, self.plan.rides, ride[0].ride.name)
             if not is_cached(self.plan.parts.ride(ride[0])):
                 return _Batch(True, ride)
-            self._ride_is_there(ride, executor, batch_cells)
+            self._ride_is_there(ride)
         return self.ready.popleft() if self.ready else None
 
-    def _ride_is_there(self, ride: tuple[Cell, ...], executor: Executor, batch_cells: int | None) -> None:
+    def _ride_is_there(self, ride: tuple[Cell, ...]) -> None:
         """Make the batches of a ride: small enough for memory, and for every worker to have some."""
         seconds = max(self.plan.parts.ride(ride[0]).profile.duration_s, 1e-3)
-        most = min(_MOST_CELLS, int(_MOST_SECONDS / seconds), self.left // (4 * executor.workers()))
-        size = batch_cells or max(1, most)
+        most = min(_MOST_CELLS, int(_MOST_SECONDS / seconds), self.left // (4 * self.executor.workers()))
+        size = self.batch_cells or max(1, most)
         self.ready.extend(_Batch(False, ride[i : i + size]) for i in range(0, len(ride), size))
         self.watcher.ride_ends()
 
-    def _submit(self, executor: Executor, batch: _Batch) -> Future[BatchResult]:
+    def _submit(self, batch: _Batch) -> Future[BatchResult]:
         """Hand a batch to the executor."""
         if not batch.ride_only:
-            return executor.submit(run_batch, self.packed, batch.cells)
-        progress = (self.watcher.ride_goes,) if executor.here else ()
-        return executor.submit(run_ride, self.packed, batch.cells, *progress)
+            return self.executor.submit(run_batch, self.packed, batch.cells)
+        progress = (self.watcher.ride_goes,) if self.executor.here else ()
+        return self.executor.submit(run_ride, self.packed, batch.cells, *progress)
 
-    def _take(
-        self, batch: _Batch, future: Future[BatchResult], executor: Executor, batch_cells: int | None
-    ) -> None:
+    def _take(self, batch: _Batch, future: Future[BatchResult]) -> None:
         """Take what came of a batch."""
         error = error_of(future)
         if error is not None and not lost(error):
@@ -255,20 +255,18 @@ class _Loop:
             self._keep(result)
         else:
             self.simulated[result.ride_number] = result
-            self._ride_is_there(batch.cells, executor, batch_cells)
+            self._ride_is_there(batch.cells)
 
     def _lost(self, batch: _Batch, *, given_up: bool) -> None:
         """A worker died over a batch: run it again, alone; in the end, its cells have failed."""
-        self.tries[batch.key] += 1
+        batch = batch._replace(lost=batch.lost + 1)
         single = batch.ride_only or len(batch.cells) == 1
-        if not given_up and self.tries[batch.key] < (_MOST_TRIES if single else _MOST_TRIES - 1):
+        if not given_up and batch.lost < (_MOST_TRIES if single else _MOST_TRIES - 1):
             self._tell(f"a worker died: {batch.words} run again")
             self.suspects.append(batch)
         elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it.
-            singles = [_Batch(False, (cell,)) for cell in batch.cells]
-            self.tries.update({one.key: _MOST_TRIES - 1 for one in singles})
-            self.suspects.extend(singles)
+            self.suspects.extend(_Batch(False, (cell,), _MOST_TRIES - 1) for cell in batch.cells)
         else:
             reason = "the worker died, killed or out of memory, each time this was run"
             self._keep(fail_batch(self.packed, batch.cells, reason))

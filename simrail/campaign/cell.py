@@ -10,24 +10,27 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError
-from simrail.core.interrupts import Check
+from simrail.core.interrupts import Check, interruptible
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
+from simrail.ride.ride import simulate
 from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
 from simrail.scenario.tables import RidePart
-from simrail.scoring.geometry import HasRails, score_geometry
+from simrail.scoring.geometry import score_geometry
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
+from simrail.track.laid_track import LaidTrack
 
 STAGES = ("simulate", "measure", "estimate", "score")
 
@@ -65,7 +68,7 @@ class CellResult:
     recording: Recording
     motion: pd.DataFrame
     estimates: dict[str, Estimate]
-    rails: HasRails | None = None
+    rails: LaidTrack | None = None
 
 
 @dataclass
@@ -109,38 +112,20 @@ class BatchTally:
             self.wall_s[stage] += time.perf_counter() - begun
             self.cpu_s[stage] += time.process_time() - worked
 
-    def fail(self, cell: Cell, estimator: str, error: Exception) -> None:
-        """Note a failure as a row with its reason."""
-        self.fail_for(cell, estimator, _reason_of(error), "".join(traceback.format_exception(error)))
-
-    def fail_for(self, cell: Cell, estimator: str, reason: str, trace: str) -> None:
-        """Note a failure whose reason is known in words."""
+    def fail(self, cell: Cell, estimator: str, error: Exception | str) -> None:
+        """Note a failure as a row with its reason: what was raised, or words."""
+        reason = error if isinstance(error, str) else _reason_of(error)
+        trace = f"{error}\n" if isinstance(error, str) else "".join(traceback.format_exception(error))
         self.failures.append(Failure(cell.number, estimator, reason, trace))
         self.add(cell, estimator, failed_figures(reason))
 
     def add(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
         """Note the figures of one estimator, or of the odometry, on a cell."""
-        self.figures.append((figures, self.labels(cell, estimator)))
-
-    def labels(self, cell: Cell, estimator: str) -> dict[str, object]:
-        """Labels of a row of the score table."""
-        return {
-            "cell": cell.number,
-            "scenario": self.scenario,
-            "ride": cell.ride.name,
-            "vehicle": cell.spec.vehicle,
-            "mount": cell.imu.name,
-            "imu": cell.imu.grade,
-            "odometry": cell.spec.odometry,
-            "tuning": self.tunings.get(estimator, "default"),
-            "track_draw": cell.track_draw,
-            "sensor_draw": cell.sensor_draw,
-            "estimator": estimator,
-        }
+        labels = _labels(cell) | {"scenario": self.scenario, "estimator": estimator}
+        self.figures.append((figures, labels | {"tuning": self.tunings.get(estimator, "default")}))
 
 
-@dataclass(frozen=True)
-class _Recorded:
+class _Recorded(NamedTuple):
     """A cell with its recording and what its estimates are compared with."""
 
     cell: Cell
@@ -209,6 +194,19 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
     return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
 
 
+def simulated(cell: Cell, parts: Parts, watcher: Watcher, number: int, count: int) -> Truth:
+    """Ride ``number`` of ``count``, that of a cell, for what is no campaign: simulated, or from the cache."""
+    watcher.ride_begins(number, count, cell.ride.name)
+    with interruptible() as check:
+        try:
+            truth = simulate(parts.ride(cell), progress=watcher.ride_goes)
+        except Exception:
+            check()  # an engine in C++ may have made an error of its own of Ctrl-C
+            raise
+    watcher.ride_ends()
+    return truth
+
+
 def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellResult:
     """Run a cell again for the figures of a report: its recording and estimates, without scores."""
     recording = record_cell(cell, truth, parts)
@@ -218,24 +216,29 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
             (estimates[name],) = estimate_many(estimator, [recording])
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
-    labels = {**tally.labels(cell, ""), **cell_record(cell)}
-    del labels["estimator"], labels["tuning"]
+    labels = {"scenario": tally.scenario, **cell_record(cell)}
     return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails)
 
 
-def cell_record(cell: Cell) -> dict[str, object]:
-    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
-    record: dict[str, object] = {
+def _labels(cell: Cell) -> dict[str, object]:
+    """What tells the rows of a cell from those of others."""
+    return {
         "cell": cell.number,
-        "case": cell.case,
         "ride": cell.ride.name,
         "vehicle": cell.spec.vehicle,
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
-        "sample": cell.sample,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
+    }
+
+
+def cell_record(cell: Cell) -> dict[str, object]:
+    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
+    record: dict[str, object] = _labels(cell) | {
+        "case": cell.case,
+        "sample": cell.sample,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
         "speed_kmh": cell.ride.speed_kmh or 0.0,

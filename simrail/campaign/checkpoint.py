@@ -133,13 +133,9 @@ def checkpoint_of(results: Path, key: str, *, start: Start = "auto") -> Iterator
         checkpoint = Checkpoint(folder)
         try:
             if start == "resume" and checkpoint.is_empty:
-                raise InputError(
-                    "there is no unfinished run of this plan",
-                    field="--resume",
-                    value=results.name,
-                    limit="the same scenario, settings, code and folder of results",
-                    remedy="run it without --resume",
-                )
+                problem, remedy = "there is no unfinished run of this plan", "run it without --resume"
+                limit = "the same scenario, settings, code and folder of results"
+                raise InputError(problem, field="--resume", value=results.name, limit=limit, remedy=remedy)
             if start in ("fresh", "retry-failed"):
                 checkpoint.clear()
             yield checkpoint

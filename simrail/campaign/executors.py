@@ -31,7 +31,7 @@ _WAIT_S = 20.0
 class Executor(Protocol):
     """Runs functions, here or elsewhere."""
 
-    here: bool
+    here: bool = False
     """Whether it is this process: then `submit` returns when the work is done."""
 
     def workers(self) -> int:
@@ -43,12 +43,12 @@ class Executor(Protocol):
         ...
 
     def renew(self) -> None:
-        """Go on after workers were lost."""
-        ...
+        """Go on after workers were lost; nothing to do unless there is a pool of one's own."""
+        return
 
     def close(self) -> None:
         """End all work, also what is under way."""
-        ...
+        return
 
 
 def error_of(future: Future[Any]) -> BaseException | None:
@@ -86,14 +86,12 @@ def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iter
         If both are given, dask is not installed, or the scheduler or its workers do not answer.
     """
     if cluster is not None and workers is not None:
-        raise InputError(
-            "a cluster has its own workers",
-            field="--workers",
-            value=workers,
-            remedy="leave out --workers, or --cluster",
-        )
+        remedy = "leave out --workers, or --cluster"
+        raise InputError("a cluster has its own workers", field="--workers", value=workers, remedy=remedy)
     if workers is None:
-        workers = 1 if cells <= FEW_CELLS else _cores()
+        from joblib import cpu_count  # those that this process may use; slow to import
+
+        workers = 1 if cells <= FEW_CELLS else cpu_count()
     executor: Executor
     if cluster is not None:
         executor = _Cluster(cluster)
@@ -105,7 +103,7 @@ def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iter
         executor.close()
 
 
-class _Here:
+class _Here(Executor):
     """The process itself, without others."""
 
     here = True
@@ -121,17 +119,9 @@ class _Here:
             future.set_exception(error)
         return future
 
-    def renew(self) -> None:
-        pass
 
-    def close(self) -> None:
-        pass
-
-
-class _Processes:
+class _Processes(Executor):
     """Processes of this machine."""
-
-    here = False
 
     def __init__(self, workers: int) -> None:
         self._workers = workers
@@ -169,21 +159,15 @@ class _Processes:
         self._pool.shutdown(wait=True, kill_workers=True)
 
 
-class _Cluster:
-    """Workers of a dask scheduler."""
-
-    here = False
+class _Cluster(Executor):
+    """Workers of a dask scheduler, which replaces those that are lost, and runs again what they had."""
 
     def __init__(self, address: str) -> None:
         try:
             import distributed
         except ImportError:
-            raise InputError(
-                "a cluster needs dask, which is not installed",
-                field="--cluster",
-                value=address,
-                remedy='pip install -e ".[cluster]"',
-            ) from None
+            problem, remedy = "a cluster needs dask, which is not installed", 'pip install -e ".[cluster]"'
+            raise InputError(problem, field="--cluster", value=address, remedy=remedy) from None
         self._address = address
         self._log = logging.getLogger("distributed")
         self._log_level = self._log.level
@@ -210,33 +194,24 @@ class _Cluster:
 
     def _judge_workers(self) -> None:
         """Refuse a cluster without workers, or one whose workers run another simrail."""
+
+        def refusal(problem: str, value: str, remedy: str) -> InputError:
+            return InputError(problem, field="--cluster", value=value, remedy=remedy)
+
         begun = time.perf_counter()
         while not self._client.nthreads():
             if time.perf_counter() - begun > _WAIT_S:
-                raise InputError(
-                    "the dask scheduler has no workers",
-                    field="--cluster",
-                    value=self._address,
-                    remedy=f"start some with 'dask worker {self._address} --nthreads 1'",
-                )
+                remedy = f"start some with 'dask worker {self._address} --nthreads 1'"
+                raise refusal("the dask scheduler has no workers", self._address, remedy)
             time.sleep(0.2)
+        remedy = "install the same simrail on every machine"
         try:
             codes = self._client.run(score_code_hash)
         except Exception as error:
-            raise InputError(
-                f"a worker cannot import simrail: {error}",
-                field="--cluster",
-                value=self._address,
-                remedy="install the same simrail on every machine",
-            ) from error
+            raise refusal(f"a worker cannot import simrail: {error}", self._address, remedy) from error
         others = sorted(worker for worker, code in codes.items() if code != score_code_hash())
         if others:
-            raise InputError(
-                "a worker runs another simrail, and would give other bits",
-                field="--cluster",
-                value=others[0],
-                remedy="install the same simrail on every machine",
-            )
+            raise refusal("a worker runs another simrail, and would give other bits", others[0], remedy)
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.
@@ -258,9 +233,6 @@ class _Cluster:
             self._busy.add(place)
             future.add_done_callback(lambda _: self._busy.discard(place))
         return future
-
-    def renew(self) -> None:
-        pass  # dask replaces workers, and runs again what they had
 
     def close(self) -> None:
         with suppress(Exception):  # a scheduler that has gone cannot be told
@@ -285,10 +257,3 @@ def _begin_worker(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

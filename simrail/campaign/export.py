@@ -4,19 +4,17 @@ Simulates (or finds in the cache) the rides of a scenario, draws the sensors as 
 what they recorded. Nothing is estimated here.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
 import pandas as pd
 
-from simrail.campaign.cell import record_cell
+from simrail.campaign.cell import cell_record, record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
-from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
-from simrail.ride.ride import simulate
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -24,14 +22,8 @@ from simrail.scoring.score import truth_at_imu
 
 INDEX_FILE = "recordings.csv"
 TRUTH_STEM = "truth_not_part_of_the_recording"
-
-
-@dataclass(frozen=True)
-class Exported:
-    """What was written: the folder, and one name per recording in it."""
-
-    folder: Path
-    recordings: tuple[str, ...]
+OF_A_RUN = ("cell", "case", "sample", "track_draw")
+"""Labels of a cell that say something within a campaign only."""
 
 
 def export(
@@ -42,7 +34,7 @@ def export(
     draw: int = 0,
     truth: bool = False,
     watcher: Watcher | None = None,
-) -> Exported:
+) -> list[str]:
     """Write every recording of a scenario, for one draw of track and sensors.
 
     Parameters
@@ -62,9 +54,9 @@ def export(
 
     Returns
     -------
-    Exported
-        The folder holds one folder per recording and an index, ``recordings.csv``, with the values of
-        the scenario's axes.
+    list of str
+        Names of the recordings: the folder holds one folder for each, and an index, ``recordings.csv``, with
+        the values of the scenario's axes.
 
     Raises
     ------
@@ -78,16 +70,10 @@ def export(
     rides = len({cell.ride_number for cell in chosen})
     names = _names(chosen)
     records = []
-    with interruptible() as check, draft_of(folder) as draft:
+    with interruptible(), draft_of(folder) as draft:
         for number, (_, group) in enumerate(groupby(chosen, key=lambda cell: cell.ride_number), start=1):
             ride_cells = list(group)
-            watcher.ride_begins(number, rides, ride_cells[0].ride.name)
-            try:
-                motion = simulate(parts.ride(ride_cells[0]), progress=watcher.ride_goes)
-            except Exception:
-                check()  # an engine in C++ may have made an error of its own of Ctrl-C
-                raise
-            watcher.ride_ends()
+            motion = simulated(ride_cells[0], parts, watcher, number, rides)
             for cell in ride_cells:
                 recording = record_cell(cell, motion, parts)
                 name = names[cell.number]
@@ -96,10 +82,13 @@ def export(
                 if truth:
                     true = truth_at_imu(motion, recording)
                     write_frame(true, draft / name / f"{TRUTH_STEM}.{format}", format=format)
-                records.append(_record(name, cell, draw))
+                labels = cell_record(cell).items()
+                records.append(
+                    {"folder": name} | {key: value for key, value in labels if key not in OF_A_RUN}
+                )
                 watcher.recording_written(len(records), len(chosen), name)
         pd.DataFrame.from_records(records).to_csv(draft / INDEX_FILE, index=False)
-    return Exported(folder, tuple(names.values()))
+    return list(names.values())
 
 
 def _names(chosen: list[Cell]) -> dict[int, str]:
@@ -111,28 +100,3 @@ def _names(chosen: list[Cell]) -> dict[int, str]:
         number: name if taken.count(name) == 1 else f"{name}_{i:0{width}d}"
         for i, (number, name) in enumerate(plain.items())
     }
-
-
-def _record(name: str, cell: Cell, draw: int) -> dict[str, object]:
-    labels: dict[str, object] = {
-        "folder": name,
-        "ride": cell.ride.name,
-        "mount": cell.imu.name,
-        "imu": cell.imu.grade,
-        "track": cell.spec.track,
-        "vehicle": cell.spec.vehicle,
-        "engine": cell.spec.engine,
-        "odometry": cell.spec.odometry,
-        "speed_kmh": cell.ride.speed_kmh or 0.0,
-        "sensor_draw": draw,
-    }
-    return labels | {key: value for key, value in cell.settings.items() if key not in labels}
-
-
-def format_of(word: str) -> Format:
-    """Judge the word for a format."""
-    if word == "csv":
-        return "csv"
-    if word == "parquet":
-        return "parquet"
-    raise InputError("no such format", field="--format", value=word, limit="csv or parquet")

@@ -6,15 +6,17 @@ campaign finds it. A machine that is busy, rides on other engines and vehicles, 
 make them differ: they are an estimate, no promise.
 """
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, islice
 
 from rich.console import Console
+from rich.filesize import decimal
 from rich.table import Table
 
 from simrail.campaign.cell import STAGES
-from simrail.campaign.worker import forget, pack, run_batch, run_ride
+from simrail.campaign.worker import BatchResult, forget, pack, run_batch, run_ride
 from simrail.core.interrupts import interruptible
 from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, is_cached
@@ -72,17 +74,6 @@ class Forecast:
         return sum(self.stages_s.values())
 
 
-@dataclass(frozen=True)
-class _CellCost:
-    """What one cell took: simulated time, processor time by stage, disk of its ride, rows, failures."""
-
-    duration_s: float
-    stages_s: dict[str, float]
-    ride_bytes: float
-    rows: int
-    failed: dict[str, str]
-
-
 def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     """Judge a scenario, and say what it will run and about what that takes.
 
@@ -100,29 +91,24 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     """
     plan = judge_scenario(scenario, many=many)
     look = plan.rides <= MOST_LOOKED_UP
-    cached = cached_s = 0.0
-    shortest: tuple[bool, float, Cell] | None = None
-    for first, ride in _rides(scenario, plan.parts):
-        duration = ride.profile.duration_s
-        in_cache = look and is_cached(ride)
-        cached, cached_s = cached + in_cache, cached_s + in_cache * duration
-        if shortest is None or (not in_cache, duration) < shortest[:2]:
-            shortest = (not in_cache, duration, first)
-        if not look:
-            break
-    assert shortest is not None  # there is no scenario without a ride
-    cost = _cost_of(shortest[2], plan.parts)
-    mean_s = plan.simulated_s / plan.rides
-    stages = {stage: plan.cells * mean_s * cost.stages_s[stage] / cost.duration_s for stage in STAGES}
-    left_s = plan.simulated_s - cached_s
+    rides = [
+        (not (look and is_cached(ride)), ride.profile.duration_s, first)
+        for first, ride in islice(_rides(scenario, plan.parts), None if look else 1)
+    ]
+    cached = [duration for is_new, duration, _ in rides if not is_new]
+    *_, cheapest = min(rides, key=lambda ride: ride[:2])
+    duration_s, cost, ride_bytes = _cost_of(cheapest, plan.parts)
+    cells_s = plan.cells * plan.simulated_s / plan.rides
+    seconds = dict.fromkeys(STAGES, cells_s) | {"simulate": plan.simulated_s - sum(cached)}
+    rows = plan.cells * len(cost.scores)
     return Forecast(
         plan=plan,
-        cached=int(cached) if look else None,
-        rows=plan.cells * cost.rows,
-        stages_s=stages | {"simulate": left_s * cost.stages_s["simulate"] / cost.duration_s},
-        ride_bytes=plan.simulated_s * cost.ride_bytes / cost.duration_s,
-        score_bytes=SCORE_ROW_BYTES * plan.cells * cost.rows,
-        failed=cost.failed,
+        cached=len(cached) if look else None,
+        rows=rows,
+        stages_s={stage: seconds[stage] * cost.cpu_s[stage] / duration_s for stage in STAGES},
+        ride_bytes=plan.simulated_s * ride_bytes / duration_s,
+        score_bytes=SCORE_ROW_BYTES * rows,
+        failed={failure.estimator: failure.reason for failure in cost.failures},
     )
 
 
@@ -135,8 +121,12 @@ def _rides(scenario: Scenario, parts: Parts) -> Iterator[tuple[Cell, Ride]]:
             yield cell, parts.ride(cell)
 
 
-def _cost_of(cell: Cell, parts: Parts) -> _CellCost:
-    """Run a cell as the campaign does, a second time where kernels are compiled, and take the time."""
+def _cost_of(cell: Cell, parts: Parts) -> tuple[float, BatchResult, float]:
+    """Run a cell as the campaign does, a second time where kernels are compiled.
+
+    Returns the simulated time, what came of the cell with the processor time of its stages, and the disk
+    that its ride takes.
+    """
     packed, ride = pack(parts), parts.ride(cell)
     duration = max(ride.profile.duration_s, 1e-3)
     with interruptible():
@@ -149,16 +139,11 @@ def _cost_of(cell: Cell, parts: Parts) -> _CellCost:
     place = ride_cache.folder() / ride_cache.key_of(ride.describe())
     engine = result.ride.get("real_time_factor")
     seconds = duration / engine + result.ride["setup_s"] if engine else simulated.cpu_s["simulate"]
-    return _CellCost(
-        duration_s=duration,
-        stages_s=result.cpu_s | {"simulate": seconds},
-        ride_bytes=sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0,
-        rows=len(result.scores),
-        failed={failure.estimator: failure.reason for failure in result.failures},
-    )
+    size = sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0
+    return duration, replace(result, cpu_s=result.cpu_s | {"simulate": seconds}), size
 
 
-def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
+def print_forecast(console: Console, expected: Forecast) -> None:
     """Print a forecast as a table."""
     plan = expected.plan
     new = plan.rides if expected.cached is None else plan.rides - expected.cached
@@ -173,13 +158,13 @@ def print_forecast(console: Console, expected: Forecast, *, cores: int) -> None:
         "rides to simulate", f"{new:,}", f"of {plan.rides:,}, {_time(plan.simulated_s)} of riding; {cache}"
     )
     table.add_row("cells", f"{plan.cells:,}", f"recordings, {len(plan.estimators)} estimators on each")
-    table.add_row("score rows", f"about {expected.rows:,}", _bytes(expected.score_bytes))
-    table.add_row("disk", _bytes(expected.ride_bytes), _cache_words(expected.ride_bytes))
+    table.add_row("score rows", f"about {expected.rows:,}", decimal(round(expected.score_bytes)))
+    table.add_row("disk", decimal(round(expected.ride_bytes)), _cache_words(expected.ride_bytes))
     table.add_section()
     for stage, words in _STAGE_WORDS.items():
         table.add_row(stage, _time(expected.stages_s[stage]), words)
     total = f"[bold]{_time(expected.total_s)}[/bold]"
-    table.add_row("[bold]about[/bold]", total, f"on one of {cores} cores; an estimate from one cell")
+    table.add_row("[bold]about[/bold]", total, f"on one of {os.cpu_count()} cores; an estimate from one cell")
     console.print(table)
     rule = stop_rule_of(plan.scenario)
     if rule is not None:
@@ -197,13 +182,6 @@ def _cache_words(size: float) -> str:
     limit = ride_cache.limit_bytes()
     words = f"of rides; the cache keeps {limit / 1e9:g} GB"
     return words if size <= limit else f"of rides, more than the {limit / 1e9:g} GB that the cache keeps"
-
-
-def _bytes(size: float) -> str:
-    for unit, scale in (("GB", 1e9), ("MB", 1e6)):
-        if size >= scale:
-            return f"{size / scale:.3g} {unit}"
-    return f"{size / 1e3:.3g} kB"
 
 
 def _time(seconds: float) -> str:

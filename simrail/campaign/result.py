@@ -17,7 +17,7 @@ from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.worker import BatchResult, example_of
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import Plan
-from simrail.scenario.stop_rule import StopRule, StopState, stop_rule_of
+from simrail.scenario.stop_rule import StopState, stop_rule_of
 from simrail.scoring.table import concat_scores, in_order
 
 MOST_EXAMPLES = 6
@@ -66,11 +66,6 @@ def chosen_cells(plan: Plan, only: int | None = None, *, draws: int | None = Non
         beyond = rule is not None and draws is not None and not rule.has(cell, draws)
         if not beyond and (only is None or cell.number == only):
             yield cell
-
-
-def stop_state(plan: Plan, checkpoint: Checkpoint, rule: StopRule, draws: int) -> StopState:
-    """Ask a stop rule about the first so many draws, all of whose cells are kept."""
-    return rule.state(chosen_cells(plan), (result.scores for result in checkpoint.results()), draws)
 
 
 def gather(

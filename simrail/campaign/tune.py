@@ -8,7 +8,7 @@ that says what there is to search (`simrail.estimation.tunable`).
 import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -16,19 +16,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.campaign.cell import record_cell
+from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, one_of
 from simrail.core.interrupts import interruptible
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
-from simrail.estimation.tunable import METHODS, tunables_of
+from simrail.estimation.tunable import tunables_of
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
 from simrail.estimators.tuning.identify import Identification, identify
 from simrail.estimators.tuning.tune import objective_of, tune
 from simrail.recording.recording import Recording
-from simrail.ride.ride import simulate
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import judge_scenario
@@ -38,15 +37,6 @@ from simrail.track.bands import SAMPLES_PER_WAVE, Band
 
 STEP_M = 0.25
 """Distance of the places of a reference, unless another is given."""
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """What a search found, the file that it was written into, and what it knows, by set of parameters."""
-
-    result: TuningResult
-    file: Path
-    identified: dict[str, Identification]
 
 
 def tune_scenario(
@@ -64,7 +54,7 @@ def tune_scenario(
     at_most: int | None = None,
     command: str = "",
     watcher: Watcher | None = None,
-) -> Tuned:
+) -> tuple[TuningResult, dict[str, Identification]]:
     """Tune an estimator of a scenario and write the result.
 
     Parameters
@@ -101,6 +91,13 @@ def tune_scenario(
     watcher : Watcher, optional
         Is told how it goes.
 
+    Returns
+    -------
+    result : TuningResult
+        What the search found, as it was written into the file.
+    identified : dict of str to Identification
+        What it knows of each parameter, by set of parameters.
+
     Raises
     ------
     InputError
@@ -111,15 +108,16 @@ def tune_scenario(
     """
     chosen_settings = dict(settings or {})
     band, step_m = chosen_settings.get("band"), float(chosen_settings.get("step_m", STEP_M))
-    if method not in METHODS:
-        raise InputError("no such method", field="--method", value=method, limit=" or ".join(METHODS))
     if method == "cml" and (band is not None or within_m is not None):
         field = "--band" if band is not None else "--within"
         raise InputError("belongs to a known output", field=field, remedy="use --method kom, or leave it out")
-    if evaluations < 0:
-        raise InputError("is out of range", field="--evaluations", value=evaluations, limit=">= 0")
-    if at_most is not None and at_most < 1:
-        raise InputError("is out of range", field="--at-most", value=at_most, limit=">= 1")
+    for field, number, least in (
+        ("--evaluations", evaluations, 0),
+        ("--at-most", at_most, 1),
+        ("--draws", draws, 1),
+    ):
+        if number is not None and number < least:
+            raise InputError("is out of range", field=field, value=number, limit=f">= {least}")
     _judge_file(out)
     watcher = watcher or Watcher()
     scenario = alone(scenario, estimator)
@@ -152,7 +150,7 @@ def tune_scenario(
         }
     result = replace(result, status=tuple(dict(one.table["status"]) for one in identified.values()))
     result.write(out)
-    return Tuned(result, out, identified)
+    return result, identified
 
 
 def _rides(
@@ -165,17 +163,10 @@ def _rides(
 ) -> tuple[list[Recording], list[pd.DataFrame]]:
     """Recordings of cells, and the rails below them."""
     recordings, references = [], []
-    with interruptible() as check:
-        for number, cell in enumerate(chosen, start=1):
-            watcher.ride_begins(number, len(chosen), cell.ride.name)
-            references.append(reference_of(cell, parts, within_m, step_m))
-            try:
-                truth = simulate(parts.ride(cell), progress=watcher.ride_goes)
-            except Exception:
-                check()  # an engine in C++ may have made an error of its own of Ctrl-C
-                raise
-            watcher.ride_ends()
-            recordings.append(record_cell(cell, truth, parts))
+    for number, cell in enumerate(chosen, start=1):
+        references.append(reference_of(cell, parts, within_m, step_m))
+        truth = simulated(cell, parts, watcher, number, len(chosen))
+        recordings.append(record_cell(cell, truth, parts))
     return recordings, references
 
 
@@ -237,14 +228,7 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
         ("--imu", [] if imu is None else [imu], [part.name for part in spec.imu]),
     ):
         for name in wanted:
-            if name not in named:
-                raise InputError(
-                    "the scenario has none of this name",
-                    file=scenario.file,
-                    field=field,
-                    value=name,
-                    limit="one of " + ", ".join(named),
-                )
+            one_of(name, named, "the scenario has none of this name", field=field, file=scenario.file)
     names = set(rides) or {part.name for part in spec.ride}
     mount = spec.imu[0].name if imu is None else imu
     by_ride: dict[str, list[Cell]] = {}
@@ -253,8 +237,6 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
             of_ride = by_ride.setdefault(cell.ride.name, [])
             if not of_ride or cell.case == of_ride[0].case:
                 of_ride.append(cell)
-    if draws < 1:
-        raise InputError("is out of range", field="--draws", value=draws, limit=">= 1")
     least = min(len(of_ride) for of_ride in by_ride.values())
     if draws > least:
         raise InputError(
@@ -289,8 +271,7 @@ def reference_of(
 
 def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
     by_name = {band.name: band for band in bands}
-    if name not in by_name:
-        raise InputError("no such band", field="--band", value=name, limit="one of " + ", ".join(by_name))
+    one_of(name, by_name, "no such band", field="--band")
     coarsest = by_name[name].shortest_m / SAMPLES_PER_WAVE
     if step_m > coarsest:
         raise InputError(
@@ -300,38 +281,31 @@ def _band(bands: Sequence[Band], name: str, *, step_m: float) -> Band:
 
 
 def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:
+    first = cell.track_draw == cell.sensor_draw == 0
     return (
         f"{scenario.name}: {cell.ride.name}, {cell.imu.name} on {cell.imu.body}, "
         f"{Path(cell.imu.grade).stem}, odometry {recording.odometry_source}, {len(recording.imu)} samples"
-        + (
-            f", draw {cell.sensor_draw} on track {cell.track_draw}"
-            if cell.track_draw or cell.sensor_draw
-            else ""
-        )
+        + ("" if first else f", draw {cell.sensor_draw} on track {cell.track_draw}")
     )
 
 
 def _judge_file(out: Path) -> None:
     """Refuse to replace what is no tuning, or to write where nothing can be written."""
+    folder = out.absolute().parent
+
+    def refusal(problem: str, *, limit: str | None = None, remedy: str | None = None) -> InputError:
+        return InputError(problem, field="--out", value=str(out), limit=limit, remedy=remedy)
+
     if out.suffix != ".toml":
-        raise InputError(
-            "is no TOML file", field="--out", value=str(out), limit="a name that ends with .toml"
-        )
-    if not out.absolute().parent.is_dir():
-        raise InputError("no such folder", field="--out", value=str(out), remedy="make the folder first")
-    if not os.access(out.absolute().parent, os.W_OK):
-        raise InputError(
-            "the folder cannot be written", field="--out", value=str(out), remedy="choose another"
-        )
+        raise refusal("is no TOML file", limit="a name that ends with .toml")
+    if not folder.is_dir():
+        raise refusal("no such folder", remedy="make the folder first")
+    if not os.access(folder, os.W_OK):
+        raise refusal("the folder cannot be written", remedy="choose another")
     if out.exists():
         try:
             is_tuning = "hyperparameters" in tomllib.loads(out.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
             is_tuning = False
         if not is_tuning:
-            raise InputError(
-                "is no tuning, and would be replaced",
-                field="--out",
-                value=str(out),
-                remedy="choose another file with --out",
-            )
+            raise refusal("is no tuning, and would be replaced", remedy="choose another file with --out")

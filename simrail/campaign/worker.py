@@ -29,7 +29,7 @@ from simrail.ride.ride import Progress, is_cached, simulate
 from simrail.ride.truth import Mount, Truth
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
-from simrail.scoring.table import labelled_all
+from simrail.scoring.table import labelled
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,8 @@ def _run(
                 truth, facts = worker.truth(cells[0], notes, progress)
         except Exception as error:
             check()
-            _raise_full_disk(error)
+            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise  # no property of a cell: it ends the campaign, which goes on when there is room
             for cell in cells:
                 for name in tally.estimators:
                     tally.fail(cell, name, error)
@@ -187,7 +188,7 @@ def fail_batch(packed: bytes, cells: tuple[Cell, ...], reason: str) -> BatchResu
         tally = worker.tally(cells[0].sample)
         for cell in cells:
             for name in tally.estimators:
-                tally.fail_for(cell, name, reason, reason + "\n")
+                tally.fail(cell, name, reason)
     return _result(cells[0].ride_number, cells, tally, {}, [])
 
 
@@ -230,7 +231,7 @@ def _result(
     return BatchResult(
         cells=tuple(cell.number for cell in cells),
         ride_number=ride_number,
-        scores=labelled_all(tally.figures) if cells else pd.DataFrame(),
+        scores=labelled(tally.figures) if cells else pd.DataFrame(),
         failures=tuple(tally.failures),
         ride=facts,
         wall_s=tally.wall_s,
@@ -238,12 +239,6 @@ def _result(
         notes=tuple(notes),
         worker=_name(),
     )
-
-
-def _raise_full_disk(error: Exception) -> None:
-    """A full disk is no property of a cell: it ends the campaign, which goes on when there is room."""
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        raise error
 
 
 def _name() -> str:

@@ -2,13 +2,12 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame, label
-from simrail.estimation.estimate import Estimate, Estimator, description_of
+from simrail.estimation.estimate import Estimate, description_of
 from simrail.estimation.recorded_ride import read_ride
 from simrail.estimation.user_modules import class_named
 from simrail.recording.files.ride_writer import Format, write_frame
@@ -20,20 +19,9 @@ from simrail.scenario.overrides import override
 PAGE = "estimate.html"
 
 
-@dataclass(frozen=True)
-class RideEstimate:
-    """What was read and concluded, the folder with the files, and the time per sample."""
-
-    recording: Recording
-    estimator: Estimator
-    estimate: Estimate
-    folder: Path
-    us_per_sample: float
-
-
 def estimate_ride(
     ride: Path, method: str, folder: Path, *, settings: Sequence[str] = (), format: Format = "csv"
-) -> RideEstimate:
+) -> tuple[Recording, Estimate]:
     """Read a ride, run an estimator on it, and write what it found.
 
     Parameters
@@ -70,13 +58,10 @@ def estimate_ride(
         estimator = construct(estimator_class, override({}, settings))
     recording = read_ride(ride)
     if recording.odometry is None and "odometry" in description_of(estimator).needs:
-        raise InputError(
-            f"{method} needs to know where the train is, and the ride does not say",
-            file=label(ride),
-            field="encoder",
-            limit="[encoder], [odometer] or [odometry]",
-            remedy="add the table of the one that was recorded, or choose an estimator that needs none",
-        )
+        problem = f"{method} needs to know where the train is, and the ride does not say"
+        limit = "[encoder], [odometer] or [odometry]"
+        remedy = "add the table of the one that was recorded, or choose an estimator that needs none"
+        raise InputError(problem, file=label(ride), field="encoder", limit=limit, remedy=remedy)
     begun = time.perf_counter()
     estimate = estimator.estimate(recording)
     us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)
@@ -101,4 +86,4 @@ def estimate_ride(
             method=repr(estimator),
             us_per_sample=us_per_sample,
         )
-    return RideEstimate(recording, estimator, estimate, folder, us_per_sample)
+    return recording, estimate

@@ -1,11 +1,15 @@
 """``simrail export | estimate``: recordings as files."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from simrail.cli.options import DONE, Form, Scenario, Seed, Settings, number
+from simrail.core.errors import one_of
+
+if TYPE_CHECKING:
+    from simrail.recording.files.ride_writer import Format
 
 
 def export(
@@ -23,17 +27,16 @@ def export(
     from rich.console import Console
 
     from simrail.campaign.export import export as export_scenario
-    from simrail.campaign.export import format_of
     from simrail.campaign.progress import ProgressWatcher
     from simrail.scenario.scenario import load_scenario
 
-    chosen, read = format_of(form), load_scenario(scenario, overrides=settings or [], seed=seed)
+    chosen, read = _format(form), load_scenario(scenario, overrides=settings or [], seed=seed)
     with ProgressWatcher(Console(stderr=True)) as watcher:
-        written = export_scenario(read, out, format=chosen, draw=draw, truth=truth, watcher=watcher)
-    print(f"wrote {number(len(written.recordings), 'recording')} into {out}:")
-    for name in written.recordings:
+        names = export_scenario(read, out, format=chosen, draw=draw, truth=truth, watcher=watcher)
+    print(f"wrote {number(len(names), 'recording')} into {out}:")
+    for name in names:
         print(f"  {name}")
-    print(f"next: simrail estimate {out / written.recordings[0]} --estimator AttitudeEkf")
+    print(f"next: simrail estimate {out / names[0]} --estimator AttitudeEkf")
     return DONE
 
 
@@ -55,20 +58,27 @@ def estimate(
     ] = None,
 ) -> int:
     """Run an estimator on a recorded ride, of a real train or exported; without truth, without scores."""
-    from simrail.campaign.export import format_of
     from simrail.cli.estimate_ride import estimate_ride
     from simrail.report.pages.estimate_page import design_difference_deg, ride_facts
 
     stem = ride.stem if ride.suffix == ".toml" and ride.stem != "ride" else ride.absolute().stem
     stem = ride.absolute().parent.name if stem == "ride" else stem
     folder = out or Path("results") / f"{stem}_{estimator.rpartition(':')[2]}"
-    done = estimate_ride(ride, estimator, folder, settings=settings or [], format=format_of(form))
-    for fact in ride_facts(done.recording):
+    recording, estimated = estimate_ride(
+        ride, estimator, folder, settings=settings or [], format=_format(form)
+    )
+    for fact in ride_facts(recording):
         print(fact)
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in done.estimate.states and done.recording.odometry is not None:
-            rms = design_difference_deg(done.recording, done.estimate, angle)
+        if angle in estimated.states and recording.odometry is not None:
+            rms = design_difference_deg(recording, estimated, angle)
             print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
     print("there is no truth beside a recording, hence no scores")
     print(f"wrote {folder / f'estimate.{form}'} and {folder / 'estimate.html'}")
     return DONE
+
+
+def _format(word: str) -> "Format":
+    """The form that a word stands for."""
+    one_of(word, ("csv", "parquet"), "no such format", field="--format")
+    return cast("Format", word)

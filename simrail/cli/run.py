@@ -98,8 +98,6 @@ def run(
 
 def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> int:
     """Show what a scenario would run."""
-    import os
-
     from rich.console import Console
 
     from simrail.campaign.forecast import forecast, print_forecast
@@ -108,7 +106,7 @@ def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> in
     read = load_scenario(name, overrides=settings, seed=seed)
     with Console(stderr=True).status("running one cell"):
         expected = forecast(read, many=many)
-    print_forecast(Console(), expected, cores=os.cpu_count() or 1)
+    print_forecast(Console(), expected)
     return DONE
 
 

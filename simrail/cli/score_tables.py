@@ -1,5 +1,7 @@
 """The scores as the command line shows them at the end of a run: tables of each case, and notes."""
 
+from typing import NamedTuple
+
 import pandas as pd
 from rich import box
 from rich.console import Console, Group, RenderableType
@@ -11,19 +13,16 @@ from simrail.campaign.result import CampaignResult
 from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
 from simrail.report.tables.geometry_tables import baseline_of, behind_baseline
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Case, cases
+from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
 from simrail.scoring.table import OK
 from simrail.track.bands import Band
 
-ATTITUDE = (
-    ("roll", "truth", "whole"),
-    ("roll", "truth", "curve"),
-    ("roll", "design", "curve"),
-    ("pitch", "truth", "whole"),
-    ("pitch", "truth", "curve"),
-    ("pitch", "design", "curve"),
+ATTITUDE = tuple(
+    (quantity, reference, window)
+    for quantity in ("roll", "pitch")
+    for reference, window in (("truth", "whole"), ("truth", "curve"), ("design", "curve"))
 )
 """Columns of the attitude. Beside rails, those against the design are left out: the design is no goal."""
 
@@ -123,50 +122,51 @@ def _case(
 
 def _rails(console: Console, case: Case, styles: list[MethodStyle], band: str) -> Table:
     """Standard deviations of the errors of those methods that say what the rails look like."""
-    columns = [q for q in RAILS if any(case.get(s.name, q, "sd", band=band).draws for s in styles)]
-    heads = [QUANTITIES[q].replace(" ", "\n").replace("cross-", "cross-\n") for q in columns]
-    lines = []
-    for style in styles:
-        sds = [case.get(style.name, quantity, "sd", band=band) for quantity in columns]
-        lines.append((style, [f"{sd.value:.3f}" if sd.draws else "-" for sd in sds], _time(case, style)))
-    return _table(console, heads, lines)
+    heads = {q: QUANTITIES[q].replace(" ", "\n").replace("cross-", "cross-\n") for q in RAILS}
+    columns = [_Column(head, q, "sd", {"band": band}) for q, head in heads.items()]
+    return _table(console, case, styles, columns, timed=True)
 
 
 def _attitude(console: Console, case: Case, styles: list[MethodStyle], beside_rails: bool) -> Table:
     """Rms errors of the attitude; the time is told once, with the rails where there are any."""
     columns = []
     for quantity, reference, window in ATTITUDE:
-        key = {"window": window, "reference": reference}
-        # A ride without curves has no columns of them.
-        there = any(case.get(style.name, quantity, "rms", **key).draws for style in styles)
-        if there and not (beside_rails and reference == "design"):
-            columns.append((quantity, reference, window))
-    lines = []
-    for style in styles:
-        errors = [case.get(style.name, q, "rms", window=w, reference=r) for q, r, w in columns]
-        time = "" if beside_rails else _time(case, style)
-        lines.append((style, [f"{one.value:.3f}" if one.draws else "-" for one in errors], time))
-    heads = [f"{q}\n{w}" + ("\nvs\ndesign" if r == "design" else "") for q, r, w in columns]
-    return _table(console, heads, lines)
+        if not (beside_rails and reference == "design"):
+            head = f"{quantity}\n{window}" + ("\nvs\ndesign" if reference == "design" else "")
+            columns.append(_Column(head, quantity, "rms", {"window": window, "reference": reference}))
+    return _table(console, case, styles, columns, timed=not beside_rails)
 
 
-def _time(case: Case, style: MethodStyle) -> str:
-    time = case.get(style.name, "roll", "us_per_sample")
-    return f"{time.value:.2f}" if time.draws else "-"
+class _Column(NamedTuple):
+    """A column of a table: its head, and which figure it holds."""
+
+    head: str
+    quantity: str
+    metric: str
+    where: dict[str, str]
+
+    def mean(self, case: Case, style: MethodStyle) -> Mean:
+        """Mean of a method over the draws of a case."""
+        return case.get(style.name, self.quantity, self.metric, **self.where)
 
 
-def _table(console: Console, heads: list[str], lines: list[tuple[MethodStyle, list[str], str]]) -> Table:
-    """Method, numbers, and time per sample where any line has it; long names are folded, never cut."""
+def _table(
+    console: Console, case: Case, styles: list[MethodStyle], columns: list[_Column], *, timed: bool
+) -> Table:
+    """Method, figures that some method has, and time per sample; long names are folded, never cut."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("method", overflow="fold")
-    timed = any(time for _, _, time in lines)
-    for head in [*heads, *(["us per\nsample"] if timed else [])]:
+    # A ride without curves has no columns of them.
+    filled = [column for column in columns if any(column.mean(case, style).draws for style in styles)]
+    for head in [*(column.head for column in filled), *(["us per\nsample"] if timed else [])]:
         table.add_column(head, justify="right", no_wrap=True)
-    for style, numbers, time in lines:
+    for style in styles:
+        means = [column.mean(case, style) for column in filled]
+        time = case.get(style.name, "roll", "us_per_sample")
         table.add_row(
             f"{style.name}{' *' if style.baseline else ' (ablation)' if style.ablation else ''}",
-            *numbers,
-            *([time] if timed else []),
+            *(f"{mean.value:.3f}" if mean.draws else "-" for mean in means),
+            *([f"{time.value:.2f}" if time.draws else "-"] if timed else []),
             style="dim" if style.baseline else None,
         )
     if Measurement.get(console, console.options, table).maximum > WIDEST:

@@ -9,28 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from simrail.cli.options import DONE, Scenario, Seed, Settings
+from simrail.core.errors import InputError, one_of
+
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from simrail.campaign.tune import Tuned
+    from simrail.estimators.tuning.file import TuningResult
+    from simrail.estimators.tuning.identify import Identification
 
 
-OPTIONS = {
-    "box": "--box",
-    "constrained": "--constrain",
-    "position_m2": "--position",
-    "by_kind": "--by-kind",
-    "band": "--band",
-    "step_m": "--step",
-}
-"""Options that are settings of an estimator's own search, by the setting."""
+CONSTRAINED = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
+"""Axes that are constrained, by the words of ``--constrain``."""
 
 
 def tune(
     context: typer.Context,
-    scenario: Annotated[
-        str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario, or the path of a TOML file.")
-    ],
+    scenario: Scenario,
     estimator: Annotated[
         str,
         typer.Option(
@@ -98,17 +93,12 @@ def tune(
         int | None,
         typer.Option("--at-most", metavar="N", help="Evaluations after which the search ends as it is."),
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Replace the scenario's seed.")] = None,
+    seed: Seed = None,
     rides: Annotated[
         list[str] | None,
         typer.Option("--ride", metavar="NAME", help="Ride to fit on; all if none is named. Repeatable."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Replace a value, e.g. --set ride.speed_kmh=70. Repeatable."
-        ),
-    ] = None,
+    settings: Settings = None,
     by_kind: Annotated[
         bool,
         typer.Option("--by-kind", help="Smoother: one set for straights, one for transitions and curves."),
@@ -119,25 +109,27 @@ def tune(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.tune import tune_scenario, unfinished
-    from simrail.core.errors import InputError
     from simrail.scenario.scenario import load_scenario
 
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
+    if constrain is not None:
+        one_of(constrain, CONSTRAINED, "no such constraint", field="--constrain")
     file = out or Path(f"{read.name}_{method}.toml")
-    own = {
-        "box": box,
-        "constrained": _axes(constrain),
-        "position_m2": position,
-        "band": band,
-        "step_m": step,
-        "by_kind": by_kind or None,
+    # Settings of an estimator's own search: the option of each, and its value if it was given.
+    own: dict[str | None, tuple[str, Any]] = {
+        "box": ("--box", box),
+        "constrained": ("--constrain", constrain and CONSTRAINED[constrain]),
+        "position_m2": ("--position", position),
+        "by_kind": ("--by-kind", by_kind or None),
+        "band": ("--band", band),
+        "step_m": ("--step", step),
     }
     best = unfinished(file)
     if best.is_file():
         print(f"going on from {best}")
     try:
         with ProgressWatcher(Console(stderr=True)) as watcher:
-            done = tune_scenario(
+            result, identified = tune_scenario(
                 read,
                 file,
                 estimator=estimator,
@@ -146,21 +138,22 @@ def tune(
                 draws=draws,
                 imu=imu,
                 within_m=within,
-                settings={name: value for name, value in own.items() if value is not None},
+                settings={str(name): value for name, (_, value) in own.items() if value is not None},
                 evaluations=evaluations,
                 at_most=at_most,
                 command=_command(context),
                 watcher=watcher,
             )
     except InputError as error:
-        error.field = OPTIONS.get(str(error.field), error.field)
+        error.field = own.get(error.field, (error.field,))[0]
         raise
     except KeyboardInterrupt:
         if best.is_file():
             print(f"the best so far is in {best}; the same command goes on from there")
         raise
-    _show(Console(), done)
-    return 0
+    _show(Console(), result, identified)
+    print(f"{result.evaluations} evaluations; wrote {file}")
+    return DONE
 
 
 def _command(context: typer.Context) -> str:
@@ -180,33 +173,15 @@ def _command(context: typer.Context) -> str:
     return shlex.join(words)
 
 
-def _axes(constrain: str | None) -> tuple[str, ...] | None:
-    """Axes that are constrained, by the option's words."""
-    from simrail.core.errors import InputError
-
-    axes: dict[str | None, tuple[str, ...] | None] = {
-        None: None,
-        "y": ("y",),
-        "z": ("z",),
-        "yz": ("y", "z"),
-        "none": (),
-    }
-    if constrain not in axes:
-        words = ", ".join(word for word in axes if word is not None)
-        raise InputError("no such constraint", field="--constrain", value=constrain, limit=f"one of {words}")
-    return axes[constrain]
-
-
-def _show(console: Console, done: Tuned) -> None:
-    """Print what was found, one table per set, and where it was written."""
+def _show(console: Console, search: TuningResult, identified: dict[str, Identification]) -> None:
+    """Print what was found, one table per set of parameters."""
     from rich import box as boxes
     from rich.table import Table
 
     from simrail.estimators.tuning.identify import TOLERANCE
 
-    search = done.result
     lower: list[str] = []
-    for (name, identification), reached in zip(done.identified.items(), search.objective, strict=True):
+    for (name, identification), reached in zip(identified.items(), search.objective, strict=True):
         table = Table(box=boxes.SIMPLE_HEAD, padding=0, show_edge=False)
         columns = (name, "value,\nSI", "", "a tenth\ncosts", "tenfold\ncosts", "known to\ndecades")
         for number, column in enumerate(columns):
@@ -238,4 +213,3 @@ def _show(console: Console, done: Tuned) -> None:
             "let it search longer (--evaluations, --at-most)",
             highlight=False,
         )
-    print(f"{search.evaluations} evaluations; wrote {done.file}")

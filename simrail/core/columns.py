@@ -42,7 +42,6 @@ EDGE_TIME = "edge_time_s"
 RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
 MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
 MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
-GYRO_BIAS = ("gyro_bias_x_radps", "gyro_bias_y_radps", "gyro_bias_z_radps")
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
 RATE_INNOVATION = ("innovation_x_radps", "innovation_y_radps", "innovation_z_radps")
 IRREGULARITY = ("alignment_m", "vertical_profile_m", "cross_level_m", "gauge_m")
@@ -62,13 +61,8 @@ _TABLE = [
     Column("position_m", "m", "track", "distance s along the horizontal projection of the track"),
     Column("speed_mps", "m/s", "track", "ds/dt, negative when running towards smaller s"),
     Column("acceleration_mps2", "m/s2", "track", "d2s/dt2"),
-    Column("position_sd_m", "m", "track", "standard deviation of position_m"),
-    Column("speed_sd_mps", "m/s", "track", "standard deviation of speed_mps"),
-    Column("acceleration_sd_mps2", "m/s2", "track", "standard deviation of acceleration_mps2"),
     Column("lateral_m", "m", "track", "lateral position r_y of the mount, positive left"),
     Column("vertical_m", "m", "track", "vertical position r_z of the mount above the design rail plane"),
-    Column("lateral_sd_m", "m", "track", "standard deviation of lateral_m"),
-    Column("vertical_sd_m", "m", "track", "standard deviation of vertical_m"),
     Column("pulse_count", "1", "-", "signed encoder counts since the start"),
     Column("edge_time_s", "s", "-", "time of the last edge that the encoder passed; optional"),
     Column("magnetic_{axis}_t", "T", "body", "magnetic flux density along the axis"),
@@ -84,10 +78,6 @@ _TABLE = [
     Column("vertical_profile_m", "m", "track", "mean vertical deviation of the rails, positive up"),
     Column("cross_level_m", "m", "track", "left minus right rail height"),
     Column("gauge_m", "m", "track", "left minus right lateral deviation, positive wider"),
-    Column("alignment_sd_m", "m", "track", "standard deviation of alignment_m"),
-    Column("vertical_profile_sd_m", "m", "track", "standard deviation of vertical_profile_m"),
-    Column("cross_level_sd_m", "m", "track", "standard deviation of cross_level_m"),
-    Column("gauge_sd_m", "m", "track", "standard deviation of gauge_m"),
 ]
 
 
@@ -100,6 +90,9 @@ def _expand() -> dict[str, Column]:
             if key in column.name:
                 names = [column.name.replace(key, word) for word in replacements]
         columns.update({name: column._replace(name=name) for name in names})
+    known = (*ODOMETRY, *RELATIVE_POSITION, *IRREGULARITY)
+    for name, sd in zip(known, (*ODOMETRY_SD, *RELATIVE_POSITION_SD, *IRREGULARITY_SD), strict=True):
+        columns[sd] = columns[name]._replace(name=sd, meaning=f"standard deviation of {name}")
     return columns
 
 

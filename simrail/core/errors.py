@@ -6,6 +6,9 @@ The command line prints it and ends with exit code 2. Faults of the program itse
 exceptions and are not wrapped.
 """
 
+import difflib
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """Input that cannot be used, said so that its author can mend it.
@@ -39,19 +42,32 @@ class InputError(ValueError):
         super().__init__(problem)
 
     def __str__(self) -> str:
-        parts = []
-        if self.file is not None:
-            parts.append(f"{self.file}: ")
-        if self.field is not None:
-            parts.append(f"{self.field}: ")
-        parts.append(self.problem)
-        if self.value is not None:
-            parts.append(f"; found {self.value!r}")
-        if self.limit is not None:
-            parts.append(f"; limit: {self.limit}")
-        if self.remedy is not None:
-            parts.append(f"; remedy: {self.remedy}")
-        return "".join(parts)
+        value = None if self.value is None else repr(self.value)
+        more = (("found", value), ("limit:", self.limit), ("remedy:", self.remedy))
+        text = "".join(f"{place}: " for place in (self.file, self.field) if place is not None)
+        return text + self.problem + "".join(f"; {word} {words}" for word, words in more if words is not None)
+
+
+def one_of(
+    word: object,
+    words: Iterable[str],
+    problem: str,
+    *,
+    field: str | None = None,
+    file: object = None,
+    remedy: str | None = None,
+) -> None:
+    """Refuse a word that is none of the possible ones, which the message lists."""
+    possible = tuple(words)
+    if word not in possible:
+        limit = "one of " + ", ".join(possible)
+        raise InputError(problem, file=file, field=field, value=word, limit=limit, remedy=remedy)
+
+
+def did_you_mean(word: object, words: Iterable[str], *, cutoff: float = 0.6) -> str | None:
+    """A guess at what a misspelt word was to be, as a remedy; None if no word is near enough."""
+    near = difflib.get_close_matches(str(word), words, n=1, cutoff=cutoff)
+    return f"did you mean {near[0]}?" if near else None
 
 
 def refuse_unless(good: bool, field: str, value: object, limit: str) -> None:

@@ -129,7 +129,6 @@ def resample(
     frame: pd.DataFrame,
     times: FloatArray,
     *,
-    gap_intervals: float = GAP_INTERVALS,
     longest_gap_s: float = LONGEST_GAP_S,
     what: str = "imu",
     file: object = None,
@@ -143,8 +142,6 @@ def resample(
     times : ndarray (m,)
         Uniform times within those of the frame, see `uniform_times`; m >= 2. At a time that is a stamp of
         the frame, bit by bit, the sample is kept bit by bit.
-    gap_intervals : float
-        Two stamps further apart than this many intervals of `times` have a gap between them.
     longest_gap_s : float
         Longest distance of two stamps that is bridged.
     what, file : str, object
@@ -174,7 +171,7 @@ def resample(
             limit=f"from {stamps[0]:.9g} to {stamps[-1]:.9g} s, the first and last time stamp",
             remedy="resample within the recorded time",
         )
-    gaps = find_gaps(stamps, (times[-1] - times[0]) / (len(times) - 1), gap_intervals=gap_intervals)
+    gaps = find_gaps(stamps, (times[-1] - times[0]) / (len(times) - 1))
     refuse_long_gaps(gaps, longest_gap_s, what=what, file=file)
     values = np.empty((len(times), frame.shape[1]))
     for column, name in enumerate(frame.columns):

@@ -7,12 +7,7 @@ from pathlib import Path
 
 NO_MATTER = (
     *("cli/", "report/", "scenarios/"),
-    *(
-        "campaign/export.py",
-        "campaign/forecast.py",
-        "campaign/tune.py",
-        "campaign/progress.py",
-    ),
+    *(f"campaign/{name}.py" for name in ("export", "forecast", "tune", "progress")),
     *("scoring/aggregate.py", "scoring/statistics.py"),
 )
 """Folders and files of this package that no score depends on."""

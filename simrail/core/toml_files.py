@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import tomli_w
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -182,9 +182,14 @@ def blame(file: object, field: str = "") -> Iterator[None]:
         yield
     except InputError as error:
         if error.file is None:
-            error.file = file
-            error.field = ".".join(part for part in (field, error.field) if part) or None
+            _place(error, file, field)
         raise
+
+
+def _place(error: InputError, file: object, field: str) -> None:
+    """Put a file and the field that it arose in before what an error says of its own."""
+    error.file = error.file or file
+    error.field = ".".join(part for part in (field, error.field) if part) or None
 
 
 class _Message(NamedTuple):
@@ -206,8 +211,7 @@ def _as_input_error(error: ValidationError, model: type[Part], file: object) -> 
         field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
     inner = first.get("ctx", {}).get("error")
     if isinstance(inner, InputError):
-        inner.file = file if inner.file is None else inner.file
-        inner.field = ".".join(part for part in (field, inner.field) if part) or None
+        _place(inner, file, field)
         return inner
     if first["type"] == "string_pattern_mismatch":
         field = field.removesuffix(".[key]")
@@ -231,20 +235,16 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
     if kind in _SIGNS:
         # A count has no unit.
         key, sign = _SIGNS[kind]
-        is_count = isinstance(context[key], int)
-        remedy = (
-            "give a number within the limit"
-            if is_count
-            else "mind the unit, which is in the name of the field"
-        )
+        remedy = "mind the unit, which is in the name of the field"
+        if isinstance(context[key], int):
+            remedy = "give a number within the limit"
         return _Message("is out of range", f"{sign} {context[key]}", remedy)
     if kind in _TYPES:
         return _wrong_type(kind, fault["input"])
     if kind == "literal_error":
         expected = str(context.get("expected", ""))
         words = expected.replace("'", "").replace(" or ", ", ").split(", ")
-        near = difflib.get_close_matches(str(fault["input"]), words, n=1)
-        guess = f"did you mean {near[0]}?" if near else None
+        guess = did_you_mean(fault["input"], words)
         return _Message("is not one of the possible values", f"one of {expected}", guess)
     if kind in ("too_short", "too_long"):
         return _Message("has the wrong number of items", fault["msg"].split(" after ")[0])
@@ -258,10 +258,10 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
 
 def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
     allowed = _fields_at(model, place[:-1])
-    near = difflib.get_close_matches(str(place[-1]), allowed, n=1)
+    guess = did_you_mean(place[-1], allowed)
     # A guess is worth more than a list that nobody reads.
-    limit = "one of " + ", ".join(allowed) if allowed and not (near and len(allowed) > 25) else None
-    return _Message("unknown key", limit, f"did you mean {near[0]}?" if near else "remove it")
+    limit = "one of " + ", ".join(allowed) if allowed and not (guess and len(allowed) > 25) else None
+    return _Message("unknown key", limit, guess or "remove it")
 
 
 def _wrong_type(kind: str, value: Any) -> _Message:

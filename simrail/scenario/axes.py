@@ -17,12 +17,11 @@ from pydantic import WrapValidator
 from simrail.core.toml_files import Part
 from simrail.scenario.distributions import Distribution, Value, distributions_of, leaves, read_distribution
 
-Scalar = Value
 _T = TypeVar("_T")
 _Part = TypeVar("_Part", bound=Part)
 
 
-class Axis(tuple[Scalar, ...]):
+class Axis(tuple[Value, ...]):
     """Values that a field takes in turn."""
 
     __slots__ = ()
@@ -75,7 +74,7 @@ def axes_of(model: Part, *, prefix: str = "", fields: Iterable[str] | None = Non
 
 def expand(
     model: _Part, *, prefix: str = "", fields: Iterable[str] | None = None
-) -> list[tuple[dict[str, Scalar], _Part]]:
+) -> list[tuple[dict[str, Value], _Part]]:
     """Return every combination of a model's axes.
 
     Parameters
@@ -104,8 +103,13 @@ def expand(
 
 
 def drawn(
-    model: _Part, values: Mapping[str, Scalar], *, prefix: str = "", fields: Iterable[str] | None = None
-) -> tuple[dict[str, Scalar], _Part]:
+    model: _Part,
+    values: Mapping[str, Value],
+    *,
+    prefix: str = "",
+    shown: str = "",
+    fields: Iterable[str] | None = None,
+) -> tuple[dict[str, Value], _Part]:
     """Put the values of one sample in the place of a model's distributions.
 
     Parameters
@@ -116,23 +120,25 @@ def drawn(
         Of the sample, by the names that the distributions have with the prefix.
     prefix : str, optional
         Stands before the model's names in ``values``, e.g. ``"ride.out."``.
+    shown : str, optional
+        Put before every name in the settings that are returned.
     fields : iterable of str, optional
         These fields only.
 
     Returns
     -------
     settings : dict
-        Name (without the prefix) -> value.
+        Name -> value.
     concrete : Part
         The model that has them.
     """
     settings = {name: values[prefix + name] for name in distributions_of(model, fields=fields)}
     for name, value in settings.items():
         model = _with(model, name.split("."), value)
-    return settings, model
+    return {shown + name: value for name, value in settings.items()}, model
 
 
-def _with(model: Any, path: list[str], value: Scalar) -> Any:
+def _with(model: Any, path: list[str], value: Value) -> Any:
     """Return a copy of a model with one (nested) field set."""
     head, rest = path[0], path[1:]
     if isinstance(model, dict):

@@ -23,9 +23,9 @@ from simrail.ride.ride import Ride, rails_of
 from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
-from simrail.scenario.distributions import Distribution
+from simrail.scenario.distributions import distributions_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
-from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
+from simrail.scenario.tables import ImuPart, RidePart
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
@@ -170,10 +170,11 @@ class Parts:
             if len(self._rides) >= _MOST_RESOLVED:
                 self._rides.clear()
             spec, vehicle = cell.spec, self.vehicle(cell)
+            rough = spec.irregularity
             self._rides[key] = Ride(
                 name=cell.ride.name,
                 track=self.track(cell),
-                irregularity=_irregularity(spec.irregularity),
+                irregularity=NO_IRREGULARITY if rough is None else Irregularity(**rough.model_dump()),
                 track_seed=cell.ride_seed,
                 vehicle=vehicle,
                 profile=_profile(cell.ride),
@@ -246,10 +247,7 @@ class Parts:
         first = self._estimators.get(0, {})
         listed = methods(self.scenario, sample=sample)
         for method in listed:
-            is_drawn = any(
-                isinstance(option, Distribution)
-                for option in self.scenario.spec.estimator[method.index].options.values()
-            )
+            is_drawn = bool(distributions_of(self.scenario.spec.estimator[method.index]))
             if method.name in estimators:
                 raise InputError(
                     "two estimators have this name",
@@ -280,11 +278,6 @@ def _profile(ride: RidePart) -> SpeedProfile:
         final_rest_s=ride.final_rest_s,
         stops=tuple((stop.position_m, stop.dwell_s) for stop in ride.stops),
     )
-
-
-def _irregularity(part: IrregularityPart | None) -> Irregularity:
-    """How the rails deviate from the design; a spectrum ``"none"`` if the scenario names none."""
-    return NO_IRREGULARITY if part is None else Irregularity(**part.model_dump())
 
 
 def _conditions(spec: ScenarioFile, vehicle: VehicleModel) -> tuple[RailCondition, ...]:

@@ -9,14 +9,13 @@ finds its files wherever it lies. Nothing is estimated here.
 """
 
 import dataclasses
-import difflib
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.errors import PydanticUserError
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 from simrail.core.toml_files import blame, existing_file, shipped_folder
 from simrail.estimation.choose_odometry import NONE, TRUTH, odometry_named
 from simrail.estimation.estimate import Estimator, description_of
@@ -55,14 +54,10 @@ def _judge_needs(scenario: Scenario, method: Method, estimator: Estimator) -> No
     need, limit, remedy = lacking
     # Where an option of that name asks for the sensor, the option may as well be given up.
     asked = method.part.options.get(need)
-    raise InputError(
-        f"the scenario has no {need.replace('_', ' ')}",
-        file=scenario.file,
-        field=f"{field}.options.{need}" if asked else f"{field}.method",
-        value=asked or method.part.method,
-        limit=limit,
-        remedy=f"{remedy}, or " + (f"set {need} = false" if asked is True else "remove this estimator"),
-    )
+    remedy += f", or set {need} = false" if asked is True else ", or remove this estimator"
+    with blame(scenario.file, f"{field}.options.{need}" if asked else f"{field}.method"):
+        problem = f"the scenario has no {need.replace('_', ' ')}"
+        raise InputError(problem, value=asked or method.part.method, limit=limit, remedy=remedy)
 
 
 def lacks(scenario: Scenario, needs: tuple[str, ...]) -> tuple[str, str, str] | None:
@@ -89,19 +84,12 @@ def odometry_estimator(scenario: Scenario, name: str) -> Estimator | None:
         return None
     with blame(scenario.file, "odometry"):
         estimator = odometry_named(name, scenario.folder)
-        needs = description_of(estimator).needs
-    lacking = lacks(scenario, needs)
-    if lacking is not None:
-        need, limit, remedy = lacking
-        article = "an" if need[0] in "aeiou" else "a"
-        raise InputError(
-            f"the odometry needs {article} {need.replace('_', ' ')}",
-            file=scenario.file,
-            field="odometry",
-            value=name,
-            limit=limit,
-            remedy=f'{remedy}, or set odometry = "truth" for an ablation, or "none"',
-        )
+        lacking = lacks(scenario, description_of(estimator).needs)
+        if lacking is not None:
+            need, limit, remedy = lacking
+            problem = f"the odometry needs {'an' if need[0] in 'aeiou' else 'a'} {need.replace('_', ' ')}"
+            remedy += ', or set odometry = "truth" for an ablation, or "none"'
+            raise InputError(problem, value=name, limit=limit, remedy=remedy)
     return estimator
 
 
@@ -135,13 +123,12 @@ def construct(known_class: type[Any], options: dict[str, Any], *, folder: Path |
     values: dict[str, Any] = {}
     for name, value in options.items():
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
             raise InputError(
                 f"{known_class.__name__} has no such option",
                 field=name,
                 value=value,
                 limit="one of " + ", ".join(sorted(known)) if known else "it has no options",
-                remedy=REMOVED.get(name) or (f"did you mean {near[0]}?" if near else "remove it"),
+                remedy=REMOVED.get(name) or did_you_mean(name, known) or "remove it",
             )
         values[name] = _option(types.get(name, Any), name, value, folder)
     try:

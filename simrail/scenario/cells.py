@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
-from simrail.scenario.axes import Scalar, axes_of, drawn, expand
-from simrail.scenario.distributions import sample_count, samples_of
+from simrail.scenario.axes import axes_of, drawn, expand
+from simrail.scenario.distributions import Value, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 
@@ -65,7 +65,7 @@ class Cell:
     sample: int
     track_draw: int
     sensor_draw: int
-    settings: dict[str, Scalar]
+    settings: dict[str, Value]
 
     @property
     def ride_seed(self) -> int:
@@ -153,12 +153,12 @@ class _World:
     """What decides the motion, of one case and sample."""
 
     case: int
-    settings: dict[str, Scalar]
+    settings: dict[str, Value]
     spec: ScenarioFile
     ride: RidePart
     ride_index: int
     sample: int
-    values: dict[str, Scalar]
+    values: dict[str, Value]
 
 
 def _worlds(spec: ScenarioFile) -> Iterator[_World]:
@@ -172,8 +172,8 @@ def _worlds(spec: ScenarioFile) -> Iterator[_World]:
     for w, (world_settings, world, i, ride_settings, ride) in enumerate(listed):
         for k, values in enumerate(samples):
             world_drawn, concrete = drawn(world, values, fields=WORLD)
-            ride_drawn, ridden = drawn(ride, values, prefix=f"ride.{ride.name}.")
-            settings = world_settings | world_drawn | ride_settings | _prefixed("ride.", ride_drawn)
+            ride_drawn, ridden = drawn(ride, values, prefix=f"ride.{ride.name}.", shown="ride.")
+            settings = world_settings | world_drawn | ride_settings | ride_drawn
             yield _World(w * sensings, settings, concrete, ridden.as_ridden, i, k, values)
 
 
@@ -188,7 +188,8 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
     of_estimators = {name: value for name, value in world.values.items() if name.startswith("estimator.")}
     for k, (sensing_settings, sensing, i, imu_settings, imu) in enumerate(listed):
         sensing_drawn, concrete = drawn(sensing, world.values, fields=SENSING)
-        imu_drawn, mounted = drawn(imu, world.values, prefix=f"imu.{imu.name}.")
+        imu_drawn, mounted = drawn(imu, world.values, prefix=f"imu.{imu.name}.", shown="imu.")
+        settings = world.settings | sensing_settings | sensing_drawn | imu_settings | imu_drawn
         yield Cell(
             number=0,
             case=world.case + k,
@@ -201,17 +202,8 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
             sample=world.sample,
             track_draw=0,
             sensor_draw=0,
-            settings=world.settings
-            | sensing_settings
-            | sensing_drawn
-            | imu_settings
-            | _prefixed("imu.", imu_drawn)
-            | of_estimators,
+            settings=settings | of_estimators,
         )
-
-
-def _prefixed(prefix: str, settings: dict[str, Scalar]) -> dict[str, Scalar]:
-    return {prefix + name: value for name, value in settings.items()}
 
 
 def sensor_draws(spec: ScenarioFile, imu: ImuPart) -> int:

@@ -9,7 +9,7 @@ returns a `Plan` that says what will be run, with warnings. Each ride is judged 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
 from simrail.scenario.build import Parts
@@ -137,14 +137,8 @@ def _judge_score(scenario: Scenario) -> None:
         ("metrics", score.metrics, METRICS),
     ):
         for i, word in enumerate(words or ()):
-            of_one_curve = name == "windows" and word.startswith(CURVE_PREFIX)
-            if word not in possible and not of_one_curve:
-                raise InputError(
-                    f"is not one of the {name}",
-                    field=f"score.{name}[{i}]",
-                    value=word,
-                    limit="one of " + ", ".join(possible),
-                )
+            if name == "metrics" or not word.startswith(CURVE_PREFIX):
+                one_of(word, possible, f"is not one of the {name}", field=f"score.{name}[{i}]")
 
 
 def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> list[str]:

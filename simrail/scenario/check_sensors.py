@@ -5,9 +5,7 @@ What a sensor may be at all is judged where it is read (`simrail.recording.sheet
 scenario's.
 """
 
-from collections.abc import Iterable
-
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
 from simrail.scenario.build import ResolvedCell
 from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
@@ -44,7 +42,7 @@ def _judge_imu(resolved: ResolvedCell) -> None:
     cell, mount, grade = resolved.cell, resolved.mount, resolved.grade
     track, vehicle, truth_rate = resolved.ride.track, resolved.ride.vehicle, resolved.ride.rate_hz
     field = f"imu[{cell.imu_index}]"
-    _one_of(vehicle.body_names, mount.body, f"{field}.body", "the vehicle has no such body")
+    one_of(mount.body, vehicle.body_names, "the vehicle has no such body", field=f"{field}.body")
     offset = mount.position_m[0] + vehicle.body(mount.body).position_m[0]
     ends = {"start_m": cell.ride.start_m, "end_m": cell.ride.end_m}
     for name, position in ends.items():
@@ -72,7 +70,7 @@ def _judge_encoder(resolved: ResolvedCell) -> None:
     sides = {name.partition(".")[2] for name in vehicle.wheel_names}
     places = [f"{where}.{side}" for where in ("leading", "trailing") for side in sorted(sides)]
     wheels = [*vehicle.wheel_names, *places]
-    _one_of(wheels, encoder.wheel, "encoder.wheel", "the vehicle has no such wheel")
+    one_of(encoder.wheel, wheels, "the vehicle has no such wheel", field="encoder.wheel")
     with blame(None, "encoder"):
         decimation_factor(resolved.ride.rate_hz, encoder.rate_hz)
         check_encoder(encoder)
@@ -92,15 +90,4 @@ def _judge_encoder(resolved: ResolvedCell) -> None:
             field="encoder.radius",
             value=encoder.radius,
             remedy='set radius = "drawing", or let the ride move',
-        )
-
-
-def _one_of(names: Iterable[str], name: str, field: str, problem: str) -> None:
-    if name not in names:
-        raise InputError(
-            problem,
-            field=field,
-            value=name,
-            limit="one of " + ", ".join(names),
-            remedy="choose one of them",
         )

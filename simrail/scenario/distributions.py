@@ -198,8 +198,7 @@ def _ordered(pair: tuple[float, float], field: str) -> None:
 
 def _pair(given: object, field: str, meaning: str) -> tuple[float, float]:
     """Two finite numbers, or a fault that says what they mean."""
-    numbers = list(_numbers(given)) if isinstance(given, list) else []
-    if not isinstance(given, list) or len(given) != 2 or len(numbers) != 2:
+    if not isinstance(given, list) or len(given) != 2 or not all(_is_finite(item) for item in given):
         raise InputError(
             "is no pair of finite numbers",
             field=field,
@@ -207,13 +206,11 @@ def _pair(given: object, field: str, meaning: str) -> tuple[float, float]:
             limit=f"[{meaning}]",
             remedy=f"write e.g. {FORMS.get(field, FORMS['normal'])}",
         )
-    return numbers[0], numbers[1]
+    return float(given[0]), float(given[1])
 
 
-def _numbers(given: list[Any]) -> Iterator[float]:
-    for item in given:
-        if isinstance(item, (int, float)) and not isinstance(item, bool) and -LARGEST < item < LARGEST:
-            yield float(item)
+def _is_finite(item: object) -> bool:
+    return isinstance(item, (int, float)) and not isinstance(item, bool) and -LARGEST < item < LARGEST
 
 
 def distributions_of(

@@ -6,13 +6,12 @@ value is read as TOML, or else as text. What the values mean is judged by the mo
 """
 
 import copy
-import difflib
 import re
 import tomllib
 from collections.abc import Sequence
 from typing import Any
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean, one_of
 
 _STEP = re.compile(r"^([A-Za-z0-9_+-]+)(?:\[(\d+)\])?$")
 _EXAMPLE = (
@@ -85,13 +84,11 @@ def _set(place: Any, steps: list[str | int], value: Any, key: str) -> None:
         place[step] = value
         return
     if step not in place:
-        near = difflib.get_close_matches(step, [str(name) for name in place], n=1)
         if rest and isinstance(rest[0], int):
             raise InputError("the scenario has no such array", file="--set", field=key, remedy=_EXAMPLE)
-        if near:
-            raise InputError(
-                "unknown key", file="--set", field=key, value=step, remedy=f"did you mean {near[0]}?"
-            )
+        guess = did_you_mean(step, map(str, place))
+        if guess:
+            raise InputError("unknown key", file="--set", field=key, value=step, remedy=guess)
         place[step] = {}
     _set(place[step], rest, value, key)
 
@@ -100,13 +97,6 @@ def _judge_name(place: list[Any], step: str, key: str) -> None:
     """Refuse a step that is no key of any table of an array, and nearly the name of one."""
     tables = [item for item in place if isinstance(item, dict)]
     names = [str(item["name"]) for item in tables if "name" in item]
-    near = difflib.get_close_matches(step, names, n=1, cutoff=0.75)
-    if near and not any(step in item for item in tables):
-        raise InputError(
-            "nothing is called so",
-            file="--set",
-            field=key,
-            value=step,
-            limit="one of " + ", ".join(names),
-            remedy=f"did you mean {near[0]}?",
-        )
+    guess = did_you_mean(step, names, cutoff=0.75)
+    if guess and not any(step in item for item in tables):
+        one_of(step, names, "nothing is called so", file="--set", field=key, remedy=guess)

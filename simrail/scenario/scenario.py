@@ -15,23 +15,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
+from simrail.scenario import tables
 from simrail.scenario.axes import Axis, Listed, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
 from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart
-from simrail.scenario.tables import (
-    EarthPart,
-    EstimatorPart,
-    GeometryPart,
-    ImuPart,
-    IrregularityPart,
-    MonteCarloPart,
-    RailConditionPart,
-    RidePart,
-    ScorePart,
-    StopRulePart,
-    TemperaturePart,
-)
 
 
 class ScenarioFile(Part):
@@ -50,21 +38,21 @@ class ScenarioFile(Part):
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
     step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=1000.0)]] = 1000.0
-    monte_carlo: MonteCarloPart = MonteCarloPart()
+    monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
     odometry: Listed[str] = ""
-    irregularity: IrregularityPart | None = None
-    rail_condition: tuple[RailConditionPart, ...] = ()
-    ride: Annotated[list[RidePart], Field(min_length=1)]
-    imu: Annotated[list[ImuPart], Field(min_length=1)]
+    irregularity: tables.IrregularityPart | None = None
+    rail_condition: tuple[tables.RailConditionPart, ...] = ()
+    ride: Annotated[list[tables.RidePart], Field(min_length=1)]
+    imu: Annotated[list[tables.ImuPart], Field(min_length=1)]
     encoder: EncoderPart | None = None
     magnetometer: MagnetometerPart | None = None
     rail_sensor: RailSensorPart | None = None
-    earth: EarthPart | None = None
-    temperature: TemperaturePart | None = None
-    estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
-    score: ScorePart = ScorePart()
-    stop: StopRulePart | None = None
-    geometry: GeometryPart = GeometryPart()
+    earth: tables.EarthPart | None = None
+    temperature: tables.TemperaturePart | None = None
+    estimator: Annotated[list[tables.EstimatorPart], Field(min_length=1)]
+    score: tables.ScorePart = tables.ScorePart()
+    stop: tables.StopRulePart | None = None
+    geometry: tables.GeometryPart = tables.GeometryPart()
 
     @field_validator("step_s")
     @classmethod
@@ -174,7 +162,7 @@ def read_scenario(
     return Scenario(name=name, file=file, folder=folder, text=text, overrides=tuple(overrides), spec=spec)
 
 
-def _options_as_axes(part: EstimatorPart, field: str, file: str) -> EstimatorPart:
+def _options_as_axes(part: tables.EstimatorPart, field: str, file: str) -> tables.EstimatorPart:
     """Read lists among an estimator's options as axes, and tables such as ``{ uniform = ... }`` as draws.
 
     A list of lists is a list-valued option. What the options may be is judged when the estimator is made.

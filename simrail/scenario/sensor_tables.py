@@ -129,6 +129,7 @@ class MagnetometerPart(Part):
     def spec(self, track_seed: int) -> MagnetometerSpec:
         """The magnetometer on the track of a seed, with no axis left."""
         iron, traction, steel = self.iron, self.traction, self.steel
+        x, y, z = (0.0, 0.0, 0.0) if iron is None else iron.hard_iron_ut
         return MagnetometerSpec(
             field=EarthField(
                 intensity_t=self.intensity_ut / 1e6,
@@ -142,14 +143,7 @@ class MagnetometerPart(Part):
             resolution_t=self.resolution_nt / 1e9,
             iron=None
             if iron is None
-            else VehicleIron(
-                hard_iron_t=(
-                    iron.hard_iron_ut[0] / 1e6,
-                    iron.hard_iron_ut[1] / 1e6,
-                    iron.hard_iron_ut[2] / 1e6,
-                ),
-                soft_iron=iron.soft_iron,
-            ),
+            else VehicleIron(hard_iron_t=(x / 1e6, y / 1e6, z / 1e6), soft_iron=iron.soft_iron),
             traction=None
             if traction is None
             else Traction(

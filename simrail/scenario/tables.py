@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
@@ -19,23 +19,29 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length
 
 Positive = Annotated[float, Field(gt=0.0)]
 
+OnBoard = Annotated[float, Field(ge=-50.0, le=50.0)]
+"""A coordinate of something that a vehicle carries, m from its reference point."""
+
 Draws = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+def _ordered(wavelengths_m: tuple[float, float]) -> tuple[float, float]:
+    if wavelengths_m[0] >= wavelengths_m[1]:
+        raise ValueError(f"are not (shortest, longest): {list(wavelengths_m)}")
+    return wavelengths_m
+
+
+Wavelengths = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
+"""The shortest and the longest wavelength, m."""
 
 
 class IrregularityPart(Part):
     """``[irregularity]``: how the rails deviate from the design. Without it they do not."""
 
     spectrum: Listed[str]
-    wavelengths_m: Annotated[tuple[Positive, Positive], Field(description="shortest, longest")] = (1.5, 100.0)
+    wavelengths_m: Wavelengths = (1.5, 100.0)
     fade_m: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 40.0
     scale: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = 1.0
-
-    @field_validator("wavelengths_m")
-    @classmethod
-    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if value[0] >= value[1]:
-            raise ValueError(f"are not (shortest, longest): {list(value)}")
-        return value
 
 
 class StopPart(Part):
@@ -132,7 +138,7 @@ class ImuPart(Part):
     name: Name
     grade: Listed[str]
     body: Listed[str]
-    position_m: tuple[float, float, float]
+    position_m: tuple[OnBoard, OnBoard, OnBoard]
     roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
     pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
     yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
@@ -142,15 +148,6 @@ class ImuPart(Part):
     def noise_added(self) -> bool:
         """Whether it stands for another one with noise added, as a report sets the two side by side."""
         return NOISE in self.name or NOISE in str(self.grade)
-
-    @field_validator("position_m")
-    @classmethod
-    def _metres(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
-        if max(abs(part) for part in value) > 50.0:
-            raise ValueError(
-                f"lies more than 50 m from the vehicle's reference point: {list(value)}; it is in metres"
-            )
-        return value
 
 
 class EarthPart(Part):
@@ -256,7 +253,7 @@ class GeometryPart(Part):
     """
 
     bands: tuple[Literal["D0", "D1", "D2", "D3"], ...] = ("D0", "D1", "D2", "D3")
-    own_bands: dict[Name, tuple[Positive, Positive]] = Field(default_factory=dict)
+    own_bands: dict[Name, Wavelengths] = Field(default_factory=dict)
     twist_base_m: Annotated[float, Field(gt=0.0, le=50.0)] = 3.0
     limits: dict[Literal["alignment", "vertical_profile", "cross_level"], GeometryLimitsPart] = Field(
         default_factory=dict
@@ -265,9 +262,7 @@ class GeometryPart(Part):
     @field_validator("own_bands")
     @classmethod
     def _bands(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-        for name, (shortest, longest) in value.items():
+        for name in value:
             if name in ("full", "D0", "D1", "D2", "D3"):
                 raise ValueError(f"{name} is a name that is taken; give the band another one")
-            if shortest >= longest:
-                raise ValueError(f"{name} is not (shortest, longest): {[shortest, longest]}")
         return value

@@ -3,15 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from simrail.scoring import table
 from simrail.scoring.bootstrap import mean_interval
-from simrail.scoring.table import (
-    FIGURE_COLUMNS,
-    INTEGER_COLUMNS,
-    LABEL_COLUMNS,
-    LEFT_OPEN,
-    OK,
-    SCORE_COLUMNS,
-)
 
 AGGREGATE_COLUMNS = ("value", "low95", "high95", "sd_sensor", "sd_track", "track_draws", "draws", "failed")
 """What `aggregate` says of a figure."""
@@ -51,9 +44,9 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         track = [*(["sample"] if "sample" in cells else []), *track]
         frame = frame.merge(cells[["cell", *axes, *track[:-1]]], on="cell", how="left")
     # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
-    frame["failed"] = (~frame["status"].isin((OK, *LEFT_OPEN))).astype(np.int64)
-    labels = [name for name in LABEL_COLUMNS if name not in INTEGER_COLUMNS]
-    figure = [name for name in FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
+    frame["failed"] = (~frame["status"].isin((table.OK, *table.LEFT_OPEN))).astype(np.int64)
+    labels = [name for name in table.LABEL_COLUMNS if name not in table.INTEGER_COLUMNS]
+    figure = [name for name in table.FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
     keys = [*labels, *axes, *figure]
     by_figure = frame.groupby(keys, observed=True, dropna=False, sort=False)
     per_track = (
@@ -95,7 +88,7 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
 
 def axis_columns(cells: pd.DataFrame) -> list[str]:
     """Columns of the table of cells that tell its cases apart: neither labels nor draws."""
-    names = [str(name) for name in cells.columns if name not in (*SCORE_COLUMNS, "sample")]
+    names = [str(name) for name in cells.columns if name not in (*table.SCORE_COLUMNS, "sample")]
     if "case" not in names:
         return names
     most = cells.groupby("case")[names].nunique(dropna=False).max()
@@ -114,12 +107,10 @@ def _bounds(
     if len(rows) == 0:
         return low, high
     which, group_rows = np.unique(group[rows], return_inverse=True)
-    order = np.argsort(group_rows, kind="stable")
-    first = np.concatenate([[0], np.flatnonzero(np.diff(group_rows[order])) + 1])
-    place = np.arange(len(rows)) - np.repeat(first, np.diff([*first, len(rows)]))
+    place = pd.Series(group_rows).groupby(group_rows).cumcount().to_numpy()
     sums = np.zeros((len(which), int(place.max()) + 1))
     counts = np.zeros_like(sums)
-    sums[group_rows[order], place] = total[rows[order]]
-    counts[group_rows[order], place] = count[rows[order]]
+    sums[group_rows, place] = total[rows]
+    counts[group_rows, place] = count[rows]
     _, low[which], high[which] = mean_interval(sums, counts)
     return low, high

@@ -1,4 +1,4 @@
-"""Confidence intervals by resampling, where draws hang together in clusters.
+"""Confidence intervals of means by resampling, where draws hang together in clusters.
 
 Chance has two levels in a campaign: the track is laid anew (a cluster), and each ride over it is recorded
 with several draws of the sensors. Draws over one track have the track in common and are not independent
@@ -6,21 +6,19 @@ of each other. An interval therefore resamples whole clusters (Davison & Hinkley
 resample the upper level only, and what lies below goes with it); one that counts all draws as independent
 would be too narrow by as much as the track matters.
 
-* Means: bootstrap-t (Hall 1988; Efron & Tibshirani 1993, chapter 12), right also for ten clusters.
-* Standard deviations and percentiles: BCa (Efron 1987), which needs some thirty clusters.
-* Fewer than `FEWEST` clusters say too little of themselves to be resampled: Student's t for the mean, and
-  no interval for the rest.
+* From `FEWEST` clusters on: bootstrap-t (Hall 1988; Efron & Tibshirani 1993, chapter 12), right also for ten.
+* Fewer say too little of themselves to be resampled: Student's t.
+
+Intervals are those of means; for other statistics of independent draws see `scipy.stats.bootstrap`.
 
 Resamples come from streams of their own names, so the same table gives the same intervals.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
-from scipy.special import ndtr, ndtri
 
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
@@ -117,14 +115,8 @@ def _means(total: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatAr
     return mean, low, high
 
 
-def interval(
-    values: npt.ArrayLike,
-    clusters: npt.ArrayLike | None = None,
-    *,
-    statistic: str = "mean",
-    confidence: float = CONFIDENCE,
-) -> Interval:
-    """Confidence interval of a statistic of all draws.
+def interval(values: npt.ArrayLike, clusters: npt.ArrayLike | None = None) -> Interval:
+    """Mean of all draws with its 95 % interval.
 
     Parameters
     ----------
@@ -133,80 +125,14 @@ def interval(
     clusters : array_like (n,), optional
         What belongs together (the track); without, or where there is one cluster only, each value is one
         of its own and the interval speaks of this track.
-    statistic : str
-        ``"mean"``, ``"sd"``, or ``"p"`` and a percentile, e.g. ``"p95"``.
-    confidence : float
-        Of the interval, two-sided.
     """
     finite, labels = clustered(values, clusters)
     if len(finite) == 0:
         return Interval(np.nan, np.nan, np.nan)
-    k = int(labels.max()) + 1
-    if statistic == "mean":
-        sums = np.asarray(np.bincount(labels, finite, k), dtype=np.float64)
-        counts = np.asarray(np.bincount(labels, minlength=k), dtype=np.float64)
-        value, low, high = mean_interval(sums, counts, confidence=confidence)
-        return Interval(float(value[0]), float(low[0]), float(high[0]))
-    of = _weighted(statistic, finite)
-    whole = float(of(np.ones((1, len(finite))))[0])
-    if k < FEWEST:
-        return Interval(whole, np.nan, np.nan)
-    redrawn = np.concatenate(
-        [of(part[:, labels]) for part in np.array_split(resampled(k), max(1, len(finite) // 500))]
-    )
-    left_out = of((1.0 - np.eye(k))[:, labels])
-    return Interval(whole, *_bca(whole, redrawn, left_out, confidence))
-
-
-def _bca(value: float, redrawn: FloatArray, left_out: FloatArray, confidence: float) -> tuple[float, float]:
-    """Bounds of the bias-corrected, accelerated bootstrap."""
-    redrawn = redrawn[np.isfinite(redrawn)]
-    if len(redrawn) == 0 or redrawn.min() == redrawn.max():
-        return np.nan, np.nan
-    below = np.mean(redrawn < value) + 0.5 * np.mean(redrawn == value)
-    bias = ndtri(np.clip(below, 1e-6, 1.0 - 1e-6))
-    away = left_out.mean() - left_out
-    spread = np.square(away).sum()
-    skew = np.power(away, 3).sum() / (6.0 * spread**1.5) if spread > 0.0 else 0.0
-    tail = ndtri(np.array([0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence)]))
-    shares = ndtr(bias + (bias + tail) / (1.0 - skew * (bias + tail)))
-    low, high = np.quantile(redrawn, shares)
-    return float(low), float(high)
-
-
-def _weighted(statistic: str, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """A statistic as a function of how often each value counts, (resamples, n) -> (resamples,)."""
-    if statistic == "sd":
-        centred = values - values.mean()
-
-        def sd(weights: FloatArray) -> FloatArray:
-            n = weights.sum(axis=1)
-            mean = weights @ centred / n
-            with np.errstate(divide="ignore", invalid="ignore"):
-                deviations: FloatArray = np.sqrt(
-                    np.maximum(weights @ centred**2 - n * mean**2, 0.0) / (n - 1.0)
-                )
-            return deviations
-
-        return sd
-    if not (statistic.startswith("p") and statistic[1:].replace(".", "", 1).isdigit()):
-        raise ValueError(f"no such statistic: {statistic}; mean, sd, or p and a percentile")
-    share = float(statistic[1:]) / 100.0
-    order = np.argsort(values, kind="stable")
-    ranked = values[order]
-
-    def percentile(weights: FloatArray) -> FloatArray:
-        # As numpy's: at share (n - 1) of the sorted values, in which each stands as often as it counts.
-        reach = np.cumsum(weights[:, order], axis=1)
-        place = share * (reach[:, -1] - 1.0)
-        lower = np.floor(place)
-        first = ranked[(reach <= lower[:, None]).sum(axis=1)]
-        after = np.minimum(lower + 1.0, reach[:, -1] - 1.0)
-        second = ranked[(reach <= after[:, None]).sum(axis=1)]
-        between: FloatArray = first + (place - lower) * (second - first)
-        return between
-
-    return percentile
+    sums = np.bincount(labels, finite).astype(np.float64)
+    counts = np.bincount(labels).astype(np.float64)
+    value, low, high = mean_interval(sums, counts)
+    return Interval(float(value[0]), float(low[0]), float(high[0]))
 
 
 def clustered(

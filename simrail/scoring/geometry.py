@@ -11,7 +11,6 @@ Windows are those of the track (whole, straight, transition, curve and each curv
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -25,6 +24,7 @@ from simrail.scoring.metrics import Row, Series, figures
 from simrail.scoring.table import NO_TWIST, UNOBSERVABLE, table_of
 from simrail.scoring.windows import chosen_metrics, chosen_windows, windows_of
 from simrail.track.bands import BANDS, Band, band_pass, sd_of_draws, twist, why_not
+from simrail.track.laid_track import LaidTrack
 
 TWIST_BASE_M = 3.0
 """Base of the twist, unless a scenario says otherwise."""
@@ -32,17 +32,9 @@ TWIST_BASE_M = 3.0
 _NO_PLACE_METRICS = ("final", "nis", "us_per_sample")
 
 
-class HasRails(Protocol):
-    """A laid track, or measured rails: anything that gives the irregularities at places."""
-
-    def irregularities(self, s: FloatArray) -> pd.DataFrame:
-        """Columns `simrail.core.columns.IRREGULARITY` at places s (n,), m."""
-        ...
-
-
 def score_geometry(
     estimate: Estimate,
-    rails: HasRails,
+    rails: LaidTrack,
     recording: Recording,
     *,
     bands: Sequence[Band] = tuple(BANDS.values()),

@@ -10,7 +10,7 @@ the other metrics mean stands in `simrail.scoring.metrics`.
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from itertools import chain
 
 import numpy as np
 import pandas as pd
@@ -20,18 +20,10 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
-from simrail.ride.truth import Mount
+from simrail.ride.truth import Mount, Truth
 from simrail.scoring.metrics import IntArray, Row, Series, figures, nis_figures
 from simrail.scoring.table import OK, table_of
 from simrail.scoring.windows import chosen_metrics, chosen_windows, windows_of
-
-
-class HasMotion(Protocol):
-    """A truth: anything that gives the motion of a mount."""
-
-    def motion(self, mount: Mount) -> pd.DataFrame:
-        """Motion of a mount, indexed by ``time_s``, columns `simrail.core.columns.MOTION`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -53,7 +45,7 @@ class Reference:
     windows: Mapping[str, IntArray]
 
 
-def truth_at_imu(truth: HasMotion, recording: Recording) -> pd.DataFrame:
+def truth_at_imu(truth: Truth, recording: Recording) -> pd.DataFrame:
     """True motion of the recording's mount at its IMU times.
 
     Raises
@@ -82,7 +74,7 @@ def truth_at_imu(truth: HasMotion, recording: Recording) -> pd.DataFrame:
     return pd.DataFrame(columns, index=recording.imu.index)
 
 
-def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Reference:
+def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference:
     """Make what the estimates of a recording are compared with.
 
     Parameters
@@ -108,7 +100,7 @@ def reference_of(truth: HasMotion | pd.DataFrame, recording: Recording) -> Refer
 
 def score(
     estimate: Estimate,
-    truth: HasMotion | pd.DataFrame | Reference,
+    truth: Truth | pd.DataFrame | Reference,
     recording: Recording,
     *,
     us_per_sample: float | None = None,
@@ -150,9 +142,7 @@ def score(
     chosen = chosen_windows(against.windows, windows)
     keep = chosen_metrics(metrics)
     rows: list[Row] = []
-    for series in _attitude_series(states, against):
-        rows += figures(series, chosen, keep)
-    for series in _other_series(states, against.motion):
+    for series in chain(_attitude_series(states, against), _other_series(states, against.motion)):
         rows += figures(series, chosen, keep)
     first = rows[0][0] if rows else "roll"
     if estimate.innovations is not None and "nis" in keep:
@@ -165,7 +155,7 @@ def score(
 
 def score_odometry(
     recording: Recording,
-    truth: HasMotion | pd.DataFrame | Reference,
+    truth: Truth | pd.DataFrame | Reference,
     *,
     windows: Collection[str] | None = None,
     metrics: Collection[str] | None = None,

@@ -60,9 +60,7 @@ def levels(values: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[float, float
     return float(np.sqrt(sensor)), float(np.sqrt(max(between - noise, 0.0) / size))
 
 
-def anees_bounds(
-    independent: int, *, dimension: int = 1, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
+def anees_bounds(independent: int, *, dimension: int = 1) -> tuple[float, float]:
     """Between which bounds a consistent method's NEES, averaged over independent draws, lies.
 
     N d times the average of d-dimensional NEES divided by d is chi-square with N d degrees of freedom
@@ -71,29 +69,23 @@ def anees_bounds(
     alarm, and shorter ones are given more room than they need.
     """
     freedom = independent * dimension
-    tail = 0.5 * (1.0 - confidence)
-    low, high = stats.chi2(freedom).ppf([tail, 1.0 - tail]) / freedom
-    return float(low), float(high)
+    low, high = stats.chi2(freedom).interval(CONFIDENCE)
+    return float(low) / freedom, float(high) / freedom
 
 
-def coverage_bounds(
-    independent: int, *, claimed: float = 0.95, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
-    """Between which bounds the share of errors inside a consistent method's interval lies.
+def coverage_bounds(independent: int) -> tuple[float, float]:
+    """Between which bounds the share of errors inside a consistent method's 95 % interval lies.
 
     Binomial, with as many trials as there are independent draws; see `anees_bounds`.
     """
-    tail = 0.5 * (1.0 - confidence)
-    low, high = stats.binom(independent, claimed).ppf([tail, 1.0 - tail]) / independent
-    return float(low), float(high)
+    low, high = stats.binom(independent, 0.95).interval(CONFIDENCE)
+    return float(low) / independent, float(high) / independent
 
 
 def compare(
     first: npt.ArrayLike,
     second: npt.ArrayLike,
     clusters: npt.ArrayLike | None = None,
-    *,
-    confidence: float = CONFIDENCE,
 ) -> Comparison:
     """Compare two methods over the same draws: whatever both suffer from alike drops out.
 
@@ -102,9 +94,7 @@ def compare(
     first, second : array_like (n,)
         Figures of the two, draw by draw; smaller is better. A draw that one of them lacks is left out.
     clusters : array_like (n,), optional
-        See `interval`.
-    confidence : float
-        Of the intervals. That of the win rate is Wilson's, with as many trials as there are clusters.
+        See `interval`. The interval of the win rate is Wilson's, with as many trials as there are clusters.
     """
     difference = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     paired, labels = clustered(difference, clusters)
@@ -113,12 +103,12 @@ def compare(
         return Comparison(nothing, nothing, np.nan, 0)
     won = (paired < 0.0) + 0.5 * (paired == 0.0)
     rate, trials = float(won.mean()), int(labels.max()) + 1
-    z = float(ndtri(0.5 * (1.0 + confidence)))
+    z = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
     middle = (rate + z * z / (2 * trials)) / (1.0 + z * z / trials)
     reach = z / (1.0 + z * z / trials) * np.sqrt(rate * (1.0 - rate) / trials + z * z / (4 * trials**2))
     spread = float(paired.std(ddof=1)) if len(paired) > 1 else np.nan
     return Comparison(
-        difference=interval(paired, labels, confidence=confidence),
+        difference=interval(paired, labels),
         win_rate=Interval(rate, float(middle - reach), float(middle + reach)),
         effect_size=float(paired.mean()) / spread if spread > 0.0 else np.nan,
         pairs=len(paired),

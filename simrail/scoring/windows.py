@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from simrail.core.errors import InputError
+from simrail.core.errors import one_of
 from simrail.core.jit import FloatArray
 from simrail.scoring.metrics import IntArray
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, METRICS, WINDOWS
@@ -51,10 +51,8 @@ def chosen_windows(windows: Mapping[str, IntArray], wanted: Collection[str] | No
     if wanted is None:
         return dict(windows)
     for name in wanted:
-        if name not in WINDOWS and not name.startswith(CURVE_PREFIX):
-            raise InputError(
-                "no such window", value=name, limit="one of " + ", ".join((*WINDOWS, EVERY_CURVE))
-            )
+        if not name.startswith(CURVE_PREFIX):
+            one_of(name, (*WINDOWS, EVERY_CURVE), "no such window")
     every_curve = EVERY_CURVE in wanted
     return {n: i for n, i in windows.items() if n in wanted or (every_curve and n.startswith(CURVE_PREFIX))}
 
@@ -64,6 +62,5 @@ def chosen_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
     if wanted is None:
         return METRICS
     for name in wanted:
-        if name not in METRICS:
-            raise InputError("no such metric", value=name, limit="one of " + ", ".join(METRICS))
+        one_of(name, METRICS, "no such metric")
     return tuple(name for name in METRICS if name in wanted)

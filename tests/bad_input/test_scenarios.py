@@ -258,7 +258,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "an IMU in millimetres": (
         "position_m = [0.0, 0.0, 0.6]",
         "position_m = [0.0, 0.0, 600.0]",
-        ["imu[0].position_m", "600.0", "metres"],
+        ["imu[0].position_m[2]", "600.0", "<= 50.0", "mind the unit"],
     ),
     "an IMU with two coordinates": (
         "position_m = [0.0, 0.0, 0.6]",

@@ -93,10 +93,10 @@ roll_deg = 3.0
 """
     (here / "two.toml").write_text(text)
     scenario = load_scenario("two.toml", overrides=[*QUICK[:2], "ride.speed_kmh=[20.0, 30.0]"])
-    done = export(scenario, here / "out", format="parquet")
-    assert len(done.recordings) == 6 == len(set(done.recordings))
+    names = export(scenario, here / "out", format="parquet")
+    assert len(names) == 6 == len(set(names))
     first = [cell for cell in cells(scenario) if cell.sensor_draw == 0]
-    for cell, name in zip(first, done.recordings, strict=True):
+    for cell, name in zip(first, names, strict=True):
         again = read_ride(here / "out" / name)
         assert again.mount == cell.imu.name and again.imu_sheet.grade == cell.imu.grade
         assert_same(recorded(scenario, cell), again)

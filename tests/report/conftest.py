@@ -154,9 +154,9 @@ def tables_of(
             for name, estimate in one.estimates.items():
                 figures = score(estimate, reference, one.recording, us_per_sample=0.2)
                 figures["value"] *= 1.0 + spread * (2 * draw - 1)
-                parts.append(labelled(figures, labels | {"estimator": name}))
+                parts.append(labelled([(figures, labels | {"estimator": name})]))
             figures = score_odometry(one.recording, reference)
-            parts.append(labelled(figures, labels | {"estimator": "odometry:encoder"}))
+            parts.append(labelled([(figures, labels | {"estimator": "odometry:encoder"})]))
     return concat_scores(parts), pd.DataFrame(cells)
 
 

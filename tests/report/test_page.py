@@ -162,7 +162,7 @@ def test_failures_are_on_the_page_and_do_not_stop_it(
     del one.estimates["vqf"]
     scores, cells = tables(one)
     labels = {name: scores[name].iloc[0] for name in scores.columns[:11]}
-    failed = labelled(failed_figures("LinAlgError: singular matrix"), labels | {"estimator": "vqf"})
+    failed = labelled([(failed_figures("LinAlgError: singular matrix"), labels | {"estimator": "vqf"})])
     path = tmp_path / "report.html"
     write_report(
         path,

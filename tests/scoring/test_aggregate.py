@@ -42,7 +42,7 @@ def table(draws: dict[str, tuple[int, int]], *, seed: int = 1) -> tuple[pd.DataF
             )
             number = len(cells)
             draw: dict[str, object] = {"cell": number, "track_draw": track, "sensor_draw": sensor}
-            parts.append(labelled(as_score_table(figure), LABELS | draw | {"estimator": name}))
+            parts.append(labelled([(as_score_table(figure), LABELS | draw | {"estimator": name})]))
             cells.append({"cell": number, "case": 0, "sample": 0})
     order = rng.permutation(len(parts))
     return concat_scores([parts[i] for i in order]), pd.DataFrame(cells)

@@ -497,7 +497,9 @@ def test_tables_are_categorical_with_the_whole_vocabulary_and_lie_side_by_side()
     for name in ("quantity", "band", "reference", "metric", "unit"):
         assert one[name].dtype == two[name].dtype
     assert list(one.columns) == list(FIGURE_COLUMNS)
-    both = concat_scores([labelled(one, LABELS), labelled(two, LABELS | {"estimator": "gda", "cell": 4})])
+    both = concat_scores(
+        [labelled([(one, LABELS)]), labelled([(two, LABELS | {"estimator": "gda", "cell": 4})])]
+    )
     assert list(both.columns) == list(SCORE_COLUMNS)
     assert len(both) == len(one) + len(two)
     assert all(
@@ -520,11 +522,11 @@ def test_aggregate_keeps_the_two_levels_of_draws_apart() -> None:
     parts, cells = [], []
     for number, (track, sensor) in enumerate(np.ndindex(4, 6)):
         labels = LABELS | {"cell": number, "track_draw": track, "sensor_draw": sensor}
-        parts.append(labelled(as_score_table(figures(value=values[track, sensor])), labels))
+        parts.append(labelled([(as_score_table(figures(value=values[track, sensor])), labels)]))
         cells.append({"cell": number, "ride.speed_kmh": 20.0})
     fast = LABELS | {"cell": 99}
-    parts.append(labelled(failed_figures("broken"), fast | {"track_draw": 0}))
-    parts.append(labelled(as_score_table(figures(value=1000.0)), fast))
+    parts.append(labelled([(failed_figures("broken"), fast | {"track_draw": 0})]))
+    parts.append(labelled([(as_score_table(figures(value=1000.0)), fast)]))
     cells.append({"cell": 99, "ride.speed_kmh": 70.0})
     table = aggregate(concat_scores(parts), pd.DataFrame(cells))
     assert len(table) == 2
