@@ -15,8 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.cell import CellResult
 from simrail.estimation.estimate import Estimate
+from simrail.report.figures.canvas import fitting_columns, legend_above, look, panels
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
-from simrail.report.figures.style import fitting_columns, legend_above, look, panels
 from simrail.report.figures.track import profile_figure, profile_words
 from simrail.report.pages.page import write_report
 from simrail.report.pages.ride import ride_data

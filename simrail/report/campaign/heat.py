@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis
-from simrail.report.figures.style import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
+from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
 
 HEAT = LinearSegmentedColormap.from_list(
     "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64

@@ -13,17 +13,9 @@ from matplotlib.axes import Axes
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.core.jit import FloatArray
+from simrail.report.figures import canvas
 from simrail.report.figures.decimate import Bins
 from simrail.report.figures.ride import over_distance
-from simrail.report.figures.style import (
-    draw_design,
-    draw_truth,
-    fit_limits,
-    legend_above,
-    look,
-    panels,
-    to_svg,
-)
 from simrail.report.tables.methods import MethodStyle
 
 _NAMES = ("roll", "pitch", "yaw")
@@ -41,24 +33,24 @@ def attitude_figure(example: CellResult, styles: Sequence[MethodStyle], *, what:
     what : str
         Description for those who cannot see it.
     """
-    with look():
+    with canvas.look():
         bins = Bins(example.motion["position_m"].to_numpy())
         frame = example.recording.track.frame(bins.x)
         design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
-        figure, axes = panels([2.05, 2.05, 1.75])
+        figure, axes = canvas.panels([2.05, 2.05, 1.75])
         for column, (axis, angle, name) in enumerate(zip(axes, ATTITUDE, _NAMES, strict=True)):
             true = example.motion[angle].to_numpy()
-            lines = [draw_truth(axis, bins, true), draw_design(axis, bins.x, design[column])]
+            lines = [canvas.draw_truth(axis, bins, true), canvas.draw_design(axis, bins.x, design[column])]
             for order, style in enumerate(styles):
                 x, y = bins.line(np.rad2deg(true + angle_error(example, style.name, column)))
                 depth: dict[str, Any] = {"lw": 1.05, "zorder": 12 - 0.1 * order}
                 axis.plot(x, y, color=style.colour, ls=style.stroke, label=style.label, **depth)
                 lines.append(y)
-            fit_limits(axis, lines, top=0.16 if column == 0 else 0.08)
+            canvas.fit_limits(axis, lines, top=0.16 if column == 0 else 0.08)
             axis.set_ylabel(f"{name}, \u00b0")
-        legend_above(axes[0])
+        canvas.legend_above(axes[0])
         over_distance(axes, example)
-        return to_svg(figure, description=what)
+        return canvas.to_svg(figure, description=what)
 
 
 def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
@@ -68,9 +60,9 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
     mean is drawn, and the range of 'design angles only' as a band. Where a baseline leaves the panel,
     a note says how far it goes.
     """
-    with look():
+    with canvas.look():
         bins = Bins(example.motion["position_m"].to_numpy())
-        figure, axes = panels([1.9, 1.9, 1.9])
+        figure, axes = canvas.panels([1.9, 1.9, 1.9])
         tested = [style for style in styles if not style.baseline] or list(styles)
         for column, axis in enumerate(axes):
             error = {style.name: _shown_error(example, style, column) for style in styles}
@@ -103,9 +95,9 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
             axis.set_ylim(low - 0.15 * reach, high + (0.3 if column == 0 else 0.05) * reach)
             axis.set_ylabel("yaw drift, \u00b0" if column == 2 else f"{_NAMES[column]} error, \u00b0")
             _note_beyond(axis, beyond)
-        legend_above(axes[0])
+        canvas.legend_above(axes[0])
         over_distance(axes, example)
-        return to_svg(figure, description="Errors of roll, pitch and yaw over distance")
+        return canvas.to_svg(figure, description="Errors of roll, pitch and yaw over distance")
 
 
 def _percentile(error: FloatArray, share: float) -> float:

@@ -9,8 +9,8 @@ from matplotlib.ticker import MaxNLocator
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO
 from simrail.recording.recording import odometry_of
+from simrail.report.figures.canvas import INK, distance_axis, legend_above, look, panels, shade_track, to_svg
 from simrail.report.figures.decimate import Bins
-from simrail.report.figures.style import INK, distance_axis, legend_above, look, panels, shade_track, to_svg
 from simrail.scenario.tables import RailConditionPart
 
 _TINTS = ("#0072B2", "#009E73", "#D55E00")

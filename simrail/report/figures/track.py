@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
+from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
 from simrail.report.words.sentences import listed
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 

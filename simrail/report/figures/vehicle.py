@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.report.figures.style import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
+from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
 from simrail.report.tables.vehicle_text import MOST_HZ
 from simrail.vehicle.contact.contact_pair import incline
 from simrail.vehicle.contact.profile_files import profiles_of

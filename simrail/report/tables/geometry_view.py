@@ -47,7 +47,7 @@ def geometry_view(
     known : mapping of str to Band
         The scenario's bands by name.
     """
-    drawn = with_rails(example, [style for style in styles if not is_zero(style)])[:MOST_DRAWN]
+    drawn = [s for s in styles if not is_zero(s) and has_rails(example, s)][:MOST_DRAWN]
     if not drawn:
         return None
     first, band = drawn[0], known.get(judged_band(case)) if case is not None else None
@@ -73,13 +73,11 @@ def geometry_view(
     }
 
 
-def with_rails(example: CellResult, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
-    """Those of some methods that say what the rails of a ride look like, if its true rails are at hand."""
-    if example.rails is None:
-        return []
-    estimates = {style.name: example.estimates.get(style.name) for style in styles}
-    there = {name for name, e in estimates.items() if e and e.geometry is not None and len(e.geometry) > 1}
-    return [style for style in styles if style.name in there]
+def has_rails(example: CellResult, style: MethodStyle) -> bool:
+    """Whether a method says what the rails of a ride look like, and the true ones are at hand."""
+    estimate = example.estimates.get(style.name)
+    geometry = estimate.geometry if estimate else None
+    return example.rails is not None and geometry is not None and len(geometry) > 1
 
 
 def _holds(example: CellResult, style: MethodStyle, band: Band) -> bool:

@@ -30,7 +30,8 @@ from simrail.recording.sheets.imu_file import load_grade
 from simrail.report.pages.page import write_report
 from simrail.report.pages.section import PageData
 from simrail.report.papers.claim import Claim, judged
-from simrail.report.papers.gonzalez_2023.judges import JUDGES, Evidence, Peak, errata_note
+from simrail.report.papers.gonzalez_2023 import judges
+from simrail.report.papers.gonzalez_2023.judges import Evidence, Peak, errata_note
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, rows_of
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, section
 from simrail.report.papers.gonzalez_2023.tunings import by_part, notes, status_table, tunings_of
@@ -160,7 +161,7 @@ def verdicts(
     peak: Peak = PEAK,
     tuning: Tuning | None = None,
 ) -> dict[str, Claim]:
-    claims = judged(PAPER, Evidence(rows, coverage, peak, tuning), JUDGES, has=rows.has)
+    claims = judged(PAPER, Evidence(rows, coverage, peak, tuning), judges, has=rows.has)
     return {claim.key: claim for claim in claims}
 
 
@@ -569,7 +570,7 @@ def test_the_own_ride_is_told_by_the_scores_of_that_ride(
     data = PageData(scenario, result.scores, result.cells, result.examples, {})  # type: ignore[attr-defined]
     vars(data)["cases"] = [doubled, *others]
     tunings = {"smoother_cml": replace(found, search=search)}
-    monkeypatch.setattr("simrail.report.papers.gonzalez_2023.section.tunings_of", lambda *_: tunings)
+    monkeypatch.setattr("simrail.report.papers.gonzalez_2023.tunings.tunings_of", lambda *_: tunings)
     view = view_of(data)
     (note,) = [text for text in view.notes if "ride that was searched on" in text]
     sds = {

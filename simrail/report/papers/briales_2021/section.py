@@ -12,13 +12,13 @@ from simrail.campaign.cell import CellResult
 from simrail.report.figures.attitude import attitude_figure
 from simrail.report.figures.ride import direction_of
 from simrail.report.pages.section import PageData, Section
+from simrail.report.papers.briales_2021 import judges
 from simrail.report.papers.briales_2021.figures import (
     compensation_figure,
     repeatability_figure,
     rides_figure,
     spread_of,
 )
-from simrail.report.papers.briales_2021.judges import JUDGES, Evidence
 from simrail.report.papers.briales_2021.rides import PAPER, QUANTITIES, Rides, is_fast, rides_of
 from simrail.report.papers.briales_2021.terms import SLOW_PART_HZ, TERMS_RIDE, terms_table
 from simrail.report.papers.claim import judged
@@ -45,13 +45,13 @@ def section(data: PageData) -> list[Section]:
         for part in ("gda_paper", "ekf_per_step", "ekf_intensity", "gda", "ekf")
         if (name := rides.names.get(part)) and len(drawn) > 1 and all(name in e.estimates for e in drawn)
     }
-    evidence = Evidence(rides, spread, _wrong_sign_deg(drawn))
+    evidence = judges.Evidence(rides, spread, _wrong_sign_deg(drawn))
     shown = {
         "paper": PAPER,
         "design": _table(rides, looks, reference="design"),
         "truth": _table(rides, looks, reference="truth"),
         "draws": max(int(case.table["draws"].max()) for case in rides.cases),
-        "all_claims": judged(PAPER, evidence, JUDGES, has=rides.has),
+        "all_claims": judged(PAPER, evidence, judges, has=rides.has),
         "beside_design": _beside_design(rides),
         "misprints": _misprints(rides),
         **_terms(drawn),
