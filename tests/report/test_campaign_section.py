@@ -17,10 +17,8 @@ import pytest
 from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import box_figure, curvature_figure, in_two
-from simrail.report.campaign.heat import heat_maps, short_number, side_of
-from simrail.report.campaign.rails import rails_figures
-from simrail.report.campaign.section import TABLES
-from simrail.report.campaign.tables import CampaignTables, campaign_tables, write_tables
+from simrail.report.campaign.heat import heat_maps, rails_figures, short_number, side_of
+from simrail.report.campaign.tables import TABLES, campaign_tables, write_tables
 from simrail.report.pages.page import write_report
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
@@ -181,7 +179,7 @@ def small() -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 @pytest.fixture(scope="module")
-def tables(small: tuple[pd.DataFrame, pd.DataFrame], styles: list[MethodStyle]) -> CampaignTables:
+def tables(small: tuple[pd.DataFrame, pd.DataFrame], styles: list[MethodStyle]) -> dict[str, pd.DataFrame]:
     scores, cells = small
     return campaign_tables(scores, cells, campaign_axes(cells), styles, command=MANIFEST["command"])  # type: ignore[arg-type]
 
@@ -293,9 +291,9 @@ def test_boxes_and_curvature_are_drawn(
 
 
 def test_methods_have_the_mean_over_all_cells(
-    small: tuple[pd.DataFrame, pd.DataFrame], tables: CampaignTables
+    small: tuple[pd.DataFrame, pd.DataFrame], tables: dict[str, pd.DataFrame]
 ) -> None:
-    rows = tables.methods[(tables.methods["quantity"] == "roll") & (tables.methods["window"] == "whole")]
+    rows = tables["methods"].query("quantity == 'roll' and window == 'whole'")
     plain = roll(small)
     for row in rows.to_dict("records"):
         values = plain.loc[plain["estimator"] == row["method"], "value"]
@@ -308,14 +306,14 @@ def test_methods_have_the_mean_over_all_cells(
 
 
 def test_pairs_compare_the_same_recordings(
-    small: tuple[pd.DataFrame, pd.DataFrame], tables: CampaignTables
+    small: tuple[pd.DataFrame, pd.DataFrame], tables: dict[str, pd.DataFrame]
 ) -> None:
     plain = roll(small).pivot_table(index="cell", columns="estimator", values="value", observed=True)
     tracks = small[1].set_index("cell")["track_draw"]
-    assert [(row["method"], row["against"]) for row in tables.pairs.to_dict("records")] == [
+    assert [(row["method"], row["against"]) for row in tables["pairs"].to_dict("records")] == [
         ("ekf_compensated", other) for other in ("ekf_uncompensated", "design_angles", "vqf")
     ]
-    for row in tables.pairs.to_dict("records"):
+    for row in tables["pairs"].to_dict("records"):
         found = compare(plain[row["method"]], plain[row["against"]], tracks.loc[plain.index])
         assert row["difference"] == pytest.approx(found.difference.value)
         assert row["difference_low95"] == pytest.approx(found.difference.low)
@@ -323,30 +321,30 @@ def test_pairs_compare_the_same_recordings(
 
 
 def test_worst_cells_are_the_worst_and_say_how_to_make_them_again(
-    small: tuple[pd.DataFrame, pd.DataFrame], tables: CampaignTables
+    small: tuple[pd.DataFrame, pd.DataFrame], tables: dict[str, pd.DataFrame]
 ) -> None:
     cells, plain = small[1], roll(small)
     ours = plain[plain["estimator"] == "ekf_compensated"].sort_values("value", ascending=False)
-    assert tables.worst["cell"].tolist() == ours["cell"].head(3).tolist()
-    assert set(tables.worst["method"]) == {"ekf_compensated"}  # baselines have no worst cells
-    for row in tables.worst.to_dict("records"):
+    assert tables["worst"]["cell"].tolist() == ours["cell"].head(3).tolist()
+    assert set(tables["worst"]["method"]) == {"ekf_compensated"}  # baselines have no worst cells
+    for row in tables["worst"].to_dict("records"):
         cell = cells[cells["cell"] == row["cell"]].iloc[0]
         assert row["IMU"] == cell["imu"] and row["speed, km/h"] == f"{cell['speed_kmh']:g}"
         assert row["command"] == f"simrail run made_up --set 'seed=2' --cell {row['cell']}"
 
 
-def test_tables_are_written_as_csv_and_latex(tables: CampaignTables, tmp_path: Path) -> None:
+def test_tables_are_written_as_csv_and_latex(tables: dict[str, pd.DataFrame], tmp_path: Path) -> None:
     write_tables(tmp_path, tables)
-    for name in ("methods", "axes", "pairs", "consistency", "worst"):
-        frame = getattr(tables, name)
-        read = pd.read_csv(tmp_path / f"{name}.csv")
+    assert set(tables) == {"methods", "axes", "pairs", "consistency", "worst"}
+    for name, frame in tables.items():
+        read = pd.read_csv(tmp_path / TABLES / f"{name}.csv")
         assert list(read.columns) == list(frame.columns) and len(read) == len(frame)
         for column in frame.columns:
             if frame[column].dtype == np.float64:
                 assert read[column].to_numpy() == pytest.approx(
                     frame[column].to_numpy(), rel=1e-5, nan_ok=True
                 )
-        text = (tmp_path / f"{name}.tex").read_text(encoding="utf-8")
+        text = (tmp_path / TABLES / f"{name}.tex").read_text(encoding="utf-8")
         body = text[text.index(r"\midrule") : text.index(r"\bottomrule")]
         rows = [line for line in body.splitlines()[1:] if line.strip()]
         assert len(rows) == len(frame)

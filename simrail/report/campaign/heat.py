@@ -1,6 +1,6 @@
-"""Heat maps over the axes of a campaign."""
+"""Heat maps over the axes of a campaign; of rails, what methods err by in the band that counts."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,11 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.campaign.axes import CampaignAxis
+from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
 from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
+from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, waves_words
+from simrail.report.tables.methods import MethodStyle
+from simrail.track.bands import Band
 
 HEAT = LinearSegmentedColormap.from_list(
     "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64
@@ -114,6 +117,55 @@ def heat_maps(
                 axis.set_ylabel(down.title.partition(",")[0])
         _colour_bar(figure, norm, unit, end, title_in, min(tall, 1.6))
         return to_svg(figure, description=what)
+
+
+def rails_figures(
+    scores: pd.DataFrame,
+    cells: pd.DataFrame,
+    axes: Sequence[CampaignAxis],
+    styles: Sequence[MethodStyle],
+    *,
+    band: str,
+    known: Mapping[str, Band],
+) -> list[tuple[str, str]]:
+    """Caption and heat maps for each axis, methods by its values; [] if no method says what rails look like.
+
+    Parameters
+    ----------
+    scores, cells : pandas.DataFrame
+        Score table and table of cells.
+    axes : sequence of CampaignAxis
+        What the cells differ in; an axis that follows from another has no figure of its own.
+    styles : sequence of MethodStyle
+        Methods, in their order.
+    band : str
+        Band that is shown.
+    known : mapping of str to Band
+        Bands whose wavelengths are told.
+    """
+    draws = {
+        QUANTITIES[quantity]: draws_of(scores, cells, axes, quantity=quantity, metric="sd", band=band)
+        for quantity in JUDGED
+    }
+    named = {name for rows in draws.values() for name in rows["estimator"].unique()}
+    shown = [style for style in styles if style.name in named]
+    if not shown:
+        return []
+    down = Side("method", [(s.name,) for s in shown], [s.label for s in shown], ["estimator"])
+    by_column = {axis.column: axis for axis in finest(axes, cells)}
+    sides = {}
+    if "speed_kmh" in by_column and "direction" in by_column:
+        both = by_column.pop("speed_kmh"), by_column.pop("direction")
+        sides["speed and direction of travel"] = side_of(*both)
+    sides |= {axis.name: side_of(axis) for axis in by_column.values()}
+    return [
+        (
+            f"Rails: standard deviation of the error {waves_words(band, known)}, by method and {title}; mean "
+            "over all other axes and draws.",
+            heat_maps(draws, across, down, unit="mm", what=f"Errors of the rails by method and {title}"),
+        )
+        for title, across in sides.items()
+    ]
 
 
 def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
