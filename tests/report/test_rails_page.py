@@ -19,13 +19,18 @@ from simrail.report.figures.canvas import fitting_columns, legend_above, look, p
 from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
 from simrail.report.figures.track import profile_figure, profile_words
 from simrail.report.pages.page import write_report
-from simrail.report.pages.ride import ride_data
+from simrail.report.pages.ride import geometry_view, ride_data
 from simrail.report.pages.section import PageData
 from simrail.report.papers.gonzalez_2023.parts import PAPER
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, peak_of, section
-from simrail.report.tables.geometry_bands import JUDGED, band_words, judged_band, waves_words
-from simrail.report.tables.geometry_tables import geometry_table, overview_table
-from simrail.report.tables.geometry_view import geometry_view
+from simrail.report.tables.geometry import (
+    JUDGED,
+    band_words,
+    geometry_table,
+    judged_band,
+    overview_table,
+    waves_words,
+)
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.report.tables.tiles import tiles

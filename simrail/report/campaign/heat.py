@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
 from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, waves_words
+from simrail.report.tables.geometry import JUDGED, QUANTITIES, waves_words
 from simrail.report.tables.methods import MethodStyle
 from simrail.track.bands import Band
 

@@ -10,8 +10,7 @@ from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray
 from simrail.report.figures import canvas
 from simrail.report.figures.ride import over_distance
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case
-from simrail.report.tables.geometry_tables import is_zero, mappers
+from simrail.report.tables.geometry import JUDGED, QUANTITIES, band_words, bands_of_case, is_zero, mappers
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case
 from simrail.scoring.table import FULL
@@ -21,6 +20,13 @@ _MARKS = "osv^PX<>*"
 
 ROOMY = 4
 """So many bands leave room for their wavelengths below the axis."""
+
+
+def has_rails(example: CellResult, style: MethodStyle) -> bool:
+    """Whether a method says what the rails of a ride look like, and the true ones are at hand."""
+    estimate = example.estimates.get(style.name)
+    geometry = estimate.geometry if estimate else None
+    return example.rails is not None and geometry is not None and len(geometry) > 1
 
 
 def stretch_of(example: CellResult, name: str, *, band: Band | None, length_m: float) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from simrail.report.pages.frame import page_text
 from simrail.report.pages.ride import ride_sections
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers import SECTIONS as PAPERS
-from simrail.report.tables.geometry_tables import geometry_table, overview_table
+from simrail.report.tables.geometry import geometry_table, overview_table
 from simrail.report.tables.pivot import Case
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table

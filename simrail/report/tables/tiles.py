@@ -3,8 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
-from simrail.report.tables.geometry_tables import baseline_of, is_zero, mappers, sd_of
+from simrail.report.tables.geometry import (
+    JUDGED,
+    QUANTITIES,
+    band_words,
+    baseline_of,
+    is_zero,
+    judged_band,
+    mappers,
+    sd_of,
+)
 from simrail.report.tables.methods import MethodStyle, attitude_methods
 from simrail.report.tables.pivot import Case
 from simrail.report.words.sentences import degrees, significant

@@ -4,14 +4,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from simrail.report.tables.geometry_bands import BAND, JUDGED, QUANTITIES, judged_band, waves_words
-from simrail.report.tables.geometry_tables import (
+from simrail.report.tables.geometry import (
+    BAND,
+    JUDGED,
+    QUANTITIES,
     baseline_of,
     behind_baseline,
     is_zero,
+    judged_band,
     main_of,
     mappers,
     sd_of,
+    waves_words,
 )
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case

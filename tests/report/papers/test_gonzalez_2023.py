@@ -35,8 +35,7 @@ from simrail.report.papers.gonzalez_2023.judges import Evidence, Peak, errata_no
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, rows_of
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, section
 from simrail.report.papers.gonzalez_2023.tunings import by_part, notes, status_table, tunings_of
-from simrail.report.tables.geometry_bands import QUANTITIES
-from simrail.report.tables.geometry_tables import geometry_table, indicator_table, overview_table
+from simrail.report.tables.geometry import QUANTITIES, geometry_table, indicator_table, overview_table
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.report.words.geometry_findings import geometry_findings

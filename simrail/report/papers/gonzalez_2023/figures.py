@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 from simrail.campaign.cell import CellResult
-from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
+from simrail.report.figures.geometry import has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.papers.gonzalez_2023.parts import PAPER, Rows
-from simrail.report.tables.geometry_view import has_rails
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.words.sentences import listed
 from simrail.track.bands import Band

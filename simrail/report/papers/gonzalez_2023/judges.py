@@ -8,7 +8,7 @@ from simrail.estimators.tuning.file import Tuning
 from simrail.report.papers.claim import Judgement
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, Rows, column_words
 from simrail.report.papers.gonzalez_2023.tunings import EDGES
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES
+from simrail.report.tables.geometry import JUDGED, QUANTITIES
 
 LIMIT = PAPER.limits
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from simrail.campaign.stored_results import StoredResults
 from simrail.report.papers.claim import read_paper
-from simrail.report.tables.geometry_bands import QUANTITIES
+from simrail.report.tables.geometry import QUANTITIES
 from simrail.report.tables.pivot import NOTHING, Case, Mean, cases
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.tables import NOISE

@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from simrail.campaign.cell import CellResult
-from simrail.report.figures.geometry import lines_of
+from simrail.report.figures.geometry import has_rails, lines_of
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers.claim import judged
 from simrail.report.papers.gonzalez_2023 import judges, parts, tunings
 from simrail.report.papers.gonzalez_2023.figures import noise_figure, tuning_figures
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, OtherSize, Rows, column_words
-from simrail.report.tables.geometry_view import has_rails
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, of_cell
 from simrail.report.tables.tables import Cell, Row, Table, mean_cell, number_cell

@@ -15,7 +15,7 @@ from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning.file import Tuning
 from simrail.estimators.tuning.space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER
 from simrail.report.papers.gonzalez_2023.parts import FILTERED, PAPER, Rows
-from simrail.report.tables.geometry_bands import QUANTITIES
+from simrail.report.tables.geometry import QUANTITIES
 from simrail.report.tables.tables import Cell, Row, Table
 from simrail.scenario.build_estimator import construct
 from simrail.scenario.cells import Method
