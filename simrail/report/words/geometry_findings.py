@@ -107,7 +107,8 @@ def _lost(case: Case, styles: Sequence[MethodStyle], band: str) -> list[Finding]
     for quantity in JUDGED:
         behind = behind_baseline(case, styles, quantity, band=band)
         worse = [style.label for style in behind if style is not first]
-        lost += [f"{listed(worse)} in {QUANTITIES[quantity]}"] * bool(worse)
+        if worse:
+            lost.append(f"{listed(worse)} in {QUANTITIES[quantity]}")
     return [Finding("bad", f"No IMU at all beats {'; '.join(lost)}.")] if lost else []
 
 
