@@ -66,33 +66,26 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
         tested = [style for style in styles if not style.baseline] or list(styles)
         for column, axis in enumerate(axes):
             error = {style.name: _shown_error(example, style, column) for style in styles}
+            most = {name: _percentile(values, 100.0) for name, values in error.items()}
             reach = max(1.15 * max(_percentile(error[s.name], 99.8) for s in tested), 1e-3)
             lowest = 1.15 * min(float(np.nanmin(error[s.name], initial=0.0)) for s in tested)
             highest = 1.15 * max(float(np.nanmax(error[s.name], initial=0.0)) for s in tested)
-            beyond = []
             for style in styles:
                 look_of: dict[str, Any] = {"color": style.colour, "ls": style.stroke, "label": style.label}
                 if style in tested:
-                    axis.plot(
-                        *bins.line(error[style.name]), lw=1.2, zorder=4 - 0.1 * len(axis.lines), **look_of
-                    )
-                elif not style.uses_imu:
-                    axis.fill_between(
-                        *bins.envelope(error[style.name]).range,
-                        color="#b9bec7",
-                        lw=0,
-                        alpha=0.55,
-                        label=f"{style.label}, range",
-                        zorder=1.5,
-                    )
+                    line, depth = bins.line(error[style.name]), 4 - 0.1 * len(axis.lines)
+                    axis.plot(*line, lw=1.2, zorder=depth, **look_of)
+                    continue
+                low, mean, high = bins.envelope(error[style.name])
+                if style.uses_imu:
+                    axis.plot(bins.x, mean, lw=0.9, zorder=2, **look_of)
                 else:
-                    axis.plot(bins.x, bins.envelope(error[style.name]).mean, lw=0.9, zorder=2, **look_of)
-                largest = _percentile(error[style.name], 100.0)
-                if largest > 1.3 * reach:
-                    beyond.append((largest, style.label))
+                    tint: dict[str, Any] = {"color": "#b9bec7", "lw": 0, "alpha": 0.55, "zorder": 1.5}
+                    axis.fill_between(bins.x, low, high, label=f"{style.label}, range", **tint)
+            beyond = [(most[s.name], s.label) for s in styles if most[s.name] > 1.3 * reach]
             axis.axhline(0.0, color="#98a1af", lw=0.7, zorder=-1)
-            low, high = max(lowest, -reach), min(highest, reach)
-            axis.set_ylim(low - 0.15 * reach, high + (0.3 if column == 0 else 0.05) * reach)
+            top = min(highest, reach) + (0.3 if column == 0 else 0.05) * reach
+            axis.set_ylim(max(lowest, -reach) - 0.15 * reach, top)
             axis.set_ylabel("yaw drift, \u00b0" if column == 2 else f"{_NAMES[column]} error, \u00b0")
             _note_beyond(axis, beyond)
         canvas.legend_above(axes[0])

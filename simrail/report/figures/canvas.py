@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.decimate import Bins
+from simrail.report.figures.decimate import Bins, Envelope
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Mean
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
@@ -178,6 +178,14 @@ def draw_marks(
         lw=1.0,
         label=style.label,
     )
+
+
+def draw_envelope(axis: Axes, bins: Bins, signal: FloatArray, *, colour: str) -> Envelope:
+    """Draw the range and the mean of a signal (n,) by bins; returns them."""
+    envelope = bins.envelope(signal)
+    axis.fill_between(bins.x, envelope.low, envelope.high, color=colour, alpha=0.28, lw=0)
+    axis.plot(bins.x, envelope.mean, color=colour, lw=1.1)
+    return envelope
 
 
 def draw_truth(axis: Axes, bins: Bins, angle_rad: FloatArray) -> FloatArray:

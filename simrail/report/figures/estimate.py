@@ -71,9 +71,7 @@ def innovation_figure(recording: Recording, estimate: Estimate) -> str:
         figure, axes = canvas.panels([1.0] * len(names), top_in=0.15)
         for axis, name in zip(axes, names, strict=True):
             values = np.nan_to_num(estimate.innovations[name].to_numpy(dtype=np.float64))
-            envelope = bins.envelope(values)
-            axis.fill_between(*envelope.range, color="#009E73", alpha=0.28, lw=0)
-            axis.plot(bins.x, envelope.mean, color="#009E73", lw=1.1)
+            envelope = canvas.draw_envelope(axis, bins, values, colour="#009E73")
             unit = COLUMNS[name].unit.replace("s2", "s\u00b2")
             word = "NIS" if name == "nis" else f"innov. {name.split('_')[1].upper()}\n{unit}"
             axis.set_ylabel(word, fontsize=8.2)
