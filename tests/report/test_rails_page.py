@@ -43,6 +43,9 @@ from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.track.bands import BANDS, Band, margin_m
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 
+Rides = Callable[..., CellResult]
+Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
+
 TEXT = """
 title = "Rails of a model"
 paper = "gonzalez_2023"
@@ -414,8 +417,8 @@ def test_only_what_is_drawn_beside_the_paper_has_a_colour_in_its_table(ran: Ran)
 
 def test_methods_are_alike_only_if_every_figure_is(
     scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     one = example()
     states = one.estimates["ekf_compensated"].states
@@ -437,11 +440,7 @@ def test_methods_are_alike_only_if_every_figure_is(
         assert ("beats b in" in text or "beats over" in text) is False or factor > 1.01
 
 
-def test_many_methods_are_told_together(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_many_methods_are_told_together(scenario: Scenario, example: Rides, tables: Tables) -> None:
     one = example()
     style = method_styles(scenario)["ekf_compensated"]
     design = method_styles(scenario)["design_angles"]

@@ -12,7 +12,16 @@ from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
-from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
+from simrail.report.figures.canvas import (
+    INK,
+    MUTED,
+    WIDTH_IN,
+    add_panel,
+    log_ticks,
+    look,
+    panels_beside,
+    to_svg,
+)
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, waves_words
 from simrail.report.tables.methods import MethodStyle
 from simrail.track.bands import Band
@@ -205,9 +214,8 @@ def short_number(value: float) -> str:
 
 
 def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: float, tall: float) -> None:
-    wide, height = figure.get_size_inches()
-    box = (left / wide, (height - top - tall) / height, 0.11 / wide, tall / height)
-    axis = figure.add_axes(box)
+    _, height = figure.get_size_inches()
+    axis = add_panel(figure, left, height - top - tall, 0.11, tall)
     bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
     bar.outline.set_visible(False)
     log_ticks(axis.yaxis)
