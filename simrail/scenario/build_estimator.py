@@ -105,7 +105,7 @@ def odometry_estimator(scenario: Scenario, name: str) -> Estimator | None:
     return estimator
 
 
-def option_files(estimator: Estimator) -> dict[str, str]:
+def option_files(estimator: object) -> dict[str, str]:
     """What was read from files that options named, as text, by option."""
     if not dataclasses.is_dataclass(estimator):
         return {}
@@ -119,9 +119,7 @@ REMOVED = {
 """Options that estimators once had, and what to do about each in a scenario of that time."""
 
 
-def construct(
-    known_class: type[Estimator], options: dict[str, Any], *, folder: Path | None = None
-) -> Estimator:
+def construct(known_class: type[Any], options: dict[str, Any], *, folder: Path | None = None) -> Estimator:
     """Make an estimator from its options, each judged against the type that its class declares.
 
     ``folder`` is where files that options name are looked for, before the working folder.

@@ -35,7 +35,7 @@ EIGHT = [
 
 @pytest.fixture(scope="module")
 def made() -> ModuleType:
-    path = Path(__file__).parents[1] / "results" / "reference" / "make.py"
+    path = Path(__file__).parents[2] / "results" / "reference" / "make.py"
     spec = importlib.util.spec_from_file_location("reference_make", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

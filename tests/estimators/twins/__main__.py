@@ -20,7 +20,8 @@ from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from trajectory import trace
 
 from simrail.core.jit import FloatArray
-from simrail.recording.recording import Recording
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.recording.recording import Recording, odometry_of
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
@@ -43,8 +44,9 @@ def ride() -> Recording:
         seed=1,
         draw=0,
     )
+    recording = with_odometry(recording, "encoder")
     few = slice(0, SAMPLES)
-    return replace(recording, imu=recording.imu.iloc[few], odometry=recording.odometry.iloc[few])
+    return replace(recording, imu=recording.imu.iloc[few], odometry=odometry_of(recording).iloc[few])
 
 
 def beside(name: str, ours: Callable[[], FloatArray], theirs: Callable[[], FloatArray]) -> None:
