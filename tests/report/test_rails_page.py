@@ -539,24 +539,23 @@ def test_of_many_others_the_best_and_the_worst_are_told(ran: Ran) -> None:
     ) in told[0].text
 
 
+def times(case: Case, name: str, factor: float) -> Case:
+    """A case in which every figure of a method is so many times as large."""
+    scores = {
+        key: figure._replace(value=factor * figure.value) if key[0] == name else figure
+        for key, figure in case.scores.items()
+    }
+    return replace(case, scores=scores)
+
+
 @pytest.mark.parametrize(("factor", "tone"), [(1e-3, "good"), (1e3, "bad")])
 def test_a_method_that_loses_to_no_imu_is_told_in_red(ran: Ran, factor: float, tone: str) -> None:
-    case = ran.cases[0]
-    found = {
-        key: one._replace(value=factor * one.value) if key[0] == "smoother" else one
-        for key, one in case.scores.items()
-    }
-    told = geometry_findings(replace(case, scores=found), ran.styles, [], known=ran.known)
+    told = geometry_findings(times(ran.cases[0], "smoother", factor), ran.styles, [], known=ran.known)
     of_smoother = [finding for finding in told if "of smoother is off by" in finding.text]
     assert len(of_smoother) == len(JUDGED) and {finding.tone for finding in of_smoother} == {tone}
 
 
 @pytest.mark.parametrize(("factor", "loses"), [(1e-3, False), (1e3, True)])
 def test_another_method_that_loses_to_no_imu_is_named(ran: Ran, factor: float, loses: bool) -> None:
-    case = ran.cases[0]
-    found = {
-        key: one._replace(value=factor * one.value) if key[0] == "camera_free" else one
-        for key, one in case.scores.items()
-    }
-    told = geometry_findings(replace(case, scores=found), ran.styles, [], known=ran.known)
+    told = geometry_findings(times(ran.cases[0], "camera_free", factor), ran.styles, [], known=ran.known)
     assert any(finding.text.startswith("No IMU at all beats camera free") for finding in told) is loses
