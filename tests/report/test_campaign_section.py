@@ -80,14 +80,6 @@ CURVES = ("curve:curve 3 R300", "curve:curve 7 R-150", "curve:curve 11 R800")
 RADIUS = {CURVES[0]: 300.0, CURVES[1]: 150.0, CURVES[2]: 800.0}
 WAYS = ["irregularity.scale", "ride.speed_kmh", "ride.reverse"]
 CELL_COLUMNS = ["case", *WAYS, "track_draw", "imu", "sensor_draw"]
-    "case",
-    "irregularity.scale",
-    "ride.speed_kmh",
-    "ride.reverse",
-    "track_draw",
-    "imu",
-    "sensor_draw",
-]
 FIGURES = [
     *(("roll", "rms", window) for window in ("whole", "straight", "transition", "curve", *CURVES)),
     *(("pitch", "rms", window) for window in ("whole", "curve")),
