@@ -181,30 +181,25 @@ def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
     """Mean over the draws of each cell of the map (rows, columns)."""
     means = draws.groupby([*down.columns, *across.columns], observed=True)["value"].mean()
     by_key = {key if isinstance(key, tuple) else (key,): value for key, value in means.items()}
-    return np.array(
-        [[by_key.get((*y, *x), np.nan) for x in across.keys] for y in down.keys], dtype=np.float64
-    )
+    table = [[by_key.get((*y, *x), np.nan) for x in across.keys] for y in down.keys]
+    return np.array(table, dtype=np.float64)
 
 
 def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
     rows, columns = table.shape
     edges = np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5
-    axis.pcolormesh(
-        *edges, np.ma.masked_invalid(table), cmap=HEAT, norm=norm, edgecolors="white", linewidth=1.2
-    )
+    shown = np.ma.masked_invalid(table)
+    axis.pcolormesh(*edges, shown, cmap=HEAT, norm=norm, edgecolors="white", linewidth=1.2)
     axis.set_ylim(rows - 0.5, -0.5)
     axis.grid(visible=False)
     axis.tick_params(length=0)
-    for spine in axis.spines.values():
-        spine.set_visible(False)
+    axis.spines[:].set_visible(False)
     for (i, j), value in np.ndenumerate(table):
-        if not np.isfinite(value):
-            axis.text(j, i, "\u2013", ha="center", va="center", color=MUTED, fontsize=8.0)
-            continue
-        dark = float(norm(max(value, norm.vmin or value))) > 0.5
-        axis.text(
-            j, i, short_number(value), ha="center", va="center", fontsize=8.0, color="white" if dark else INK
-        )
+        text, colour = "\u2013", MUTED
+        if np.isfinite(value):
+            is_dark = float(norm(max(value, norm.vmin or value))) > 0.5
+            text, colour = short_number(value), "white" if is_dark else INK
+        axis.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
 
 
 def short_number(value: float) -> str:

@@ -105,17 +105,15 @@ def _note_beyond(axis: Axes, beyond: list[tuple[float, str]]) -> None:
     listed = ", ".join(f"{label} {largest:.2g}\u00b0" for largest, label in sorted(beyond, reverse=True))
     box: dict[str, Any] = {"facecolor": "white", "alpha": 0.85, "lw": 0, "pad": 1.5}
     style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.8, "color": "#475467", "zorder": 30}
-    axis.text(
-        0.995, 0.03, f"beyond the panel, at most: {listed}", transform=axis.transAxes, bbox=box, **style
-    )
+    words = f"beyond the panel, at most: {listed}"
+    axis.text(0.995, 0.03, words, transform=axis.transAxes, bbox=box, **style)
 
 
 def angle_error(example: CellResult, name: str, column: int) -> FloatArray:
     """Error (n,) of an angle against the truth, wrapped, rad."""
     angle = ATTITUDE[column]
-    error = (
-        example.estimates[name].states[angle].to_numpy(dtype=np.float64) - example.motion[angle].to_numpy()
-    )
+    estimated = example.estimates[name].states[angle].to_numpy(dtype=np.float64)
+    error = estimated - example.motion[angle].to_numpy()
     wrapped: FloatArray = (error + np.pi) % (2.0 * np.pi) - np.pi
     return wrapped
 

@@ -129,15 +129,8 @@ def rails_figure(
                         tint: dict[str, Any] = {"color": style.colour, "alpha": 0.16, "lw": 0}
                         axis.fill_between(place[at], low, high, label="its 95 % interval", zorder=1, **tint)
                         reach += [*low, *high]
-                axis.plot(
-                    place[at],
-                    found[at],
-                    color=style.colour,
-                    ls=style.stroke,
-                    lw=1.1,
-                    label=style.label,
-                    zorder=9 - 0.1 * order,
-                )
+                look_of: dict[str, Any] = {"color": style.colour, "ls": style.stroke, "lw": 1.1}
+                axis.plot(place[at], found[at], label=style.label, zorder=9 - 0.1 * order, **look_of)
                 reach += [*found[at]]
             canvas.pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
             axis.set_ylabel(f"{QUANTITIES[quantity]},\nmm")

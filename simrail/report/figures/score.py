@@ -29,9 +29,8 @@ def rms_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
                         continue
                     reach.append(value)
                     if sd > 0.0:
-                        axis.plot(
-                            [max(value - sd, 0.3 * value), value + sd], [line, line], color=colour, lw=1.6
-                        )
+                        ends = [max(value - sd, 0.3 * value), value + sd]
+                        axis.plot(ends, [line, line], color=colour, lw=1.6)
                     axis.plot(value, line, marker, color=colour, ms=5.4, mec="white", mew=0.6, zorder=4)
                 floor = case.get(style.name, quantity, "rms").value
                 if not style.uses_imu and floor > 1e-5:
@@ -50,9 +49,8 @@ def rms_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
         handles.append(Line2D([], [], color=canvas.MUTED, lw=1.0, ls=_DASHES))
         labels = [*(window for window, *_ in _WINDOWS), "design angles only, whole ride"]
         canvas.figure_legend(figure, handles, labels, left_in=_LEFT_IN)
-        return canvas.to_svg(
-            figure, description="Root mean square errors of every method in straights, transitions and curves"
-        )
+        words = "Root mean square errors of every method in straights, transitions and curves"
+        return canvas.to_svg(figure, description=words)
 
 
 def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:

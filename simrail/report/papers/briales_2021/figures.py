@@ -1,8 +1,10 @@
 """Our versions of the paper's Figs. 12 to 22: rms per ride, compensation, and repeatability of roll."""
 
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
+import pandas as pd
 
 from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
@@ -78,15 +80,13 @@ def repeatability_figure(examples: Sequence[CellResult], styles: Sequence[Method
     with canvas.look():
         figure, axes = canvas.panels([1.55] * len(styles))
         for axis, style in zip(axes, styles, strict=True):
-            seen: list[tuple[bool, bool]] = []
+            colours = {kind: cycle(pair) for kind, pair in _RIDE_COLOURS.items()}
             lines: list[FloatArray] = []
             for example in examples:
-                bins = Bins(example.motion["position_m"].to_numpy())
-                kind = (direction_of(example) > 0, is_fast(example.cell))
-                colour = _RIDE_COLOURS[kind][seen.count(kind) % 2]
-                seen.append(kind)
+                bins, fast = Bins(example.motion["position_m"].to_numpy()), is_fast(example.cell)
+                colour = next(colours[direction_of(example) > 0, fast])
                 x, y = bins.line(_roll(example, style))
-                behind = 2 if kind[1] else 4  # the fast rides swing most and would hide the others
+                behind = 2 if fast else 4  # the fast rides swing most and would hide the others
                 axis.plot(x, y, color=colour, lw=0.9, label=example.recording.name, zorder=behind)
                 lines.append(y)
             places = np.sort(bins.x)
@@ -104,20 +104,17 @@ def spread_of(examples: Sequence[CellResult], name: str) -> float:
     The error, not the roll: on one irregular track the true roll differs from ride to ride as well. Errors
     are averaged over each metre that all rides passed.
     """
-    per_ride = []
-    low = max(float(e.motion["position_m"].min()) for e in examples)
-    high = min(float(e.motion["position_m"].max()) for e in examples)
+    positions = [example.motion["position_m"].to_numpy() for example in examples]
+    low, high = max(position.min() for position in positions), min(position.max() for position in positions)
     edges = np.arange(np.ceil(low), np.floor(high), _GRID_STEP_M)
-    for example in examples:
-        position = example.motion["position_m"].to_numpy()
-        error = np.rad2deg(angle_error(example, name, 0))
-        cell = np.searchsorted(edges, position, side="right") - 1
-        inside = (cell >= 0) & (cell < len(edges) - 1)
-        total = np.bincount(cell[inside], weights=error[inside], minlength=len(edges) - 1)
-        count = np.bincount(cell[inside], minlength=len(edges) - 1)
-        per_ride.append(total / np.where(count > 0, count, np.nan))
-    variance = np.var(np.array(per_ride), axis=0, ddof=1)
-    return float(np.sqrt(np.nanmean(variance)))
+    per_ride = []
+    for example, position in zip(examples, positions, strict=True):
+        # Metre 1 begins at the first edge: what lies before it (0), or from the last edge on, is left out.
+        metre = np.searchsorted(edges, position, side="right")
+        errors = pd.Series(np.rad2deg(angle_error(example, name, 0))).groupby(metre).mean()
+        per_ride.append(errors.reindex(range(1, len(edges))))
+    variance = pd.concat(per_ride, axis=1).dropna().var(axis=1)
+    return float(np.sqrt(variance.mean()))
 
 
 def _roll(example: CellResult, style: MethodStyle) -> FloatArray:
