@@ -10,8 +10,14 @@ from rich.table import Table
 from rich.text import Text
 
 from simrail.campaign.result import CampaignResult
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, judged_band, waves_words
-from simrail.report.tables.geometry_tables import baseline_of, behind_baseline
+from simrail.report.tables.geometry import (
+    JUDGED,
+    QUANTITIES,
+    baseline_of,
+    behind_baseline,
+    judged_band,
+    waves_words,
+)
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.results import Results

@@ -18,17 +18,16 @@ from simrail.report.words.findings import findings
 from simrail.report.words.sentences import significant
 from simrail.scenario.scenario import Scenario
 
+Rides = Callable[..., CellResult]
+Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
+
 
 def said(scenario: Scenario, scores: pd.DataFrame, cells: pd.DataFrame) -> str:
     styles = list(method_styles(scenario).values())
     return "\n".join(finding.text for finding in findings(cases(scores, cells)[0], styles))
 
 
-def test_sentences_are_looked_up_in_the_scores(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_sentences_are_looked_up_in_the_scores(scenario: Scenario, example: Rides, tables: Tables) -> None:
     text = said(scenario, *tables(example()))
     sizes = "from 0.500\u00b0 rms without to 0.100\u00b0 with it: 5.0 times less"
     assert f"In curves, compensation takes the roll error of EKF {sizes}" in text
@@ -44,11 +43,7 @@ def test_sentences_are_looked_up_in_the_scores(
     assert "odometry 'encoder'; its position error is 0.500 m rms" in text
 
 
-def test_sentences_turn_with_the_scores(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_sentences_turn_with_the_scores(scenario: Scenario, example: Rides, tables: Tables) -> None:
     """Exchange the method with its uncompensated twin: the page must say that compensation hurts."""
     one = example()
     swapped = dict(one.estimates)
@@ -61,8 +56,8 @@ def test_sentences_turn_with_the_scores(
 
 def test_a_filter_that_is_never_beaten_is_said_to_be_so(
     scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     one = example()
     states = one.motion[list(ATTITUDE)]
@@ -73,8 +68,8 @@ def test_a_filter_that_is_never_beaten_is_said_to_be_so(
 
 def test_coverage_decides_what_is_said_of_the_standard_deviations(
     scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     one = example()
     for sd_deg, verdict in ((0.1, "larger than its errors"), (0.04, "are too small")):
@@ -84,22 +79,14 @@ def test_coverage_decides_what_is_said_of_the_standard_deviations(
         assert verdict in text
 
 
-def test_true_odometry_is_called_an_ablation(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_true_odometry_is_called_an_ablation(scenario: Scenario, example: Rides, tables: Tables) -> None:
     one = example()
     scores, cells = tables(one)
     scores["estimator"] = scores["estimator"].cat.rename_categories({"odometry:encoder": "odometry:truth"})
     assert "ablation" in said(scenario, scores, cells)
 
 
-def test_the_ideal_imu_tells_the_floor(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_the_ideal_imu_tells_the_floor(scenario: Scenario, example: Rides, tables: Tables) -> None:
     one = example()
     ideal = CellResult(one.cell | {"imu": "ideal"}, one.recording, one.motion, one.estimates)
     all_cases = cases(*tables(one, ideal))
@@ -140,8 +127,8 @@ def test_numbers_have_three_significant_digits(value: float, text: str) -> None:
 
 def test_metrics_that_were_not_kept_are_not_spoken_of(
     scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     scores, cells = tables(example())
     text = said(scenario, scores[scores["metric"] == "rms"], cells)
@@ -150,11 +137,7 @@ def test_metrics_that_were_not_kept_are_not_spoken_of(
     assert "nan" not in text.lower() and "position error" not in text
 
 
-def test_the_floor_is_that_of_the_same_speed(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_the_floor_is_that_of_the_same_speed(scenario: Scenario, example: Rides, tables: Tables) -> None:
     """Cases of other speeds have an ideal IMU, too: it is not this one's floor."""
     one = example()
     ideal = CellResult(one.cell | {"imu": "ideal"}, one.recording, one.motion, one.estimates)

@@ -20,25 +20,18 @@ from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.table import concat_scores, failed_figures, labelled
 
+Rides = Callable[..., CellResult]
+Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
+
 
 @pytest.fixture(scope="module")
-def page(
-    scenario: Scenario,
-    tmp_path_factory: pytest.TempPathFactory,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> str:
+def page(scenario: Scenario, tmp_path_factory: pytest.TempPathFactory, example: Rides, tables: Tables) -> str:
     return written(
         scenario, tmp_path_factory.mktemp("page"), [example(), example(backward=True, name="back")], tables
     )
 
 
-def written(
-    scenario: Scenario,
-    folder: Path,
-    examples: list[CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> str:
+def written(scenario: Scenario, folder: Path, examples: list[CellResult], tables: Tables) -> str:
     scores, cells = tables(*examples)
     path = folder / "report.html"
     manifest = {"command": "simrail run test", "seed": 1, "started_utc": "2026-01-02T03:04:05"}
@@ -142,8 +135,8 @@ def test_the_page_is_the_same_when_written_twice(
     scenario: Scenario,
     page: str,
     tmp_path: Path,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     again = written(scenario, tmp_path, [example(), example(backward=True, name="back")], tables)
     assert again == page
@@ -152,8 +145,8 @@ def test_the_page_is_the_same_when_written_twice(
 def test_failures_are_on_the_page_and_do_not_stop_it(
     scenario: Scenario,
     tmp_path: Path,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     one = example()
     states = one.estimates["ekf_compensated"].states.copy()
@@ -181,8 +174,8 @@ def test_failures_are_on_the_page_and_do_not_stop_it(
 def test_a_hundred_thousand_samples_are_drawn_in_seconds_and_kilobytes(
     scenario: Scenario,
     tmp_path: Path,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     one = example(rate=1430.0)
     assert len(one.motion) > 100_000

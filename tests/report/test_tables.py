@@ -14,6 +14,9 @@ from simrail.report.tables.pivot import Case, cases, of_cell
 from simrail.report.tables.tables import error_table
 from simrail.scenario.scenario import Scenario, load_scenario
 
+Rides = Callable[..., CellResult]
+Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
+
 
 def case_of(scores: pd.DataFrame, cells: pd.DataFrame) -> Case:
     return cases(scores, cells)[0]
@@ -21,8 +24,8 @@ def case_of(scores: pd.DataFrame, cells: pd.DataFrame) -> Case:
 
 def test_table_marks_the_best_method_and_every_loss(
     scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
+    example: Rides,
+    tables: Tables,
 ) -> None:
     styles = list(method_styles(scenario).values())
     table = error_table(case_of(*tables(example())), styles, reference="truth")
@@ -36,11 +39,7 @@ def test_table_marks_the_best_method_and_every_loss(
     assert sum(span for _, span in table.groups) == len(table.columns) == len(table.rows[0].cells)
 
 
-def test_spread_over_draws_is_shown(
-    scenario: Scenario,
-    example: Callable[..., CellResult],
-    tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]],
-) -> None:
+def test_spread_over_draws_is_shown(scenario: Scenario, example: Rides, tables: Tables) -> None:
     case = case_of(*tables(example(), spread=0.1))
     found = case.get("ekf_compensated", "roll", "rms")
     assert found.draws == 2
@@ -48,9 +47,7 @@ def test_spread_over_draws_is_shown(
     assert found.sd == pytest.approx(0.1 * np.sqrt(2) * 0.1)
 
 
-def test_cases_are_found_by_their_labels(
-    example: Callable[..., CellResult], tables: Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
-) -> None:
+def test_cases_are_found_by_their_labels(example: Rides, tables: Tables) -> None:
     one, two = example(), example(backward=True, name="back")
     all_cases = cases(*tables(one, two))
     assert len(all_cases) == 2

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.report.words.sentences import UNITS
+from simrail.report.words.sentences import axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
@@ -34,6 +34,11 @@ class CampaignAxis:
     values: tuple[object, ...]
     words: tuple[str, ...]
 
+    @property
+    def name(self) -> str:
+        """Its title without a unit."""
+        return self.title.partition(",")[0]
+
 
 def is_campaign(scenario: Scenario) -> bool:
     """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
@@ -50,7 +55,7 @@ def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
     columns: list[str] = []
     for name in ordered:
-        if not any(_says_the_same(cells, earlier, name) for earlier in columns):
+        if not any(_follows(cells, name, one) and _follows(cells, one, name) for one in columns):
             columns.append(name)
     return [_axis(cells, name) for name in columns]
 
@@ -74,9 +79,10 @@ def draws_of(
     window: str = "whole",
     band: str = FULL,
 ) -> pd.DataFrame:
-    """One row per cell and method that has the figure: value, axes, draws.
+    """One row per cell and method that has the figure: value, axes, draws, and ``cluster``.
 
-    ``window`` may be ``curve:*``: every single curve, one row each.
+    That is the number of the track that a draw was made over, the same in every case. ``window`` may be
+    ``curve:*``: every single curve, one row each.
     """
     chosen = (scores["quantity"] == quantity) & (scores["metric"] == metric)
     chosen &= (scores["reference"] == "truth") & (scores["band"] == band) & scores["value"].notna()
@@ -86,20 +92,10 @@ def draws_of(
     else:
         chosen &= scores["window"] == window
     columns = ["cell", "estimator", "window", "value", "track_draw", "sensor_draw"]
-    draws = scores.loc[chosen, columns]
     beside = [axis.column for axis in axes] + [name for name in ("case", "sample") if name in cells]
-    return draws.merge(cells[["cell", *dict.fromkeys(beside)]], on="cell", how="left")
-
-
-def cluster_of(draws: pd.DataFrame) -> pd.Series:
-    """Number of the track that a draw was made over, the same in every case."""
-    names = [name for name in ("sample", "track_draw") if name in draws]
-    return draws.groupby(names, sort=True).ngroup()
-
-
-def _says_the_same(cells: pd.DataFrame, one: str, other: str) -> bool:
-    pairs = cells[[one, other]].drop_duplicates()
-    return len(pairs) == pairs[one].nunique(dropna=False) == pairs[other].nunique(dropna=False)
+    draws = scores.loc[chosen, columns].merge(cells[["cell", *dict.fromkeys(beside)]], on="cell", how="left")
+    tracks = [name for name in ("sample", "track_draw") if name in draws]
+    return draws.assign(cluster=draws.groupby(tracks, sort=True).ngroup())
 
 
 def _follows(cells: pd.DataFrame, one: str, other: str) -> bool:
@@ -117,12 +113,8 @@ def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:
 
 
 def _title(name: str) -> str:
-    if name in _TITLES:
-        return _TITLES[name]
-    *words, last = name.rpartition(".")[2].split("_")
-    if words and last in UNITS:
-        return f"{' '.join(words)}, {UNITS[last]}"
-    return " ".join([*words, last])
+    words, unit = axis_name(name)
+    return _TITLES.get(name) or (f"{words}, {unit}" if unit else words)
 
 
 def _words(value: object) -> str:

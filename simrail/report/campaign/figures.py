@@ -11,17 +11,8 @@ from matplotlib.patches import Patch
 from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
 from simrail.report.campaign.axes import CampaignAxis
+from simrail.report.figures import canvas
 from simrail.report.figures.attitude import angle_error
-from simrail.report.figures.style import (
-    INK,
-    MUTED,
-    categories,
-    figure_legend,
-    log_scale,
-    look,
-    panels_beside,
-    to_svg,
-)
 from simrail.report.tables.methods import MethodStyle
 
 MOST_CURVATURES = 4
@@ -41,20 +32,22 @@ def box_figure(
         return ""
     limits = 0.8 * float(positive.quantile(0.001)), 1.25 * float(positive.quantile(0.999))
     across = min(len(axes), 2)
-    with look():
-        figure, panels = panels_beside(len(axes), tall_in=2.2, across=across, gap_in=0.7, right_in=0.2)
+    with canvas.look():
+        figure, panels = canvas.panels_beside(len(axes), tall_in=2.2, across=across, gap_in=0.7, right_in=0.2)
         for number, (panel, along) in enumerate(zip(panels, axes, strict=True)):
             _draw_boxes(panel, draws, styles, along)
             panel.set_ylim(*limits)
-            log_scale(panel.yaxis)
+            canvas.log_scale(panel.yaxis)
             if number % across == 0:
                 panel.set_ylabel("rms roll error, \u00b0")
         _legend(figure, styles)
-        return to_svg(figure, description=what)
+        return canvas.to_svg(figure, description=what)
 
 
 def _legend(figure: Figure, styles: Sequence[MethodStyle]) -> None:
-    figure_legend(figure, [Patch(color=style.colour) for style in styles], [style.label for style in styles])
+    canvas.figure_legend(
+        figure, [Patch(color=style.colour) for style in styles], [style.label for style in styles]
+    )
 
 
 def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle], along: CampaignAxis) -> None:
@@ -73,7 +66,7 @@ def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle],
             # A box without height is seen as a bar.
             panel.plot(ends, [middle, middle], color=style.colour, lw=3.6, solid_capstyle="butt", zorder=2)
             panel.plot(ends, [middle, middle], color="white", lw=1.3, solid_capstyle="butt", zorder=4)
-    categories(panel, [in_two(word) for word in along.words])
+    canvas.categories(panel, [in_two(word) for word in along.words])
     panel.set_xlabel(along.title)
 
 
@@ -98,8 +91,8 @@ def curvature_figure(
     rides = [ride for ride in rides if len(ride[2]) > 1][:MOST_CURVATURES]
     if not rides:
         return ""
-    with look():
-        figure, axes = panels_beside(
+    with canvas.look():
+        figure, axes = canvas.panels_beside(
             len(rides), tall_in=2.5, across=len(rides), gap_in=0.3, right_in=0.2, share_y=True
         )
         for axis, (example, word, middles, number_of) in zip(axes, rides, strict=True):
@@ -110,13 +103,13 @@ def curvature_figure(
                 means = [float(np.mean(error[number_of == k])) for k in range(len(middles))]
                 face = "white" if style.baseline else style.colour
                 axis.plot(middles, means, "o-", color=style.colour, mfc=face, ms=4.4, mew=1.1, lw=1.0)
-            axis.axhline(0.0, color=MUTED, lw=0.7, zorder=1)
-            axis.set_title(word, color=INK)
+            axis.axhline(0.0, color=canvas.MUTED, lw=0.7, zorder=1)
+            axis.set_title(word, color=canvas.INK)
             axis.set_xlabel("curvature, 1/km (positive to the left)")
             axis.tick_params(labelleft=axis is axes[0])
         axes[0].set_ylabel("mean roll error, \u00b0")
         _legend(figure, [style for style in styles if any(style.name in e.estimates for e, *_ in rides)])
-        return to_svg(figure, description=what)
+        return canvas.to_svg(figure, description=what)
 
 
 def _curvature_bins(example: CellResult) -> tuple[FloatArray, np.ndarray]:

@@ -1,6 +1,6 @@
-"""Heat maps over the axes of a campaign."""
+"""Heat maps over the axes of a campaign; of rails, what methods err by in the band that counts."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,20 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.campaign.axes import CampaignAxis
-from simrail.report.figures.style import INK, MUTED, WIDTH_IN, log_ticks, look, panels_beside, to_svg
+from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
+from simrail.report.figures.canvas import (
+    INK,
+    MUTED,
+    WIDTH_IN,
+    add_panel,
+    log_ticks,
+    look,
+    panels_beside,
+    to_svg,
+)
+from simrail.report.tables.geometry import JUDGED, QUANTITIES, waves_words
+from simrail.report.tables.methods import MethodStyle
+from simrail.track.bands import Band
 
 HEAT = LinearSegmentedColormap.from_list(
     "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64
@@ -116,34 +128,78 @@ def heat_maps(
         return to_svg(figure, description=what)
 
 
+def rails_figures(
+    scores: pd.DataFrame,
+    cells: pd.DataFrame,
+    axes: Sequence[CampaignAxis],
+    styles: Sequence[MethodStyle],
+    *,
+    band: str,
+    known: Mapping[str, Band],
+) -> list[tuple[str, str]]:
+    """Caption and heat maps for each axis, methods by its values; [] if no method says what rails look like.
+
+    Parameters
+    ----------
+    scores, cells : pandas.DataFrame
+        Score table and table of cells.
+    axes : sequence of CampaignAxis
+        What the cells differ in; an axis that follows from another has no figure of its own.
+    styles : sequence of MethodStyle
+        Methods, in their order.
+    band : str
+        Band that is shown.
+    known : mapping of str to Band
+        Bands whose wavelengths are told.
+    """
+    draws = {
+        QUANTITIES[quantity]: draws_of(scores, cells, axes, quantity=quantity, metric="sd", band=band)
+        for quantity in JUDGED
+    }
+    named = {name for rows in draws.values() for name in rows["estimator"].unique()}
+    shown = [style for style in styles if style.name in named]
+    if not shown:
+        return []
+    down = Side("method", [(s.name,) for s in shown], [s.label for s in shown], ["estimator"])
+    by_column = {axis.column: axis for axis in finest(axes, cells)}
+    sides = {}
+    if "speed_kmh" in by_column and "direction" in by_column:
+        both = by_column.pop("speed_kmh"), by_column.pop("direction")
+        sides["speed and direction of travel"] = side_of(*both)
+    sides |= {axis.name: side_of(axis) for axis in by_column.values()}
+    return [
+        (
+            f"Rails: standard deviation of the error {waves_words(band, known)}, by method and {title}; mean "
+            "over all other axes and draws.",
+            heat_maps(draws, across, down, unit="mm", what=f"Errors of the rails by method and {title}"),
+        )
+        for title, across in sides.items()
+    ]
+
+
 def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
     """Mean over the draws of each cell of the map (rows, columns)."""
     means = draws.groupby([*down.columns, *across.columns], observed=True)["value"].mean()
     by_key = {key if isinstance(key, tuple) else (key,): value for key, value in means.items()}
-    return np.array(
-        [[by_key.get((*y, *x), np.nan) for x in across.keys] for y in down.keys], dtype=np.float64
-    )
+    table = [[by_key.get((*y, *x), np.nan) for x in across.keys] for y in down.keys]
+    return np.array(table, dtype=np.float64)
 
 
 def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
     rows, columns = table.shape
     edges = np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5
-    axis.pcolormesh(
-        *edges, np.ma.masked_invalid(table), cmap=HEAT, norm=norm, edgecolors="white", linewidth=1.2
-    )
+    shown = np.ma.masked_invalid(table)
+    axis.pcolormesh(*edges, shown, cmap=HEAT, norm=norm, edgecolors="white", linewidth=1.2)
     axis.set_ylim(rows - 0.5, -0.5)
     axis.grid(visible=False)
     axis.tick_params(length=0)
-    for spine in axis.spines.values():
-        spine.set_visible(False)
+    axis.spines[:].set_visible(False)
     for (i, j), value in np.ndenumerate(table):
-        if not np.isfinite(value):
-            axis.text(j, i, "\u2013", ha="center", va="center", color=MUTED, fontsize=8.0)
-            continue
-        dark = float(norm(max(value, norm.vmin or value))) > 0.5
-        axis.text(
-            j, i, short_number(value), ha="center", va="center", fontsize=8.0, color="white" if dark else INK
-        )
+        text, colour = "\u2013", MUTED
+        if np.isfinite(value):
+            is_dark = float(norm(max(value, norm.vmin or value))) > 0.5
+            text, colour = short_number(value), "white" if is_dark else INK
+        axis.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
 
 
 def short_number(value: float) -> str:
@@ -153,9 +209,8 @@ def short_number(value: float) -> str:
 
 
 def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: float, tall: float) -> None:
-    wide, height = figure.get_size_inches()
-    box = (left / wide, (height - top - tall) / height, 0.11 / wide, tall / height)
-    axis = figure.add_axes(box)
+    _, height = figure.get_size_inches()
+    axis = add_panel(figure, left, height - top - tall, 0.11, tall)
     bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
     bar.outline.set_visible(False)
     log_ticks(axis.yaxis)

@@ -1,7 +1,7 @@
 """The section itself: tables and figures over the axes of a campaign, gathered for the template."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,8 @@ import pandas as pd
 from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import CampaignAxis, campaign_axes, draws_of, finest, is_campaign
 from simrail.report.campaign.figures import box_figure, curvature_figure
-from simrail.report.campaign.heat import Side, heat_maps, side_of
-from simrail.report.campaign.rails import rails_figures
-from simrail.report.campaign.tables import campaign_tables, write_tables
+from simrail.report.campaign.heat import Side, heat_maps, rails_figures, side_of
+from simrail.report.campaign.tables import HEADLINES, campaign_tables, write_tables
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle, readable
 from simrail.report.tables.tables import NONE, Cell, Row, Table, method_row, number_cell, signed
@@ -23,9 +22,6 @@ MOST_METHODS = 8
 
 MOST_BOXES = 6
 """Axes along which the spread is drawn."""
-
-TABLES = "tables"
-"""Folder beside the page for the tables of a campaign, as CSV and LaTeX."""
 
 
 def campaign_section(data: PageData) -> list[Section]:
@@ -38,39 +34,33 @@ def campaign_section(data: PageData) -> list[Section]:
     if not axes or not (scores["quantity"] == "roll").any():
         return []
     # What stands beside a run has no part in one of its cells.
-    command = str(data.manifest.get("command", f"simrail run {data.scenario.called}")).partition(
-        " --beside "
-    )[0]
+    command, *_ = str(data.manifest.get("command", f"simrail run {data.scenario.called}")).split(" --beside ")
     tables = campaign_tables(scores, cells, axes, styles, command=command)
-    if tables.methods.empty:
+    if tables["methods"].empty:
         return []
     by_name = {style.name: style for style in data.styles}
     rails = rails_figures(scores, cells, axes, data.styles, band=data.judged_band, known=data.bands)
     shown = {
         "axes": [(axis.title, ", ".join(axis.words)) for axis in axes],
         "cells": len(cells),
-        "tracks": int(tables.methods["tracks"].max()),
+        "tracks": int(tables["methods"]["tracks"].max()),
         "rails": rails,
-        "methods": _methods_table(tables.methods, by_name),
-        "pairs": _pairs_table(tables.pairs, by_name),
-        "consistency": _consistency_table(tables.consistency, by_name),
+        "methods": _methods_table(tables["methods"], by_name),
+        "pairs": _pairs_table(tables["pairs"], by_name),
+        "consistency": _consistency_table(tables["consistency"], by_name),
         "worst": [
             (
                 readable(row["method"]),
                 f"{row['rms_roll_deg']:.3f}\u00b0",
-                " \u00b7 ".join(f"{_name(axis.title)} {row[axis.title]}" for axis in axes),
+                " \u00b7 ".join(f"{axis.name} {row[axis.title]}" for axis in axes),
                 row["command"],
             )
-            for row in tables.worst.to_dict("records")
+            for row in tables["worst"].to_dict("records")
         ],
         **_drawings(data, axes),
     }
-
-    def write_beside(folder: Path) -> None:
-        write_tables(folder / TABLES, tables)
-
-    template = "campaign/section.html.j2"
-    return [Section("campaign", "The campaign as a whole", template, shown, write_beside)]
+    title, template = "The campaign as a whole", "campaign/section.html.j2"
+    return [Section("campaign", title, template, shown, partial(write_tables, tables=tables))]
 
 
 def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
@@ -97,8 +87,8 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
         "curves": heat(curves, speeds, down, "speed and curve radius") if many else "",
         "maps": [
             (
-                _name(across.title),
-                _name(axis.title),
+                across.title.partition(",")[0],
+                axis.name,
                 heat(roll, across, side_of(axis), f"Roll by {axis.title}"),
             )
             for axis in fine
@@ -139,20 +129,10 @@ def _words_of(example: CellResult, axes: Sequence[CampaignAxis]) -> str:
     return " \u00b7 ".join(words[:3])
 
 
-def _name(title: str) -> str:
-    return title.partition(",")[0]
-
-
 def _methods_table(frame: pd.DataFrame, by_name: Mapping[str, MethodStyle]) -> Table:
-    titles = {
-        ("roll", "whole"): "roll",
-        ("roll", "curve"): "roll in curves",
-        ("pitch", "whole"): "pitch",
-        ("yaw_debiased", "whole"): "yaw\u00b9",
-    }
     headlines = {
         title: frame[(frame["quantity"] == quantity) & (frame["window"] == window)].set_index("method")
-        for (quantity, window), title in titles.items()
+        for title, (quantity, _, window) in HEADLINES.items()
     }
     headlines = {title: means for title, means in headlines.items() if len(means)}
     spreads = next(iter(headlines.values()))

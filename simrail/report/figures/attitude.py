@@ -13,17 +13,9 @@ from matplotlib.axes import Axes
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.core.jit import FloatArray
+from simrail.report.figures import canvas
 from simrail.report.figures.decimate import Bins
 from simrail.report.figures.ride import over_distance
-from simrail.report.figures.style import (
-    draw_design,
-    draw_truth,
-    fit_limits,
-    legend_above,
-    look,
-    panels,
-    to_svg,
-)
 from simrail.report.tables.methods import MethodStyle
 
 _NAMES = ("roll", "pitch", "yaw")
@@ -41,24 +33,24 @@ def attitude_figure(example: CellResult, styles: Sequence[MethodStyle], *, what:
     what : str
         Description for those who cannot see it.
     """
-    with look():
+    with canvas.look():
         bins = Bins(example.motion["position_m"].to_numpy())
         frame = example.recording.track.frame(bins.x)
         design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
-        figure, axes = panels([2.05, 2.05, 1.75])
+        figure, axes = canvas.panels([2.05, 2.05, 1.75])
         for column, (axis, angle, name) in enumerate(zip(axes, ATTITUDE, _NAMES, strict=True)):
             true = example.motion[angle].to_numpy()
-            lines = [draw_truth(axis, bins, true), draw_design(axis, bins.x, design[column])]
+            lines = [canvas.draw_truth(axis, bins, true), canvas.draw_design(axis, bins.x, design[column])]
             for order, style in enumerate(styles):
                 x, y = bins.line(np.rad2deg(true + angle_error(example, style.name, column)))
                 depth: dict[str, Any] = {"lw": 1.05, "zorder": 12 - 0.1 * order}
                 axis.plot(x, y, color=style.colour, ls=style.stroke, label=style.label, **depth)
                 lines.append(y)
-            fit_limits(axis, lines, top=0.16 if column == 0 else 0.08)
+            canvas.fit_limits(axis, lines, top=0.16 if column == 0 else 0.08)
             axis.set_ylabel(f"{name}, \u00b0")
-        legend_above(axes[0])
+        canvas.legend_above(axes[0])
         over_distance(axes, example)
-        return to_svg(figure, description=what)
+        return canvas.to_svg(figure, description=what)
 
 
 def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
@@ -68,44 +60,37 @@ def error_figure(example: CellResult, styles: Sequence[MethodStyle]) -> str:
     mean is drawn, and the range of 'design angles only' as a band. Where a baseline leaves the panel,
     a note says how far it goes.
     """
-    with look():
+    with canvas.look():
         bins = Bins(example.motion["position_m"].to_numpy())
-        figure, axes = panels([1.9, 1.9, 1.9])
+        figure, axes = canvas.panels([1.9, 1.9, 1.9])
         tested = [style for style in styles if not style.baseline] or list(styles)
         for column, axis in enumerate(axes):
             error = {style.name: _shown_error(example, style, column) for style in styles}
+            most = {name: _percentile(values, 100.0) for name, values in error.items()}
             reach = max(1.15 * max(_percentile(error[s.name], 99.8) for s in tested), 1e-3)
             lowest = 1.15 * min(float(np.nanmin(error[s.name], initial=0.0)) for s in tested)
             highest = 1.15 * max(float(np.nanmax(error[s.name], initial=0.0)) for s in tested)
-            beyond = []
             for style in styles:
                 look_of: dict[str, Any] = {"color": style.colour, "ls": style.stroke, "label": style.label}
                 if style in tested:
-                    axis.plot(
-                        *bins.line(error[style.name]), lw=1.2, zorder=4 - 0.1 * len(axis.lines), **look_of
-                    )
-                elif not style.uses_imu:
-                    axis.fill_between(
-                        *bins.envelope(error[style.name]).range,
-                        color="#b9bec7",
-                        lw=0,
-                        alpha=0.55,
-                        label=f"{style.label}, range",
-                        zorder=1.5,
-                    )
+                    line, depth = bins.line(error[style.name]), 4 - 0.1 * len(axis.lines)
+                    axis.plot(*line, lw=1.2, zorder=depth, **look_of)
+                    continue
+                low, mean, high = bins.envelope(error[style.name])
+                if style.uses_imu:
+                    axis.plot(bins.x, mean, lw=0.9, zorder=2, **look_of)
                 else:
-                    axis.plot(bins.x, bins.envelope(error[style.name]).mean, lw=0.9, zorder=2, **look_of)
-                largest = _percentile(error[style.name], 100.0)
-                if largest > 1.3 * reach:
-                    beyond.append((largest, style.label))
+                    tint: dict[str, Any] = {"color": "#b9bec7", "lw": 0, "alpha": 0.55, "zorder": 1.5}
+                    axis.fill_between(bins.x, low, high, label=f"{style.label}, range", **tint)
+            beyond = [(most[s.name], s.label) for s in styles if most[s.name] > 1.3 * reach]
             axis.axhline(0.0, color="#98a1af", lw=0.7, zorder=-1)
-            low, high = max(lowest, -reach), min(highest, reach)
-            axis.set_ylim(low - 0.15 * reach, high + (0.3 if column == 0 else 0.05) * reach)
+            top = min(highest, reach) + (0.3 if column == 0 else 0.05) * reach
+            axis.set_ylim(max(lowest, -reach) - 0.15 * reach, top)
             axis.set_ylabel("yaw drift, \u00b0" if column == 2 else f"{_NAMES[column]} error, \u00b0")
             _note_beyond(axis, beyond)
-        legend_above(axes[0])
+        canvas.legend_above(axes[0])
         over_distance(axes, example)
-        return to_svg(figure, description="Errors of roll, pitch and yaw over distance")
+        return canvas.to_svg(figure, description="Errors of roll, pitch and yaw over distance")
 
 
 def _percentile(error: FloatArray, share: float) -> float:
@@ -120,17 +105,15 @@ def _note_beyond(axis: Axes, beyond: list[tuple[float, str]]) -> None:
     listed = ", ".join(f"{label} {largest:.2g}\u00b0" for largest, label in sorted(beyond, reverse=True))
     box: dict[str, Any] = {"facecolor": "white", "alpha": 0.85, "lw": 0, "pad": 1.5}
     style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.8, "color": "#475467", "zorder": 30}
-    axis.text(
-        0.995, 0.03, f"beyond the panel, at most: {listed}", transform=axis.transAxes, bbox=box, **style
-    )
+    words = f"beyond the panel, at most: {listed}"
+    axis.text(0.995, 0.03, words, transform=axis.transAxes, bbox=box, **style)
 
 
 def angle_error(example: CellResult, name: str, column: int) -> FloatArray:
     """Error (n,) of an angle against the truth, wrapped, rad."""
     angle = ATTITUDE[column]
-    error = (
-        example.estimates[name].states[angle].to_numpy(dtype=np.float64) - example.motion[angle].to_numpy()
-    )
+    estimated = example.estimates[name].states[angle].to_numpy(dtype=np.float64)
+    error = estimated - example.motion[angle].to_numpy()
     wrapped: FloatArray = (error + np.pi) % (2.0 * np.pi) - np.pi
     return wrapped
 

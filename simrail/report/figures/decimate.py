@@ -15,17 +15,11 @@ BINS = 700
 
 
 class Envelope(NamedTuple):
-    """Smallest, mean and largest value per bin, and where the bins lie; every array (bins,)."""
+    """Smallest, mean and largest value per bin; every array (bins,)."""
 
-    x: FloatArray
     low: FloatArray
     mean: FloatArray
     high: FloatArray
-
-    @property
-    def range(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where the bins lie, smallest and largest value."""
-        return self.x, self.low, self.high
 
 
 class Bins:
@@ -57,9 +51,8 @@ class Bins:
 
     def envelope(self, y: FloatArray) -> Envelope:
         """Envelope of a signal (n,)."""
-        return Envelope(
-            self.x, np.minimum.reduceat(y, self.first), self._mean(y), np.maximum.reduceat(y, self.first)
-        )
+        low, high = np.minimum.reduceat(y, self.first), np.maximum.reduceat(y, self.first)
+        return Envelope(low, self._mean(y), high)
 
     def line(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Polyline (2 bins,) through the extremes of a signal (n,), in the order that they rise or fall."""

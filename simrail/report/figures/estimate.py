@@ -9,18 +9,8 @@ from simrail.core.columns import ATTITUDE, ATTITUDE_SD, COLUMNS, INNOVATION, RAT
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
+from simrail.report.figures import canvas
 from simrail.report.figures.decimate import Bins
-from simrail.report.figures.style import (
-    distance_axis,
-    draw_design,
-    fit_limits,
-    legend_above,
-    look,
-    pad_limits,
-    panels,
-    shade_track,
-    to_svg,
-)
 
 ESTIMATE, BAND = "#0072B2", "#0072B2"
 LEAST_WAY_M = 10.0
@@ -41,13 +31,13 @@ def place_of(recording: Recording) -> FloatArray:
 
 def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label: str) -> str:
     """Estimated roll, pitch and yaw with their 95 % bands, and the design angles."""
-    with look():
+    with canvas.look():
         x = _axis(recording)
         bins = Bins(x)
         frame = recording.track.frame_extended(place_of(recording)[bins.first])
         design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
         drawn = [name for name in ATTITUDE if name in estimate.states]
-        figure, axes = panels([1.9] * len(drawn))
+        figure, axes = canvas.panels([1.9] * len(drawn))
         for axis, name in zip(axes, drawn, strict=True):
             angle = np.rad2deg(estimate.states[name].to_numpy(dtype=np.float64))
             place, line = bins.line(angle)
@@ -59,35 +49,35 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
             axis.plot(place, line, color=ESTIMATE, lw=1.05, zorder=12, label=label)
             lines = [line]
             if recording.odometry is not None:
-                lines.append(draw_design(axis, bins.x, design[ATTITUDE.index(name)]))
-            fit_limits(axis, lines, top=0.16)
+                lines.append(canvas.draw_design(axis, bins.x, design[ATTITUDE.index(name)]))
+            canvas.fit_limits(axis, lines, top=0.16)
             axis.set_ylabel(f"{name.removesuffix('_rad')}, \u00b0")
-        legend_above(axes[0])
+        canvas.legend_above(axes[0])
         _finish(axes, recording, x)
-        return to_svg(figure, description=f"Attitude of ride {recording.name}, estimated and by design")
+        return canvas.to_svg(
+            figure, description=f"Attitude of ride {recording.name}, estimated and by design"
+        )
 
 
 def innovation_figure(recording: Recording, estimate: Estimate) -> str:
     """Range and mean of each innovation."""
     assert estimate.innovations is not None
-    with look():
+    with canvas.look():
         times = recording.imu.index.to_numpy()
         # Innovations may come at fewer times than the samples: an update that was left out has none.
         x = np.interp(estimate.innovations.index.to_numpy(), times, _axis(recording))
         bins = Bins(x, bins=500)
         names = [name for name in (*RATE_INNOVATION, *INNOVATION) if name in estimate.innovations]
-        figure, axes = panels([1.0] * len(names), top_in=0.15)
+        figure, axes = canvas.panels([1.0] * len(names), top_in=0.15)
         for axis, name in zip(axes, names, strict=True):
             values = np.nan_to_num(estimate.innovations[name].to_numpy(dtype=np.float64))
-            envelope = bins.envelope(values)
-            axis.fill_between(*envelope.range, color="#009E73", alpha=0.28, lw=0)
-            axis.plot(bins.x, envelope.mean, color="#009E73", lw=1.1)
+            envelope = canvas.draw_envelope(axis, bins, values, colour="#009E73")
             unit = COLUMNS[name].unit.replace("s2", "s\u00b2")
             word = "NIS" if name == "nis" else f"innov. {name.split('_')[1].upper()}\n{unit}"
             axis.set_ylabel(word, fontsize=8.2)
-            pad_limits(axis, np.percentile(envelope.low, 1.0), np.percentile(envelope.high, 99.0))
+            canvas.pad_limits(axis, np.percentile(envelope.low, 1.0), np.percentile(envelope.high, 99.0))
         _finish(axes, recording, x)
-        return to_svg(figure, description="Innovations: measured minus predicted signals")
+        return canvas.to_svg(figure, description="Innovations: measured minus predicted signals")
 
 
 def _axis(recording: Recording) -> FloatArray:
@@ -102,8 +92,8 @@ def _finish(axes: list[Axes], recording: Recording, x: FloatArray) -> None:
     room = 0.01 * max(high - low, 1e-3)
     if moves(recording):
         limits: Any = (low - room, high + room)
-        shade_track(axes, recording.track, limits=limits)
-        distance_axis(axes[-1], direction=1 if x[-1] >= x[0] else -1)
+        canvas.shade_track(axes, recording.track, limits=limits)
+        canvas.distance_axis(axes[-1], direction=1 if x[-1] >= x[0] else -1)
     else:
         axes[0].set_xlim(low - room, high + room)
         axes[-1].set_xlabel("time, s")

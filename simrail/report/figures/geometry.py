@@ -8,23 +8,9 @@ import numpy as np
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray
+from simrail.report.figures import canvas
 from simrail.report.figures.ride import over_distance
-from simrail.report.figures.style import (
-    INK,
-    TRUTH,
-    categories,
-    draw_marks,
-    figure_legend,
-    legend_above,
-    log_scale,
-    look,
-    pad_limits,
-    panels,
-    panels_beside,
-    to_svg,
-)
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case
-from simrail.report.tables.geometry_tables import is_zero, mappers
+from simrail.report.tables.geometry import JUDGED, QUANTITIES, band_words, bands_of_case, is_zero, mappers
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case
 from simrail.scoring.table import FULL
@@ -34,6 +20,13 @@ _MARKS = "osv^PX<>*"
 
 ROOMY = 4
 """So many bands leave room for their wavelengths below the axis."""
+
+
+def has_rails(example: CellResult, style: MethodStyle) -> bool:
+    """Whether a method says what the rails of a ride look like, and the true ones are at hand."""
+    estimate = example.estimates.get(style.name)
+    geometry = estimate.geometry if estimate else None
+    return example.rails is not None and geometry is not None and len(geometry) > 1
 
 
 def stretch_of(example: CellResult, name: str, *, band: Band | None, length_m: float) -> tuple[float, float]:
@@ -120,8 +113,8 @@ def rails_figure(
     what : str
         Description for those who cannot see it.
     """
-    with look():
-        figure, axes = panels([1.55] * len(JUDGED))
+    with canvas.look():
+        figure, axes = canvas.panels([1.55] * len(JUDGED))
         for axis, quantity in zip(axes, JUDGED, strict=True):
             reach = [0.0]
             for order, style in enumerate(styles):
@@ -129,28 +122,21 @@ def rails_figure(
                 place, true, found, sd = lines_of(example, style.name, quantity, band, by_draws=drawn)
                 at = (place >= limits[0]) & (place <= limits[1]) & np.isfinite(found)
                 if order == 0:
-                    axis.plot(place[at], true[at], color=TRUTH, lw=2.6, label="truth", zorder=2)
+                    axis.plot(place[at], true[at], color=canvas.TRUTH, lw=2.6, label="truth", zorder=2)
                     reach += [*true[at]]
                     if with_interval and np.isfinite(sd).any():
                         low, high = found[at] - 1.96 * sd[at], found[at] + 1.96 * sd[at]
                         tint: dict[str, Any] = {"color": style.colour, "alpha": 0.16, "lw": 0}
                         axis.fill_between(place[at], low, high, label="its 95 % interval", zorder=1, **tint)
                         reach += [*low, *high]
-                axis.plot(
-                    place[at],
-                    found[at],
-                    color=style.colour,
-                    ls=style.stroke,
-                    lw=1.1,
-                    label=style.label,
-                    zorder=9 - 0.1 * order,
-                )
+                look_of: dict[str, Any] = {"color": style.colour, "ls": style.stroke, "lw": 1.1}
+                axis.plot(place[at], found[at], label=style.label, zorder=9 - 0.1 * order, **look_of)
                 reach += [*found[at]]
-            pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
+            canvas.pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
             axis.set_ylabel(f"{QUANTITIES[quantity]},\nmm")
-        legend_above(axes[0])
+        canvas.legend_above(axes[0])
         over_distance(axes, example, limits=limits)
-        return to_svg(figure, description=what)
+        return canvas.to_svg(figure, description=what)
 
 
 def bands_figure(case: Case, styles: Sequence[MethodStyle], *, known: Mapping[str, Band] = BANDS) -> str:
@@ -167,20 +153,22 @@ def bands_figure(case: Case, styles: Sequence[MethodStyle], *, known: Mapping[st
     shown = mappers(case, styles)
     if not bands or not shown:
         return ""
-    with look():
-        figure, axes = panels_beside(len(JUDGED), tall_in=2.0, left_in=0.62)
+    with canvas.look():
+        figure, axes = canvas.panels_beside(len(JUDGED), tall_in=2.0, left_in=0.62)
         words = [_tick(band, known if len(bands) <= ROOMY else {}) for band in bands]
         for axis, quantity in zip(axes, JUDGED, strict=True):
             for order, style in enumerate(shown):
                 scores = [case.get(style.name, quantity, "sd", band=band) for band in bands]
                 marker = "D" if is_zero(style) else _MARKS[order % len(_MARKS)]
-                draw_marks(axis, scores, style, slot=(order, len(shown)), wide=0.7, marker=marker)
-            categories(axis, words)
-            log_scale(axis.yaxis)
-            axis.set_title(QUANTITIES[quantity], color=INK)
+                canvas.draw_marks(axis, scores, style, slot=(order, len(shown)), wide=0.7, marker=marker)
+            canvas.categories(axis, words)
+            canvas.log_scale(axis.yaxis)
+            axis.set_title(QUANTITIES[quantity], color=canvas.INK)
         axes[0].set_ylabel("sd of the error, mm")
-        figure_legend(figure, *axes[0].get_legend_handles_labels(), left_in=0.62)
-        return to_svg(figure, description="Standard deviation of the error of the rail geometry by band")
+        canvas.figure_legend(figure, *axes[0].get_legend_handles_labels(), left_in=0.62)
+        return canvas.to_svg(
+            figure, description="Standard deviation of the error of the rail geometry by band"
+        )
 
 
 def _tick(band: str, known: Mapping[str, Band]) -> str:

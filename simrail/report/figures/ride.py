@@ -9,8 +9,17 @@ from matplotlib.ticker import MaxNLocator
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO
 from simrail.recording.recording import odometry_of
+from simrail.report.figures.canvas import (
+    INK,
+    distance_axis,
+    draw_envelope,
+    legend_above,
+    look,
+    panels,
+    shade_track,
+    to_svg,
+)
 from simrail.report.figures.decimate import Bins
-from simrail.report.figures.style import INK, distance_axis, legend_above, look, panels, shade_track, to_svg
 from simrail.scenario.tables import RailConditionPart
 
 _TINTS = ("#0072B2", "#009E73", "#D55E00")
@@ -47,8 +56,7 @@ def speed_figure(example: CellResult, *, conditions: Sequence[RailConditionPart]
         figure, (axis,) = panels([1.5], top_in=0.15)
         speed = 3.6 * np.abs(example.motion["speed_mps"].to_numpy())
         axis.plot(*bins.line(speed), color=INK, lw=1.3)
-        axis.set_ylim(0.0, 1.3 * max(float(speed.max()), 1.0))
-        axis.set_ylabel("speed, km/h")
+        axis.set(ylim=(0.0, 1.3 * max(float(speed.max()), 1.0)), ylabel="speed, km/h")
         for at in conditions:
             axis.axvspan(at.start_m, at.end_m, ymax=0.06, color="#b5651d", alpha=0.55, lw=0)
             axis.annotate(at.words, (at.start_m, 0.08), xycoords=axis.get_xaxis_transform(), fontsize=7.2)
@@ -64,10 +72,8 @@ def imu_figure(example: CellResult) -> str:
         names = [(name, 180.0 / np.pi, "\u00b0/s", "rate") for name in GYRO]
         names += [(name, 1.0, "m/s\u00b2", "accel.") for name in ACCEL]
         for i, (axis, (name, scale, unit, word)) in enumerate(zip(axes, names, strict=True)):
-            envelope = bins.envelope(scale * recording.imu[name].to_numpy())
-            colour = _TINTS[i % 3]
-            axis.fill_between(*envelope.range, color=colour, alpha=0.28, lw=0)
-            axis.plot(bins.x, envelope.mean, color=colour, lw=1.1)
+            signal = scale * recording.imu[name].to_numpy()
+            envelope = draw_envelope(axis, bins, signal, colour=_TINTS[i % 3])
             axis.set_ylabel(f"{word} {name.split('_')[1].upper()}\n{unit}", fontsize=8.2)
             low, high = np.percentile(envelope.low, 0.5), np.percentile(envelope.high, 99.5)
             room = 0.12 * max(high - low, 1e-6)
@@ -89,11 +95,9 @@ def odometry_figure(example: CellResult) -> str:
         axis.fill_between(bins.x, -wide, wide, color="#009E73", alpha=0.14, lw=0, label="its own 95 % band")
         axis.plot(*bins.line(error), color="#009E73", lw=1.3, label=f"odometry: {recording.odometry_source}")
         axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
-        reach = max(
-            1.25 * float(np.abs(error).max()), min(float(wide.max()), 5.0 * float(np.abs(error).max())), 1e-3
-        )
-        axis.set_ylim(-1.1 * reach, 1.25 * reach)
-        axis.set_ylabel("position error, m")
+        largest = float(np.abs(error).max())
+        reach = max(1.25 * largest, min(float(wide.max()), 5.0 * largest), 1e-3)
+        axis.set(ylim=(-1.1 * reach, 1.25 * reach), ylabel="position error, m")
         legend_above(axis)
         over_distance([axis], example)
         return to_svg(figure, description="Position error of the odometry over distance")

@@ -4,19 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.lines import Line2D
 
-from simrail.report.figures.style import (
-    INK,
-    MUTED,
-    categories,
-    draw_marks,
-    figure_legend,
-    legend_above,
-    log_scale,
-    look,
-    panels,
-    panels_beside,
-    to_svg,
-)
+from simrail.report.figures import canvas
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case
 from simrail.scoring.table import CURVE_PREFIX
@@ -29,9 +17,9 @@ _DASHES = (0, (3, 2))
 
 def rms_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
     """Rms error of every method in straights, transitions and curves, on a logarithmic axis."""
-    with look():
+    with canvas.look():
         tall = 0.34 * len(styles) + 0.1
-        figure, axes = panels_beside(3, tall_in=tall, left_in=_LEFT_IN, gap_in=0.25, right_in=0.2)
+        figure, axes = canvas.panels_beside(3, tall_in=tall, left_in=_LEFT_IN, gap_in=0.25, right_in=0.2)
         for axis, (quantity, title) in zip(axes, _QUANTITIES, strict=True):
             reach = []
             for line, style in enumerate(styles):
@@ -41,30 +29,28 @@ def rms_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
                         continue
                     reach.append(value)
                     if sd > 0.0:
-                        axis.plot(
-                            [max(value - sd, 0.3 * value), value + sd], [line, line], color=colour, lw=1.6
-                        )
+                        ends = [max(value - sd, 0.3 * value), value + sd]
+                        axis.plot(ends, [line, line], color=colour, lw=1.6)
                     axis.plot(value, line, marker, color=colour, ms=5.4, mec="white", mew=0.6, zorder=4)
                 floor = case.get(style.name, quantity, "rms").value
                 if not style.uses_imu and floor > 1e-5:
-                    axis.axvline(floor, color=MUTED, lw=1.0, ls=_DASHES, zorder=1)
+                    axis.axvline(floor, color=canvas.MUTED, lw=1.0, ls=_DASHES, zorder=1)
             if reach:
                 axis.set_xlim(0.6 * min(reach), 1.6 * max(reach))
-            log_scale(axis.xaxis)
+            canvas.log_scale(axis.xaxis)
             axis.set_ylim(len(styles) - 0.5, -0.5)
             axis.set_yticks(range(len(styles)), [_row_label(s) for s in styles] if axis is axes[0] else [])
             axis.tick_params(axis="y", length=0)
             for label, style in zip(axis.get_yticklabels(), styles, strict=False):
-                label.set_color(MUTED if style.baseline else INK)
-            axis.set_title(title, color=INK)
+                label.set_color(canvas.MUTED if style.baseline else canvas.INK)
+            axis.set_title(title, color=canvas.INK)
             axis.set_xlabel("rms error, \u00b0 (logarithmic)")
         handles = [Line2D([], [], marker=mark, color=colour, lw=0, ms=5.6) for _, mark, colour in _WINDOWS]
-        handles.append(Line2D([], [], color=MUTED, lw=1.0, ls=_DASHES))
+        handles.append(Line2D([], [], color=canvas.MUTED, lw=1.0, ls=_DASHES))
         labels = [*(window for window, *_ in _WINDOWS), "design angles only, whole ride"]
-        figure_legend(figure, handles, labels, left_in=_LEFT_IN)
-        return to_svg(
-            figure, description="Root mean square errors of every method in straights, transitions and curves"
-        )
+        canvas.figure_legend(figure, handles, labels, left_in=_LEFT_IN)
+        words = "Root mean square errors of every method in straights, transitions and curves"
+        return canvas.to_svg(figure, description=words)
 
 
 def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
@@ -72,17 +58,19 @@ def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
     windows = case.curves()
     if not windows:
         return ""
-    with look():
-        figure, (axis,) = panels([2.1])
+    with canvas.look():
+        figure, (axis,) = canvas.panels([2.1])
         for order, style in enumerate(styles):
             scores = [case.get(style.name, "roll", "rms", window=window) for window in windows]
             slot, wide = (order, len(styles)), min(0.62, 0.045 * len(windows) * len(styles))
-            draw_marks(axis, scores, style, slot=slot, wide=wide, marker="D" if style.baseline else "o")
-        categories(axis, [window.removeprefix(CURVE_PREFIX) for window in windows])
-        log_scale(axis.yaxis)
+            canvas.draw_marks(
+                axis, scores, style, slot=slot, wide=wide, marker="D" if style.baseline else "o"
+            )
+        canvas.categories(axis, [window.removeprefix(CURVE_PREFIX) for window in windows])
+        canvas.log_scale(axis.yaxis)
         axis.set_ylabel("rms roll error, \u00b0")
-        legend_above(axis)
-        return to_svg(figure, description="Root mean square roll error of every method in each curve")
+        canvas.legend_above(axis)
+        return canvas.to_svg(figure, description="Root mean square roll error of every method in each curve")
 
 
 def _row_label(style: MethodStyle) -> str:

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.style import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
+from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
 from simrail.report.words.sentences import listed
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 
@@ -51,8 +51,7 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(x=0.03, y=0.22)
         axis.grid(False)
-        axis.set_xticks([])
-        axis.set_yticks([])
+        axis.set(xticks=[], yticks=[])
         axis.spines[:].set_visible(False)
         axis.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=3)
         _scale_bar(axis, span[0])
@@ -76,8 +75,7 @@ def profile_figure(track: TrackDesign) -> str:
             floor = float(height.min()) - 0.1 * span
             axis.fill_between(s, height, floor, color="#e8ebf0", lw=0)
             axis.plot(s, height, color=INK, lw=1.4)
-            axis.set_ylim(floor, float(height.min()) + 1.35 * span)
-            axis.set_ylabel("height, m")
+            axis.set(ylim=(floor, float(height.min()) + 1.35 * span), ylabel="height, m")
         rest[0].plot(s, 1e3 * track.curvature(s), color="#D55E00", lw=1.4)
         rest[0].set_ylabel("curvature, 1/km")
         if has_cant:

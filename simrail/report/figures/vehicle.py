@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.report.figures.style import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
+from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
 from simrail.report.tables.vehicle_text import MOST_HZ
 from simrail.vehicle.contact.contact_pair import incline
 from simrail.vehicle.contact.profile_files import profiles_of
@@ -41,24 +41,13 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
         axis.fill_between(wheel_y[::-1], wheel_z[::-1], roof, color="#dbe9f4", lw=0)
         axis.plot(wheel_y, wheel_z, color=_LEFT, lw=1.6)
         axis.plot([-1e3 * at], [0.0], marker="o", ms=6, mfc="white", mec=_RIGHT, mew=1.6, zorder=5)
-        axis.annotate(
-            f"wheel {wheel.name}",
-            (float(wheel_y.min()) + 3.0 * size, roof - 3.0 * size),
-            va="top",
-            ha="left",
-            color=_LEFT,
-        )
-        axis.annotate(
-            f"rail {rail.name}",
-            (float(rail_y.mean()), floor + 3.0 * size),
-            va="bottom",
-            ha="center",
-            color=MUTED,
-        )
+        place = (float(wheel_y.min()) + 3.0 * size, roof - 3.0 * size)
+        axis.annotate(f"wheel {wheel.name}", place, va="top", ha="left", color=_LEFT)
+        place = (float(rail_y.mean()), floor + 3.0 * size)
+        axis.annotate(f"rail {rail.name}", place, va="bottom", ha="center", color=MUTED)
         axis.set_aspect("equal", adjustable="datalim")
-        axis.set_ylim(floor, roof)
-        axis.set_xlabel("from the tape circle towards the middle of the track, mm")
-        axis.set_ylabel("height over the contact, mm")
+        below = "from the tape circle towards the middle of the track, mm"
+        axis.set(ylim=(floor, roof), xlabel=below, ylabel="height over the contact, mm")
         return to_svg(figure, description=f"Wheel {wheel.name} in contact with rail {rail.name}")
 
 
@@ -74,12 +63,11 @@ def shift_figure(contact: Conicity) -> str:
         difference = 1e3 * (contact.rest.radius_left_m - contact.rest.radius_right_m)
         axes[2].plot(y, difference, color=_THIRD, lw=1.5)
         axes[2].axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
-        axes[0].set_ylabel("contact, mm")
-        axes[1].set_ylabel("contact angle, \N{DEGREE SIGN}")
-        axes[2].set_ylabel("radius difference, mm")
+        words = ("contact, mm", "contact angle, \N{DEGREE SIGN}", "radius difference, mm")
+        for axis, label in zip(axes, words, strict=True):
+            axis.set_ylabel(label)
         axes[0].legend(loc="lower left", bbox_to_anchor=(-0.005, 1.0), ncols=2, borderaxespad=0.15)
-        axes[2].set_xlabel("lateral shift of the wheelset, mm")
-        axes[2].set_xlim(float(y[0]), float(y[-1]))
+        axes[2].set(xlabel="lateral shift of the wheelset, mm", xlim=(float(y[0]), float(y[-1])))
         return to_svg(figure, description="Contact of both wheels over the lateral shift of the wheelset")
 
 
@@ -90,17 +78,9 @@ def conicity_figure(contact: Conicity) -> str:
         axis.plot(1e3 * contact.amplitude_m, contact.equivalent, color=_LEFT, lw=1.6, marker="o", ms=4)
         at = 3.0 * contact.scale
         axis.axvline(at, color=MUTED, lw=0.9, ls=(0, (4, 3)))
-        axis.annotate(
-            f"{contact.at_3_mm:.3f} at {at:.2g} mm",
-            (at, contact.at_3_mm),
-            xytext=(8, -16),
-            textcoords="offset points",
-            color=INK,
-        )
-        axis.set_ylim(bottom=0.0)
-        axis.set_xlim(left=0.0)
-        axis.set_ylabel("equivalent conicity")
-        axis.set_xlabel("amplitude, mm")
+        text, place = f"{contact.at_3_mm:.3f} at {at:.2g} mm", (at, contact.at_3_mm)
+        axis.annotate(text, place, (8, -16), textcoords="offset points", color=INK)
+        axis.set(ylim=(0.0, None), xlim=(0.0, None), ylabel="equivalent conicity", xlabel="amplitude, mm")
         return to_svg(figure, description="Equivalent conicity over the amplitude")
 
 
@@ -123,17 +103,14 @@ def locus_figure(study: VehicleStudy) -> str:
         bar.set_label("speed, km/h")
         bar.outline.set_visible(False)
         plane.axvline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))
-        plane.set_ylim(0.0, _MOST_HZ)
-        plane.set_xlabel("real part, 1/s")
-        plane.set_ylabel("frequency, Hz")
+        plane.set(ylim=(0.0, _MOST_HZ), xlabel="real part, 1/s", ylabel="frequency, Hz")
         counts = (frequency > SLOWEST_HZ) & (frequency < MOST_HZ)
         damping = np.where(counts, -values.real / np.maximum(np.abs(values), 1e-9), np.inf).min(axis=1)
         below.plot(speed, 100.0 * damping, color=_LEFT, lw=1.6)
         below.axhline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))
         if study.critical.speed_mps is not None:
             below.axvline(3.6 * study.critical.speed_mps, color=_RIGHT, lw=1.1)
-        below.set_xlim(0.0, float(speed[-1]))
-        below.set_ylim(top=max(1.15 * 100.0 * float(damping.max()), 1.0))
-        below.set_xlabel("speed, km/h")
-        below.set_ylabel("least damping, %")
+        most = max(1.15 * 100.0 * float(damping.max()), 1.0)
+        below.set(xlim=(0.0, float(speed[-1])), ylim=(None, most))
+        below.set(xlabel="speed, km/h", ylabel="least damping, %")
         return to_svg(figure, description="Root locus over the speed, and the smallest damping ratio")

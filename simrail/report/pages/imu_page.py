@@ -12,7 +12,7 @@ from simrail.recording.sheets.allan import overlapping_allan
 from simrail.recording.sheets.datasheet import FIGURES
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuHead
-from simrail.report.figures.style import INK, legend_above, log_scale, look, panels, to_svg
+from simrail.report.figures.canvas import INK, legend_above, log_scale, look, panels, to_svg
 from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.imu_text import device_rows, triad_rows
 from simrail.sensors.imu import sample_imu

@@ -18,7 +18,7 @@ from simrail.report.pages.frame import page_text
 from simrail.report.pages.ride import ride_sections
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers import SECTIONS as PAPERS
-from simrail.report.tables.geometry_tables import geometry_table, overview_table
+from simrail.report.tables.geometry import geometry_table, overview_table
 from simrail.report.tables.pivot import Case
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
@@ -106,14 +106,7 @@ def _tracks(data: PageData) -> list[Section]:
         tracks.setdefault(track.name, track)
         stops.setdefault(track.name, {"start": float(position.iloc[0]), "end": float(position.iloc[-1])})
     shown = [
-        {
-            "name": name,
-            "synthetic": track.synthetic,
-            "length_m": track.length_m,
-            "plan": plan_figure(track, stops=stops[name]),
-            "profile": profile_figure(track),
-            "profile_words": profile_words(track),
-        }
+        (track, plan_figure(track, stops=stops[name]), profile_figure(track), profile_words(track))
         for name, track in tracks.items()
     ]
     return [_section("track", "Track", tracks=shown)]
@@ -133,22 +126,13 @@ def _scores(data: PageData) -> list[Section]:
 def _case(data: PageData, case: Case) -> dict[str, Any]:
     """The tables of one case."""
     labels = case.labels
-    title = [
-        f"{labels['ride']} \u00b7 IMU {labels['mount']} ({labels['imu']})",
-        f"odometry {labels['odometry']}",
-    ]
-    title += [
-        axis_words(name, value)
-        for name, value in labels.items()
-        if "." in name and not name.startswith("imu.grade")
-    ]
+    axes = {name: value for name, value in labels.items() if "." in name and not name.startswith("imu.grade")}
+    title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
-    words = (
-        f"mean \u00b1 standard deviation between {draws} draws of the sensors" if draws > 1 else "one draw"
-    )
+    words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     return {
-        "title": " \u00b7 ".join(title),
-        "draws": words + (f" over {tracks} draws of the track" if tracks > 1 else ""),
+        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in axes.items())]),
+        "draws": (words if draws > 1 else "one draw") + f" over {tracks} draws of the track" * (tracks > 1),
         "truth": error_table(case, data.attitude_styles, reference="truth"),
         "design": error_table(case, data.attitude_styles, reference="design"),
         "consistency": consistency_table(case, data.styles),
@@ -164,16 +148,12 @@ def _odometry(data: PageData) -> list[Section]:
 def _words(data: PageData) -> list[Section]:
     geometry = data.scenario.spec.geometry
     bands = [data.bands[name] for name in (*geometry.bands, *geometry.own_bands)]
-    return [
-        _section("words", "Words of this page", scenario=data.scenario, bands=bands, rails=bool(_rails(data)))
-    ]
+    shown = {"scenario": data.scenario, "bands": bands, "rails": bool(_rails(data))}
+    return [_section("words", "Words of this page", **shown)]
 
 
 def _parts(data: PageData) -> list[Section]:
-    rows = [
-        (part.what, part.name, part.synthetic, part.source)
-        for part in parts(data.scenario, data.cells, data.examples)
-    ]
+    rows = parts(data.scenario, data.cells, data.examples)
     return [_section("parts", "Parts and sources", parts=rows)]
 
 

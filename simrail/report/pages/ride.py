@@ -1,24 +1,40 @@
 """The sections of single rides: how each was driven, what was concluded from it, and how it errs."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from simrail.campaign.cell import CellResult
+from simrail.core.columns import IRREGULARITY
 from simrail.report.figures.attitude import attitude_figure, error_figure
+from simrail.report.figures.geometry import bands_figure, has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.figures.ride import direction_of, imu_figure, odometry_figure, speed_figure
 from simrail.report.figures.score import curves_figure, rms_figure
 from simrail.report.pages.section import PageData, Section
-from simrail.report.tables.geometry_view import MOST_DRAWN, geometry_view
-from simrail.report.tables.pivot import of_cell
+from simrail.report.tables.geometry import BAND, JUDGED, indicator_table, is_zero, judged_band, waves_words
+from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.pivot import Case, of_cell
+from simrail.report.tables.tables import Table
 from simrail.report.tables.tiles import tiles
 from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import axis_words, recording_facts
 from simrail.scenario.build import goals_mm, limits_of
+from simrail.track.bands import BANDS, Band, why_not
+from simrail.track.quality import Limits
 
 MOST_RIDES = 6
 """Rides that are drawn; the tables hold all."""
+
+LONG_M = 400.0
+"""Stretch that is drawn unfiltered."""
+
+WAVES = 5.0
+"""So many of the longest waves of a band are drawn of it: 125 m of D1."""
+
+MOST_DRAWN = 3
+"""Methods of one figure of rails; the tables hold all."""
 
 
 def ride_sections(data: PageData) -> list[Section]:
@@ -104,3 +120,68 @@ def ride_facts(example: CellResult) -> list[str]:
         f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
         *recording_facts(recording),
     ]
+
+
+def geometry_view(
+    example: CellResult,
+    case: Case | None,
+    styles: Sequence[MethodStyle],
+    *,
+    limits: Mapping[str, Limits],
+    known: Mapping[str, Band] = BANDS,
+) -> dict[str, Any] | None:
+    """What the template of rails shows; None if no method of the ride says what the rails look like.
+
+    Parameters
+    ----------
+    example : CellResult
+        The ride.
+    case : Case, optional
+        Its scores; they say in which band it is judged.
+    styles : sequence of MethodStyle
+        The scenario's methods.
+    limits : mapping of str to Limits
+        Limits of the indicators.
+    known : mapping of str to Band
+        The scenario's bands by name.
+    """
+    drawn = [s for s in styles if not is_zero(s) and has_rails(example, s)][:MOST_DRAWN]
+    if not drawn:
+        return None
+    first, band = drawn[0], known.get(judged_band(case)) if case is not None else None
+    if band is not None and not _holds(example, first, band):
+        band = None
+    stretches: dict[Band | None, float] = {None: LONG_M}
+    if band is not None:
+        stretches[band] = WAVES * max(band.edges_m(quantity)[1] for quantity in JUDGED)
+    rails = []
+    for part, length_m in stretches.items():
+        stretch = stretch_of(example, first.name, band=part, length_m=length_m)
+        words = f" {waves_words(part.name, known)}" if part else ", unfiltered"
+        what = f"Rails over distance{words}"
+        svg = rails_figure(example, drawn, band=part, limits=stretch, with_interval=not part, what=what)
+        rails.append((part is not None, f"{stretch_words(example, stretch)}{words}", svg))
+    return {
+        "methods": [style.label for style in drawn],
+        "rails": rails,
+        "bands": bands_figure(case, styles, known=known) if case is not None else "",
+        "indicators": _indicators(example, first, limits),
+        "limits": limits,
+        "band": BAND,
+    }
+
+
+def _holds(example: CellResult, style: MethodStyle, band: Band) -> bool:
+    """Whether a ride is long enough, and its places near enough to each other, for a band."""
+    geometry = example.estimates[style.name].geometry
+    assert geometry is not None
+    step = float(geometry.index[1] - geometry.index[0])
+    return not any(why_not(band.edges_m(q), count=len(geometry), step_m=step) for q in JUDGED)
+
+
+def _indicators(example: CellResult, style: MethodStyle, limits: Mapping[str, Limits]) -> Table | None:
+    geometry = example.estimates[style.name].geometry
+    if geometry is None or example.rails is None or not _holds(example, style, BANDS[BAND]):
+        return None
+    truth = example.rails.irregularities(geometry.index.to_numpy(dtype="float64"))[list(IRREGULARITY)]
+    return indicator_table(truth.set_index(geometry.index), geometry, limits=limits, band=BANDS[BAND])

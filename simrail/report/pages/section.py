@@ -10,7 +10,7 @@ import pandas as pd
 
 from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
-from simrail.report.tables.geometry_bands import band_of_all
+from simrail.report.tables.geometry import band_of_all
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, cases
 from simrail.scenario.build import bands_by_name

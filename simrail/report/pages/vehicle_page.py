@@ -7,7 +7,7 @@ import numpy as np
 
 from simrail.report.figures.vehicle import conicity_figure, locus_figure, pair_figure, shift_figure
 from simrail.report.pages.frame import page_text, write_page
-from simrail.report.tables.vehicle_text import amount, critical_words, listed
+from simrail.report.tables.vehicle_text import body_rows, critical_words, listed
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import Mode
 from simrail.vehicle.study import Conicity, VehicleStudy
@@ -22,7 +22,7 @@ def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
         contents=[item for item in contents.items() if study.conicity or item[0] != "contact"],
         model=model,
         tiles=_tiles(study),
-        bodies=_bodies(model),
+        bodies=body_rows(model),
         wheels=[
             (wheel.name, f"{load / 1e3:.4g}", f"{wheel.radius_m:g}", _turns(model, wheel.spin))
             for wheel, load in zip(model.wheels, study.wheel_load_n, strict=True)
@@ -55,19 +55,6 @@ def _tiles(study: VehicleStudy) -> list[tuple[str, str, str]]:
         note = f"equivalent, at {3.0 * contact.scale:.2g} mm"
         tiles.insert(2, ("conicity", f"{contact.at_3_mm:.3f}", note))
     return tiles
-
-
-def _bodies(model: VehicleModel) -> list[tuple[str, ...]]:
-    return [
-        (
-            body.name,
-            amount(body.mass_kg),
-            *(amount(value) for value in body.inertia_kgm2),
-            f"{body.position_m[0]:.3f}",
-            f"{body.position_m[2]:.3f}",
-        )
-        for body in model.bodies
-    ]
 
 
 def _turns(model: VehicleModel, spin: str) -> str:

@@ -19,7 +19,8 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any, Literal, TypeVar
+from types import ModuleType
+from typing import Any, Literal
 
 from jinja2 import Environment, StrictUndefined
 
@@ -27,15 +28,17 @@ from simrail.core.toml_files import Part
 from simrail.report.words.sentences import FILTERS
 from simrail.scenario.cells import Method
 
-Verdict = Literal["reproduced", "beaten", "not reproduced", "not asked"]
+Verdict = Literal["reproduced", "not reproduced", "not asked"]
 
 WORDS: dict[Verdict, tuple[str, str]] = {
     "reproduced": ("good", "Reproduces."),
-    "beaten": ("good", "Beaten."),
     "not reproduced": ("bad", "Does not reproduce."),
     "not asked": ("note", "Not asked."),
 }
-"""How the page marks a verdict, and says it. What is better than what was printed is beaten."""
+"""How the page marks a verdict, and says it."""
+
+_ENVIRONMENT = Environment(undefined=StrictUndefined)
+_ENVIRONMENT.filters |= FILTERS
 
 
 class Role(Part):
@@ -101,6 +104,12 @@ class Paper(Part):
         """How a part is called."""
         return self.parts[part].label
 
+    def written(self, text: str, **values: Any) -> str:
+        """Words of the paper, filled with its own data and with some values."""
+        own = {"limit": self.limits, "printed": self.printed, "figures": self.figures, "words": self.words}
+        label = {part: role.label for part, role in self.parts.items()}
+        return " ".join(_ENVIRONMENT.from_string(text).render(own, label=label, **values).split())
+
 
 def read_paper(name: str) -> Paper:
     """Read the data of a paper, ``papers/<name>/paper.toml``."""
@@ -131,18 +140,11 @@ class Claim:
         return WORDS[self.verdict][1]
 
 
-Evidence = TypeVar("Evidence")
-Judgement = tuple[bool | Verdict, Mapping[str, Any]]
-"""Whether a claim holds, or its verdict; and the numbers that its words need."""
+Judgement = tuple[bool, Mapping[str, Any]]
+"""Whether a claim holds, and the numbers that its words need."""
 
 
-def judged(
-    paper: Paper,
-    evidence: Evidence,
-    judges: Sequence[Callable[[Evidence, Sequence[str]], Judgement | None]],
-    *,
-    has: Callable[[str], bool],
-) -> list[Claim]:
+def judged(paper: Paper, evidence: object, judges: ModuleType, *, has: Callable[[str], bool]) -> list[Claim]:
     """Judge all claims of a paper, in its order.
 
     Parameters
@@ -151,39 +153,24 @@ def judged(
         Its data.
     evidence : object
         Our figures, as the judges of the paper take them.
-    judges : sequence of callable
+    judges : module
         Functions of the evidence and of the parts that a claim needs, called as their claims or as
-        `Statement.judge`; they return None where there is nothing to judge by.
+        `Statement.judge`, which return a `Judgement`, or None where there is nothing to judge by.
     has : callable
         Whether a part was run, and has figures throughout.
     """
-    environment = Environment(undefined=StrictUndefined)
-    environment.filters |= FILTERS
-    common = {
-        "limit": paper.limits,
-        "printed": paper.printed,
-        "figures": paper.figures,
-        "words": paper.words,
-        "label": {part: role.label for part, role in paper.parts.items()},
-    }
-    by_name = {judge.__name__: judge for judge in judges}
-
-    def written(text: str, values: Mapping[str, Any]) -> str:
-        return " ".join(environment.from_string(text).render(common, **values).split())
-
     claims = []
     for one in paper.claims:
-        says, printed, rule = (written(text, {}) for text in (one.says, one.printed, one.rule))
+        says, printed, rule = (paper.written(text) for text in (one.says, one.printed, one.rule))
         missing = [paper.label(part) for part in one.needs if not has(part)]
         judge = one.judge or one.key
-        judgement = None if missing else by_name[judge](evidence, one.needs)
+        judgement: Judgement | None = None if missing else getattr(judges, judge)(evidence, one.needs)
         if judgement is None:
             why = f"Not run: {', '.join(missing)}." if missing else one.unasked
             claims.append(Claim(one.key, says, printed, why, rule, "not asked"))
             continue
-        verdict, values = judgement
-        if isinstance(verdict, bool):
-            verdict = "reproduced" if verdict else "not reproduced"
-        ours, cause = (written(text, values) for text in (one.ours or paper.words[judge], one.cause))
+        holds, values = judgement
+        verdict: Verdict = "reproduced" if holds else "not reproduced"
+        ours, cause = (paper.written(text, **values) for text in (one.ours or paper.words[judge], one.cause))
         claims.append(Claim(one.key, says, printed, ours, rule, verdict, cause))
     return claims

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 
-from simrail.estimation.estimate import Estimator, description_of
+from simrail.estimation.estimate import description_of
 from simrail.scenario import cells
 from simrail.scenario.build import Parts
 from simrail.scenario.scenario import Scenario
@@ -25,29 +25,10 @@ _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"
 _MOST_ALIKE = 3
 """So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
 shades of it, which stay beside those of their twins."""
-_APART = (
-    "#0072B2",
-    "#D55E00",
-    "#56B4E9",
-    "#E69F00",
-    "#CC79A7",
-    "#332288",
-    "#882255",
-    "#7b5e2a",
-    "#999933",
-)
+_APART = ("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7", "#332288", "#882255", "#7b5e2a", "#999933")
 """Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
-_SPELLED = {
-    "sabatini": "Sabatini",
-    "yuan": "Yuan",
-    "ekf": "EKF",
-    "gda": "GDA",
-    "vqf": "VQF",
-    "ahrs": "AHRS",
-    "kf": "KF",
-    "imu": "IMU",
-}
+_SPELLED = {word.lower(): word for word in ("Sabatini", "Yuan", "EKF", "GDA", "VQF", "AHRS", "KF", "IMU")}
 
 
 @dataclass(frozen=True)
@@ -96,7 +77,8 @@ def readable(name: str) -> str:
 def method_styles(scenario: Scenario) -> dict[str, MethodStyle]:
     """Styles of a scenario's methods, by name, in their order."""
     methods, estimators = cells.methods(scenario), Parts(scenario).estimators(0)
-    compensated = {name: _compensated(estimator) for name, estimator in estimators.items()}
+    flags = {name: getattr(estimator, "compensated", None) for name, estimator in estimators.items()}
+    compensated = {name: flag if isinstance(flag, bool) else None for name, flag in flags.items()}
     styles: dict[str, MethodStyle] = {}
     seen: list[tuple[str, bool | None]] = []
     other_classes: list[str] = []
@@ -163,11 +145,6 @@ def _mixed(colour: str, share: float) -> str:
     """A colour with a share of white, or of black if it is negative."""
     red, green, blue = ((1.0 - abs(share)) * part + max(share, 0.0) for part in to_rgb(colour))
     return to_hex((red, green, blue))
-
-
-def _compensated(estimator: Estimator) -> bool | None:
-    flag = getattr(estimator, "compensated", None)
-    return flag if isinstance(flag, bool) else None
 
 
 def _is_twin(one: cells.Method, other: cells.Method, compensated: dict[str, bool | None]) -> bool:

@@ -82,11 +82,10 @@ def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Case]:
         return []
     axes = [str(n) for n in table.columns if n not in (*SCORE_COLUMNS, *AGGREGATE_COLUMNS)]
     keys = [*CASE_COLUMNS, *axes]
-    result = []
-    for values, rows in table.groupby(keys, observed=True, dropna=False, sort=False):
-        labels = {name: str(value) for name, value in zip(keys, values, strict=True)}
-        result.append(Case(labels, rows, _index(rows)))
-    return result
+    return [
+        Case({name: str(value) for name, value in zip(keys, values, strict=True)}, rows, _index(rows))
+        for values, rows in table.groupby(keys, observed=True, dropna=False, sort=False)
+    ]
 
 
 def of_cell(all_cases: list[Case], cell: dict[str, object]) -> Case | None:

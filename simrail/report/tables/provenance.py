@@ -1,8 +1,8 @@
 """Where the numbers of a campaign come from: which parts are synthetic, and how to make it again."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from contextlib import suppress
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -15,19 +15,8 @@ from simrail.track.rail_condition import FRICTION
 from simrail.vehicle.file import VehicleFile
 
 
-@dataclass(frozen=True)
-class Part:
-    """One part of the scenario.
-
-    Attributes
-    ----------
-    what, name : str
-        Kind and name.
-    synthetic : str
-        ``"synthetic"``, or what else it is.
-    source : str
-        What its file says of its source.
-    """
+class Part(NamedTuple):
+    """One part of the scenario: kind and name, ``"synthetic"`` or what else it is, its file's source."""
 
     what: str
     name: str
@@ -37,58 +26,42 @@ class Part:
 
 def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult]) -> list[Part]:
     """Every part that the campaign used, with its source."""
-    result: dict[tuple[str, str], Part] = {}
-    for example in examples:
-        track = example.recording.track
-        word = "synthetic" if track.synthetic else "as published"
-        result["track", track.name] = Part("track", track.name, word, track.source)
+    tracks = {example.recording.track.name: example.recording.track for example in examples}
+    result = [Part("track", name, _word(track.synthetic), track.source) for name, track in tracks.items()]
     irregularity = scenario.spec.irregularity
     if irregularity is not None:
         shortest, longest = irregularity.wavelengths_m
         source = f"random draw from the spectrum, wavelengths {shortest:g} to {longest:g} m"
-        spectrum = str(irregularity.spectrum)
-        result["irregularity", spectrum] = Part("irregularity", spectrum, "synthetic", source)
+        result.append(Part("irregularity", str(irregularity.spectrum), "synthetic", source))
     for at in scenario.spec.rail_condition:
-        where = f"{at.words}, {at.start_m:g} to {at.end_m:g} m"
         if at.condition is None:
             source = "friction as the scenario says"
         elif at.condition == "dry":
             source = "friction as the vehicle file says"
         else:
             source = f"friction {FRICTION[at.condition]:g}, a nominal value of this project"
-        result["rail condition", where] = Part("rail condition", where, "synthetic", source)
+        where = f"{at.words}, {at.start_m:g} to {at.end_m:g} m"
+        result.append(Part("rail condition", where, "synthetic", source))
     for name in _names(cells, "vehicle"):
-        try:
+        word, source = "synthetic", "a body that follows the rails exactly; no vehicle file"
+        with suppress(InputError):
             vehicle = load(VehicleFile, "vehicle", name, folder=scenario.folder)
-        except InputError:
-            source = "a body that follows the rails exactly; no vehicle file"
-            result["vehicle", name] = Part("vehicle", name, "synthetic", source)
-        else:
-            word = "synthetic" if vehicle.synthetic else "as published"
-            result["vehicle", name] = Part("vehicle", name, word, f"{vehicle.title}. {vehicle.source}")
+            word, source = _word(vehicle.synthetic), f"{vehicle.title}. {vehicle.source}"
+        result.append(Part("vehicle", name, word, source))
     for name in _names(cells, "imu"):
-        try:
+        with suppress(InputError):
             imu = load(ImuFile, "imu", name, folder=scenario.folder)
-        except InputError:
-            continue
-        assumed = f" Assumed: {imu.assumed}" if imu.assumed else ""
-        result["imu", name] = Part("IMU", name, "simulated", f"{imu.title} ({imu.source}).{assumed}")
-    return list(result.values())
+            assumed = f" Assumed: {imu.assumed}" if imu.assumed else ""
+            result.append(Part("IMU", name, "simulated", f"{imu.title} ({imu.source}).{assumed}"))
+    return list(dict.fromkeys(result))
+
+
+def _word(is_synthetic: bool) -> str:
+    return "synthetic" if is_synthetic else "as published"
 
 
 def _names(cells: pd.DataFrame, column: str) -> list[str]:
     return [str(name) for name in cells[column].unique()] if column in cells else []
-
-
-def facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """The manifest as pairs of words, what is long left to manifest.json."""
-    listed: list[tuple[str, str]] = []
-    for key, word in _WORDS.items():
-        value = manifest.get(key)
-        if value is None or value in ([], {}, ""):
-            continue
-        listed.append((word, value["told"] if key == "stop" else _plain(value)))
-    return listed
 
 
 _WORDS = {
@@ -109,6 +82,12 @@ _WORDS = {
     "versions": "versions",
     "platform": "platform",
 }
+
+
+def facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The manifest as pairs of words, what is long left to manifest.json."""
+    values = {key: manifest[key] for key in _WORDS if manifest.get(key) not in (None, [], {}, "")}
+    return [(_WORDS[k], value["told"] if k == "stop" else _plain(value)) for k, value in values.items()]
 
 
 def _plain(value: Any) -> str:

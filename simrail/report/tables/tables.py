@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, Mean
@@ -93,32 +94,24 @@ def method_row(style: MethodStyle, cells: list[Cell]) -> Row:
 
 def error_table(case: Case, styles: Sequence[MethodStyle], *, reference: str) -> Table:
     """Errors of every method in degrees; the best method under test and losses to 'design angles' marked."""
-    design = next((style.name for style in styles if not style.uses_imu), None)
-    columns = [c for c in _ERRORS if _is_there(case, styles, *c[:3], reference)]
-    marks: list[dict[str, str]] = []
-    for quantity, metric, window, _ in columns:
-        values = {
-            s.name: abs(case.get(s.name, quantity, metric, window=window, reference=reference).value)
-            for s in styles
-        }
-        tested = {s.name: values[s.name] for s in styles if s.uses_imu and values[s.name] >= 0.0}
-        floor = values.get(design or "", float("nan"))
-        mark = {name: "worse" for name, value in tested.items() if reference == "truth" and value > floor}
-        if tested:
-            # As they are shown: what reads the same is as good.
-            least = round(min(tested.values()), DECIMALS)
-            for name, value in tested.items():
-                if round(value, DECIMALS) == least:
-                    mark[name] = (mark.get(name, "") + " best").strip()
-        marks.append(mark)
-    rows = []
-    for style in styles:
-        cells = []
-        for (quantity, metric, window, _), mark in zip(columns, marks, strict=True):
-            mean = case.get(style.name, quantity, metric, window=window, reference=reference)
-            cells.append(mean_cell(mean, mark=mark.get(style.name, "")))
-        rows.append(method_row(style, cells))
-    return Table(_group_spans(columns), [word for *_, word in columns], rows)
+    means = {
+        column: [case.get(s.name, *column[:2], window=column[2], reference=reference) for s in styles]
+        for column in _ERRORS
+    }
+    means = {column: figures for column, figures in means.items() if any(mean.draws for mean in figures)}
+    cells: list[list[Cell]] = [[] for _ in styles]
+    for figures in means.values():
+        floor = next((abs(m.value) for s, m in zip(styles, figures, strict=True) if not s.uses_imu), math.nan)
+        tested = [abs(m.value) for s, m in zip(styles, figures, strict=True) if s.uses_imu]
+        # As they are shown: what reads the same is as good.
+        least = min((round(value, DECIMALS) for value in tested if value >= 0.0), default=math.nan)
+        for style, mean, row in zip(styles, figures, cells, strict=True):
+            own = abs(mean.value) if style.uses_imu else math.nan
+            marks = ["worse"] * (reference == "truth" and own > floor)
+            marks += ["best"] * (own >= 0.0 and round(own, DECIMALS) == least)
+            row.append(mean_cell(mean, mark=" ".join(marks)))
+    rows = [method_row(style, row) for style, row in zip(styles, cells, strict=True)]
+    return Table(_group_spans(list(means)), [word for *_, word in means], rows)
 
 
 def consistency_table(case: Case, styles: Sequence[MethodStyle]) -> Table:
@@ -165,12 +158,6 @@ def odometry_table(all_cases: Sequence[Case]) -> Table:
     return Table(groups, ["rms", "max", "final, %", "rms, moving", "interval, %"], rows)
 
 
-def _is_there(
-    case: Case, styles: Sequence[MethodStyle], quantity: str, metric: str, window: str, reference: str
-) -> bool:
-    return any(case.get(s.name, quantity, metric, window=window, reference=reference).draws for s in styles)
-
-
 _WORDS = {
     "roll": "roll error, \u00b0",
     "pitch": "pitch error, \u00b0",
@@ -179,11 +166,7 @@ _WORDS = {
 
 
 def _group_spans(columns: Sequence[tuple[str, str, str, str]]) -> list[tuple[str, int]]:
-    spans: list[tuple[str, int]] = []
-    for quantity, metric, _, _ in columns:
-        word = _WORDS[quantity] + (" rms" if metric == "rms" else "")
-        if spans and spans[-1][0] == word:
-            spans[-1] = (word, spans[-1][1] + 1)
-        else:
-            spans.append((word if metric == "rms" else "", 1))
-    return spans
+    """Title and width of columns of one quantity and metric; what is no rms has its title below."""
+    groups = groupby(columns, key=lambda column: column[:2])
+    spans = [(quantity, metric, len(list(group))) for (quantity, metric), group in groups]
+    return [(f"{_WORDS[quantity]} rms" if metric == "rms" else "", n) for quantity, metric, n in spans]

@@ -3,8 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, judged_band
-from simrail.report.tables.geometry_tables import baseline_of, is_zero, mappers, sd_of
+from simrail.report.tables.geometry import (
+    JUDGED,
+    QUANTITIES,
+    band_words,
+    baseline_of,
+    is_zero,
+    judged_band,
+    mappers,
+    sd_of,
+)
 from simrail.report.tables.methods import MethodStyle, attitude_methods
 from simrail.report.tables.pivot import Case
 from simrail.report.words.sentences import degrees, significant
@@ -46,20 +54,18 @@ def tiles(case: Case, styles: Sequence[MethodStyle], *, known: Mapping[str, Band
 def _rails(case: Case, styles: Sequence[MethodStyle], known: Mapping[str, Band]) -> list[Tile]:
     """Per quantity, the method that errs least in the band that the case is judged in, beside no IMU."""
     band, floor = judged_band(case), baseline_of(case, styles)
+    tested = [style for style in mappers(case, styles) if not is_zero(style)]
+    where = f"sd in {band_words(band, known)}" if band != FULL else "sd, unfiltered"
     result = []
     for quantity in JUDGED:
-        tested = {
-            s.label: sd_of(case, s, quantity, band=band) for s in mappers(case, styles) if not is_zero(s)
-        }
-        tested = {label: sd for label, sd in tested.items() if sd > 0.0}
-        if not tested:
-            continue
-        best = min(tested, key=lambda label: tested[label])
-        note = f"sd in {band_words(band, known)}" if band != FULL else "sd, unfiltered"
-        note += f"; best: {best}" if len(tested) > 1 else f", {best}"
-        if floor:
-            note += f"; no IMU: {significant(sd_of(case, floor, quantity, band=band))} mm"
-        result.append(Tile(f"{QUANTITIES[quantity]} error", f"{significant(tested[best])} mm", note))
+        sds = {style.label: sd_of(case, style, quantity, band=band) for style in tested}
+        sds = {label: sd for label, sd in sds.items() if sd > 0.0}
+        if sds:
+            best = min(sds, key=lambda label: sds[label])
+            note = f"{where}; best: {best}" if len(sds) > 1 else f"{where}, {best}"
+            if floor:
+                note += f"; no IMU: {significant(sd_of(case, floor, quantity, band=band))} mm"
+            result.append(Tile(f"{QUANTITIES[quantity]} error", f"{significant(sds[best])} mm", note))
     return result
 
 

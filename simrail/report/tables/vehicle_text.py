@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-import numpy as np
 from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import CriticalSpeed, Mode
 from simrail.vehicle.study import VehicleStudy
 
@@ -36,6 +36,20 @@ def listed(modes: list[Mode]) -> list[Mode]:
     return [m for m in modes if m.natural_frequency_hz < MOST_HZ and m.damping < 0.98]
 
 
+def body_rows(model: VehicleModel) -> list[tuple[str, ...]]:
+    """Name of each body, its mass and inertias, and where its centre of gravity lies."""
+    return [
+        (
+            body.name,
+            amount(body.mass_kg),
+            *(amount(value) for value in body.inertia_kgm2),
+            f"{body.position_m[0]:.3f}",
+            f"{body.position_m[2]:.3f}",
+        )
+        for body in model.bodies
+    ]
+
+
 def print_study(console: Console, study: VehicleStudy) -> None:
     """Print a study."""
     model = study.model
@@ -44,9 +58,8 @@ def print_study(console: Console, study: VehicleStudy) -> None:
     console.print(f"[dim]{escape(model.source)}[/dim]", highlight=False)
 
     bodies = _table("body", "mass\nkg", "roll\nkg m2", "pitch\nkg m2", "yaw\nkg m2", "height\nm")
-    for body in model.bodies:
-        inertia = [amount(value) for value in body.inertia_kgm2]
-        bodies.add_row(body.name, amount(body.mass_kg), *inertia, f"{body.position_m[2]:.3f}")
+    for *row, _, height in body_rows(model):
+        bodies.add_row(*row, height)
     console.print(bodies)
     mass = sum(body.mass_kg for body in model.bodies)
     loads = ", ".join(
@@ -60,31 +73,27 @@ def print_study(console: Console, study: VehicleStudy) -> None:
         modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", words)
     if modes.row_count:
         console.print(modes)
-
-    pair = model.wheel_rail
-    if study.conicity is None:
-        console.print("contact: prescribed and linear", highlight=False)
-    else:
-        told = ", ".join(
-            f"{1e3 * a:.2g} mm {value:.3f}"
-            for a, value in zip(study.conicity.amplitude_m, study.conicity.equivalent, strict=True)
-            if np.isclose(a / study.conicity.scale % 1e-3, 0.0, atol=1e-6)
-            or np.isclose(a / study.conicity.scale % 1e-3, 1e-3, atol=1e-6)
-        )
-        size = "" if pair.profile_scale == 1.0 else f" at {_ratio(pair.profile_scale)}"
-        console.print(
-            f"wheel {Path(pair.wheel_profile).name} on rail {Path(pair.rail_profile).name}{size}, "
-            f"gauge {1e3 * pair.gauge_m:g} mm, inclination {_ratio(pair.rail_inclination)}, "
-            "under static load",
-            highlight=False,
-        )
-        at = 3.0 * study.conicity.scale
-        console.print(
-            f"equivalent conicity at {at:.2g} mm: [bold]{study.conicity.at_3_mm:.3f}[/bold]; over the "
-            f"amplitude: {told}",
-            highlight=False,
-        )
+    for line in _contact_lines(study):
+        console.print(line, highlight=False)
     console.print(f"critical speed: [bold]{critical_words(study.critical)}[/bold]", highlight=False)
+
+
+def _contact_lines(study: VehicleStudy) -> list[str]:
+    pair, contact = study.model.wheel_rail, study.conicity
+    if contact is None:
+        return ["contact: prescribed and linear"]
+    size = "" if pair.profile_scale == 1.0 else f" at {_ratio(pair.profile_scale)}"
+    at_amplitudes = ", ".join(
+        f"{1e3 * amplitude:.2g} mm {value:.3f}"
+        for amplitude, value in zip(contact.amplitude_m, contact.equivalent, strict=True)
+        if abs(amplitude / contact.scale - 1e-3 * round(1e3 * amplitude / contact.scale)) < 1e-6
+    )
+    return [
+        f"wheel {Path(pair.wheel_profile).name} on rail {Path(pair.rail_profile).name}{size}, "
+        f"gauge {1e3 * pair.gauge_m:g} mm, inclination {_ratio(pair.rail_inclination)}, under static load",
+        f"equivalent conicity at {3.0 * contact.scale:.2g} mm: [bold]{contact.at_3_mm:.3f}[/bold]; over the "
+        f"amplitude: {at_amplitudes}",
+    ]
 
 
 def _ratio(inclination: float) -> str:

@@ -4,7 +4,7 @@ A sentence is written whether it flatters or not: where 'design angles only' bea
 so, and where compensation does not help it says that.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,9 +25,6 @@ _WINDOWS = {
 ALIKE = 0.01
 """Methods are alike if no figure of their attitude differs by more than this share of it."""
 
-_COMPARED = ("roll", "pitch", "yaw_debiased")
-_EVERYWHERE = ("whole", "straight", "transition", "curve", "standstill")
-
 MOST_NAMED = 3
 """So many methods have a sentence each; of more, sentences tell together."""
 
@@ -46,238 +43,205 @@ def findings(case: Case, styles: Sequence[MethodStyle], *, others: Sequence[Case
     """
     groups = alike(case, styles)
     like = {style.name for _, *rest in groups for style in rest}
-    told = [style for style in styles if style.name not in like]
+    unlike = [style for style in styles if style.name not in like]
     return [
         *_alike(groups),
-        *_compensation(case, told),
-        *_design_angles(case, told),
-        *_general_purpose(case, told),
-        *_floor(case, told, others),
-        *_consistency(case, told),
+        *_compensation(case, unlike),
+        *_design_angles(case, unlike),
+        *_general_purpose(case, unlike),
+        *_floor(case, unlike, others),
+        *_consistency(case, unlike),
         *_odometry(case),
         *_failures(case),
     ]
 
 
-def _alike(groups: Sequence[Sequence[MethodStyle]]) -> list[Finding]:
+def _rms(case: Case, name: str, quantity: str = "roll", *, window: str = "whole") -> float:
+    """Error of a method; NaN without any."""
+    return case.get(name, quantity, "rms", window=window).value
+
+
+def _alike(groups: Sequence[Sequence[MethodStyle]]) -> Iterator[Finding]:
     """Methods that the other sentences do not tell apart."""
-    result = []
     for group in groups:
         if len(group) > 1:
-            text = (
+            yield Finding(
+                "note",
                 f"The attitudes of {listed([style.label for style in group])} differ by less than "
                 f"{100.0 * ALIKE:g} %: what is said of {group[0].label} holds of "
-                f"{'both' if len(group) == 2 else 'all of them'}."
+                f"{'both' if len(group) == 2 else 'all of them'}.",
             )
-            result.append(Finding("note", text))
-    return result
 
 
-def _compensation(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
-    result = []
+def _compensation(case: Case, styles: Sequence[MethodStyle]) -> Iterator[Finding]:
     for style in styles:
-        if not (style.compensated and style.twin):
+        in_curves = case.get(style.name, "roll", "rms", window="curve").draws > 0
+        window, where = ("curve", "In curves") if in_curves else ("whole", "Over the whole ride")
+        own, without = (_rms(case, name, window=window) for name in (style.name, style.twin))
+        if not (style.compensated and own > 0.0 and without > 0.0):
             continue
-        window = "curve" if case.get(style.name, "roll", "rms", window="curve").draws else "whole"
-        where = "In curves" if window == "curve" else "Over the whole ride"
-        own = case.get(style.name, "roll", "rms", window=window).value
-        without = case.get(style.twin, "roll", "rms", window=window).value
-        if not (own > 0.0 and without > 0.0):
-            continue
-        name, ratio = style.kind, without / own
-        sizes = f"{degrees(without)} rms without to {degrees(own)} with it"
+        roll, ratio = f"the roll error of {style.kind}", without / own
+        sizes = f"from {degrees(without)} rms without to {degrees(own)} with it"
         if ratio >= 1.05:
-            text = (
-                f"{where}, compensation takes the roll error of {name} from {sizes}: {ratio:.1f} times less."
-            )
-            result.append(Finding("good", text))
+            yield Finding("good", f"{where}, compensation takes {roll} {sizes}: {ratio:.1f} times less.")
         else:
-            text = f"{where}, compensation does not reduce the roll error of {name}: it goes from {sizes}."
-            result.append(Finding("bad", text))
-    return result
+            yield Finding("bad", f"{where}, compensation does not reduce {roll}: it goes {sizes}.")
 
 
-def _design_angles(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
+def _design_angles(case: Case, styles: Sequence[MethodStyle]) -> Iterator[Finding]:
     design = next((style for style in styles if not style.uses_imu), None)
     if design is None:
-        text = "'Design angles only' was not run: whether a filter beats no IMU at all is not known."
-        return [Finding("note", text)]
-    result, unbeaten, baselines = [], [], []
-    beaten: dict[str, list[str]] = {}
-    for style in styles:
-        if not style.uses_imu or not case.get(style.name, "roll", "rms").draws:
-            continue
-        losses = [
-            loss
-            for quantity, word in _QUANTITIES.items()
-            if (loss := _loss(case, style, design, quantity, word))
-        ]
-        if losses and style.baseline:
-            baselines.append(f"{style.label} in {listed(losses)}")
-        elif losses:
-            beaten[style.label] = losses
-        else:
-            unbeaten.append(style.label)
-    if len(beaten) > MOST_NAMED:
-        result += _many_beaten(case, [style for style in styles if style.label in beaten], design)
-    else:
-        for label, losses in beaten.items():
-            text = f"'Design angles only', which uses no IMU, beats {label} in {listed(losses)}."
-            result.append(Finding("bad", text))
-    if baselines:
-        text = f"Of the baselines, 'design angles only' beats {'; '.join(baselines)}."
-        result.append(Finding("bad", text))
-    if unbeaten:
-        text = (
-            f"'Design angles only', which uses no IMU, nowhere beats {listed(unbeaten)}: neither "
-            "overall nor in any kind of track."
+        yield Finding(
+            "note", "'Design angles only' was not run: whether a filter beats no IMU at all is not known."
         )
-        result.insert(0, Finding("good", text))
-    return result
+        return
+    losses = {
+        style: [loss for quantity in _QUANTITIES if (loss := _loss(case, style, design, quantity))]
+        for style in styles
+        if style.uses_imu and case.get(style.name, "roll", "rms").draws
+    }
+    unbeaten = [style.label for style, lost in losses.items() if not lost]
+    beaten = [style for style, lost in losses.items() if lost and not style.baseline]
+    baselines = [f"{s.label} in {listed(lost)}" for s, lost in losses.items() if lost and s.baseline]
+    if unbeaten:
+        yield Finding(
+            "good",
+            f"'Design angles only', which uses no IMU, nowhere beats {listed(unbeaten)}: neither "
+            "overall nor in any kind of track.",
+        )
+    if len(beaten) > MOST_NAMED:
+        yield from _many_beaten(case, beaten, design)
+    else:
+        for style in beaten:
+            text = f"'Design angles only', which uses no IMU, beats {style.label} in {listed(losses[style])}."
+            yield Finding("bad", text)
+    if baselines:
+        yield Finding("bad", f"Of the baselines, 'design angles only' beats {'; '.join(baselines)}.")
 
 
-def _many_beaten(case: Case, styles: Sequence[MethodStyle], design: MethodStyle) -> list[Finding]:
+def _many_beaten(case: Case, styles: Sequence[MethodStyle], design: MethodStyle) -> Iterator[Finding]:
     """Where the design angles win over many methods: a sentence per quantity, without the sizes."""
-    result = []
     for quantity, word in _QUANTITIES.items():
-        floor = case.get(design.name, quantity, "rms").value
-        overall = [s.label for s in styles if floor < case.get(s.name, quantity, "rms").value]
-        lost = [s.label for s in styles if _loss(case, s, design, quantity, word)]
-        in_parts = [label for label in lost if label not in overall]
+        floor = _rms(case, design.name, quantity)
+        lost = [style for style in styles if _loss(case, style, design, quantity)]
+        overall = [style.label for style in lost if floor < _rms(case, style.name, quantity)]
+        in_parts = [style.label for style in lost if style.label not in overall]
         parts = [f"{listed(overall)} over the whole ride"] if overall else []
         parts += [f"{listed(in_parts)} in some kind of track"] if in_parts else []
         if parts:
             text = f"In {word}, 'design angles only', which uses no IMU, beats {', and '.join(parts)}."
-            result.append(Finding("bad", text))
-    return result
+            yield Finding("bad", text)
 
 
-def _loss(case: Case, style: MethodStyle, design: MethodStyle, quantity: str, word: str) -> str:
+def _loss(case: Case, style: MethodStyle, design: MethodStyle, quantity: str) -> str:
     """Where a method loses to the design angles in one quantity, in words; "" if nowhere."""
-    own = {
-        window: case.get(style.name, quantity, "rms", window=window).value for window in ("whole", *_WINDOWS)
-    }
-    floor = {window: case.get(design.name, quantity, "rms", window=window).value for window in own}
-    lost = [place for window, place in _WINDOWS.items() if floor[window] < own[window]]
+    word = _QUANTITIES[quantity]
+    own, floor = (
+        {window: _rms(case, name, quantity, window=window) for window in ("whole", *_WINDOWS)}
+        for name in (style.name, design.name)
+    )
     if not floor["whole"] < own["whole"]:
+        lost = [place for window, place in _WINDOWS.items() if floor[window] < own[window]]
         return f"{word} {listed(lost)}" if lost else ""
     won = [place for window, place in _WINDOWS.items() if own[window] < floor[window]]
     inside = f", though not {listed(won)}" if won else ""
     return f"{word} ({degrees(floor['whole'])} against {degrees(own['whole'])} rms{inside})"
 
 
-def _general_purpose(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
-    result = []
+def _general_purpose(case: Case, styles: Sequence[MethodStyle]) -> Iterator[Finding]:
     tested = [s for s in styles if not s.baseline and case.get(s.name, "roll", "rms").draws]
     if not tested:
-        return []
-    best = min(tested, key=lambda s: case.get(s.name, "roll", "rms").value)
-    own = case.get(best.name, "roll", "rms").value
+        return
+    best = min(tested, key=lambda style: _rms(case, style.name))
+    own = _rms(case, best.name)
     for style in styles:
-        value = case.get(style.name, "roll", "rms").value
-        if style.baseline == "general purpose" and value > 0.0:
-            verb, tone = ("is worse than", "good") if value > own else ("is better than", "bad")
-            text = (
-                f"The general-purpose filter {style.label} {verb} {best.label} in roll: "
-                f"{degrees(value)} against {degrees(own)} rms over the whole ride."
+        other = _rms(case, style.name)
+        if style.baseline == "general purpose" and other > 0.0:
+            word, tone = ("worse", "good") if other > own else ("better", "bad")
+            yield Finding(
+                tone,
+                f"The general-purpose filter {style.label} is {word} than {best.label} in roll: "
+                f"{degrees(other)} against {degrees(own)} rms over the whole ride.",
             )
-            result.append(Finding(tone, text))
-    return result
 
 
 _OF_THE_IMU = ("imu", "imu.grade", "mount", "case")
 """Labels in which the case of the ideal IMU differs by its nature; it may be an IMU of its own."""
 
 
-def _floor(case: Case, styles: Sequence[MethodStyle], others: Sequence[Case]) -> list[Finding]:
+def _floor(case: Case, styles: Sequence[MethodStyle], others: Sequence[Case]) -> Iterator[Finding]:
     if case.labels["imu"] == "ideal":
-        return []
+        return
     # The same ride in every other respect: speed, irregularity and whatever else there is an axis for.
-    same = [name for name in case.labels if name not in _OF_THE_IMU]
-    ideal = [
-        c for c in others if c.labels["imu"] == "ideal" and all(c.labels[k] == case.labels[k] for k in same)
-    ]
-    if not ideal:
+    same = {(name, label) for name, label in case.labels.items() if name not in _OF_THE_IMU}
+    ideal = next((c for c in others if c.labels["imu"] == "ideal" and same <= c.labels.items()), None)
+    if ideal is None:
         text = "No ideal IMU was run beside this one: what of the errors is the methods' own is not known."
-        return [Finding("note", text)]
-    sizes = {}
-    for style in styles:
-        own, least = (c.get(style.name, "roll", "rms").value for c in (case, ideal[0]))
-        if not style.baseline and own > 0.0 and least > 0.0:
-            sizes[style.label] = (least, own)
-    if not sizes:
-        return []
+        yield Finding("note", text)
+        return
+    sizes = {
+        style.label: (least, own)
+        for style in styles
+        if not style.baseline
+        and (own := _rms(case, style.name)) > 0.0
+        and (least := _rms(ideal, style.name)) > 0.0
+    }
+    words = [f"{label} {degrees(least)} instead of {degrees(own)}" for label, (least, own) in sizes.items()]
+    parts = f"{'; '.join(words)} rms."
     if len(sizes) > MOST_NAMED:
         with_ideal, with_own = (
-            f"{degrees(min(values))} to {degrees(max(values))}"
-            for values in zip(*sizes.values(), strict=True)
+            f"{degrees(min(rms))} to {degrees(max(rms))}" for rms in zip(*sizes.values(), strict=True)
         )
-        told = f"{with_ideal} rms, by method, instead of {with_own}."
-    else:
-        told = "; ".join(
-            f"{label} {degrees(least)} instead of {degrees(own)}" for label, (least, own) in sizes.items()
-        )
-        told = f"{told} rms."
-    return [Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {told}")]
+        parts = f"{with_ideal} rms, by method, instead of {with_own}."
+    if sizes:
+        yield Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {parts}")
 
 
-def _consistency(case: Case, styles: Sequence[MethodStyle]) -> list[Finding]:
+def _consistency(case: Case, styles: Sequence[MethodStyle]) -> Iterator[Finding]:
     shares = {}
     for style in styles:
-        covered = {q: case.get(style.name, q, "coverage95") for q in ("roll", "pitch")}
-        known = {q: c.value for q, c in covered.items() if c.draws}
-        if known and not style.baseline:
-            shares[style.label] = known
+        covered = {angle: case.get(style.name, angle, "coverage95") for angle in ("roll", "pitch")}
+        held = {angle: share.value for angle, share in covered.items() if share.draws}
+        if held and not style.baseline:
+            shares[style.label] = held
     if len(shares) > MOST_NAMED:
-        return _many_intervals({label: min(known.values()) for label, known in shares.items()})
-    result = []
-    for label, known in shares.items():
-        parts = [f"the true {quantity} in {100.0 * share:.0f} %" for quantity, share in known.items()]
-        tone, verdict = interval_verdict(min(known.values()))
+        # A sentence per verdict, each method with the worse of roll and pitch.
+        by_verdict: dict[tuple[str, str], list[str]] = {}
+        for label, held in shares.items():
+            worse = min(held.values())
+            words = f"{label} ({100.0 * worse:.0f} % inside)"
+            by_verdict.setdefault(interval_verdict(worse), []).append(words)
+        for (tone, verdict), named in by_verdict.items():
+            yield Finding(tone, f"The 95 % interval of roll or pitch is {verdict} with {listed(named)}.")
+        return
+    for label, held in shares.items():
+        parts = [f"the true {angle} in {100.0 * share:.0f} %" for angle, share in held.items()]
+        tone, verdict = interval_verdict(min(held.values()))
         text = f"The 95 % interval of {label} holds {listed(parts)} of the samples: "
-        result.append(Finding(tone, f"{text}the standard deviations that it claims are {verdict}."))
-    return result
+        yield Finding(tone, f"{text}the standard deviations that it claims are {verdict}.")
 
 
-def _many_intervals(shares: dict[str, float]) -> list[Finding]:
-    """The same of many methods: a sentence per verdict, each method with the worse of roll and pitch."""
-    by_verdict: dict[tuple[str, str], list[str]] = {}
-    for label, share in shares.items():
-        by_verdict.setdefault(interval_verdict(share), []).append(f"{label} ({100.0 * share:.0f} % inside)")
-    return [
-        Finding(tone, f"The 95 % interval of roll or pitch is {verdict} with {listed(named)}.")
-        for (tone, verdict), named in by_verdict.items()
-    ]
-
-
-def _odometry(case: Case) -> list[Finding]:
-    result = []
+def _odometry(case: Case) -> Iterator[Finding]:
     for name in case.estimators():
         if name.startswith("odometry:"):
-            error, last = case.get(name, "position", "rms").value, case.get(name, "position", "max").value
+            rms, largest = (case.get(name, "position", metric).value for metric in ("rms", "max"))
             # A scenario says which metrics it keeps.
-            known = {"rms": error, "at most": last}
-            sizes = [
-                f"{significant(size)} m {word}" if word == "rms" else f"{word} {significant(size)} m"
-                for word, size in known.items()
-                if size >= 0.0
-            ]
-            if not sizes:
-                continue
+            sizes = [f"{significant(rms)} m rms"] * (rms >= 0.0)
+            sizes += [f"at most {significant(largest)} m"] * (largest >= 0.0)
             source = name.removeprefix("odometry:")
-            told = ", the true one: an ablation, not something that a train has" if source == "truth" else ""
-            text = (
-                f"All methods take position and speed from the odometry '{source}'{told}; "
-                f"its position error is {listed(sizes)}."
-            )
-            result.append(Finding("note", text))
-    return result
+            note = ", the true one: an ablation, not something that a train has" if source == "truth" else ""
+            if sizes:
+                yield Finding(
+                    "note",
+                    f"All methods take position and speed from the odometry '{source}'{note}; "
+                    f"its position error is {listed(sizes)}.",
+                )
 
 
-def _failures(case: Case) -> list[Finding]:
+def _failures(case: Case) -> Iterator[Finding]:
     empty = case.table[(case.table["failed"] > 0) & (case.table["window"].astype(str) == "whole")]
-    names = [str(name) for name in empty["estimator"].unique()]
-    return [Finding("bad", f"{name} has no value for some figures; see 'What failed'.") for name in names]
+    for name in empty["estimator"].unique():
+        yield Finding("bad", f"{name} has no value for some figures; see 'What failed'.")
 
 
 def alike(case: Case, styles: Sequence[MethodStyle]) -> list[list[MethodStyle]]:
@@ -290,13 +254,17 @@ def alike(case: Case, styles: Sequence[MethodStyle]) -> list[list[MethodStyle]]:
         if style.baseline:
             continue
         own = _figures(case, style)
-        for group in groups:
-            first = _figures(case, group[0])
-            if np.isfinite(own).any() and np.allclose(own, first, rtol=ALIKE, atol=0.0, equal_nan=True):
-                group.append(style)
-                break
-        else:
+        like = (
+            group
+            for group in groups
+            if np.isfinite(own).any()
+            and np.allclose(own, _figures(case, group[0]), rtol=ALIKE, atol=0.0, equal_nan=True)
+        )
+        group = next(like, None)
+        if group is None:
             groups.append([style])
+        else:
+            group.append(style)
     return groups
 
 
@@ -310,6 +278,7 @@ def one_of_each(case: Case, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
 
 
 def _figures(case: Case, style: MethodStyle) -> FloatArray:
-    errors = [case.get(style.name, q, "rms", window=w).value for q in _COMPARED for w in _EVERYWHERE]
-    held = [case.get(style.name, quantity, "coverage95").value for quantity in _COMPARED]
+    windows = ("whole", *_WINDOWS)
+    errors = [_rms(case, style.name, q, window=window) for q in _QUANTITIES for window in windows]
+    held = [case.get(style.name, quantity, "coverage95").value for quantity in _QUANTITIES]
     return np.array([*errors, *held])

@@ -2,16 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from simrail.report.tables.geometry_bands import BAND, JUDGED, QUANTITIES, judged_band, waves_words
-from simrail.report.tables.geometry_tables import (
+from simrail.report.tables.geometry import (
+    BAND,
+    JUDGED,
+    QUANTITIES,
     baseline_of,
     behind_baseline,
     is_zero,
+    judged_band,
     main_of,
     mappers,
     sd_of,
+    waves_words,
 )
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case
@@ -50,14 +52,20 @@ def geometry_findings(
     if main is None:
         return []
     where = waves_words(band, known)
-    where = where[:1].upper() + where[1:]
+    twins = {
+        "with the true position": _twin(case, others, odometry=True),
+        "with an ideal IMU": _twin(case, others, imu=True),
+        "with both, which is the vehicle between IMU and rails, and the method": _twin(
+            case, others, odometry=True, imu=True
+        ),
+    }
     result = []
     for quantity in JUDGED:
         own, words = sd_of(case, main, quantity, band=band), QUANTITIES[quantity]
         if not own > 0.0:
             continue
-        text = f"{where}, the {words} of {main.label} is off by {significant(own)} mm (sd)"
-        tone = "note"
+        tone, text = "note", f"{where[:1].upper()}{where[1:]}, the {words} of {main.label}"
+        text += f" is off by {significant(own)} mm (sd)"
         if floor:
             zero = sd_of(case, floor, quantity, band=band)
             tone = "good" if own < zero else "bad"
@@ -67,22 +75,10 @@ def geometry_findings(
             tone = "bad" if own > goal else tone
             over = f"missed by {significant(own - goal)} mm" if own > goal else "kept"
             text += f". Asked were {goal:g} mm: {over}"
-        parts = []
-        for name, words_of in (("odometry", "with the true position"), ("imu", "with an ideal IMU")):
-            twin = _twin(case, others, name)
-            least = sd_of(twin, main, quantity, band=band) if twin else np.nan
-            if least > 0.0:
-                parts.append(f"{significant(least)} mm {words_of}")
-        both = _twin(case, others, "both")
-        least = sd_of(both, main, quantity, band=band) if both else np.nan
-        if least > 0.0:
-            parts.append(
-                f"{significant(least)} mm with both, which is the vehicle between IMU and rails, and the "
-                "method"
-            )
+        sds = {name: sd_of(twin, main, quantity, band=band) for name, twin in twins.items() if twin}
+        parts = [f"{significant(sd)} mm {name}" for name, sd in sds.items() if sd > 0.0]
         text += f". It would be {', '.join(parts)}." if parts else "."
-        text += _beside(case, styles, quantity, band=band)
-        result.append(Finding(tone, text))
+        result.append(Finding(tone, text + _beside(case, styles, quantity, band=band)))
     return result + _lost(case, styles, band) + _coverage(case, main, band, known)
 
 
@@ -90,17 +86,18 @@ def _beside(case: Case, styles: Sequence[MethodStyle], quantity: str, *, band: s
     """What the other methods under test err by: all of a few, else the best and the worst."""
     _, *rest = [style for style in mappers(case, styles) if not is_zero(style)]
     sds = {style.label: sd_of(case, style, quantity, band=band) for style in rest}
-    sds = {label: sd for label, sd in sds.items() if sd > 0.0}
-    if not sds:
+    by = {label: f"by {significant(sd)} mm" for label, sd in sds.items() if sd > 0.0}
+    if not by:
         return ""
-    if len(sds) <= MOST_OTHERS:
-        first, *more = [(label, f"by {significant(sd)} mm") for label, sd in sds.items()]
-        told = [f"That of {first[0]} is off {first[1]}", *(f"that of {label} {by}" for label, by in more)]
-        return f" {listed(told)}."
-    best, worst = (choose(sds, key=lambda label: sds[label]) for choose in (min, max))
+    if len(by) <= MOST_OTHERS:
+        (first, its), *more = by.items()
+        return (
+            f" {listed([f'That of {first} is off {its}', *(f'that of {one} {own}' for one, own in more)])}."
+        )
+    best, worst = (choose(by, key=lambda label: sds[label]) for choose in (min, max))
     return (
-        f" Of the {len(sds)} other methods, that of {best} is off the least, by {significant(sds[best])} mm, "
-        f"and that of {worst} the most, by {significant(sds[worst])} mm."
+        f" Of the {len(by)} other methods, that of {best} is off the least, {by[best]}, and that of {worst} "
+        f"the most, {by[worst]}."
     )
 
 
@@ -120,43 +117,35 @@ def _coverage(case: Case, main: MethodStyle, band: str, known: Mapping[str, Band
 
     Those of the band that counts where the method has them, else those of the unfiltered rails.
     """
-    told, tones = [], []
-    if not any(case.get(main.name, quantity, "coverage95", band=band).draws for quantity in JUDGED):
-        band = FULL
-    for quantity in JUDGED:
-        covered = case.get(main.name, quantity, "coverage95", band=band)
-        if not covered.draws:
-            continue
-        tone, verdict = interval_verdict(covered.value)
-        told.append(f"the true {QUANTITIES[quantity]} in {100.0 * covered.value:.0f} %: {verdict}")
-        tones.append(tone)
-    if not told:
-        return []
-    worst = next(tone for tone in ("bad", "note", "good") if tone in tones)
-    where = "of the unfiltered rails" if band == FULL else waves_words(band, known)
-    text = f"The 95 % interval of {main.label}, {where}, holds {'; '.join(told)}."
-    return [Finding(worst, text)]
+    for name in (band, FULL):
+        covered = {quantity: case.get(main.name, quantity, "coverage95", band=name) for quantity in JUDGED}
+        shares = {quantity: share.value for quantity, share in covered.items() if share.draws}
+        if shares:
+            verdicts = {quantity: interval_verdict(share) for quantity, share in shares.items()}
+            parts = [
+                f"the true {QUANTITIES[quantity]} in {100.0 * share:.0f} %: {verdicts[quantity][1]}"
+                for quantity, share in shares.items()
+            ]
+            tones = [tone for tone, _ in verdicts.values()]
+            worst = next(tone for tone in ("bad", "note", "good") if tone in tones)
+            where = "of the unfiltered rails" if name == FULL else waves_words(name, known)
+            return [Finding(worst, f"The 95 % interval of {main.label}, {where}, holds {'; '.join(parts)}.")]
+    return []
 
 
-def _twin(case: Case, others: Sequence[Case], what: str) -> Case | None:
+def _twin(case: Case, others: Sequence[Case], *, imu: bool = False, odometry: bool = False) -> Case | None:
     """The case that differs in an ideal IMU, the true odometry, or both; None if there is none."""
-    if case.labels["imu"] == "ideal" or case.labels["odometry"] == "truth":
+    own = case.labels
+    if own["imu"] == "ideal" or own["odometry"] == "truth":
         return None
-    mount = case.labels["mount"]
-    wanted = dict(case.labels)
     for other in others:
         labels = other.labels
-        is_ideal = labels["imu"] == "ideal"
-        same_mount = labels["mount"] in (mount, f"{mount}_ideal")
-        if not same_mount or any(labels[k] != wanted[k] for k in ("ride", "vehicle")):
-            continue
-        odometry_true = labels["odometry"] == "truth"
-        same_odometry = labels["odometry"] == wanted["odometry"]
-        fits = {
-            "odometry": odometry_true and labels["imu"] == wanted["imu"],
-            "imu": is_ideal and same_odometry,
-            "both": is_ideal and odometry_true,
-        }
-        if fits[what]:
+        fits = (
+            labels["mount"] in (own["mount"], f"{own['mount']}_ideal")
+            and all(labels[name] == own[name] for name in ("ride", "vehicle"))
+            and labels["imu"] == ("ideal" if imu else own["imu"])
+            and labels["odometry"] == ("truth" if odometry else own["odometry"])
+        )
+        if fits:
             return other
     return None

@@ -70,13 +70,19 @@ UNITS = {
 """Units by the ends of names."""
 
 
+def axis_name(name: str) -> tuple[str, str]:
+    """Words and unit of an axis: ``ride.speed_kmh`` is the speed in km/h; a unit of "" for none."""
+    *words, last = name.rpartition(".")[2].split("_")
+    if words and last in UNITS:
+        return " ".join(words), UNITS[last]
+    return " ".join([*words, last]), ""
+
+
 def axis_words(name: str, value: object) -> str:
     """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
-    *words, last = name.rpartition(".")[2].split("_")
+    words, unit = axis_name(name)
     shown = f"{value:g}" if isinstance(value, float) else str(value)
-    if words and last in UNITS:
-        return f"{' '.join(words)} {shown} {UNITS[last]}"
-    return f"{' '.join([*words, last])} {shown}"
+    return f"{words} {shown} {unit}".rstrip()
 
 
 def recording_facts(recording: Recording) -> list[str]:

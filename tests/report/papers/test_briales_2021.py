@@ -18,8 +18,9 @@ from simrail.campaign.result import CampaignResult
 from simrail.core.errors import InputError
 from simrail.report.pages.page import write_report
 from simrail.report.pages.section import PageData
+from simrail.report.papers.briales_2021 import judges
 from simrail.report.papers.briales_2021.figures import spread_of
-from simrail.report.papers.briales_2021.judges import JUDGES, TIME_CONSTANTS_S, Evidence
+from simrail.report.papers.briales_2021.judges import TIME_CONSTANTS_S, Evidence
 from simrail.report.papers.briales_2021.rides import GENERAL_PURPOSE, PAPER, Rides, rides_of
 from simrail.report.papers.briales_2021.section import section
 from simrail.report.papers.claim import Claim, judged
@@ -123,7 +124,7 @@ def planted(change: Change = lambda part, ride, quantity: 1.0, *, without: tuple
 
 def verdicts(rides: Rides, spread: dict[str, float] = SPREAD) -> dict[str, Claim]:
     """All claims by key."""
-    claims = judged(PAPER, Evidence(rides, spread, 13.0), JUDGES, has=rides.has)
+    claims = judged(PAPER, Evidence(rides, spread, 13.0), judges, has=rides.has)
     return {claim.key: claim for claim in claims}
 
 

@@ -23,19 +23,19 @@ from simrail.estimators.tuning.space import (
 )
 
 from simrail.campaign.campaign import run_campaign
-from simrail.campaign.cell import CellResult
+from simrail.campaign.result import CampaignResult
 from simrail.core.columns import IRREGULARITY
 from simrail.core.seeds import stream
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.report.pages.page import write_report
 from simrail.report.pages.section import PageData
 from simrail.report.papers.claim import Claim, judged
-from simrail.report.papers.gonzalez_2023.judges import JUDGES, Evidence, Peak, errata_note
+from simrail.report.papers.gonzalez_2023 import judges
+from simrail.report.papers.gonzalez_2023.judges import Evidence, Peak, errata_note
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, rows_of
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, section
 from simrail.report.papers.gonzalez_2023.tunings import by_part, notes, status_table, tunings_of
-from simrail.report.tables.geometry_bands import QUANTITIES
-from simrail.report.tables.geometry_tables import geometry_table, indicator_table, overview_table
+from simrail.report.tables.geometry import QUANTITIES, geometry_table, indicator_table, overview_table
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.report.words.geometry_findings import geometry_findings
@@ -45,6 +45,9 @@ from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.track.bands import BANDS
 from simrail.track.quality import Limits
+
+Ran = tuple[Scenario, CampaignResult, Path]
+"""A scenario, its result, and its page."""
 
 
 def style(name: str, *, baseline: str = "") -> MethodStyle:
@@ -160,7 +163,7 @@ def verdicts(
     peak: Peak = PEAK,
     tuning: Tuning | None = None,
 ) -> dict[str, Claim]:
-    claims = judged(PAPER, Evidence(rows, coverage, peak, tuning), JUDGES, has=rows.has)
+    claims = judged(PAPER, Evidence(rows, coverage, peak, tuning), judges, has=rows.has)
     return {claim.key: claim for claim in claims}
 
 
@@ -445,7 +448,7 @@ method = "ZeroTrack"
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scenario, object, Path]:
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
         patch.setattr("simrail.ride.cache.cache_folder", lambda: folder)
@@ -470,7 +473,7 @@ def view_of(data: PageData) -> SimpleNamespace:
     return SimpleNamespace(**made.data)
 
 
-def test_the_page_shows_rails_and_the_section(ran: tuple[Scenario, object, Path]) -> None:
+def test_the_page_shows_rails_and_the_section(ran: Ran) -> None:
     page = ran[2].read_text(encoding="utf-8")
     for words in (
         "Beside Gonzalez-Carbajal et al. 2023",
@@ -489,9 +492,9 @@ def test_the_page_shows_rails_and_the_section(ran: tuple[Scenario, object, Path]
     assert "What failed" not in page
 
 
-def test_the_section_counts_coverage_as_the_paper_does(ran: tuple[Scenario, object, Path]) -> None:
+def test_the_section_counts_coverage_as_the_paper_does(ran: Ran) -> None:
     _, result, _ = ran
-    example: CellResult = result.examples[0]  # type: ignore[attr-defined]
+    example = result.examples[0]
     assert example.rails is not None
     geometry = example.estimates["smoother"].geometry
     assert geometry is not None
@@ -505,11 +508,11 @@ def test_the_section_counts_coverage_as_the_paper_does(ran: tuple[Scenario, obje
     assert coverage_of(wrong, style("smoother"), FULL_SIZE)[:2] == pytest.approx([0.0, 0.0], abs=0.5)
 
 
-def test_the_section_holds_printed_and_own_rows(ran: tuple[Scenario, object, Path]) -> None:
+def test_the_section_holds_printed_and_own_rows(ran: Ran) -> None:
     scenario, result, _ = ran
-    scores, cell_table = result.scores, result.cells  # type: ignore[attr-defined]
+    scores, cell_table = result.scores, result.cells
     all_cases = cases(scores, cell_table)
-    view = view_of(PageData(scenario, scores, cell_table, result.examples, {}))  # type: ignore[attr-defined]
+    view = view_of(PageData(scenario, scores, cell_table, result.examples, {}))
     labels = [row.label for row in view.tables.rows]
     assert "KOM: printed" in labels and "KOM: ours" not in labels
     assert "CML: ours" in labels and "CML, noise added: ours" in labels
@@ -519,30 +522,24 @@ def test_the_section_holds_printed_and_own_rows(ran: tuple[Scenario, object, Pat
     assert own.cells[1].text == f"{rows.get('hand', 'cross_level', 'sd', filtered=False).value:.3f}"
     assert {len(row.cells) for row in view.tables.rows} == {12}
     noisy = view.tables.rows[labels.index("CML, noise added: ours")]
-    found = next(c for c in all_cases if c.labels["mount"] == "axle_noise").get(
-        "smoother_cml", "cross_level", "sd"
-    )
-    assert (
-        noisy.cells[1].text
-        == f"{found.value:.3f}"
-        != view.tables.rows[labels.index("CML: ours")].cells[1].text
-    )
+    loud = next(c for c in all_cases if c.labels["mount"] == "axle_noise")
+    found = loud.get("smoother_cml", "cross_level", "sd")
+    quiet = view.tables.rows[labels.index("CML: ours")]
+    assert noisy.cells[1].text == f"{found.value:.3f}" != quiet.cells[1].text
     assert section(PageData(scenario, scores.iloc[:0], cell_table, [], {})) == []
 
 
 @pytest.mark.parametrize(("size_m", "held"), [(1e-9, "0"), (1.0, "100")])
-def test_the_interval_by_draws_is_of_the_filtered_rails_alone(
-    ran: tuple[Scenario, object, Path], size_m: float, held: str
-) -> None:
+def test_the_interval_by_draws_is_of_the_filtered_rails_alone(ran: Ran, size_m: float, held: str) -> None:
     """Draws that are tiny, or huge, hold nothing or all of the filtered rails; others stay as they are."""
     scenario, result, _ = ran
-    example: CellResult = result.examples[0]  # type: ignore[attr-defined]
+    example = result.examples[0]
     estimate = example.estimates["smoother"]
     assert estimate.geometry is not None
     shape = (20, len(estimate.geometry), len(IRREGULARITY))
     drawn = replace(estimate, geometry_draws=size_m * stream(1, "draws").standard_normal(shape))
     examples = [replace(example, estimates={**example.estimates, "smoother": drawn})]
-    view = view_of(PageData(scenario, result.scores, result.cells, examples, {}))  # type: ignore[attr-defined]
+    view = view_of(PageData(scenario, result.scores, result.cells, examples, {}))
     rows = {row.label: [cell.text for cell in row.cells] for row in view.coverage.rows}
     own, by_draws = rows["set by hand"], rows["set by hand: interval of the filtered rails, by draws"]
     for (_, filtered), one, other in zip(COLUMNS, own, by_draws, strict=True):
@@ -550,15 +547,13 @@ def test_the_interval_by_draws_is_of_the_filtered_rails_alone(
     assert len(rows) == 1 + 1 + len(["hand", "cml", "printed"])  # what has no draws has no row of them
 
 
-def test_the_own_ride_is_told_by_the_scores_of_that_ride(
-    ran: tuple[Scenario, object, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_own_ride_is_told_by_the_scores_of_that_ride(ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     """One draw was run, so the scores are of the own ride; twice of them are planted as the mean of two."""
     scenario, result, _ = ran
     found = tuned()
     assert found.search is not None
     search = replace(found.search, seed=3, fitted_on=("short: go, axle on front, made up",))
-    (case, *others) = cases(result.scores, result.cells)  # type: ignore[attr-defined]
+    (case, *others) = cases(result.scores, result.cells)
     doubled = replace(
         case,
         scores={
@@ -566,10 +561,10 @@ def test_the_own_ride_is_told_by_the_scores_of_that_ride(
             for key, one in case.scores.items()
         },
     )
-    data = PageData(scenario, result.scores, result.cells, result.examples, {})  # type: ignore[attr-defined]
+    data = PageData(scenario, result.scores, result.cells, result.examples, {})
     vars(data)["cases"] = [doubled, *others]
     tunings = {"smoother_cml": replace(found, search=search)}
-    monkeypatch.setattr("simrail.report.papers.gonzalez_2023.section.tunings_of", lambda *_: tunings)
+    monkeypatch.setattr("simrail.report.papers.gonzalez_2023.tunings.tunings_of", lambda *_: tunings)
     view = view_of(data)
     (note,) = [text for text in view.notes if "ride that was searched on" in text]
     sds = {

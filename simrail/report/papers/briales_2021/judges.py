@@ -181,13 +181,8 @@ def backward_ekf(seen: Evidence, parts: Sequence[str]) -> Judgement | None:
     }
     fails = ratios[parts[0]] >= LIMIT["fails_backward_factor"]
     apart = {part: _apart(rides, part) for part in shown}
-    values = {
-        "ratios": ratios,
-        "apart": apart,
-        "holds_its_way": not fails,
-        "wrong_sign_deg": seen.wrong_sign_deg,
-    }
-    return fails, values
+    beside = {"holds_its_way": not fails, "wrong_sign_deg": seen.wrong_sign_deg}
+    return fails, {"ratios": ratios, "apart": apart, **beside}
 
 
 def repeatability(seen: Evidence, _: Sequence[str]) -> Judgement | None:
@@ -197,19 +192,3 @@ def repeatability(seen: Evidence, _: Sequence[str]) -> Judgement | None:
         return None
     ratio = spread["ekf_per_step"] / spread["gda_paper"]
     return ratio >= LIMIT["repeats_factor"], {"spread": spread, "ratio": ratio}
-
-
-JUDGES = (
-    commercial_yaw,
-    sabatini,
-    yuan,
-    compensation,
-    general_purpose,
-    gda_slightly_better,
-    same_yaw,
-    yaw_size,
-    size,
-    backward_gda,
-    backward_ekf,
-    repeatability,
-)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from simrail.report.papers.claim import read_paper
 from simrail.report.tables.pivot import Case
@@ -36,34 +37,26 @@ class Rides:
     def has(self, *parts: str) -> bool:
         """Whether all parts were run and have a roll error on every ride: only then they are judged."""
         return bool(self.cases) and all(
-            part in self.names and bool(np.isfinite(self.each(part, "roll")).all()) for part in parts
+            part in self.names and all(np.isfinite(self.one(case, part, "roll")) for case in self.cases)
+            for part in parts
         )
 
     def present(self, parts: Sequence[str]) -> list[str]:
         """Those of some parts that can be judged."""
         return [part for part in parts if self.has(part)]
 
-    def each(
-        self, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"
-    ) -> list[float]:
-        """Rms of each ride, mean over its draws; NaN where there is none. Degrees."""
-        return [self.one(case, part, quantity, window=window, reference=reference) for case in self.cases]
-
     def one(
         self, case: Case, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"
     ) -> float:
-        """Rms on one ride, mean over its draws."""
+        """Rms on one ride, mean over its draws, degrees; NaN where there is none."""
         return case.get(self.names.get(part, ""), quantity, "rms", window=window, reference=reference).value
 
     def mean(
         self, part: str, quantity: str, *, window: str = "whole", reference: str = "truth"
     ) -> tuple[float, float]:
         """Mean and standard deviation over the rides of the rms, as the paper's Table 3 has it."""
-        values = np.array(self.each(part, quantity, window=window, reference=reference))
-        values = values[np.isfinite(values)]
-        if not len(values):
-            return float("nan"), float("nan")
-        return float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else float("nan")
+        rms = pd.Series([self.one(c, part, quantity, window=window, reference=reference) for c in self.cases])
+        return float(rms.mean()), float(rms.std())
 
     def as_printed(self, part: str, quantity: str) -> float:
         """Mean over the rides as in Table 3: against the design angles, cropped."""
@@ -71,12 +64,10 @@ class Rides:
 
     def by_speed(self) -> dict[str, list[Case]]:
         """Rides by their class of speed, km/h; a class without any is left out."""
-        classes = {"20": False, "70": True}
-        groups = {
-            kmh: [case for case in self.cases if is_fast(case.labels) == fast]
-            for kmh, fast in classes.items()
-        }
-        return {kmh: group for kmh, group in groups.items() if group}
+        groups: dict[str, list[Case]] = {}
+        for case in sorted(self.cases, key=lambda case: is_fast(case.labels)):
+            groups.setdefault("70" if is_fast(case.labels) else "20", []).append(case)
+        return groups
 
 
 FAST_KMH = 45.0

@@ -12,19 +12,18 @@ from simrail.campaign.cell import CellResult
 from simrail.report.figures.attitude import attitude_figure
 from simrail.report.figures.ride import direction_of
 from simrail.report.pages.section import PageData, Section
+from simrail.report.papers.briales_2021 import judges
 from simrail.report.papers.briales_2021.figures import (
     compensation_figure,
     repeatability_figure,
     rides_figure,
     spread_of,
 )
-from simrail.report.papers.briales_2021.judges import JUDGES, Evidence
 from simrail.report.papers.briales_2021.rides import PAPER, QUANTITIES, Rides, is_fast, rides_of
 from simrail.report.papers.briales_2021.terms import SLOW_PART_HZ, TERMS_RIDE, terms_table
 from simrail.report.papers.claim import judged
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
-from simrail.report.words.sentences import degrees
 
 _REPEATED = ("gda_paper", "ekf_per_step", "ekf")
 """Methods whose roll is laid over itself, ride upon ride."""
@@ -45,15 +44,14 @@ def section(data: PageData) -> list[Section]:
         for part in ("gda_paper", "ekf_per_step", "ekf_intensity", "gda", "ekf")
         if (name := rides.names.get(part)) and len(drawn) > 1 and all(name in e.estimates for e in drawn)
     }
-    evidence = Evidence(rides, spread, _wrong_sign_deg(drawn))
+    evidence = judges.Evidence(rides, spread, _wrong_sign_deg(drawn))
     shown = {
         "paper": PAPER,
         "design": _table(rides, looks, reference="design"),
         "truth": _table(rides, looks, reference="truth"),
         "draws": max(int(case.table["draws"].max()) for case in rides.cases),
-        "all_claims": judged(PAPER, evidence, JUDGES, has=rides.has),
-        "beside_design": _beside_design(rides),
-        "misprints": _misprints(rides),
+        "all_claims": judged(PAPER, evidence, judges, has=rides.has),
+        "notes": _notes(rides),
         **_terms(drawn),
         **_drawings(rides, looks, drawn),
     }
@@ -81,29 +79,19 @@ def _number(mean: float, sd: float) -> Cell:
     return number_cell(mean, decimals=3 if mean < 5.0 else 2, spread=sd)
 
 
-def _beside_design(rides: Rides) -> dict[str, Any]:
-    """Roll error of the design angles against the truth, and who loses to it or wins; {} without it."""
-    if not rides.has("design"):
-        return {}
-    floor = rides.mean("design", "roll")[0]
-    errors = {
-        part: rides.mean(part, "roll")[0] for part in rides.present(list(PAPER.parts)) if part != "design"
-    }
-    said = {part: f"{PAPER.label(part)} ({degrees(error)})" for part, error in errors.items()}
-    return {
-        "floor": floor,
-        "lost": [said[part] for part, error in errors.items() if error > floor],
-        "won": [said[part] for part, error in errors.items() if not error > floor],
-    }
-
-
-def _misprints(rides: Rides) -> list[str]:
-    """What the misprints of Eqs. 3 to 6 cost each method."""
-    return [
-        f"{own.upper()} from {' to '.join(degrees(rides.mean(part, 'roll')[0]) for part in (own, printed))}"
+def _notes(rides: Rides) -> list[str]:
+    """Who loses to the design angles against the truth and who wins, and what the misprints cost."""
+    notes = []
+    if rides.has("design"):
+        errors = {part: rides.mean(part, "roll")[0] for part in rides.present(list(PAPER.parts))}
+        floor = errors.pop("design")
+        notes.append(PAPER.written(PAPER.words["beside_design"], floor=floor, errors=errors))
+    changes = {
+        own.upper(): [rides.mean(part, "roll")[0] for part in (own, printed)]
         for own, printed in (("ekf", "ekf_printed"), ("gda", "gda_printed"))
         if rides.has(own, printed)
-    ]
+    }
+    return notes + ([PAPER.written(PAPER.words["misprints"], changes=changes)] if changes else [])
 
 
 def _terms(examples: Sequence[CellResult]) -> dict[str, Any]:

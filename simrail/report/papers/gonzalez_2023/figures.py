@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 from simrail.campaign.cell import CellResult
-from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
+from simrail.report.figures.geometry import has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.papers.gonzalez_2023.parts import PAPER, Rows
-from simrail.report.tables.geometry_view import with_rails
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.words.sentences import listed
 from simrail.track.bands import Band
@@ -15,26 +14,22 @@ DRAWN_M = 300.0
 
 
 def tuning_figures(looks: dict[str, MethodStyle], example: CellResult, band: Band) -> list[tuple[str, str]]:
-    """Our versions of Figs. A1 and A3."""
-    there = {part: style for part, style in looks.items() if part != "zero" and with_rails(example, [style])}
-    ride = example.recording.name
-    figures: list[tuple[str, str]] = []
-    first = [there[part] for part in ("cml", "kom", "hand") if part in there]
-    if first:
-        limits = stretch_of(example, first[0].name, band=band, length_m=DRAWN_M)
-        named = listed([style.label for style in first])
-        text = (
-            f"As Fig. A1: rails over {stretch_words(example, limits)} {ride}, filtered, as {named} "
-            f"find{'s' * (len(first) == 1)} them."
-        )
-        svg = rails_figure(example, first, band=band, limits=limits, with_interval=False, what=text)
-        figures.append((text, svg))
-        drawn = example.estimates[first[0].name].geometry_draws is not None
-        how = "which follows from draws of its error" if drawn else "that of unfiltered rails"
-        text = f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}."
-        svg = rails_figure(example, first[:1], band=band, limits=limits, with_interval=True, what=text)
-        figures.append((text, svg))
-    return figures
+    """Our versions of Figs. A1 and A3, of parts whose methods say what the rails look like."""
+    first = [looks[part] for part in ("cml", "kom", "hand") if part in looks]
+    if not first:
+        return []
+    limits = stretch_of(example, first[0].name, band=band, length_m=DRAWN_M)
+    has_draws = example.estimates[first[0].name].geometry_draws is not None
+    how = "which follows from draws of its error" if has_draws else "that of unfiltered rails"
+    texts = (
+        f"As Fig. A1: rails over {stretch_words(example, limits)} {example.recording.name}, filtered, as "
+        f"{listed([style.label for style in first])} find{'s' * (len(first) == 1)} them.",
+        f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}.",
+    )
+    return [
+        (text, rails_figure(example, drawn, band=band, limits=limits, with_interval=with_interval, what=text))
+        for text, drawn, with_interval in zip(texts, (first, first[:1]), (False, True), strict=True)
+    ]
 
 
 def noise_figure(
@@ -42,7 +37,7 @@ def noise_figure(
 ) -> list[tuple[str, str]]:
     """Our version of Fig. A2: CML without and with noise added to the IMU; [] where one is missing."""
     quiet, loud = looks.get("cml"), looks.get(rows.played_by("cml_noise"))
-    if quiet is None or loud is None or not (with_rails(example, [quiet]) and with_rails(noisy, [loud])):
+    if quiet is None or loud is None or not (has_rails(example, quiet) and has_rails(noisy, loud)):
         return []
     # The two are of two recordings: for one figure, the second goes beside the first under its own name.
     role = PAPER.parts["cml_noise"]

@@ -8,8 +8,7 @@ from simrail.estimators.tuning.file import Tuning
 from simrail.report.papers.claim import Judgement
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, Rows, column_words
 from simrail.report.papers.gonzalez_2023.tunings import EDGES
-from simrail.report.tables.geometry_bands import QUANTITIES
-from simrail.report.words.sentences import significant
+from simrail.report.tables.geometry import JUDGED, QUANTITIES
 
 LIMIT = PAPER.limits
 
@@ -96,28 +95,16 @@ def intervals(seen: Evidence, _: Sequence[str]) -> Judgement | None:
     return not wide_enough and wide, values
 
 
-JUDGES = (constraint, alike, peak, intervals)
-
-
 def errata_note(rows: Rows) -> str:
     """What the misprints of the equations cost; "" if it was not run."""
     if not rows.has("hand", "printed"):
         return ""
-    changes, worst, limit = [], 1.0, LIMIT["matters_factor"]
-    for quantity in ("vertical_profile", "cross_level", "alignment"):
-        for filtered, words in ((False, "unfiltered"), (True, "filtered")):
-            own, printed = (
-                rows.get(part, quantity, "sd", filtered=filtered).value for part in ("hand", "printed")
-            )
-            worst = max(worst, printed / own)
-            sizes = f"from {significant(printed)} to {significant(own)} mm"
-            changes.append(f"{QUANTITIES[quantity]} {words} {sizes}")
-    verdict = (
-        f"They matter: an error is up to {worst:.1f} times as large with them"
-        if worst > limit
-        else f"They hardly matter here: no error is more than {limit:g} times as large with them"
-    )
-    return (
-        "Misprints of the equations: corrected, and with what is beyond first order, the sd of the error "
-        f"changes: {'; '.join(changes)}. {verdict}."
-    )
+    changes = {
+        f"{QUANTITIES[quantity]} {'filtered' if filtered else 'unfiltered'}": [
+            rows.get(part, quantity, "sd", filtered=filtered).value for part in ("printed", "hand")
+        ]
+        for quantity in JUDGED
+        for filtered in (False, True)
+    }
+    worst = max(1.0, *(printed / own for printed, own in changes.values()))
+    return PAPER.written(PAPER.words["misprints"], changes=changes, worst=worst)

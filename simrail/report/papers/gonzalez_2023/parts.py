@@ -1,14 +1,18 @@
-"""Which of our methods stand for which of the paper's, and in which of our cases they are looked at."""
+"""Which of our methods stand for which of the paper's, and in which of our cases they are looked at.
+
+Beside our own, in which case of another run: that of the track at its other size.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from simrail.campaign.stored_results import StoredResults
 from simrail.report.papers.claim import read_paper
-from simrail.report.tables.geometry_bands import QUANTITIES
-from simrail.report.tables.pivot import NOTHING, Case, Mean
-from simrail.scenario.cells import Method
+from simrail.report.tables.geometry import QUANTITIES
+from simrail.report.tables.pivot import NOTHING, Case, Mean, cases
+from simrail.scenario.cells import Method, methods
 from simrail.scenario.tables import NOISE
 
 PAPER = read_paper("gonzalez_2023")
@@ -22,6 +26,12 @@ COLUMNS = (
 """Quantities of its Tables 1 and 2, and whether they are filtered."""
 
 FILTERED = tuple(quantity for quantity, filtered in COLUMNS if filtered)
+
+MODEL, FULL = "1:10", "full size"
+"""What the two sizes of a track are called."""
+
+LONGEST_OF_MODEL_M = 10.0
+"""Longest wave of the scenario's own band below which it is taken for one of the 1:10 track."""
 
 
 def column_words(comma: str = ", ") -> list[str]:
@@ -82,9 +92,9 @@ class Rows:
         return next((part for part in ("cml", "kom", "hand") if self.has(part)), "")
 
 
-def rows_of(all_cases: Sequence[Case], methods: Sequence[Method], *, band: str) -> Rows | None:
+def rows_of(all_cases: Sequence[Case], ran: Sequence[Method], *, band: str) -> Rows | None:
     """Find the first case of a real IMU with rail geometry; None if there is none."""
-    names = PAPER.names(methods)
+    names = PAPER.names(ran)
     real = [case for case in all_cases if case.labels["imu"] != "ideal"]
     plain = [case for case in real if not _is_noisy(case)]
     for case in [*plain, *all_cases]:
@@ -97,3 +107,39 @@ def rows_of(all_cases: Sequence[Case], methods: Sequence[Method], *, band: str) 
 
 def _is_noisy(case: Case) -> bool:
     return NOISE in case.labels["imu"] or NOISE in case.labels["mount"]
+
+
+@dataclass(frozen=True)
+class OtherSize:
+    """Rows of another run.
+
+    Attributes
+    ----------
+    name, started : str
+        Its scenario, and its date.
+    size : str
+        `MODEL` or `FULL`, with what tells it from ours if that is of the same size.
+    rows : Rows
+        Its figures.
+    """
+
+    name: str
+    started: str
+    size: str
+    rows: Rows
+
+
+def other_size(former: StoredResults, *, band: str) -> OtherSize | None:
+    """Rows of former results in the band of that name; None if they have no rail geometry."""
+    scenario = former.scenario()
+    rows = rows_of(cases(former.scores, former.cells), methods(scenario), band=band)
+    if rows is None:
+        return None
+    _, longest_m = scenario.spec.geometry.own_bands.get(band, (0.0, np.inf))
+    started = str(former.manifest.get("started_utc", "an unknown day"))[:10]
+    return OtherSize(scenario.name, started, size_of(longest_m), rows)
+
+
+def size_of(longest_m: float) -> str:
+    """`MODEL` or `FULL`, by the longest wave of the scenario's own band."""
+    return MODEL if longest_m < LONGEST_OF_MODEL_M else FULL

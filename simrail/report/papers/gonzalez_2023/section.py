@@ -9,16 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from simrail.campaign.cell import CellResult
-from simrail.report.figures.geometry import lines_of
+from simrail.report.figures.geometry import has_rails, lines_of
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers.claim import judged
-from simrail.report.papers.gonzalez_2023.beside import MODEL, OtherSize, other_size, size_of
+from simrail.report.papers.gonzalez_2023 import judges, parts, tunings
 from simrail.report.papers.gonzalez_2023.figures import noise_figure, tuning_figures
-from simrail.report.papers.gonzalez_2023.judges import JUDGES, Evidence, Peak, errata_note
-from simrail.report.papers.gonzalez_2023.own_ride import own_ride_note, searched_on
-from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, Rows, column_words, rows_of
-from simrail.report.papers.gonzalez_2023.tunings import by_part, commands, notes, status_table, tunings_of
-from simrail.report.tables.geometry_view import with_rails
+from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, OtherSize, Rows, column_words
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, of_cell
 from simrail.report.tables.tables import Cell, Row, Table, mean_cell, number_cell
@@ -40,7 +36,7 @@ COVERED = ("cml", "cml_held", "kom", "hand", "printed")
 
 def section(data: PageData) -> list[Section]:
     """Make the section; none if no case has rail geometry."""
-    rows = rows_of(data.cases, data.methods, band=SCALED.name)
+    rows = parts.rows_of(data.cases, data.methods, band=SCALED.name)
     if rows is None:
         return []
     example = _example_of(data, rows.case)
@@ -53,37 +49,42 @@ def section(data: PageData) -> list[Section]:
         if style.name == name
     }
     band = _band_of(data, example)
-    seen = {part: style for part, style in looks.items() if example and with_rails(example, [style])}
-    covered = {part: coverage_of(example, seen[part], band) for part in COVERED if example and part in seen}
-    size, other = size_of(band.longest_m), other_size(data.beside, band=SCALED.name) if data.beside else None
+    seen = {part: style for part, style in looks.items() if example and has_rails(example, style)}
+    covered, by_draws = (
+        {part: coverage_of(example, seen[part], band, by_draws=own) for part in COVERED if part in seen}
+        if example
+        else {}
+        for own in (False, True)
+    )
+    size = parts.size_of(band.longest_m)
+    other = parts.other_size(data.beside, band=SCALED.name) if data.beside else None
     if other is not None and other.size == size:  # of one size: then the name tells rows apart
         other = replace(other, size=f"{size}, {other.name}")
-    tuned = by_part(rows.names, tunings_of(data.methods, data.scenario.folder))
+    tuned = tunings.by_part(rows.names, tunings.tunings_of(data.methods, data.scenario.folder))
     own = {
-        part: _filtered_sds(example, looks[part], band)
+        part: [_sd_of(example, seen[part], quantity, band) for quantity in FILTERED]
         for part, tuning in tuned.items()
-        if example and part in looks and searched_on(tuning, data.scenario, example.cell)
+        if example and part in seen and tunings.searched_on(tuning, data.scenario, example.cell)
     }
     peak = peak_of(example, seen[rows.main], band) if example and rows.main in seen else None
-    evidence = Evidence(rows, covered.get(rows.main, []), peak, tuned.get("cml"))
+    evidence = judges.Evidence(rows, covered.get(rows.main, []), peak, tuned.get("cml"))
     missing = [PAPER.label(part) for part in PAPER.printed if not rows.has(part)]
-    not_run = f"Not run in this scenario: {', '.join(missing)}." if missing else ""
+    notes = [*tunings.notes(tuned), tunings.own_ride_note(rows, own), judges.errata_note(rows)]
+    notes += [f"Not run in this scenario: {', '.join(missing)}."] * bool(missing)
     drawings = tuning_figures(seen, example, band) if example else []
     if example and noisy:
         drawings += noise_figure(rows, looks, example, noisy, band)
     shown = {
         "where": rows.where,
         "size": size,
-        "is_model": size == MODEL,
+        "is_model": size == parts.MODEL,
         "other": other,
         "tables": _table(rows, looks, size, other),
-        "coverage": _coverage_table(example, covered, looks, band),
-        "tunings": status_table(tuned),
-        "commands": commands(tuned),
-        "all_claims": judged(PAPER, evidence, JUDGES, has=rows.has),
-        "notes": [
-            note for note in (*notes(tuned), own_ride_note(rows, own), errata_note(rows), not_run) if note
-        ],
+        "coverage": _coverage_table(covered, by_draws, looks),
+        "tunings": tunings.status_table(tuned),
+        "commands": tunings.commands(tuned),
+        "all_claims": judged(PAPER, evidence, judges, has=rows.has),
+        "notes": [note for note in notes if note],
         "drawings": drawings,
     }
     return [Section("paper", f"Beside {PAPER.heading}", "papers/gonzalez_2023/section.html.j2", shown)]
@@ -94,16 +95,11 @@ def _example_of(data: PageData, case: Case | None) -> CellResult | None:
     return next((e for e in data.examples if case and of_cell(data.cases, e.cell) is case), None)
 
 
-def _filtered_sds(example: CellResult, style: MethodStyle, band: Band) -> list[float]:
-    """Sd of a method's filtered errors on a ride, mm, in the order of `FILTERED`; NaN without rails."""
-    sds = []
-    for quantity in FILTERED:
-        if not with_rails(example, [style]):
-            return [float("nan")] * len(FILTERED)
-        _, true, own, _ = lines_of(example, style.name, quantity, band)
-        error = (own - true)[np.isfinite(own)]
-        sds.append(float(error.std()) if len(error) else float("nan"))
-    return sds
+def _sd_of(example: CellResult, style: MethodStyle, quantity: str, band: Band) -> float:
+    """Sd of a method's filtered error on a ride, mm; NaN without any."""
+    _, true, own, _ = lines_of(example, style.name, quantity, band)
+    error = (own - true)[np.isfinite(own)]
+    return float(error.std()) if len(error) else float("nan")
 
 
 def _band_of(data: PageData, example: CellResult | None) -> Band:
@@ -122,12 +118,13 @@ def _table(rows: Rows, looks: Mapping[str, MethodStyle], size: str, other: Other
     for part, role in PAPER.parts.items():
         style = looks.get(rows.played_by(part))
         colour = style.colour if style else ""
-        if part in PAPER.printed:
-            cells = [number_cell(value) for printed in PAPER.printed[part] for value in printed]
-            lines.append(Row(f"{role.label}: printed", "", "", cells))
+        printed = PAPER.printed.get(part, ())
+        if printed:
+            lines.append(
+                Row(f"{role.label}: printed", "", "", [number_cell(v) for one in printed for v in one])
+            )
         if rows.has(part):
-            named = part in PAPER.printed or other is not None
-            label = f"{role.label}: {ours}" if named else role.label
+            label = f"{role.label}: {ours}" if printed or other is not None else role.label
             lines.append(Row(label, "", colour, _numbers(rows, part)))
         if other is not None and other.rows.has(part):
             label = f"{role.label}: ours, {other.size}"
@@ -164,25 +161,18 @@ def coverage_of(
 
 
 def _coverage_table(
-    example: CellResult | None,
-    covered: Mapping[str, list[float]],
-    looks: Mapping[str, MethodStyle],
-    band: Band,
+    covered: Mapping[str, list[float]], by_draws: Mapping[str, list[float]], looks: Mapping[str, MethodStyle]
 ) -> Table:
     rows = [Row("CML: printed", "", "", [Cell(f"{value:g}") for value in PAPER.figures["coverage"]])]
-    for part, as_printed in covered.items():
-        label, style = PAPER.label(part), looks[part]
-        by_draws = coverage_of(example, style, band, by_draws=True) if example else []
-        lines = {label: as_printed, f"{label}: interval of the filtered rails, by draws": by_draws}
-        for words, shares in lines.items():
-            if shares:
-                rows.append(
-                    Row(words, "", style.colour, [number_cell(share, decimals=0) for share in shares])
-                )
+    for part in covered:
+        for words, shares in (("", covered), (": interval of the filtered rails, by draws", by_draws)):
+            cells = [number_cell(share, decimals=0) for share in shares[part]]
+            if cells:
+                rows.append(Row(f"{PAPER.label(part)}{words}", "", looks[part].colour, cells))
     return Table([("inside the 95 % interval, %", len(COLUMNS))], column_words(), rows)
 
 
-def peak_of(example: CellResult, style: MethodStyle, band: Band) -> Peak:
+def peak_of(example: CellResult, style: MethodStyle, band: Band) -> judges.Peak:
     """How the start of a ride errs beside its rest; its first metres are as long as its size asks for."""
     place, true, own, _ = lines_of(example, style.name, "alignment", None)
     error = own - true
@@ -190,5 +180,5 @@ def peak_of(example: CellResult, style: MethodStyle, band: Band) -> Peak:
     first_m = START_M * band.longest_m / SCALED.longest_m
     first = away < first_m
     if not first.any() or first.all():
-        return Peak(first_m, float("nan"), float("nan"))
-    return Peak(first_m, float(np.abs(error[first]).max()), float(error[~first].std()))
+        return judges.Peak(first_m, float("nan"), float("nan"))
+    return judges.Peak(first_m, float(np.abs(error[first]).max()), float(error[~first].std()))

@@ -1,5 +1,9 @@
-"""What a search of hyper-parameters knows of each: read from the tunings that a scenario names."""
+"""What a search of hyper-parameters knows of each: read from the tunings that a scenario names.
 
+And whether that is true of more than the ride that it was searched on.
+"""
+
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,10 +14,12 @@ from simrail.estimation.user_modules import class_named
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from simrail.estimators.tuning.file import Tuning
 from simrail.estimators.tuning.space import CONSTRAINT, FLAT, HELD, IDENTIFIED, LOWER, NAMES, UPPER
-from simrail.report.papers.gonzalez_2023.parts import PAPER
+from simrail.report.papers.gonzalez_2023.parts import FILTERED, PAPER, Rows
+from simrail.report.tables.geometry import QUANTITIES
 from simrail.report.tables.tables import Cell, Row, Table
 from simrail.scenario.build_estimator import construct
 from simrail.scenario.cells import Method
+from simrail.scenario.scenario import Scenario
 
 EDGES = (LOWER, UPPER, CONSTRAINT)
 
@@ -55,11 +61,8 @@ def status_table(tunings: Mapping[str, Tuning]) -> Table | None:
             value = f"{getattr(tuning.hyperparameters, name):.1e}".replace("-", "\u2212")
             cells.append(Cell(value, f" {status}", "best" if status == IDENTIFIED else ""))
         rows.append(Row(name, "", "", cells))
-    return Table(
-        [("value, SI, and what the search knows of it", len(tunings))],
-        [PAPER.label(part) for part in tunings],
-        rows,
-    )
+    groups = [("value, SI, and what the search knows of it", len(tunings))]
+    return Table(groups, [PAPER.label(part) for part in tunings], rows)
 
 
 def commands(tunings: Mapping[str, Tuning]) -> list[tuple[str, str]]:
@@ -68,33 +71,63 @@ def commands(tunings: Mapping[str, Tuning]) -> list[tuple[str, str]]:
 
 
 def notes(tunings: Mapping[str, Tuning]) -> list[str]:
-    """How many of the parameters each search tells anything about, and which not."""
+    """How many of the parameters each search tells anything about, and which not.
+
+    And how far searches of the same kind over other parts of the track came from each other.
+    """
     sentences = []
+    kinds = {"identified": (IDENTIFIED,), "at_an_edge": EDGES, "flat": (FLAT,)}
     for part, tuning in tunings.items():
         assert tuning.status is not None
-        sure = [name for name in NAMES if tuning.status[name] == IDENTIFIED]
-        searched = [name for name in NAMES if tuning.status[name] != HELD]
-        text = (
-            f"{PAPER.label(part)} identifies {len(sure)} of the {len(searched)} parameters that it searches"
-        )
-        for words, kinds in (("at an edge or at the constraint", EDGES), ("flat", (FLAT,))):
-            those = [name for name in NAMES if tuning.status[name] in kinds]
-            text += f"; {words}: {', '.join(those)}" if those else ""
-        sentences.append(text + ".")
-    return sentences + _apart(tunings)
-
-
-def _apart(tunings: Mapping[str, Tuning]) -> list[str]:
-    """How far searches of the same kind over other parts of the track came from each other."""
+        status = {name: tuning.status[name] for name in NAMES if tuning.status[name] != HELD}
+        names = {kind: [name for name in status if status[name] in held] for kind, held in kinds.items()}
+        sentences.append(PAPER.written(PAPER.words["search"], part=part, searched=len(status), **names))
     same = [part for part in ("kom", "kom_start", "kom_end") if part in tunings]
-    if len(same) < 2:
-        return []
-    logs = np.log10([[getattr(tunings[part].hyperparameters, name) for name in NAMES] for part in same])
-    decades = np.ptp(logs, axis=0)
-    widest = int(np.argmax(decades))
-    return [
-        f"{', '.join(PAPER.label(part) for part in same)}: their values lie up to {decades[widest]:.1f} "
-        f"decades apart ({NAMES[widest]}), at least {decades.min():.1f}. Identified is meant of one search "
-        "and about the place where it ended; what differs so between parts of one ride is no property of the "
-        "vehicle."
-    ]
+    if len(same) > 1:
+        logs = np.log10([[getattr(tunings[part].hyperparameters, name) for name in NAMES] for part in same])
+        decades = dict(zip(NAMES, np.ptp(logs, axis=0), strict=True))
+        sentences.append(PAPER.written(PAPER.words["searches"], parts=same, decades=decades))
+    return sentences
+
+
+def searched_on(tuning: Tuning, scenario: Scenario, cell: Mapping[str, object]) -> bool:
+    """Whether a tuning was searched on this very cell of this very scenario, and on no other.
+
+    By the command that made it: the scenario's name and settings, ride and IMU, the first draw.
+    """
+    search = tuning.search
+    if search is None or len(search.fitted_on) != 1 or cell["track_draw"] or cell["sensor_draw"]:
+        return False
+    words = shlex.split(search.command)
+    settings = [words[at + 1] for at, word in enumerate(words) if word == "--set"]
+    if words[:3] != ["simrail", "tune", scenario.name] or settings != list(scenario.overrides):
+        return False
+    ride = f"{scenario.name}: {cell['ride']}, {cell['mount']} on "
+    return search.seed == scenario.spec.seed and search.fitted_on[0].startswith(ride)
+
+
+def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:
+    """How a tuning does on the ride that it was searched on, and on all draws; "" if none was.
+
+    A verdict takes rides over other rails: with the same ones, only the sensors' errors are others.
+
+    Parameters
+    ----------
+    rows : Rows
+        The scores.
+    own : mapping of str to sequence of float
+        Sd of the filtered error on the own ride, mm, by part, in the order of `FILTERED`.
+    """
+    largest, worst, draws = {}, 0.0, 0
+    for part, sds in own.items():
+        means = [rows.get(part, quantity, "sd", filtered=True) for quantity in FILTERED]
+        factors = np.array([mean.value / sd for mean, sd in zip(means, sds, strict=True)])
+        if np.isfinite(factors).all() and means[0].draws > 1:
+            at = int(np.argmax(factors))
+            worst, draws = max(worst, factors[at]), means[at].draws
+            largest[part] = QUANTITIES[FILTERED[at]], sds[at], means[at].value
+    if not largest:
+        return ""
+    tracks = int(rows.case.table["track_draws"].max())
+    text = PAPER.words["own_ride"]
+    return PAPER.written(text, largest=largest, worst=worst, draws=draws, tracks=tracks)

@@ -1,17 +1,73 @@
-"""Tables of rail geometry: errors by band beside the baseline, and indicators against limits."""
+"""Rail geometry: bands of wavelengths as page and terminal speak of them, errors by band beside the baseline.
+
+Which bands a case has, in which one it is judged, and indicators against limits.
+"""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from simrail.report.tables.geometry_bands import JUDGED, QUANTITIES, band_words, bands_of_case, judged_band
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import NOTHING, Case
 from simrail.report.tables.tables import DECIMALS, NONE, Cell, Row, Table, mean_cell, number_cell
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
 from simrail.track.quality import Limits, section_indicators
+
+QUANTITIES = {
+    "vertical_profile": "vertical profile",
+    "cross_level": "cross-level",
+    "alignment": "alignment",
+    "twist": "twist",
+    "gauge": "gauge",
+}
+"""Quantities of rail geometry in the order of the page."""
+
+JUDGED = ("vertical_profile", "cross_level", "alignment")
+"""Those that every method under test is judged by."""
+
+BAND = "D1"
+"""Band that a case is judged in where its ride is long enough, and that a scenario's limits are of."""
+
+
+def bands_of_case(case: Case) -> list[str]:
+    """Bands in which a case has rail geometry, ``full`` first; empty without any."""
+    table = case.table
+    rows = table[table["quantity"].astype(str).isin(QUANTITIES) & (table["draws"] > 0)]
+    return [str(name) for name in dict.fromkeys(rows["band"])]
+
+
+def judged_band(case: Case) -> str:
+    """Band that a case is judged in: `BAND` where the ride is long enough, else the scenario's own.
+
+    Where there is no own band either, the first that has figures, at last ``full``.
+    """
+    there = [name for name in bands_of_case(case) if name != FULL]
+    own = [name for name in there if name not in BANDS]
+    return BAND if BAND in there else next(iter([*own, *there]), FULL)
+
+
+def band_of_all(all_cases: Sequence[Case]) -> str:
+    """Band that most cases are judged in: of those with rail geometry."""
+    judged = [judged_band(case) for case in all_cases if bands_of_case(case)]
+    return max(dict.fromkeys(judged), key=judged.count, default=FULL)
+
+
+def band_words(name: str, bands: Mapping[str, Band] = BANDS) -> str:
+    """A band with its wavelengths: ``D1 (3-25 m)``; one that `bands` does not hold by its name alone."""
+    if name not in bands:
+        return "unfiltered" if name == FULL else name
+    band = bands[name]
+    return f"{name} ({band.shortest_m:g}\u2013{band.longest_m:g} m)"
+
+
+def waves_words(name: str, bands: Mapping[str, Band] = BANDS) -> str:
+    """The same for a sentence: ``in wavelengths of 3-25 m (D1)``."""
+    if name not in bands:
+        return "unfiltered" if name == FULL else f"in the band {name}"
+    band = bands[name]
+    return f"in wavelengths of {band.shortest_m:g}\u2013{band.longest_m:g} m ({name})"
 
 
 def mappers(case: Case, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
@@ -63,40 +119,33 @@ def geometry_table(
     known : mapping of str to Band
         Bands whose wavelengths are told.
     """
-    bands, shown = bands_of_case(case), mappers(case, styles)
-    judged = judged_band(case)
+    bands, shown, judged = bands_of_case(case), mappers(case, styles), judged_band(case)
     if not bands or not shown:
         return None
     rows = []
     for quantity, words in QUANTITIES.items():
-        if not any(case.get(s.name, quantity, "sd").draws for s in shown):
-            if _is_unobservable(case, quantity):
-                is_base = _is_base(case, quantity, shown)
-                why = (
-                    "its base is no multiple of the geometry's step"
-                    if is_base
-                    else "no sensor sees the rails"
-                )
-                rows.append(Row(f"{words}: {why}", "", "", _open(len(bands) + 3, is_base=is_base)))
-            continue
-        for style in shown:
-            if not case.get(style.name, quantity, "sd").draws:
+        there = [style for style in shown if case.get(style.name, quantity, "sd").draws]
+        if not there and _is_unobservable(case, quantity):
+            why, cells = _left_open(case, quantity, shown, len(bands) + 3)
+            rows.append(Row(f"{words}: {why}", "", "", cells))
+        for style in shown if there else ():
+            label, baseline = f"{words}: {style.label}", style.baseline if is_zero(style) else ""
+            if style in there:
+                cells = [
+                    mean_cell(
+                        case.get(style.name, quantity, "sd", band=band),
+                        mark="" if baseline else _mark(case, shown, style, quantity, band),
+                    )
+                    for band in bands
+                ]
+                cells.append(mean_cell(case.get(style.name, quantity, "mean"), decimals=2))
+                cells.append(mean_cell(case.get(style.name, quantity, "max", band=judged), decimals=2))
+                cells.append(mean_cell(case.get(style.name, quantity, "coverage95"), decimals=0, scale=100.0))
+                rows.append(Row(label, baseline, style.colour, cells))
+            elif not baseline and _is_unobservable(case, quantity, style.name):
                 # What a method under test leaves open is told; of rails as designed it goes without saying.
-                if not is_zero(style) and _is_unobservable(case, quantity, style.name):
-                    left = _open(len(bands) + 3, is_base=_is_base(case, quantity, [style]))
-                    rows.append(Row(f"{words}: {style.label}", "", style.colour, left))
-                continue
-            cells = []
-            for band in bands:
-                mean = case.get(style.name, quantity, "sd", band=band)
-                mark = "" if is_zero(style) else _mark(case, shown, quantity, band, mean.value)
-                cells.append(mean_cell(mean, mark=mark))
-            cells.append(mean_cell(case.get(style.name, quantity, "mean"), decimals=2))
-            cells.append(mean_cell(case.get(style.name, quantity, "max", band=judged), decimals=2))
-            cells.append(mean_cell(case.get(style.name, quantity, "coverage95"), decimals=0, scale=100.0))
-            rows.append(
-                Row(f"{words}: {style.label}", style.baseline if is_zero(style) else "", style.colour, cells)
-            )
+                _, cells = _left_open(case, quantity, [style], len(bands) + 3)
+                rows.append(Row(label, "", style.colour, cells))
     groups = [("standard deviation of the error, mm", len(bands)), ("mean, mm", 1), ("max, mm", 1)]
     groups += [("inside 95 %", 1)]
     words_of = {band: band_words(band, known) for band in bands}
@@ -104,31 +153,25 @@ def geometry_table(
     return Table(groups, columns, rows)
 
 
-def _mark(case: Case, shown: Sequence[MethodStyle], quantity: str, band: str, value: float) -> str:
+def _mark(case: Case, shown: Sequence[MethodStyle], style: MethodStyle, quantity: str, band: str) -> str:
     """How the error of a method under test is marked: the best of them, worse than without any IMU."""
-    tested, floor = (
-        [case.get(s.name, quantity, "sd", band=band).value for s in shown if is_zero(s) is baseline]
-        for baseline in (False, True)
-    )
+    own = sd_of(case, style, quantity, band=band)
+    sds = [sd_of(case, one, quantity, band=band) for one in shown if not is_zero(one)]
     # As they are shown: what reads the same is as good.
-    is_best = round(value, DECIMALS) == round(
-        min((v for v in tested if np.isfinite(v)), default=np.nan), DECIMALS
-    )
-    is_worse = any(value > v for v in floor)
-    return " ".join(word for word, holds in (("best", is_best), ("worse", is_worse)) if holds)
+    is_best = round(own, DECIMALS) == round(float(np.nanmin(sds)), DECIMALS) if np.isfinite(own) else False
+    is_worse = style in behind_baseline(case, shown, quantity, band=band)
+    return " ".join(["best"] * is_best + ["worse"] * is_worse)
 
 
-def _is_base(case: Case, quantity: str, styles: Sequence[MethodStyle]) -> bool:
-    """Whether twist is left open for its base: it follows from the cross-level, and that is known."""
-    return quantity == "twist" and any(case.get(s.name, "cross_level", "sd").draws for s in styles)
-
-
-def _open(columns: int, *, is_base: bool) -> list[Cell]:
-    """Cells of a quantity that is left open."""
-    return [
-        Cell("not computed" if is_base else "not observable", mark="none"),
-        *[NONE] * (columns - 1),
-    ]
+def _left_open(
+    case: Case, quantity: str, styles: Sequence[MethodStyle], columns: int
+) -> tuple[str, list[Cell]]:
+    """Why a quantity is left open, and its cells: twist follows from the cross-level, if that is known."""
+    if quantity == "twist" and any(case.get(s.name, "cross_level", "sd").draws for s in styles):
+        why, word = "its base is no multiple of the geometry's step", "not computed"
+    else:
+        why, word = "no sensor sees the rails", "not observable"
+    return why, [Cell(word, mark="none"), *[NONE] * (columns - 1)]
 
 
 def _is_unobservable(case: Case, quantity: str, name: str = "") -> bool:
@@ -149,8 +192,9 @@ def overview_table(
     """
     rows = []
     for case in all_cases:
-        cells, band = [], judged_band(case)
-        floor, main = baseline_of(case, styles), main_of(case, styles)
+        band, labels = judged_band(case), case.labels
+        main, floor = main_of(case, styles), baseline_of(case, styles)
+        cells = []
         for quantity in JUDGED:
             own, zero = (
                 case.get(style.name, quantity, "sd", band=band) if style else NOTHING
@@ -158,15 +202,13 @@ def overview_table(
             )
             mark = "worse" if own.value > zero.value else ""
             cells += [mean_cell(own, mark=mark), mean_cell(zero, decimals=2)]
-        if all(cell.mark == "none" for cell in cells):
-            continue
-        labels = case.labels
         note = ", an ablation" if labels["odometry"] == "truth" else ""
         label = (
             f"{labels['ride']} \u00b7 {labels['mount']} ({labels['imu']}) \u00b7 {labels['odometry']}{note} "
             f"\u00b7 {band_words(band, known)}"
         )
-        rows.append(Row(label, "", "", cells))
+        if not all(cell.mark == "none" for cell in cells):
+            rows.append(Row(label, "", "", cells))
     if not rows:
         return None
     groups = [(f"{QUANTITIES[quantity]}, mm", 2) for quantity in JUDGED]

@@ -9,8 +9,8 @@ import pytest
 from simrail.estimators.tuning.file import Tuning
 
 from simrail.core.toml_files import shipped
-from simrail.report.papers.gonzalez_2023.own_ride import own_ride_note, searched_on
 from simrail.report.papers.gonzalez_2023.parts import Rows
+from simrail.report.papers.gonzalez_2023.tunings import own_ride_note, searched_on
 from simrail.report.tables.pivot import Case, Mean
 from simrail.scenario.scenario import Scenario, load_scenario
 

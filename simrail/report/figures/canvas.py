@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.decimate import Bins
+from simrail.report.figures.decimate import Bins, Envelope
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Mean
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
@@ -36,6 +36,17 @@ LEFT_IN = 0.84
 INK, MUTED, GRID = "#1b2430", "#667085", "#e4e7ec"
 TRUTH, DESIGN = "#c2c8d1", "#111111"
 CURVE_TINT, TRANSITION_TINT = "#eef1e6", "#f6f8f2"
+
+_CURVE_NAME: dict[str, Any] = {
+    "textcoords": "offset points",
+    "ha": "center",
+    "va": "top",
+    "fontsize": 7.2,
+    "color": "#66714a",
+    "zorder": 40,
+    "bbox": {"facecolor": CURVE_TINT, "alpha": 0.85, "lw": 0, "pad": 1.0},
+}
+"""How the names of curves look in a plot over distance."""
 
 _RC: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -73,6 +84,14 @@ def look() -> AbstractContextManager[None]:
     return mpl.rc_context(_RC)
 
 
+def add_panel(
+    figure: Figure, left_in: float, low_in: float, wide_in: float, tall_in: float, **options: Any
+) -> Axes:
+    """Add a panel to a figure, at a place in inches."""
+    wide, tall = figure.get_size_inches()
+    return figure.add_axes((left_in / wide, low_in / tall, wide_in / wide, tall_in / tall), **options)
+
+
 def panels(heights_in: Sequence[float], *, top_in: float = 0.42) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels above each other over one x axis.
 
@@ -83,16 +102,11 @@ def panels(heights_in: Sequence[float], *, top_in: float = 0.42) -> tuple[Figure
     figure = Figure(figsize=(WIDTH_IN, height))
     axes: list[Axes] = []
     edge = height - top_in
+    wide = WIDTH_IN - LEFT_IN - right
     for tall in heights_in:
-        box = (
-            LEFT_IN / WIDTH_IN,
-            (edge - tall) / height,
-            1.0 - (LEFT_IN + right) / WIDTH_IN,
-            tall / height,
-        )
-        axis = figure.add_axes(box, sharex=axes[0] if axes else None)
+        axis = add_panel(figure, LEFT_IN, edge - tall, wide, tall, sharex=axes[0] if axes else None)
         # A fixed place, so that no label depends on the width of its tick labels.
-        axis.yaxis.set_label_coords(-0.56 / (WIDTH_IN - LEFT_IN - right), 0.5)
+        axis.yaxis.set_label_coords(-0.56 / wide, 0.5)
         axes.append(axis)
         edge -= tall + gap
     for axis in axes[:-1]:
@@ -123,8 +137,7 @@ def panels_beside(
         row, column = divmod(number, across)
         low = height - top_in - tall_in - row * (tall_in + row_gap_in)
         left = left_in + column * (wide + gap_in)
-        box = (left / WIDTH_IN, low / height, wide / WIDTH_IN, tall_in / height)
-        axes.append(figure.add_axes(box, sharey=axes[0] if share_y and axes else None))
+        axes.append(add_panel(figure, left, low, wide, tall_in, sharey=axes[0] if share_y and axes else None))
     return figure, axes
 
 
@@ -178,6 +191,14 @@ def draw_marks(
         lw=1.0,
         label=style.label,
     )
+
+
+def draw_envelope(axis: Axes, bins: Bins, signal: FloatArray, *, colour: str) -> Envelope:
+    """Draw the range and the mean of a signal (n,) by bins; returns them."""
+    envelope = bins.envelope(signal)
+    axis.fill_between(bins.x, envelope.low, envelope.high, color=colour, alpha=0.28, lw=0)
+    axis.plot(bins.x, envelope.mean, color=colour, lw=1.1)
+    return envelope
 
 
 def draw_truth(axis: Axes, bins: Bins, angle_rad: FloatArray) -> FloatArray:
@@ -277,26 +298,11 @@ def shade_track(axes: Sequence[Axes], track: TrackDesign, *, limits: tuple[float
             for axis in axes:
                 axis.axvspan(max(start, low), min(end, high), color=tint, lw=0, zorder=-5)
             middle = 0.5 * (start + end)
-            if (
-                isinstance(element, Curve)
-                and middle - last_label > 0.05 * (high - low)
-                and low < middle < high
-            ):
-                side = "left" if element.radius_m > 0 else "right"
-                text = f"{abs(element.radius_m):.0f} m {side}"
-                axes[0].annotate(
-                    text,
-                    (middle, 1.0),
-                    xycoords=axes[0].get_xaxis_transform(),
-                    xytext=(0, -3),
-                    textcoords="offset points",
-                    ha="center",
-                    va="top",
-                    fontsize=7.2,
-                    color="#66714a",
-                    zorder=40,
-                    bbox={"facecolor": CURVE_TINT, "alpha": 0.85, "lw": 0, "pad": 1.0},
-                )
+            has_room = middle - last_label > 0.05 * (high - low) and low < middle < high
+            if isinstance(element, Curve) and has_room:
+                text = f"{abs(element.radius_m):.0f} m {'left' if element.radius_m > 0 else 'right'}"
+                at_top = axes[0].get_xaxis_transform()
+                axes[0].annotate(text, (middle, 1.0), (0, -3), xycoords=at_top, **_CURVE_NAME)
                 last_label = middle
         start = end
     axes[0].set_xlim(low, high)
@@ -308,16 +314,8 @@ def distance_axis(axis: Axes, *, direction: int | None = None) -> None:
     if direction is None:
         return
     arrow, side, x = ("travel \u2192", "right", 1.0) if direction >= 0 else ("\u2190 travel", "left", 0.0)
-    axis.annotate(
-        arrow,
-        (x, 0.0),
-        xycoords="axes fraction",
-        xytext=(0, -29),
-        textcoords="offset points",
-        ha=side,
-        color=INK,
-        weight="bold",
-    )
+    look_of: dict[str, Any] = {"textcoords": "offset points", "ha": side, "color": INK, "weight": "bold"}
+    axis.annotate(arrow, (x, 0.0), (0, -29), xycoords="axes fraction", **look_of)
 
 
 def pad_limits(axis: Axes, low: float, high: float, *, top: float = 0.14) -> None:
