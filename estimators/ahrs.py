@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import imufusion
 import numpy as np
 import pandas as pd
-from simrail.estimators.attitude.compensation import gravity_force, start_frame
+from simrail.estimators.attitude.compensation import gravity_force, needs_of, role_of, start_frame
 from simrail.estimators.attitude.quaternions import to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias
 from vqf import VQF
@@ -41,19 +41,14 @@ class Vqf:
     rest_bias: bool = True
 
     causal = True
+    role = property(role_of)
     label = "VQF"
     cites = ("Laidig and Seel 2023",)
 
     @property
     def needs(self) -> tuple[str, ...]:
         """The magnetometer, and the odometry for the compensation, if they are asked for."""
-        odometry = ("odometry",) if self.compensated else ()
-        return (*odometry, "magnetometer") if self.magnetometer else odometry
-
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
+        return (*needs_of(self), "magnetometer") if self.magnetometer else needs_of(self)
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw.
@@ -117,18 +112,10 @@ class Imufusion:
     rest_bias: bool = True
 
     causal = True
+    needs = property(needs_of)
+    role = property(role_of)
     label = "imufusion"
     cites = ("Madgwick, Wilson, Turk, Burridge, Kapatos and Vaidyanathan 2020",)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The odometry, for the compensation."""
-        return ("odometry",) if self.compensated else ()
-
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gain < np.inf:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.attitude.compensation import design_frame, gravity_force, start_frame
+from simrail.estimators.attitude.compensation import design_frame, gravity_force, role_of, start_frame
 from simrail.estimators.attitude.kernel import attitude_ekf
 from simrail.estimators.attitude.noise import (
     SWING_PER_SPEED,
@@ -86,6 +86,7 @@ class AttitudeEkf:
     start_yaw_sd_rad: float = math.radians(0.3)
 
     causal = True
+    role = property(role_of)
     label = "EKF"
     cites = ("Briales, Urda and Escalona 2021",)
 
@@ -93,11 +94,6 @@ class AttitudeEkf:
     def needs(self) -> tuple[str, ...]:
         """The odometry, for the compensation, and for what the recommended tuning knows of the vibration."""
         return ("odometry",) if self.compensated or self.tuning == "recommended" else ()
-
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         check_tuning(self.tuning, self.process_noise)

@@ -7,7 +7,7 @@ The state is
 
 with the angles of the body in the global frame, its place (0, y, z) in the design track frame, ' for d/dt.
 
-Not here: the loops (`simrail.estimators.trajectory.kernel_filter`), and the noise
+Not here: the loops (`simrail.estimators.trajectory.kernel`), and the noise
 (`simrail.estimators.trajectory.noise`).
 """
 

@@ -27,9 +27,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
-from simrail.estimators.trajectory.kernel_back import trajectory_back
+from simrail.estimators.trajectory.kernel import (
+    room_for_filtered,
+    room_for_past,
+    trajectory_back,
+    trajectory_filter,
+)
 from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
-from simrail.estimators.trajectory.kernel_filter import room_for_filtered, room_for_past, trajectory_filter
 from simrail.estimators.trajectory.model import Model, model_of
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of

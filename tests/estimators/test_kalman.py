@@ -21,7 +21,6 @@ from simrail.estimators.kalman import (
     chain_information,
     congruence,
     fixed_interval,
-    joint_draw,
     log_density,
     mirror,
     remember,
@@ -182,20 +181,6 @@ def test_smoother_is_the_joint_distributions(run: Run, joint: Joint) -> None:
     for k in range(STEPS):
         at = slice(k * N, (k + 1) * N)
         np.testing.assert_allclose(covariances[k], covariance[at, at], rtol=0, atol=1e-9)
-
-
-def test_draws_have_the_joint_covariance_of_all_steps(run: Run, joint: Joint, model: Target) -> None:
-    """A draw is linear in its normal numbers: unit vectors give the matrix, and no statistics are needed."""
-    roots = np.array(
-        [np.linalg.cholesky(process(*of_step)) for of_step in zip(model.dt, model.q, strict=True)]
-    )
-    start_root, sds = np.linalg.cholesky(model.start_covariance), np.sqrt(model.noise)
-    columns, errors = [], np.empty((STEPS, N))
-    for unit in np.eye(STEPS * (N + M)):
-        joint_draw(run.past, start_root, roots, sds, unit.reshape(STEPS, N + M), errors)
-        columns.append(errors.ravel().copy())
-    drawn = np.column_stack(columns)
-    np.testing.assert_allclose(drawn @ drawn.T, joint.given(len(joint.z))[1], rtol=0, atol=1e-9)
 
 
 def test_filter_and_smoother_equal_filterpys(run: Run, model: Target, measured: np.ndarray) -> None:

@@ -14,14 +14,14 @@ from scipy.linalg import block_diag
 from scipy.special import stdtrit
 from scipy.stats import binom
 from simrail.estimators.trajectory.draws import FELT, geometry_draws, state_errors, stream_of
-from simrail.estimators.trajectory.kernel_back import trajectory_error
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES, WIDTH, linearise
-from simrail.estimators.trajectory.kernel_filter import (
+from simrail.estimators.trajectory.kernel import (
     Past,
     room_for_filtered,
     room_for_past,
+    trajectory_error,
     trajectory_filter,
 )
+from simrail.estimators.trajectory.kernel_equations import ROWS, STATES, WIDTH, linearise
 from simrail.estimators.trajectory.model import Model, packed_process, process_noise, transition
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, run_model
