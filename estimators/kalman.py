@@ -59,6 +59,27 @@ def room_for_history(steps: int, n: int, m: int) -> History:
 
 
 @njit_borrowed
+def keep(states: FloatArray, covariances: FloatArray, k: int, x: FloatArray, p: FloatArray) -> None:
+    """Write state and covariance of step k into rows k.
+
+    By elements: numba compiles the assignment of a whole array for half a second, wherever it stands.
+    """
+    for i in range(x.shape[0]):
+        states[k, i] = x[i]
+        for c in range(x.shape[0]):
+            covariances[k, i, c] = p[i, c]
+
+
+@njit_borrowed
+def remember_prediction(past: History, k: int, x: FloatArray, p: FloatArray, f: FloatArray) -> None:
+    """Put predicted state, covariance and F of step k into the history."""
+    keep(past.states, past.covariances, k, x, p)
+    for i in range(x.shape[0]):
+        for c in range(x.shape[0]):
+            past.transitions[k, i, c] = f[i, c]
+
+
+@njit_borrowed
 def remember(past: History, k: int, m: int, h: FloatArray, gain: FloatArray, error: float, s: float) -> None:
     """Put update m of step k into the history: row h, gain K, innovation e and its variance s."""
     for i in range(h.shape[0]):

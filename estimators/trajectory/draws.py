@@ -22,8 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
-from simrail.estimators.trajectory.kernel import Past, trajectory_error
-from simrail.estimators.trajectory.kernel_equations import ROLL, ROWS, STATES, Y, Z
+from simrail.estimators.trajectory.kernel import ROLL, ROWS, STATES, Past, Y, Z, trajectory_error
 from simrail.estimators.trajectory.model import Model, dense_process
 from simrail.estimators.trajectory.over_space import over_space
 from simrail.estimators.trajectory.track_geometry import Sight, slopes

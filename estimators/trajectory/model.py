@@ -12,13 +12,12 @@ Not here: the loops (`simrail.estimators.trajectory.kernel`), and the noise
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 from simrail.estimators.attitude.compensation import design_frame, track_motion
 from simrail.estimators.attitude.rest_bias import rest_bias
-from simrail.estimators.trajectory.kernel_equations import BLOCKS, STATES
+from simrail.estimators.trajectory.kernel import BLOCKS, STATES, Model
 from simrail.estimators.trajectory.noise import Hyperparameters
 
 from simrail.core.columns import ACCEL, GYRO
@@ -26,45 +25,6 @@ from simrail.core.jit import FloatArray, IntArray
 from simrail.recording.recording import Recording, odometry_of
 from simrail.track.design import STRAIGHT
 from simrail.track.frame import TrackFrame
-
-
-class Model(NamedTuple):
-    """What the filter takes of a ride of n samples.
-
-    Attributes
-    ----------
-    signals : ndarray (n, 6)
-        Angular rate less its bias, rad/s, and specific force, m/s2, body axes.
-    track : ndarray (n, 15)
-        `simrail.estimators.trajectory.kernel_equations.TERMS`.
-    slips : ndarray (n, 3) or (0, 3)
-        See `simrail.estimators.trajectory.kernel_equations.linearise`; of no rows for the corrected
-        equations.
-    kinds : ndarray of int (n,)
-        Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
-    process : ndarray (c, 21)
-        Upper triangles of the five blocks of Q, row by row.
-    noise : ndarray (c, 8)
-        Variances U of the measurements.
-    virtual : ndarray (2,)
-        Virtual positions y and z, m.
-    start, start_variance : ndarray (12,)
-        State before the first update, and its variances.
-    step_s, gravity : float
-        Sample interval, s, and gravity, m/s2.
-    """
-
-    signals: FloatArray
-    track: FloatArray
-    slips: FloatArray
-    kinds: IntArray
-    process: FloatArray
-    noise: FloatArray
-    virtual: FloatArray
-    start: FloatArray
-    start_variance: FloatArray
-    step_s: float
-    gravity: float
 
 
 def transition(step_s: float) -> FloatArray:
@@ -172,7 +132,7 @@ def model_of(
 
 
 def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
-    """`simrail.estimators.trajectory.kernel_equations.TERMS` at every sample, (n, 15).
+    """`simrail.estimators.trajectory.kernel.TERMS` at every sample, (n, 15).
 
     Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
     (paper 001, appendix 1, g4C, g5C, g6C).
@@ -220,7 +180,7 @@ def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) ->
 
 
 def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
-    """Paper 001's misprints, (n, 3); see `simrail.estimators.trajectory.kernel_equations.linearise`."""
+    """Paper 001's misprints, (n, 3); see `simrail.estimators.trajectory.kernel.linearise`."""
     _, v, h = frame.rates.T
     return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
 

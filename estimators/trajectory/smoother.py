@@ -28,12 +28,13 @@ import numpy as np
 import pandas as pd
 from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
 from simrail.estimators.trajectory.kernel import (
+    PACKED,
+    STATES,
     room_for_filtered,
     room_for_past,
     trajectory_back,
     trajectory_filter,
 )
-from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
 from simrail.estimators.trajectory.model import Model, model_of
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of

@@ -25,7 +25,7 @@ from simrail.estimation.estimate import Estimator
 from simrail.estimation.tunable import METHODS, tunables_of
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
-from simrail.estimators.tuning.identify import Identification, identify
+from simrail.estimators.tuning.identify import identify
 from simrail.estimators.tuning.tune import objective_of, tune
 from simrail.recording.recording import Recording
 from simrail.ride.ride import simulate
@@ -46,7 +46,7 @@ class Tuned:
 
     result: TuningResult
     file: Path
-    identified: dict[str, Identification]
+    identified: dict[str, pd.DataFrame]
 
 
 def tune_scenario(
@@ -150,7 +150,7 @@ def tune_scenario(
             )
             for (name, tunable), values in zip(tunables.items(), result.values, strict=True)
         }
-    result = replace(result, status=tuple(dict(one.table["status"]) for one in identified.values()))
+    result = replace(result, status=tuple(dict(table["status"]) for table in identified.values()))
     result.write(out)
     return Tuned(result, out, identified)
 

@@ -213,7 +213,7 @@ def _show(console: Console, done: Tuned) -> None:
             table.add_column(
                 column, justify="left" if number in (0, 2) else "right", no_wrap=number in (0, 2)
             )
-        for parameter, row in identification.table.iterrows():
+        for parameter, row in identification.iterrows():
             span = "" if math.isnan(row["span_decades"]) else f"{row['span_decades']:.2g}"
             costs = []
             for column in ("tenth", "tenfold"):

@@ -21,9 +21,11 @@ from simrail.estimators.kalman import (
     chain_information,
     congruence,
     fixed_interval,
+    keep,
     log_density,
     mirror,
     remember,
+    remember_prediction,
     room_for_history,
     update,
 )
@@ -65,7 +67,7 @@ def track_target(
                 p[i, i + 2] += q * dt**2 / 2.0
                 p[i + 2, i] += q * dt**2 / 2.0
                 p[i + 2, i + 2] += q * dt
-        past.states[k], past.covariances[k], past.transitions[k] = x, p, f
+        remember_prediction(past, k, x, p, f)
         for m in range(z.shape[1]):
             if np.isfinite(z[k, m]):
                 h = model.rows[k, m]
@@ -73,7 +75,7 @@ def track_target(
                 s = update(x, p, h, error, model.noise[k, m], gain, v)
                 remember(past, k, m, h, gain, error, s)
                 likelihood += log_density(error * error / s, s, 1)
-        states[k], covariances[k] = x, p
+        keep(states, covariances, k, x, p)
     return likelihood
 
 

@@ -13,6 +13,7 @@ from simrail.estimators.odometry.kernel import (
     DRIFT,
     LAG,
     LEAD,
+    SCALE,
     STATES,
     SWAY,
     TREAD,
@@ -160,7 +161,7 @@ def test_finds_wheel_and_bias():
         counts = recording.encoder["pulse_count"].to_numpy()
         position = truth.motion(AXLE)["position_m"].to_numpy()
         rolled = way * (counts[-1] - counts[0]) / (position[-1] - position[0]) - 1.0
-        assert CurveMatchedOdometry().wheel_scale(recording)[0] == pytest.approx(rolled, abs=3e-3)
+        assert trace.states[-1, SCALE] == pytest.approx(rolled, abs=3e-3)
         assert abs(rolled) > 0.007
         assert np.degrees(trace.states[-1, DRIFT] - BIAS_RADPS) == pytest.approx(0.0, abs=0.002)
 

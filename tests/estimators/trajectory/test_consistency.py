@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 from scipy.stats import chi2
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES, WIDTH, constant_rows, linearise
+from simrail.estimators.trajectory.kernel import ROWS, STATES, WIDTH, constant_rows, linearise
 from simrail.estimators.trajectory.model import Model, packed_process, process_noise, transition
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import run_model

@@ -15,13 +15,16 @@ from scipy.special import stdtrit
 from scipy.stats import binom
 from simrail.estimators.trajectory.draws import FELT, geometry_draws, state_errors, stream_of
 from simrail.estimators.trajectory.kernel import (
+    ROWS,
+    STATES,
+    WIDTH,
     Past,
+    linearise,
     room_for_filtered,
     room_for_past,
     trajectory_error,
     trajectory_filter,
 )
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES, WIDTH, linearise
 from simrail.estimators.trajectory.model import Model, packed_process, process_noise, transition
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, run_model

@@ -14,7 +14,7 @@ import pytest
 import twins.trajectory
 from scipy.signal import butter, sosfiltfilt
 from simrail.estimators.baselines import ZeroTrack
-from simrail.estimators.trajectory.kernel_equations import TERMS
+from simrail.estimators.trajectory.kernel import TERMS
 from simrail.estimators.trajectory.model import Model, kinds_of, packed_process
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother, log_likelihood, run_model

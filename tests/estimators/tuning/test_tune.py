@@ -19,7 +19,7 @@ import pytest
 import simrail.estimators.tuning.objectives
 from scipy.linalg import block_diag
 from scipy.stats import chi2
-from simrail.estimators.trajectory.kernel_equations import STATES, TERMS
+from simrail.estimators.trajectory.kernel import STATES, TERMS
 from simrail.estimators.trajectory.model import Model, kinds_of, packed_process, process_noise, transition
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
@@ -142,13 +142,13 @@ def test_cml_recovers_the_noise_of_its_own_model() -> None:
     goal = synthetic()
     found = found_in(goal)
     known = identify(goal, asdict(found), cube_of(SYNTHETIC))
-    assert list(known.table["status"][:11]) == [IDENTIFIED] * 11
-    assert list(known.table["status"][11:]) == [HELD] * 2
+    assert list(known["status"][:11]) == [IDENTIFIED] * 11
+    assert list(known["status"][11:]) == [HELD] * 2
     off = np.log(found.vector() / TRUE.vector())[:11]
-    sd = np.log(10.0) * known.table["sd_decades"].to_numpy()[:11]
+    sd = np.log(10.0) * known["sd_decades"].to_numpy()[:11]
     assert (np.abs(off / sd) < 4.0).all()
     assert sd.max() < 0.25
-    squares = goal.samples * off @ known.curvature @ off
+    squares = goal.samples * off @ known.attrs["curvature"] @ off
     low, high = chi2.ppf([0.0005, 0.9995], 11)
     assert low < squares < high
     # The truth costs no more than the fit of 11 parameters to noise gains: half of that chi-square.
@@ -251,7 +251,7 @@ def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording, searched:
 def test_what_the_likelihood_does_not_identify(ride: Recording, searched: Callable) -> None:
     """The virtual positions are constants: ten times the confidence gains ln(10)/2 a sample, for nothing."""
     values = asdict(searched(ride, "paper").hyperparameters)
-    known = identify(objective_of([ride], TrajectorySmoother()), values, cube_of(SearchSpace())).table
+    known = identify(objective_of([ride], TrajectorySmoother()), values, cube_of(SearchSpace()))
     for name in ("lateral_position_m2", "vertical_position_m2"):
         assert known.loc[name, "status"] == LOWER
         assert known.loc[name, "tenth"] == pytest.approx(-0.5 * np.log(10.0), rel=0.1)
@@ -276,16 +276,16 @@ def test_ends_flats_and_constraints_are_told_apart() -> None:
     values[[5, 6, 9]] = low, high, 1e-3  # 9 is y's accelerometer, at a tenth of its position
     at_edges = dict(zip(NAMES, values, strict=True))
     known = identify(Bowl(), at_edges, cube_of(SearchSpace(box=(low, high))))
-    status = known.table["status"]
+    status = known["status"]
     assert list(status.iloc[[0, 1, 2, 3, 4, 5, 6, 9]]) == [
         IDENTIFIED, FLAT, FLAT, FLAT, FLAT, LOWER, UPPER, CONSTRAINT,
     ]  # fmt: skip
-    assert known.table.loc[NAMES[0], "curvature"] == pytest.approx(2.0, rel=1e-6)
-    assert known.table.loc[NAMES[0], "span_decades"] == pytest.approx(np.sqrt(1e-3) / np.log(10.0), rel=1e-6)
-    assert known.table.loc[NAMES[3], "curvature"] == pytest.approx(2.0, rel=1e-6)
+    assert known.loc[NAMES[0], "curvature"] == pytest.approx(2.0, rel=1e-6)
+    assert known.loc[NAMES[0], "span_decades"] == pytest.approx(np.sqrt(1e-3) / np.log(10.0), rel=1e-6)
+    assert known.loc[NAMES[3], "curvature"] == pytest.approx(2.0, rel=1e-6)
     # Two share a direction without end, which counts as ending at the box: half of each in it.
     least = 2e-3 / np.log(high / low) ** 2
-    assert known.table.loc[NAMES[3], "profile_curvature"] == pytest.approx(2.0 * least, rel=1e-2)
+    assert known.loc[NAMES[3], "profile_curvature"] == pytest.approx(2.0 * least, rel=1e-2)
 
 
 def rails_of(recording: Recording) -> pd.DataFrame:
@@ -462,7 +462,7 @@ def test_any_tunable_is_searched_and_judged(ride: Recording) -> None:
     assert values["mean_radps"] == pytest.approx(gyro.mean(), rel=1e-3)
     assert values["sd_radps"] == pytest.approx(gyro.std(ddof=0), rel=1e-3)
     cube = Cube(tuple(Scale().parameters()))
-    judged = identify(Scale().likelihood([ride]), values, cube).table
+    judged = identify(Scale().likelihood([ride]), values, cube)
     assert list(judged["status"]) == [IDENTIFIED] * 2
     known_to = judged["sd_decades"] * np.log(10.0)
     assert known_to["sd_radps"] == pytest.approx(1.0 / np.sqrt(2 * len(gyro)), rel=0.02)

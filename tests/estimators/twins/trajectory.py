@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, rts_smoother
-from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
+from simrail.estimators.trajectory.kernel import PACKED, STATES
 from simrail.estimators.trajectory.model import Model, dense_process, transition
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother
 
