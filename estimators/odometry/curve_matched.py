@@ -61,7 +61,6 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
-from simrail.recording.wheel_speed import pulse_way_m
 from simrail.track.design import TrackDesign
 
 _PLACES_PER_M = 4.0
@@ -187,7 +186,7 @@ class CurveMatchedOdometry:
         ends = time[block - 1 :: block][:n]
         read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
         counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
-        pulse = pulse_way_m(wheel)
+        pulse = wheel.pulse_m
         grid, table = line_table(recording.track)
         x, p = self._start(recording, pulse)
         states, covariance, flags = (

@@ -26,7 +26,6 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray, njit, njit_inline
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import EncoderSheet, OdometerSheet, Recording
-from simrail.recording.wheel_speed import pulse_way_m
 
 JERK_INTENSITY_M2PS5 = 0.01
 """Intensity of the model's white jerk. Small enough for quiet accelerations at constant speed, large
@@ -112,7 +111,7 @@ class EncoderOdometry:
             Indexed by `times`, columns `simrail.core.columns.ODOMETRY` and `ODOMETRY_SD`. At rest speed
             and acceleration are exactly 0.
         """
-        quantum = pulse_way_m(sheet)
+        quantum = sheet.pulse_m
         states = _filter(
             np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
             encoder["pulse_count"].to_numpy(dtype=np.float64),

@@ -22,8 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
-from simrail.estimators.trajectory.kernel import ROLL, ROWS, STATES, Past, Y, Z, trajectory_error
-from simrail.estimators.trajectory.model import Model, dense_process
+from simrail.estimators.trajectory.kernel import ROLL, ROWS, STATES, Model, Past, Y, Z, trajectory_error
 from simrail.estimators.trajectory.over_space import over_space
 from simrail.estimators.trajectory.track_geometry import Sight, slopes
 
@@ -73,7 +72,7 @@ def state_errors(model: Model, past: Past, streams: Sequence[np.random.Generator
         rad and m.
     """
     n = len(past.states)
-    roots = np.array([np.linalg.cholesky(dense_process(q)) for q in model.process])
+    roots = np.linalg.cholesky(model.process)
     drawn, errors, innovations = np.empty((len(streams), n, 3)), np.empty((n, STATES)), np.empty((n, ROWS))
     for draw, rng in enumerate(streams):
         normals = rng.standard_normal((n, STATES + ROWS))

@@ -93,8 +93,8 @@ class Model(NamedTuple):
         See `linearise`; of no rows for the corrected equations.
     kinds : ndarray of int (n,)
         Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
-    process : ndarray (c, 21)
-        Upper triangles of the five blocks of Q, row by row.
+    process : ndarray (c, 12, 12)
+        Q, in five blocks.
     noise : ndarray (c, 8)
         Variances U of the measurements.
     virtual : ndarray (2,)
@@ -267,16 +267,14 @@ def unpack(packed: FloatArray, k: int, p: FloatArray) -> None:
 
 @njit_borrowed
 def predict(x: FloatArray, p: FloatArray, process: FloatArray, kind: int, dt: float) -> None:
-    """X <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is row ``kind`` of ``process`` (c, 21)."""
+    """X <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is ``process[kind]``, (c, 12, 12)."""
     share = shares(dt)
     chain(x, INTO, ORIGIN, share)
     chain_covariance(p, INTO, ORIGIN, share)
-    at = 0
     for first, end in BLOCKS:
         for i in range(first, end):
             for c in range(i, end):
-                p[i, c] += process[kind, at]
-                at += 1
+                p[i, c] += process[kind, i, c]
     mirror(p)
 
 

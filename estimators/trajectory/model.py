@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from simrail.estimators.attitude.compensation import design_frame, track_motion
 from simrail.estimators.attitude.rest_bias import rest_bias
-from simrail.estimators.trajectory.kernel import BLOCKS, STATES, Model
+from simrail.estimators.trajectory.kernel import STATES, Model
 from simrail.estimators.trajectory.noise import Hyperparameters
 
 from simrail.core.columns import ACCEL, GYRO
@@ -27,15 +27,8 @@ from simrail.track.design import STRAIGHT
 from simrail.track.frame import TrackFrame
 
 
-def transition(step_s: float) -> FloatArray:
-    """F (12, 12): angles turn with constant rates, places move with constant acceleration."""
-    pair = np.array([[1.0, step_s], [0.0, 1.0]])
-    triple = np.array([[1.0, step_s, 0.5 * step_s**2], [0.0, 1.0, step_s], [0.0, 0.0, 1.0]])
-    return np.asarray(block_diag(pair, pair, pair, triple, triple))
-
-
-def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray]:
-    """Blocks of Q: white angular acceleration, and white jerk, over one step."""
+def process_noise(parameters: Hyperparameters, step_s: float) -> FloatArray:
+    """Q (12, 12): white angular acceleration, and white jerk, over one step."""
     dt = step_s
     pair = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
     triple = np.array(
@@ -46,24 +39,15 @@ def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray
         ]
     )
     values = parameters.vector()
-    return [q * pair for q in values[:3]] + [q * triple for q in values[3:5]]
-
-
-def packed_process(parameters: Sequence[Hyperparameters], step_s: float) -> FloatArray:
-    """Upper triangles of the blocks of Q, row by row: (c, 21) for c sets of hyper-parameters."""
-    return np.array(
-        [
-            np.concatenate([q[np.triu_indices(len(q))] for q in process_noise(values, step_s)])
-            for values in parameters
-        ]
-    )
+    return np.asarray(block_diag(*(q * pair for q in values[:3]), *(q * triple for q in values[3:5])))
 
 
 def with_noise(model: Model, *parameters: Hyperparameters) -> Model:
     """The model with other noise: one set for all samples, or one for each kind of them."""
     kinds = model.kinds if len(parameters) > 1 else np.zeros_like(model.kinds)
     noise = np.array([values.vector()[5:] for values in parameters])
-    return model._replace(kinds=kinds, process=packed_process(parameters, model.step_s), noise=noise)
+    process = np.array([process_noise(values, model.step_s) for values in parameters])
+    return model._replace(kinds=kinds, process=process, noise=noise)
 
 
 def kinds_of(recording: Recording) -> IntArray:
@@ -120,7 +104,7 @@ def model_of(
         track=track_terms(recording, frame, printed=printed),
         slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
         kinds=kinds_of(recording),
-        process=np.empty((0, 21)),
+        process=np.empty((0, STATES, STATES)),
         noise=np.empty((0, 8)),
         virtual=np.array([lateral, height]),
         start=start,
@@ -183,14 +167,3 @@ def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
     """Paper 001's misprints, (n, 3); see `simrail.estimators.trajectory.kernel.linearise`."""
     _, v, h = frame.rates.T
     return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
-
-
-def dense_process(process: FloatArray) -> FloatArray:
-    """Q (12, 12) of the upper triangles (21,) of its blocks."""
-    q, at = np.zeros((STATES, STATES)), 0
-    for first, end in BLOCKS:
-        upper = np.triu_indices(end - first)
-        block, count = q[first:end, first:end], len(upper[0])
-        block[upper] = block.T[upper] = process[at : at + count]
-        at += count
-    return q

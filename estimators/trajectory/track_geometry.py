@@ -25,7 +25,6 @@ from simrail.core.rotation import rotation_matrix
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording, odometry_of
 
-GAUGE = IRREGULARITY.index("gauge_m")
 OUTLIER_SDS = 5.0
 """Standard deviations of the noise from the running median beyond which a view of the rails is not used."""
 

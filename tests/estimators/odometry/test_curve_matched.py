@@ -320,7 +320,8 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     x[YAW] = np.interp(x[S], grid[0] + np.arange(len(table)) / grid[1], table[:, 0])
     p[V, V] = 0.1
     n = STATES
-    out = Steps(np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), np.empty((steps, 2)))
+    flags = np.empty((2, steps), dtype=bool)
+    out = Steps(time, np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), *flags)
     past = room_for_history(steps, n, UPDATES)
     curve_matched(
         0.02, imu[:, 1:4].copy(), counts[read], method._model(recording, pulse), 9.81,
@@ -328,7 +329,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
     fixed_interval(past, smoothed, covariance)
-    return (*out[:2], *past[:3], smoothed, covariance)
+    return (*out[1:3], *past[:3], smoothed, covariance)
 
 
 def test_smoother_equals_rauch_tung_striebel():

@@ -15,7 +15,7 @@ import twins.trajectory
 from scipy.signal import butter, sosfiltfilt
 from simrail.estimators.baselines import ZeroTrack
 from simrail.estimators.trajectory.kernel import TERMS
-from simrail.estimators.trajectory.model import Model, kinds_of, packed_process
+from simrail.estimators.trajectory.model import Model, kinds_of, process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother, log_likelihood, run_model
 from simrail.estimators.trajectory.track_geometry import track_geometry
@@ -97,7 +97,7 @@ def test_two_sets_of_noise_equal_filterpy(line_recording: Callable) -> None:
         ours = replace(two, smoothed=smoothed)
         compare(ours.trace(recording), twins.trajectory.trace(ours, recording))
     likelihoods = {
-        smoother.log_likelihood(recording)
+        log_likelihood(smoother.model(recording))
         for smoother in (
             two,
             TrajectorySmoother(),
@@ -115,7 +115,7 @@ def test_the_likelihood_alone_and_the_means_alone_are_the_same(line_recording: C
     smoother = TrajectorySmoother()
     found = smoother.trace(recording)
     assert log_likelihood(smoother.model(recording)) == found.log_likelihood
-    assert smoother.log_likelihood(recording) == found.log_likelihood
+    assert log_likelihood(smoother.model(recording)) == found.log_likelihood
     means = replace(smoother, with_covariance=False).trace(recording)
     assert np.array_equal(means.states, found.states)
     assert len(means.covariance) == 0
@@ -356,7 +356,7 @@ def test_steady_for_hours() -> None:
         track=np.zeros((n, len(TERMS))),
         slips=np.empty((0, 3)),
         kinds=np.zeros(n, dtype=np.int64),
-        process=packed_process([parameters], 0.1),
+        process=process_noise(parameters, 0.1)[None],
         noise=parameters.vector()[None, 5:],
         virtual=np.array([0.0, 0.6]),
         start=np.array([0.0] * 9 + [0.6, 0.0, 0.0]),
