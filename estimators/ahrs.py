@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import imufusion
 import numpy as np
-import pandas as pd
 from simrail.estimators.attitude.compensation import gravity_force, needs_of, role_of, start_frame
 from simrail.estimators.attitude.quaternions import to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias
@@ -12,7 +11,7 @@ from vqf import VQF
 
 from simrail.core.columns import ATTITUDE, GYRO, MAGNETIC
 from simrail.core.errors import InputError
-from simrail.estimation.estimate import Estimate
+from simrail.estimation.estimate import Estimate, states_only
 from simrail.recording.recording import Recording
 
 
@@ -84,10 +83,7 @@ class Vqf:
             angles = to_euler(vqf.updateBatch(gyro, force)["quat6D"], start_yaw_rad=0.0)
             # Its heading starts anywhere: turned so that the first sample is the design track's.
             angles[:, 2] += start_yaw - angles[0, 2]
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)
 
 
 @dataclass(frozen=True)
@@ -138,7 +134,4 @@ class Imufusion:
             found[k] = quaternion()
         angles = to_euler(found, start_yaw_rad=0.0)
         angles[:, 2] += float(start_frame(recording).yaw_rad[0]) - angles[0, 2]
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)

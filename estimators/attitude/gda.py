@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from simrail.estimators.attitude.compensation import gravity_force, needs_of, role_of, start_frame
 from simrail.estimators.attitude.kernel import attitude_gda
 from simrail.estimators.attitude.quaternions import from_euler, level, to_euler
@@ -18,7 +17,7 @@ from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
 
 from simrail.core.columns import ATTITUDE
 from simrail.core.errors import InputError
-from simrail.estimation.estimate import Estimate
+from simrail.estimation.estimate import Estimate, states_only
 from simrail.recording.recording import Recording
 
 GYRO_ERROR_RADPS = {"recommended": math.radians(0.2), "paper": math.radians(0.5)}
@@ -91,7 +90,4 @@ class AttitudeGda:
             quaternions,
         )
         angles = to_euler(quaternions, start_yaw_rad=start_yaw)
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)

@@ -23,8 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 from simrail.estimators.trajectory.kernel import ROLL, ROWS, STATES, Model, Past, Y, Z, trajectory_error
-from simrail.estimators.trajectory.over_space import over_space
-from simrail.estimators.trajectory.track_geometry import Sight, slopes
+from simrail.estimators.trajectory.track_geometry import Sight, over_space, slopes
 
 from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray

@@ -54,6 +54,12 @@ class Estimate:
     geometry_draws: FloatArray | None = None
 
 
+def states_only(recording: Recording, states: FloatArray, columns: Sequence[str]) -> Estimate:
+    """The estimate that is nothing but states (n, m), one row per sample of the IMU."""
+    frame = pd.DataFrame(states, index=recording.imu.index, columns=list(columns))
+    return Estimate(states=frame, mount=recording.mount)
+
+
 NEEDS = ("odometry", "encoder", "magnetometer", "rail_sensor")
 """What an estimator may need beside the IMU, by the keys of a scenario."""
 

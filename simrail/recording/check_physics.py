@@ -180,12 +180,10 @@ def _judge_push(x: tuple[float, float], y: tuple[float, float]) -> None:
         return
     sideways = abs(y[0]) > max(abs(x[0]), 0.4)
     if x[0] < -0.4 and not sideways:
-        problem, remedy = (
-            "pushes backwards when the train gains speed",
-            (
-                'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards '
-                "smaller s has falling pulse counts (reverse = true)"
-            ),
+        problem = "pushes backwards when the train gains speed"
+        remedy = (
+            'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards smaller s '
+            "has falling pulse counts (reverse = true)"
         )
     elif sideways:
         axes = '["y", "-x", "z"]' if y[0] > 0.0 else '["-y", "x", "z"]'

@@ -60,7 +60,7 @@ def run(scale: float = 1.0) -> dict[bool, tuple[np.ndarray, np.ndarray]]:
     root, sd = np.linalg.cholesky(q), np.sqrt(NOISE.vector()[5:])
     start = np.zeros(STATES)
     start[[0, 5, 9]] = CANT, SPEED / RADIUS, 0.6
-    kinds, process = np.zeros(SAMPLES, dtype=np.int64)([NOISE], STEP)
+    kinds, process = np.zeros(SAMPLES, dtype=np.int64), q[None]
     upper, slips = np.triu_indices(STATES), np.empty((0, 3))
     g, rows = np.zeros(ROWS), np.zeros((ROWS, WIDTH))
     constant_rows(rows)
