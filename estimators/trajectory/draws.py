@@ -71,7 +71,7 @@ def state_errors(model: Model, past: Past, streams: Sequence[np.random.Generator
         rad and m.
     """
     n = len(past.states)
-    roots = np.linalg.cholesky(model.process)
+    roots = np.asarray(np.linalg.cholesky(model.process), dtype=np.float64)
     drawn, errors, innovations = np.empty((len(streams), n, 3)), np.empty((n, STATES)), np.empty((n, ROWS))
     for draw, rng in enumerate(streams):
         normals = rng.standard_normal((n, STATES + ROWS))

@@ -30,12 +30,13 @@ from simrail.estimators.trajectory.draws import geometry_draws, state_errors, st
 from simrail.estimators.trajectory.kernel import (
     PACKED,
     STATES,
+    Model,
     room_for_filtered,
     room_for_past,
     trajectory_back,
     trajectory_filter,
 )
-from simrail.estimators.trajectory.model import Model, model_of
+from simrail.estimators.trajectory.model import model_of
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 from simrail.estimators.tuning.file import Tuning

@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from simrail.estimators.trajectory.kernel import ROWS, STATES, WIDTH, constant_rows, linearise
-from simrail.estimators.trajectory.model import Model, process_noise
+from simrail.estimators.trajectory.kernel import ROWS, STATES, WIDTH, Model, constant_rows, linearise
+from simrail.estimators.trajectory.model import process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import run_model
 from twins.trajectory import transition

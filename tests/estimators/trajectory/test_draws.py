@@ -17,6 +17,7 @@ from simrail.estimators.trajectory.kernel import (
     ROWS,
     STATES,
     WIDTH,
+    Model,
     Past,
     linearise,
     room_for_filtered,
@@ -24,7 +25,7 @@ from simrail.estimators.trajectory.kernel import (
     trajectory_error,
     trajectory_filter,
 )
-from simrail.estimators.trajectory.model import Model, process_noise
+from simrail.estimators.trajectory.model import process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, run_model
 from simrail.estimators.trajectory.track_geometry import Sight, geometry_of, sight_of, track_geometry

@@ -14,8 +14,8 @@ import pytest
 import twins.trajectory
 from scipy.signal import butter, sosfiltfilt
 from simrail.estimators.baselines import ZeroTrack
-from simrail.estimators.trajectory.kernel import TERMS
-from simrail.estimators.trajectory.model import Model, kinds_of, process_noise
+from simrail.estimators.trajectory.kernel import TERMS, Model
+from simrail.estimators.trajectory.model import kinds_of, process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother, log_likelihood, run_model
 from simrail.estimators.trajectory.track_geometry import track_geometry
@@ -183,17 +183,29 @@ LIMITS = {70.0: (0.1, 0.5), 20.0: (0.3, 1.0)}
 """By speed in km/h: sd of y and z between 3 and 25 m (mm), rms of yaw (deg)."""
 
 
+LINE, CURVE = (10.0, 2090.0), (400.0, 620.0)
+"""The whole line, and a stretch of it with a curve, m."""
+
+
 @pytest.mark.parametrize(
-    ("speed_kmh", "direction"),
-    [(70.0, 1), *(pytest.param(*way, marks=pytest.mark.slow) for way in ((70.0, -1), (20.0, 1), (20.0, -1)))],
+    ("speed_kmh", "direction", "way"),
+    [
+        (70.0, 1, LINE),
+        (20.0, 1, CURVE),
+        *(pytest.param(*ride, LINE, marks=pytest.mark.slow) for ride in ((70.0, -1), (20.0, 1), (20.0, -1))),
+    ],
 )
 def test_accuracy_on_the_simulated_bogie(
-    metro_recording: Callable, metro_motion: Callable, speed_kmh: float, direction: int
+    metro_recording: Callable,
+    metro_motion: Callable,
+    speed_kmh: float,
+    direction: int,
+    way: tuple[float, float],
 ) -> None:
     """Attitude to the accelerometer's bias; short waves to fractions of a mm; never worse than nothing."""
     for mount in ("axle", "frame"):
-        recording = metro_recording(speed_kmh, direction, mount, 0)
-        motion = metro_motion(speed_kmh, direction, mount)
+        recording = metro_recording(speed_kmh, direction, mount, 0, way)
+        motion = metro_motion(speed_kmh, direction, mount, way)
         error = errors(TrajectorySmoother(with_covariance=False).estimate(recording).states, motion)
         motion = motion.reindex(error.index, method="nearest", tolerance=1e-6)
         rms = np.degrees(np.sqrt((error**2).mean()))
@@ -208,7 +220,8 @@ def test_accuracy_on_the_simulated_bogie(
             of_error = 1e3 * band_sd(error[name].to_numpy()[moves], position, 3.0, 25.0)
             of_zero = 1e3 * band_sd(motion[name].to_numpy()[moves], position, 3.0, 25.0)
             assert of_error < short < 0.5 * of_zero
-            assert error[name].std() < (motion[name] - recording.mount_position_m[axis]).std()
+            if way == LINE:  # a stretch has too few of the waves beyond 37 m, which 20 km/h does not show
+                assert error[name].std() < (motion[name] - recording.mount_position_m[axis]).std()
 
 
 def test_time_and_memory_grow_with_the_ride(line_recording: Callable) -> None:

@@ -18,8 +18,8 @@ import pandas as pd
 import pytest
 import simrail.estimators.tuning.objectives
 from scipy.stats import chi2
-from simrail.estimators.trajectory.kernel import STATES, TERMS
-from simrail.estimators.trajectory.model import Model, kinds_of, process_noise
+from simrail.estimators.trajectory.kernel import STATES, TERMS, Model
+from simrail.estimators.trajectory.model import kinds_of, process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likelihood
 from simrail.estimators.tuning import tune as generic

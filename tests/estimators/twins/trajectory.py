@@ -11,8 +11,7 @@ import math
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, rts_smoother
 from scipy.linalg import block_diag
-from simrail.estimators.trajectory.kernel import PACKED, STATES
-from simrail.estimators.trajectory.model import Model
+from simrail.estimators.trajectory.kernel import PACKED, STATES, Model
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother
 
 from simrail.core.jit import FloatArray
