@@ -6,6 +6,7 @@ call there is its model.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -155,11 +156,23 @@ class Run(NamedTuple):
     likelihood: float
 
 
+def run_by(track: Callable, model: Target, measured: np.ndarray) -> Run:
+    states, covariances, past = np.empty((STEPS, N)), np.empty((STEPS, N, N)), room_for_history(STEPS, N, M)
+    likelihood = track(model, measured, states, covariances, past)
+    return Run(states, covariances, past, likelihood)
+
+
 @pytest.fixture(scope="module")
 def run(model: Target, measured: np.ndarray) -> Run:
-    states, covariances, past = np.empty((STEPS, N)), np.empty((STEPS, N, N)), room_for_history(STEPS, N, M)
-    likelihood = track_target(model, measured, states, covariances, past)
-    return Run(states, covariances, past, likelihood)
+    """By the interpreter, which is faster than to compile it; what it calls is compiled."""
+    return run_by(track_target.py_func, model, measured)
+
+
+@pytest.mark.slow
+def test_the_example_compiles(run: Run, model: Target, measured: np.ndarray) -> None:
+    compiled = run_by(track_target, model, measured)
+    np.testing.assert_allclose(compiled.states, run.states, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(compiled.past.gains, run.past.gains, rtol=0, atol=1e-12)
 
 
 def test_filter_and_likelihood_are_the_joint_distributions(
@@ -206,7 +219,13 @@ def test_filter_and_smoother_equal_filterpys(run: Run, model: Target, measured: 
     np.testing.assert_allclose(covariances, by_rts[1], rtol=0, atol=1e-7)
 
 
-def test_a_block_is_its_whitened_rows_one_by_one() -> None:
+@pytest.mark.parametrize(
+    "block_update",
+    # To compile it takes longer than all else here together, and its algebra is the same.
+    [block_update.py_func, pytest.param(block_update, marks=pytest.mark.slow)],
+    ids=["plain", "compiled"],
+)
+def test_a_block_is_its_whitened_rows_one_by_one(block_update: Callable) -> None:
     """Correlated noise; Joseph's form leaves P symmetric and positive where the measurement is far better."""
     rng = np.random.default_rng(3)
     root, rows, errors = rng.standard_normal((N, N)), rng.standard_normal((3, N)), rng.standard_normal(3)
