@@ -4,15 +4,14 @@ from dataclasses import dataclass
 
 import imufusion
 import numpy as np
-import pandas as pd
-from simrail.estimators.attitude.compensation import gravity_force, start_frame
+from simrail.estimators.attitude.compensation import gravity_force, needs_of, role_of, start_frame
 from simrail.estimators.attitude.quaternions import to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias
 from vqf import VQF
 
 from simrail.core.columns import ATTITUDE, GYRO, MAGNETIC
 from simrail.core.errors import InputError
-from simrail.estimation.estimate import Estimate
+from simrail.estimation.estimate import Estimate, states_only
 from simrail.recording.recording import Recording
 
 
@@ -41,19 +40,14 @@ class Vqf:
     rest_bias: bool = True
 
     causal = True
+    role = property(role_of)
     label = "VQF"
     cites = ("Laidig and Seel 2023",)
 
     @property
     def needs(self) -> tuple[str, ...]:
         """The magnetometer, and the odometry for the compensation, if they are asked for."""
-        odometry = ("odometry",) if self.compensated else ()
-        return (*odometry, "magnetometer") if self.magnetometer else odometry
-
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
+        return (*needs_of(self), "magnetometer") if self.magnetometer else needs_of(self)
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw.
@@ -89,10 +83,7 @@ class Vqf:
             angles = to_euler(vqf.updateBatch(gyro, force)["quat6D"], start_yaw_rad=0.0)
             # Its heading starts anywhere: turned so that the first sample is the design track's.
             angles[:, 2] += start_yaw - angles[0, 2]
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)
 
 
 @dataclass(frozen=True)
@@ -117,18 +108,10 @@ class Imufusion:
     rest_bias: bool = True
 
     causal = True
+    needs = property(needs_of)
+    role = property(role_of)
     label = "imufusion"
     cites = ("Madgwick, Wilson, Turk, Burridge, Kapatos and Vaidyanathan 2020",)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The odometry, for the compensation."""
-        return ("odometry",) if self.compensated else ()
-
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gain < np.inf:
@@ -151,7 +134,4 @@ class Imufusion:
             found[k] = quaternion()
         angles = to_euler(found, start_yaw_rad=0.0)
         angles[:, 2] += float(start_frame(recording).yaw_rad[0]) - angles[0, 2]
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)

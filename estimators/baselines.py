@@ -6,12 +6,11 @@ A method that loses to `DesignAngles` is better replaced by the track's drawing.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 from simrail.estimators.attitude.compensation import design_frame
 from simrail.estimators.trajectory.track_geometry import track_geometry
 
 from simrail.core.columns import ATTITUDE, RELATIVE_POSITION
-from simrail.estimation.estimate import Estimate
+from simrail.estimation.estimate import Estimate, states_only
 from simrail.recording.recording import Recording
 
 
@@ -29,10 +28,7 @@ class DesignAngles:
         """Look up roll, pitch and yaw of the design track."""
         frame = design_frame(recording)
         angles = np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad])
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)
 
 
 @dataclass(frozen=True)

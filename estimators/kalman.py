@@ -1,4 +1,4 @@
-"""The algebra of every Kalman filter here: predict, update, smooth, draw, on arrays and in place.
+"""The algebra of every Kalman filter here: predict, update, smooth, on arrays and in place.
 
 For compiled loops: each function is a few lines that a kernel calls once a step and the compiler puts in its
 place, so that what a filter adds is its model alone. The model is linear, or linearised about the state:
@@ -7,16 +7,16 @@ place, so that what a filter adds is its model alone. The model is linear, or li
 
 Measurements of independent noise are taken one by one, which needs no inverse and equals taking them at once;
 `block_update` is for those whose noise is not. A covariance P is (n, w) with w >= n: rows may be padded with
-zeros to fill the vector registers. A row h has n numbers, of which only those at the indices ``at`` count;
-``at`` is a tuple of integers, which the compiler unrolls, and `everything` gives that of a full row.
+zeros to fill the vector registers. A row h has n numbers, most of which may be zero.
 
-The smoother and the draws go backwards through what a filter left behind (`History`), update by update, by
-the modified Bryson-Frazier recursion: it equals the Rauch-Tung-Striebel smoother and inverts nothing.
+The smoother goes backwards through what a filter left behind (`History`), update by update, by the modified
+Bryson-Frazier recursion: it equals the Rauch-Tung-Striebel smoother and inverts nothing. Draws of its error
+go the same way (`simrail.estimators.trajectory.kernel.trajectory_error`).
 
 References: G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, Academic Press 1977,
 chapters 2 and 10 (scalar updates, Bryson-Frazier); P. D. Joseph in R. S. Bucy and P. D. Joseph, Filtering for
 Stochastic Processes, Wiley 1968 (block update); F. C. Schweppe, IEEE Trans. Inf. Theory 11 (1965) 61-70
-(likelihood); J. Durbin and S. J. Koopman, Biometrika 89 (2002) 603-615 (draws by mean corrections).
+(likelihood).
 """
 
 import math
@@ -56,6 +56,27 @@ def room_for_history(steps: int, n: int, m: int) -> History:
     square, updates = (steps, n, n), (steps, m, n)
     shapes = ((steps, n), square, square, updates, updates, (steps, m), (steps, m))
     return History(*(np.zeros(shape) for shape in shapes))
+
+
+@njit_borrowed
+def keep(states: FloatArray, covariances: FloatArray, k: int, x: FloatArray, p: FloatArray) -> None:
+    """Write state and covariance of step k into rows k.
+
+    By elements: numba compiles the assignment of a whole array for half a second, wherever it stands.
+    """
+    for i in range(x.shape[0]):
+        states[k, i] = x[i]
+        for c in range(x.shape[0]):
+            covariances[k, i, c] = p[i, c]
+
+
+@njit_borrowed
+def remember_prediction(past: History, k: int, x: FloatArray, p: FloatArray, f: FloatArray) -> None:
+    """Put predicted state, covariance and F of step k into the history."""
+    keep(past.states, past.covariances, k, x, p)
+    for i in range(x.shape[0]):
+        for c in range(x.shape[0]):
+            past.transitions[k, i, c] = f[i, c]
 
 
 @njit_borrowed
@@ -307,56 +328,3 @@ def fixed_interval(past: History, states: FloatArray, covariances: FloatArray) -
         states[k] = past.states[k] - p @ lam
         covariances[k] = p - p @ info @ p
         lam, info = f.T @ lam, f.T @ info @ f
-
-
-@njit
-def joint_draw(
-    past: History,
-    start_root: FloatArray,
-    process_roots: FloatArray,
-    noise_sds: FloatArray,
-    normals: FloatArray,
-    errors: FloatArray,
-) -> None:
-    """One draw of truth minus smoothed state from the joint posterior of all steps.
-
-    Let e be the truth minus the filter's state. It obeys the filter's own recursion, whatever the truth is,
-    driven by the noise alone: with e ~ N(0, P0) at first, forwards, for m = first..last,
-
-        v = h e + u,   e <- e - K v;     then   e <- F e + w,   w ~ N(0, Q),  u ~ N(0, r)
-
-    and backwards, as the smoother goes,
-
-        lam <- lam - h' (K' lam + v/s);    error = e^- + P^- lam;    lam <- F' lam
-
-    Parameters
-    ----------
-    past : History
-    start_root, process_roots : ndarray (n, n), (k, n, n)
-        Roots L of P0 = L L' and of Q = L L' of the step to each; the first of these is not used.
-    noise_sds : ndarray (k, m)
-        Standard deviations of the measurements.
-    normals : ndarray (k, n + m)
-        Independent standard normal numbers: of start or process, and of the measurements.
-    errors : ndarray (k, n), out
-    """
-    steps, n = past.states.shape
-    updates = past.rows.shape[1]
-    innovations = np.zeros((steps, updates))
-    e = start_root @ normals[0, :n]
-    for k in range(steps):
-        if k > 0:
-            e = past.transitions[k] @ e + process_roots[k] @ normals[k, :n]
-        errors[k] = e
-        for m in range(updates):
-            if past.inverses[k, m] > 0.0:
-                v = (past.rows[k, m] * e).sum() + noise_sds[k, m] * normals[k, n + m]
-                e -= past.gains[k, m] * v
-                innovations[k, m] = v * past.inverses[k, m]
-    lam = np.zeros(n)
-    for k in range(steps - 1, -1, -1):
-        for m in range(updates - 1, -1, -1):
-            if past.inverses[k, m] > 0.0:
-                withdraw(lam, past.rows[k, m], past.gains[k, m], innovations[k, m])
-        errors[k] += past.covariances[k] @ lam
-        lam = past.transitions[k].T @ lam

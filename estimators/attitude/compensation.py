@@ -8,7 +8,7 @@ It assumes that the body's axes are those of the track frame and that the body d
 what is neglected is the body's own relative motion.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,6 +16,25 @@ from simrail.core.columns import ACCEL
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording, odometry_of
 from simrail.track.design import TrackFrame
+
+
+class Compensating(Protocol):
+    """An attitude estimator that can take the design track's acceleration off the accelerometer."""
+
+    @property
+    def compensated(self) -> bool:
+        """Whether it does."""
+        ...
+
+
+def needs_of(estimator: Compensating) -> tuple[str, ...]:
+    """What it needs beside the IMU: the odometry, for the compensation."""
+    return ("odometry",) if estimator.compensated else ()
+
+
+def role_of(estimator: Compensating) -> str:
+    """Under test with compensation; a filter that knows nothing of trains without."""
+    return "method" if estimator.compensated else "general_purpose"
 
 
 def design_frame(recording: Recording) -> TrackFrame:

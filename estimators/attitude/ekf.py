@@ -10,12 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.attitude.compensation import design_frame, gravity_force, start_frame
+from simrail.estimators.attitude.compensation import design_frame, gravity_force, role_of, start_frame
 from simrail.estimators.attitude.kernel import attitude_ekf
 from simrail.estimators.attitude.noise import (
+    READINGS,
     SWING_PER_SPEED,
+    TUNINGS,
     Noise,
-    check_tuning,
     paper_noise,
     recommended_noise,
 )
@@ -27,6 +28,15 @@ from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 from simrail.track.design import TrackFrame
+
+LIMITS = {
+    "gyro_intensity_rad2ps": ">= 0",
+    "accel_sd_mps2": "> 0",
+    "doubt": ">= 0",
+    "vibration": ">= 0",
+    "start_sd_rad": "> 0",
+    "start_yaw_sd_rad": ">= 0",
+}
 
 
 class _Arrays(NamedTuple):
@@ -86,6 +96,7 @@ class AttitudeEkf:
     start_yaw_sd_rad: float = math.radians(0.3)
 
     causal = True
+    role = property(role_of)
     label = "EKF"
     cites = ("Briales, Urda and Escalona 2021",)
 
@@ -94,27 +105,16 @@ class AttitudeEkf:
         """The odometry, for the compensation, and for what the recommended tuning knows of the vibration."""
         return ("odometry",) if self.compensated or self.tuning == "recommended" else ()
 
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
-
     def __post_init__(self) -> None:
-        check_tuning(self.tuning, self.process_noise)
-        for name in (
-            "gyro_intensity_rad2ps",
-            "accel_sd_mps2",
-            "doubt",
-            "vibration",
-            "start_sd_rad",
-            "start_yaw_sd_rad",
-        ):
+        for name, allowed in (("tuning", TUNINGS), ("process_noise", READINGS)):
             value = getattr(self, name)
-            lowest_allowed = name in ("doubt", "vibration", "start_yaw_sd_rad", "gyro_intensity_rad2ps")
-            if value is not None and not (0.0 < value < math.inf or (lowest_allowed and value == 0.0)):
-                raise InputError(
-                    "is out of range", field=name, value=value, limit=">= 0" if lowest_allowed else "> 0"
-                )
+            if value not in allowed:
+                problem = "no such " + name.replace("_", " ")
+                raise InputError(problem, field=name, value=value, limit=f"one of {', '.join(allowed)}")
+        for name, limit in LIMITS.items():
+            value = getattr(self, name)
+            if value is not None and not (0.0 < value < math.inf or (value == 0.0 and limit == ">= 0")):
+                raise InputError("is out of range", field=name, value=value, limit=limit)
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw with covariance and innovations at every IMU sample."""

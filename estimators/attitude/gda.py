@@ -10,15 +10,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
-from simrail.estimators.attitude.compensation import gravity_force, start_frame
+from simrail.estimators.attitude.compensation import gravity_force, needs_of, role_of, start_frame
 from simrail.estimators.attitude.kernel import attitude_gda
 from simrail.estimators.attitude.quaternions import from_euler, level, to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
 
 from simrail.core.columns import ATTITUDE
 from simrail.core.errors import InputError
-from simrail.estimation.estimate import Estimate
+from simrail.estimation.estimate import Estimate, states_only
 from simrail.recording.recording import Recording
 
 GYRO_ERROR_RADPS = {"recommended": math.radians(0.2), "paper": math.radians(0.5)}
@@ -56,18 +55,10 @@ class AttitudeGda:
     printed: bool = False
 
     causal = True
+    needs = property(needs_of)
+    role = property(role_of)
     label = "GDA"
     cites = ("Briales, Urda and Escalona 2021", "Madgwick 2010")
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The odometry, for the compensation."""
-        return ("odometry",) if self.compensated else ()
-
-    @property
-    def role(self) -> str:
-        """Under test with compensation; a filter that knows nothing of trains without."""
-        return "method" if self.compensated else "general_purpose"
 
     def __post_init__(self) -> None:
         if self.tuning not in GYRO_ERROR_RADPS:
@@ -99,7 +90,4 @@ class AttitudeGda:
             quaternions,
         )
         angles = to_euler(quaternions, start_yaw_rad=start_yaw)
-        return Estimate(
-            states=pd.DataFrame(angles, index=recording.imu.index, columns=list(ATTITUDE)),
-            mount=recording.mount,
-        )
+        return states_only(recording, angles, ATTITUDE)

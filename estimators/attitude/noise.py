@@ -42,7 +42,6 @@ import numpy as np
 from simrail.estimators.attitude.rest_bias import RestBias
 
 from simrail.core.columns import ODOMETRY_SD
-from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import ImuSheet, Recording, odometry_of
 from simrail.track.design import TrackFrame
@@ -197,14 +196,5 @@ def time_constant(
     return tau
 
 
-def check_tuning(tuning: str, reading: str) -> None:
-    """Refuse names that are not known."""
-    if tuning not in TUNINGS:
-        raise InputError("no such tuning", field="tuning", value=tuning, limit="one of " + ", ".join(TUNINGS))
-    if reading not in ("intensity", "per_step"):
-        raise InputError(
-            "no such reading of the process noise",
-            field="process_noise",
-            value=reading,
-            limit="intensity or per_step",
-        )
+READINGS = ("intensity", "per_step")
+"""How a process noise is read: Q = value Ts, or Q = value."""

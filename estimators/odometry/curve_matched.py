@@ -29,20 +29,34 @@ metre or two behind. They are found along the way because the train knows where 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
 wheel's way starts anew when both agree on the speed again.
 
-Not here: the loops (`simrail.estimators.odometry.kernel`, `simrail.estimators.kalman`), what is made of their
-steps (`simrail.estimators.odometry.trace`), and odometry from the encoder alone
-(`simrail.estimators.odometry.encoder`).
+Of the three that an attitude filter asks for, position and speed are the filter's. The acceleration is
+made here, since a train's own acceleration changes slowly, and the accelerometer shakes with the body.
+
+Not here: the loops (`simrail.estimators.odometry.kernel`, `simrail.estimators.kalman`), and odometry from the
+encoder alone (`simrail.estimators.odometry.encoder`).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
+from scipy import signal
 from simrail.estimators.kalman import fixed_interval, room_for_history
-from simrail.estimators.odometry.kernel import SCALE, STATES, UPDATES, YAW, LineModel, S, Steps, curve_matched
-from simrail.estimators.odometry.trace import RATE_HZ, STILL_SD_MPS, Trace, at_imu_times
+from simrail.estimators.odometry.encoder import EncoderOdometry
+from simrail.estimators.odometry.kernel import (
+    STATES,
+    UPDATES,
+    YAW,
+    BoolArray,
+    LineModel,
+    S,
+    Steps,
+    V,
+    curve_matched,
+)
 
-from simrail.core.columns import ACCEL, GYRO
+from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
@@ -51,6 +65,21 @@ from simrail.track.design import TrackDesign
 
 _PLACES_PER_M = 4.0
 _STILL_S = 0.5
+
+RATE_HZ = 50.0
+"""Rate of the filter. A train's jerk is limited: between two steps nothing happens along the track."""
+
+CALM_HZ = 1.0
+"""Up to here an acceleration is the train's."""
+
+HOLD_S = 2.0
+"""After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
+
+ACCELERATION_SD_MPS2 = 0.03
+"""Of that acceleration: what the body's pitching leaves in it."""
+
+STILL_SD_MPS = 1e-3
+"""Of the speed of a train that is known to stand."""
 
 
 @dataclass(frozen=True)
@@ -136,17 +165,10 @@ class CurveMatchedOdometry:
         InputError
             If the recording has no encoder.
         """
-        trace = self.trace(recording)
-        states = at_imu_times(
-            trace,
-            recording,
-            smoothed=self.smoothed,
-            start_sd_m=self.start_sd_m,
-            radius_sd=self.radius_sd,
-        )
+        states = self._at_imu_times(self.trace(recording), recording)
         return Estimate(states=states, mount=recording.mount)
 
-    def trace(self, recording: Recording) -> Trace:
+    def trace(self, recording: Recording) -> Steps:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
         if recording.encoder is None or recording.encoder_sheet is None:
             raise InputError(
@@ -164,48 +186,71 @@ class CurveMatchedOdometry:
         ends = time[block - 1 :: block][:n]
         read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
         counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
-        pulse = 2.0 * math.pi * wheel.wheel_radius_m / wheel.pulses_per_revolution
+        pulse = wheel.pulse_m
         grid, table = line_table(recording.track)
         x, p = self._start(recording, pulse)
-        steps = Steps(np.empty((n, STATES)), np.empty((n, STATES, STATES)), np.empty(n), np.empty((n, 2)))
+        states, covariance, flags = (
+            np.empty((n, STATES)),
+            np.empty((n, STATES, STATES)),
+            np.empty((2, n), bool),
+        )
+        steps = Steps(ends, states, covariance, np.empty(n), *flags)
         past = room_for_history(n if self.smoothed else 0, STATES, UPDATES)
         model = self._model(recording, pulse)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
         curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, past)
         if self.smoothed:
             fixed_interval(past, steps.states, steps.covariance)
-        slips, rests = steps.flags.T > 0.0
-        return Trace(ends, steps.states, steps.covariance, steps.acceleration, slips, rests)
+        return steps
 
-    def wheel_scale(self, recording: Recording) -> tuple[float, float]:
-        """Relative error of the nominal wheel radius found at the end of the ride, and its sd.
+    def _at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
+        """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
+        wanted = recording.imu.index.to_numpy(dtype=np.float64)
+        values = np.column_stack([steps.states[:, [S, V]], _calm(steps, smoothed=self.smoothed)])
+        values[steps.resting, 1:] = 0.0
+        sd = np.sqrt(np.diagonal(steps.covariance, axis1=1, axis2=2)[:, [S, V]])
+        lines = np.column_stack([values, sd, np.full(len(sd), ACCELERATION_SD_MPS2)])
+        # Until the filter's first step: standing at the start.
+        start = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, STILL_SD_MPS, ACCELERATION_SD_MPS2]
+        lines, times = np.vstack([start, lines]), np.concatenate([[-np.inf], steps.time_s])
+        if self.smoothed:
+            times[0] = min(wanted[0], steps.time_s[0]) - 1.0 / RATE_HZ
+            values = np.column_stack([np.interp(wanted, times, column) for column in lines.T])
+        else:
+            last = np.searchsorted(times, wanted, side="right") - 1
+            values = lines[last]
+            rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
+            values[rolls, 2::3] = self._wheel_acceleration(recording)[rolls]
+            ahead = np.where(last > 0, wanted - times[last], 0.0)
+            values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
+            values[:, 1] += ahead * values[:, 2]
+        return pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
 
-        Positive if the wheel shows more way than the track has: its true radius is smaller.
+    def _wheel_acceleration(self, recording: Recording) -> FloatArray:
+        """The wheel's own acceleration and its sd (n, 2), for where it rolls.
+
+        An attitude filter takes the acceleration off the accelerometer. Made from that same accelerometer
+        it would take the body's own pitch away as well.
         """
-        trace = self.trace(recording)
-        return float(trace.states[-1, SCALE]), float(np.sqrt(trace.covariance[-1, SCALE, SCALE]))
+        assert recording.encoder_sheet is not None
+        sheet = replace(recording.encoder_sheet, radius_relative_sd=self.radius_sd)
+        wheel = EncoderOdometry().estimate(replace(recording, encoder_sheet=sheet)).states
+        return wheel[["acceleration_mps2", "acceleration_sd_mps2"]].to_numpy()
 
     def _model(self, recording: Recording, pulse: float) -> LineModel:
+        """Noise and constants: those of the method under their own names, with what the data sheet adds."""
         sheet = recording.imu_sheet
-        return LineModel(
-            pulse_m=pulse,
-            still_s=_STILL_S,
-            gate=self.gate,
-            wheel_walk_m=self.wheel_walk_m,
-            tread_sd=self.tread_sd,
-            tread_length_m=self.tread_length_m,
-            force_m2ps3=sheet.accel_noise_mpsqrts**2 + self.force_m2ps3,
-            unsteady_s05=self.unsteady_s05,
-            push_walk_m2ps5=self.push_walk_m2ps5,
-            gyro_rad2ps=sheet.gyro_noise_radpsqrts**2 + 1e-12,
+        own = {name: value for name, value in vars(self).items() if name in LineModel._fields}
+        sheets = {
+            "pulse_m": pulse,
+            "still_s": _STILL_S,
+            "force_m2ps3": sheet.accel_noise_mpsqrts**2 + self.force_m2ps3,
+            "gyro_rad2ps": sheet.gyro_noise_radpsqrts**2 + 1e-12,
             # Of a Markov process that wanders by its bias instability within some 300 s.
-            drift_walk_rad2ps3=2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
-            gyro_scale=sheet.gyro_scale_error / math.sqrt(3.0),
-            sway_sd_rad=self.sway_sd_rad,
-            sway_length_m=self.sway_length_m,
-            lag_walk_m=self.lag_walk_m,
-            heading_sd_rad=self.heading_sd_rad,
-        )
+            "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
+            "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
+        }
+        return LineModel(**(own | sheets))
 
     def _start(self, recording: Recording, pulse: float) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand."""
@@ -248,3 +293,26 @@ def line_table(track: TrackDesign) -> tuple[FloatArray, FloatArray]:
     frame = track.frame(places)
     table = np.column_stack([frame.yaw_rad, frame.rates[:, 2], frame.roll_rad, frame.pitch_rad])
     return np.array([track.start_m, _PLACES_PER_M]), np.ascontiguousarray(table)
+
+
+def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:
+    """Acceleration without what the body shakes, (n,): the train's own changes slowly."""
+    if smoothed:
+        slope = np.gradient(steps.states[:, V], 1.0 / RATE_HZ)
+        sections = signal.butter(2, CALM_HZ, fs=RATE_HZ, output="sos")
+        calm: FloatArray = signal.sosfiltfilt(sections, slope, padlen=min(len(slope) - 1, 150))
+        return calm
+    # Critically damped: the slope of the speed, followed by two equal lags.
+    keep = math.exp(-2.0 * math.pi * CALM_HZ / RATE_HZ)
+    passed: FloatArray = signal.lfilter(
+        [(1.0 - keep) ** 2], [1.0, -2.0 * keep, keep * keep], steps.acceleration
+    )
+    return passed
+
+
+def _held(flags: BoolArray, hold_s: float) -> BoolArray:
+    """Flags (n,) at the filter's steps, each held on for a time."""
+    number = np.arange(len(flags))
+    latest = np.maximum.accumulate(np.where(flags, number, -len(flags) - 10**6))
+    held: BoolArray = number - latest <= hold_s * RATE_HZ
+    return held

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from simrail.estimators.kalman import chain, chain_covariance, mirror, update
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
-from simrail.core.jit import FloatArray, njit
+from simrail.core.jit import FloatArray, njit, njit_inline
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import EncoderSheet, OdometerSheet, Recording
-from simrail.recording.wheel_speed import pulse_way_m
 
 JERK_INTENSITY_M2PS5 = 0.01
 """Intensity of the model's white jerk. Small enough for quiet accelerations at constant speed, large
@@ -111,7 +111,7 @@ class EncoderOdometry:
             Indexed by `times`, columns `simrail.core.columns.ODOMETRY` and `ODOMETRY_SD`. At rest speed
             and acceleration are exactly 0.
         """
-        quantum = pulse_way_m(sheet)
+        quantum = sheet.pulse_m
         states = _filter(
             np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
             encoder["pulse_count"].to_numpy(dtype=np.float64),
@@ -146,54 +146,39 @@ def _frame(states: FloatArray, times: FloatArray, start_m: float, scale_sd: floa
     return pd.DataFrame(states, index=pd.Index(times, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
 
 
-@njit
-def _predict(x: FloatArray, p: FloatArray, dt: float, intensity: float) -> None:
+STATES = 3
+S, V, A = range(STATES)
+
+INTO, ORIGIN = (S, S, V), (V, A, A)
+"""Where F is not the identity, as `simrail.estimators.kalman.chain` takes it: a triple integrator."""
+
+
+@njit_inline
+def predict(x: FloatArray, p: FloatArray, dt: float, intensity: float) -> None:
     """X <- F x, P <- F P F' + Q in place; F and Q of a triple integrator driven by white noise."""
-    half = 0.5 * dt * dt
-    x[0] += dt * x[1] + half * x[2]
-    x[1] += dt * x[2]
-    for j in range(3):
-        p[0, j] += dt * p[1, j] + half * p[2, j]
-        p[1, j] += dt * p[2, j]
-    for i in range(3):
-        p[i, 0] += dt * p[i, 1] + half * p[i, 2]
-        p[i, 1] += dt * p[i, 2]
-    p[0, 0] += intensity * dt**5 / 20.0
-    p[1, 1] += intensity * dt**3 / 3.0
-    p[2, 2] += intensity * dt
-    p[0, 1] += intensity * dt**4 / 8.0
-    p[1, 0] += intensity * dt**4 / 8.0
-    p[0, 2] += intensity * dt**3 / 6.0
-    p[2, 0] += intensity * dt**3 / 6.0
-    p[1, 2] += intensity * dt**2 / 2.0
-    p[2, 1] += intensity * dt**2 / 2.0
+    share = dt, 0.5 * dt * dt, dt
+    chain(x, INTO, ORIGIN, share)
+    chain_covariance(p, INTO, ORIGIN, share)
+    p[S, S] += intensity * dt**5 / 20.0
+    p[S, V] += intensity * dt**4 / 8.0
+    p[S, A] += intensity * dt**3 / 6.0
+    p[V, V] += intensity * dt**3 / 3.0
+    p[V, A] += intensity * dt**2 / 2.0
+    p[A, A] += intensity * dt
+    mirror(p)
 
 
-@njit
-def _update(x: FloatArray, p: FloatArray, measured: float, variance: float, m: int = 0) -> None:
-    """Kalman update with a measured x[m], in place; P in Joseph's form, so that it stays positive."""
-    s = p[m, m] + variance
-    k0, k1, k2 = p[0, m] / s, p[1, m] / s, p[2, m] / s
-    innovation = measured - x[m]
-    x[0] += k0 * innovation
-    x[1] += k1 * innovation
-    x[2] += k2 * innovation
-    gain = (k0, k1, k2)
-    row = (p[m, 0], p[m, 1], p[m, 2])
-    for i in range(3):
-        for j in range(3):
-            p[i, j] += gain[i] * gain[j] * s - gain[i] * row[j] - row[i] * gain[j]
-
-
-@njit
-def _ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: FloatArray) -> None:
-    """Write s, V, A and their variances into out (6,), predicted by a time; x and P stay."""
-    ahead_x, ahead_p = x.copy(), p.copy()
-    if lead > 0.0:
-        _predict(ahead_x, ahead_p, lead, intensity)
-    for i in range(3):  # by elements: numba compiles the assignment of a whole array for seconds
-        out[i] = ahead_x[i]
-        out[3 + i] = ahead_p[i, i]
+@njit_inline
+def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: FloatArray, k: int) -> None:
+    """Write s, V, A and their variances into row k of ``out`` (n, 6), as `predict` by a time has them."""
+    half = 0.5 * lead * lead
+    out[k, S] = x[S] + lead * x[V] + half * x[A]
+    out[k, V] = x[V] + lead * x[A]
+    out[k, A] = x[A]
+    across = lead * p[S, V] + half * p[S, A] + lead * half * p[V, A]
+    out[k, 3] = p[S, S] + lead**2 * p[V, V] + half**2 * p[A, A] + 2.0 * across + intensity * lead**5 / 20.0
+    out[k, 4] = p[V, V] + lead**2 * p[A, A] + 2.0 * lead * p[V, A] + intensity * lead**3 / 3.0
+    out[k, 5] = p[A, A] + intensity * lead
 
 
 @njit
@@ -202,8 +187,8 @@ def _filter(
 ) -> FloatArray:
     """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
     out = np.empty((len(wanted), 6))
-    x = np.zeros(3)
-    p = np.zeros((3, 3))
+    x, p, rows = np.zeros(STATES), np.zeros((STATES, STATES)), np.eye(STATES)
+    gain, work = np.zeros(STATES), np.zeros(STATES)
     # A start with constant jerk from rest: speed and acceleration when the first pulse comes.
     jerk = 0.5
     start_speed = 0.5 * jerk ** (1.0 / 3.0) * (6.0 * q) ** (2.0 / 3.0)
@@ -219,43 +204,44 @@ def _filter(
         way = (count[k] - count[0]) * q
         idle += dt
         if not resting:
-            _predict(x, p, dt, intensity)
+            predict(x, p, dt, intensity)
         if change != 0.0:
             direction = 1.0 if change > 0.0 else -1.0
             steps = abs(change)
             if resting:
                 fastest = start_speed + q / idle + (steps - 1.0) * q / dt
                 p[:, :] = 0.0
-                p[0, 0] = q * q
-                p[1, 1] = 0.25 * fastest**2
-                p[2, 2] = start_acceleration**2
-                x[1] = 0.5 * direction * fastest
+                p[S, S] = q * q
+                p[V, V] = 0.25 * fastest**2
+                p[A, A] = start_acceleration**2
+                x[V] = 0.5 * direction * fastest
                 resting = False
             width = q
             if steps == 1.0:
-                width = min(q, max(0.1 * q, (abs(x[1]) + 2.0 * np.sqrt(p[1, 1])) * dt))
-            _update(x, p, way - 0.5 * direction * (q - width), width * width / 12.0)
+                width = min(q, max(0.1 * q, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
+            middle = way - 0.5 * direction * (q - width)
+            update(x, p, rows[S], middle - x[S], width * width / 12.0, gain, work)
             idle = 0.0
-            patience = min(max(3.0 * q / max(abs(x[1]), 1e-9), still), 10.0 * still)
+            patience = min(max(3.0 * q / max(abs(x[V]), 1e-9), still), 10.0 * still)
         elif not resting:
             # No pulse although one was due: the train is at most at the edge.
-            if abs(x[0] - way) > 0.5 * q:
-                _update(x, p, way + np.sign(x[0] - way) * 0.5 * q, q * q / 12.0)
-            if x[1] * direction <= 0.0 or idle > patience:
+            if abs(x[S] - way) > 0.5 * q:
+                edge = way + np.sign(x[S] - way) * 0.5 * q
+                update(x, p, rows[S], edge - x[S], q * q / 12.0, gain, work)
+            if x[V] * direction <= 0.0 or idle > patience:
                 resting = True
         if resting:
-            x[1] = 0.0
-            x[2] = 0.0
+            x[V] = 0.0
+            x[A] = 0.0
             quiet = max(idle, 1e-3)
             p[:, :] = 0.0
-            p[0, 0] = q * q / 12.0
+            p[S, S] = q * q / 12.0
             # Less than one pulse in this time, in either direction: uniform in [-b, b] has sd b/sqrt(3).
-            p[1, 1] = min(start_speed, q / quiet) ** 2 / 3.0
-            p[2, 2] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
+            p[V, V] = min(start_speed, q / quiet) ** 2 / 3.0
+            p[A, A] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
-            lead = 0.0 if resting else wanted[next_out] - time[k]
-            _ahead(x, p, lead, intensity, out[next_out])
+            ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out, next_out)
             next_out += 1
     return out
 
@@ -266,33 +252,30 @@ def _speed_filter(
 ) -> FloatArray:
     """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
     out = np.empty((len(wanted), 6))
-    x = np.zeros(3)
-    p = np.zeros((3, 3))
+    x, p, rows = np.zeros(STATES), np.zeros((STATES, STATES)), np.eye(STATES)
+    gain, work = np.zeros(STATES), np.zeros(STATES)
     resting = True
     next_out = 0
     for k in range(len(time)):
         if k > 0 and not resting:
-            _predict(x, p, time[k] - time[k - 1], intensity)
+            predict(x, p, time[k] - time[k - 1], intensity)
         if abs(speed[k]) < still:
             resting = True
-            x[1] = 0.0
-            x[2] = 0.0
-            p[1, :] = 0.0
-            p[2, :] = 0.0
-            p[:, 1] = 0.0
-            p[:, 2] = 0.0
-            p[1, 1] = still * still / 3.0
+            x[V] = 0.0
+            x[A] = 0.0
+            for i in range(STATES):
+                p[i, V] = p[V, i] = p[i, A] = p[A, i] = 0.0
+            p[V, V] = still * still / 3.0
         else:
             if resting:
                 # Setting off, or the first reading of a moving train: an acceleration of up to 1 m/s2.
-                x[1] = speed[k]
-                p[1, 1] = variance
-                p[2, 2] = 1.0
+                x[V] = speed[k]
+                p[V, V] = variance
+                p[A, A] = 1.0
                 resting = False
-            _update(x, p, speed[k], variance, 1)
+            update(x, p, rows[V], speed[k] - x[V], variance, gain, work)
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
-            lead = 0.0 if resting else wanted[next_out] - time[k]
-            _ahead(x, p, lead, intensity, out[next_out])
+            ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out, next_out)
             next_out += 1
     return out

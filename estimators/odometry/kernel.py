@@ -7,9 +7,12 @@ noise is chosen, stands in `simrail.estimators.odometry.curve_matched`.
 from typing import NamedTuple
 
 import numpy as np
-from simrail.estimators.kalman import History, congruence, remember, update
+import numpy.typing as npt
+from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
 
 from simrail.core.jit import FloatArray, njit
+
+BoolArray = npt.NDArray[np.bool_]
 
 STATES = 13
 S, V, WAY, SCALE, TREAD, TURN, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG = range(STATES)
@@ -81,22 +84,26 @@ class LineModel(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What the filter finds at each of n steps.
+    """What the filter finds at each of n steps; the states are those of the smoother after that.
 
     Attributes
     ----------
+    time_s : ndarray (n,)
+        Ends of the steps; given.
     states, covariance : ndarray (n, 13), (n, 13, 13)
-        Filtered.
+        See `simrail.estimators.odometry.curve_matched`.
     acceleration : ndarray (n,)
-        Acceleration along the track over the step, unfiltered.
-    flags : ndarray (n, 2)
-        1 where the wheel is not believed; 1 where the train stands.
+        Along the track, over the step; it shakes with the body.
+    slipping, resting : ndarray (n,) of bool
+        Where the wheel was not believed, and where the train stood.
     """
 
+    time_s: FloatArray
     states: FloatArray
     covariance: FloatArray
     acceleration: FloatArray
-    flags: FloatArray
+    slipping: BoolArray
+    resting: BoolArray
 
 
 @njit
@@ -144,9 +151,9 @@ def predict(
     rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here[1]
     wears, sways = np.exp(-run / model.tread_length_m), np.exp(-run / model.sway_length_m)
     # F, the derivative of all that follows by the state.
-    f[:, :] = 0.0
     for i in range(n):
-        f[i, i] = 1.0
+        for j in range(n):
+            f[i, j] = 1.0 if i == j else 0.0
     by_place = level * gravity * level * lean[4]
     for place, slope in (
         (S, by_place),
@@ -305,7 +312,7 @@ def curve_matched(
         wanted[WHEEL] = not slipping and (change != 0.0 or error[WHEEL] != 0.0)
         wanted[HEADING], wanted[REST] = 1.0, resting
         if past.states.shape[0] > 0:
-            past.states[k], past.covariances[k], past.transitions[k] = x, p, f
+            remember_prediction(past, k, x, p, f)
 
         for m in range(UPDATES):
             if m == HEADING:
@@ -319,5 +326,5 @@ def curve_matched(
                 s = update(x, p, h[m], error[m], variance[m], gain, v)
                 if past.states.shape[0] > 0:
                     remember(past, k, m, h[m], gain, error[m], s)
-        steps.states[k], steps.covariance[k] = x, p
-        steps.flags[k, 0], steps.flags[k, 1] = slipping, resting
+        keep(steps.states, steps.covariance, k, x, p)
+        steps.slipping[k], steps.resting[k] = slipping, resting

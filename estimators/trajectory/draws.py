@@ -8,7 +8,7 @@ What is drawn is what `simrail.estimators.trajectory.track_geometry` has in its 
 it hangs together:
 
 * the smoother's error: from the joint posterior of all samples
-(`simrail.estimators.trajectory.kernel_back`);
+(`simrail.estimators.trajectory.kernel`);
 * the accelerometer's turn-on bias, taken for roll, and that of the package: one number each, uniform;
 * the rail sensor's noise: white;
 * the odometry's error of position: one normal number per draw times its sd at each place, as if it were of
@@ -22,12 +22,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
-from simrail.estimators.trajectory.kernel_back import trajectory_error
-from simrail.estimators.trajectory.kernel_equations import ROLL, ROWS, STATES, Y, Z
-from simrail.estimators.trajectory.kernel_filter import Past
-from simrail.estimators.trajectory.model import Model, dense_process
-from simrail.estimators.trajectory.over_space import over_space
-from simrail.estimators.trajectory.track_geometry import Sight, slopes
+from simrail.estimators.trajectory.kernel import ROLL, ROWS, STATES, Model, Past, Y, Z, trajectory_error
+from simrail.estimators.trajectory.track_geometry import Sight, over_space, slopes
 
 from simrail.core.columns import IRREGULARITY
 from simrail.core.jit import FloatArray
@@ -75,7 +71,7 @@ def state_errors(model: Model, past: Past, streams: Sequence[np.random.Generator
         rad and m.
     """
     n = len(past.states)
-    roots = np.array([np.linalg.cholesky(dense_process(q)) for q in model.process])
+    roots = np.asarray(np.linalg.cholesky(model.process), dtype=np.float64)
     drawn, errors, innovations = np.empty((len(streams), n, 3)), np.empty((n, STATES)), np.empty((n, ROWS))
     for draw, rng in enumerate(streams):
         normals = rng.standard_normal((n, STATES + ROWS))

@@ -7,18 +7,17 @@ The state is
 
 with the angles of the body in the global frame, its place (0, y, z) in the design track frame, ' for d/dt.
 
-Not here: the loops (`simrail.estimators.trajectory.kernel_filter`), and the noise
+Not here: the loops (`simrail.estimators.trajectory.kernel`), and the noise
 (`simrail.estimators.trajectory.noise`).
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 from simrail.estimators.attitude.compensation import design_frame, track_motion
 from simrail.estimators.attitude.rest_bias import rest_bias
-from simrail.estimators.trajectory.kernel_equations import BLOCKS, STATES
+from simrail.estimators.trajectory.kernel import STATES, Model
 from simrail.estimators.trajectory.noise import Hyperparameters
 
 from simrail.core.columns import ACCEL, GYRO
@@ -27,54 +26,8 @@ from simrail.recording.recording import Recording, odometry_of
 from simrail.track.design import STRAIGHT, TrackFrame
 
 
-class Model(NamedTuple):
-    """What the filter takes of a ride of n samples.
-
-    Attributes
-    ----------
-    signals : ndarray (n, 6)
-        Angular rate less its bias, rad/s, and specific force, m/s2, body axes.
-    track : ndarray (n, 15)
-        `simrail.estimators.trajectory.kernel_equations.TERMS`.
-    slips : ndarray (n, 3) or (0, 3)
-        See `simrail.estimators.trajectory.kernel_equations.linearise`; of no rows for the corrected
-        equations.
-    kinds : ndarray of int (n,)
-        Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
-    process : ndarray (c, 21)
-        Upper triangles of the five blocks of Q, row by row.
-    noise : ndarray (c, 8)
-        Variances U of the measurements.
-    virtual : ndarray (2,)
-        Virtual positions y and z, m.
-    start, start_variance : ndarray (12,)
-        State before the first update, and its variances.
-    step_s, gravity : float
-        Sample interval, s, and gravity, m/s2.
-    """
-
-    signals: FloatArray
-    track: FloatArray
-    slips: FloatArray
-    kinds: IntArray
-    process: FloatArray
-    noise: FloatArray
-    virtual: FloatArray
-    start: FloatArray
-    start_variance: FloatArray
-    step_s: float
-    gravity: float
-
-
-def transition(step_s: float) -> FloatArray:
-    """F (12, 12): angles turn with constant rates, places move with constant acceleration."""
-    pair = np.array([[1.0, step_s], [0.0, 1.0]])
-    triple = np.array([[1.0, step_s, 0.5 * step_s**2], [0.0, 1.0, step_s], [0.0, 0.0, 1.0]])
-    return np.asarray(block_diag(pair, pair, pair, triple, triple))
-
-
-def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray]:
-    """Blocks of Q: white angular acceleration, and white jerk, over one step."""
+def process_noise(parameters: Hyperparameters, step_s: float) -> FloatArray:
+    """Q (12, 12): white angular acceleration, and white jerk, over one step."""
     dt = step_s
     pair = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
     triple = np.array(
@@ -85,24 +38,15 @@ def process_noise(parameters: Hyperparameters, step_s: float) -> list[FloatArray
         ]
     )
     values = parameters.vector()
-    return [q * pair for q in values[:3]] + [q * triple for q in values[3:5]]
-
-
-def packed_process(parameters: Sequence[Hyperparameters], step_s: float) -> FloatArray:
-    """Upper triangles of the blocks of Q, row by row: (c, 21) for c sets of hyper-parameters."""
-    return np.array(
-        [
-            np.concatenate([q[np.triu_indices(len(q))] for q in process_noise(values, step_s)])
-            for values in parameters
-        ]
-    )
+    return np.asarray(block_diag(*(q * pair for q in values[:3]), *(q * triple for q in values[3:5])))
 
 
 def with_noise(model: Model, *parameters: Hyperparameters) -> Model:
     """The model with other noise: one set for all samples, or one for each kind of them."""
     kinds = model.kinds if len(parameters) > 1 else np.zeros_like(model.kinds)
     noise = np.array([values.vector()[5:] for values in parameters])
-    return model._replace(kinds=kinds, process=packed_process(parameters, model.step_s), noise=noise)
+    process = np.array([process_noise(values, model.step_s) for values in parameters])
+    return model._replace(kinds=kinds, process=process, noise=noise)
 
 
 def kinds_of(recording: Recording) -> IntArray:
@@ -159,7 +103,7 @@ def model_of(
         track=track_terms(recording, frame, printed=printed),
         slips=jacobian_slips(frame, speed) if printed else np.empty((0, 3)),
         kinds=kinds_of(recording),
-        process=np.empty((0, 21)),
+        process=np.empty((0, STATES, STATES)),
         noise=np.empty((0, 8)),
         virtual=np.array([lateral, height]),
         start=start,
@@ -171,7 +115,7 @@ def model_of(
 
 
 def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = False) -> FloatArray:
-    """`simrail.estimators.trajectory.kernel_equations.TERMS` at every sample, (n, 15).
+    """`simrail.estimators.trajectory.kernel.TERMS` at every sample, (n, 15).
 
     Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
     (paper 001, appendix 1, g4C, g5C, g6C).
@@ -219,17 +163,6 @@ def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) ->
 
 
 def jacobian_slips(frame: TrackFrame, speed: FloatArray) -> FloatArray:
-    """Paper 001's misprints, (n, 3); see `simrail.estimators.trajectory.kernel_equations.linearise`."""
+    """Paper 001's misprints, (n, 3); see `simrail.estimators.trajectory.kernel.linearise`."""
     _, v, h = frame.rates.T
     return np.column_stack([v * speed - v * speed**2, h**2, h**2 * speed**2])
-
-
-def dense_process(process: FloatArray) -> FloatArray:
-    """Q (12, 12) of the upper triangles (21,) of its blocks."""
-    q, at = np.zeros((STATES, STATES)), 0
-    for first, end in BLOCKS:
-        upper = np.triu_indices(end - first)
-        block, count = q[first:end, first:end], len(upper[0])
-        block[upper] = block.T[upper] = process[at : at + count]
-        at += count
-    return q

@@ -65,8 +65,3 @@ class Hyperparameters:
     def vector(self) -> FloatArray:
         """The 13 values in the paper's order."""
         return np.array(astuple(self), dtype=np.float64)
-
-    @classmethod
-    def from_vector(cls, values: FloatArray) -> Hyperparameters:
-        """Make them from the 13 values in the paper's order."""
-        return cls(*(float(value) for value in values))

@@ -27,10 +27,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
-from simrail.estimators.trajectory.kernel_back import trajectory_back
-from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
-from simrail.estimators.trajectory.kernel_filter import room_for_filtered, room_for_past, trajectory_filter
-from simrail.estimators.trajectory.model import Model, model_of
+from simrail.estimators.trajectory.kernel import (
+    PACKED,
+    STATES,
+    Model,
+    room_for_filtered,
+    room_for_past,
+    trajectory_back,
+    trajectory_filter,
+)
+from simrail.estimators.trajectory.model import model_of
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 from simrail.estimators.tuning.file import Tuning
@@ -165,36 +171,22 @@ class TrajectorySmoother:
                     value=getattr(self, name),
                     remedy="in a scenario, name a file of them in the option tuning",
                 )
-        for name in ("start_sd_rad", "start_yaw_sd_rad"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
         again = self.smoothed and self.second_order and not self.printed
-        if self.passes != 1 and not (again and self.passes in range(1, MOST_PASSES + 1)):
-            raise InputError(
-                "cannot be",
-                field="passes",
-                value=self.passes,
-                limit=f"1 to {MOST_PASSES}; 1 unless smoothed, of second order and not as printed",
-            )
-        if not 0.0 <= self.geometry_step_m < math.inf:
-            raise InputError(
-                "is out of range",
-                field="geometry_step_m",
-                value=self.geometry_step_m,
-                limit="0 (none) or more, m",
-            )
         is_whole = isinstance(self.draws, int) and not isinstance(self.draws, bool)
-        if not is_whole or not 0 <= self.draws <= MOST_DRAWS:
-            raise InputError(
-                "is no number of draws", field="draws", value=self.draws, limit=f"0 to {MOST_DRAWS}"
-            )
-        if self.draws and not (self.smoothed and self.geometry_step_m):
-            raise InputError(
-                "cannot be",
-                field="draws",
-                value=self.draws,
-                limit="0 unless smoothed and with a geometry",
-            )
+        has_rails = self.smoothed and self.geometry_step_m > 0.0
+        passes = f"1 to {MOST_PASSES}; 1 unless smoothed, of second order and not as printed"
+        draws = f"0 to {MOST_DRAWS}"
+        out = "is out of range"
+        for name, is_good, problem, limit in (
+            ("start_sd_rad", 0.0 < self.start_sd_rad < math.inf, out, "> 0"),
+            ("start_yaw_sd_rad", 0.0 < self.start_yaw_sd_rad < math.inf, out, "> 0"),
+            ("passes", self.passes in range(1, MOST_PASSES + 1 if again else 2), "cannot be", passes),
+            ("geometry_step_m", 0.0 <= self.geometry_step_m < math.inf, out, "0 (none) or more, m"),
+            ("draws", is_whole and self.draws in range(MOST_DRAWS + 1), "is no number of draws", draws),
+            ("draws", not self.draws or has_rails, "cannot be", "0 unless smoothed and with a geometry"),
+        ):
+            if not is_good:
+                raise InputError(problem, field=name, value=getattr(self, name), limit=limit)
         given = self.hyperparameters != Hyperparameters() or self.curve_hyperparameters is not None
         if self.tuning is not None and given:
             raise InputError("a file and values cannot both be given", field="tuning")
@@ -267,10 +259,6 @@ class TrajectorySmoother:
         model = self.model(recording, around=around)
         streams = [stream_of(recording, draw, "trajectory") for draw in range(self.draws)]
         return run_model(model, smoothed=self.smoothed, with_covariance=self.with_covariance, streams=streams)
-
-    def log_likelihood(self, recording: Recording) -> float:
-        """Log-likelihood of the recording by prediction-error decomposition."""
-        return log_likelihood(self.model(recording))
 
     def tunables(self, settings: Mapping[str, Any]) -> Mapping[str, Tunable]:
         """What `simrail tune` searches; see `simrail.estimators.tuning.objectives`."""

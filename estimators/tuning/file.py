@@ -18,9 +18,8 @@ parameters set by hand, leave [search] out. Not here: the search (`simrail.estim
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ from simrail.estimators.tuning.space import NAMES, STATUSES, SearchSpace
 
 from simrail.core.atomic_files import whole_file
 from simrail.core.errors import InputError
-from simrail.core.toml_files import toml_text
+from simrail.core.toml_files import Part, blame, judge, read_toml, toml_text
 
 REMEDY = "tune anew with 'simrail tune', or leave out [search] for values set by hand"
 
@@ -103,28 +102,13 @@ class Tuning:
             or name that is missing or unknown, a number that is none, not positive or outside the box.
         """
         file = Path(path)
-        tables = _tables(file)
-        search = _search(tables["search"], file) if "search" in tables else None
-        sets = [_hyperparameters(tables[name], name, search, file) for name in SETS if name in tables]
-        for name in (name for name in STATUS if name in tables):
-            _judge_status(tables[name], name, file)
-        statuses = [tables.get(name) for name in STATUS]
-        return cls(sets[0], sets[1] if len(sets) > 1 else None, search, *statuses)
-
-    def text(self) -> str:
-        """The file's text; numbers read back bit by bit."""
-        tables: dict[str, Mapping[str, Any] | None] = {
-            name: None if getattr(self, name) is None else asdict(getattr(self, name)) for name in SETS
-        }
-        if self.search is not None:
-            search = asdict(self.search)
-            tables["search"] = search | search.pop("space")
-        return _text(tables | {name: getattr(self, name) for name in STATUS})
-
-    def write(self, path: str | Path) -> None:
-        """Write the file: whole or not at all."""
-        with whole_file(Path(path)) as stream:
-            stream.write(self.text().encode())
+        tables = judge(_Tables, read_toml(file), file=file.name)
+        with blame(file.name):
+            search = None if tables.search is None else tables.search.search()
+            sets = [_hyperparameters(getattr(tables, name), name, search) for name in SETS]
+            for name in STATUS:
+                _judge_status(getattr(tables, name), name)
+        return cls(sets[0] or Hyperparameters(), sets[1], search, tables.status, tables.curve_status)
 
 
 @dataclass(frozen=True)
@@ -165,25 +149,19 @@ class TuningResult:
         )
 
     def text(self) -> str:
-        """The file's text, as `Tuning.text` has it."""
-        own = {entry.name for entry in fields(Search)} - {"space"}
-        search = {entry.name: getattr(self, entry.name) for entry in fields(Search) if entry.name in own}
-        return _text(
-            dict(zip(SETS, self.values, strict=False))
-            | {"search": {**search, **self.settings}}
-            | dict(zip(STATUS, self.status, strict=False))
-        )
+        """The file's text; numbers read back bit by bit."""
+        own = [entry.name for entry in fields(Search) if entry.name != "space"]
+        tables = {
+            **dict(zip(SETS, self.values, strict=False)),
+            "search": {name: getattr(self, name) for name in own} | dict(self.settings),
+            **dict(zip(STATUS, self.status, strict=False)),
+        }
+        return (f"# Made by: {self.command}\n\n" if self.command else "") + toml_text(tables)
 
     def write(self, path: str | Path) -> None:
         """Write the file: whole or not at all."""
         with whole_file(Path(path)) as stream:
             stream.write(self.text().encode())
-
-
-def _text(tables: Mapping[str, Mapping[str, Any] | None]) -> str:
-    """Text of a tuning file: the command that made it, if there is one, and the tables that there are."""
-    command = (tables.get("search") or {}).get("command")
-    return (f"# Made by: {command}\n\n" if command else "") + toml_text(tables)
 
 
 SETS = ("hyperparameters", "curve_hyperparameters")
@@ -193,51 +171,61 @@ STATUS = ("status", "curve_status")
 """Tables of what is known of each."""
 
 
-def _tables(file: Path) -> dict[str, dict[str, Any]]:
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", file=file.name, value=str(file), remedy="mend the path"
-        ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"is no TOML: {error}", file=file.name, remedy=REMEDY) from error
-    _judge_names(data, (*SETS, "search", *STATUS), needed=SETS[:1], file=file, what="table")
-    for name, table in data.items():
-        if not isinstance(table, dict):
-            raise InputError("is no table", file=file.name, field=name, value=table, remedy=f"write [{name}]")
-    return data
+class _SearchTable(Part):
+    """Table [search]: a `Search`, whose space lies flat in it."""
+
+    method: str
+    objective: tuple[float, ...]
+    unit: str
+    box: tuple[float, float]
+    constrained: tuple[str, ...]
+    position_m2: float | None = None
+    seed: int
+    evaluations: int
+    fitted_on: tuple[str, ...] = ()
+    command: str = ""
+    finished: bool = True
+
+    def search(self) -> Search:
+        """The same as a noun."""
+        entries = self.model_dump()
+        with blame(None, "search"):
+            space = SearchSpace(**{entry.name: entries.pop(entry.name) for entry in fields(SearchSpace)})
+        return Search(space=space, **entries)
 
 
-def _judge_names(
-    data: Mapping[str, Any],
-    allowed: tuple[str, ...],
-    *,
-    needed: tuple[str, ...],
-    file: Path,
-    what: str,
-    prefix: str = "",
-) -> None:
-    """Refuse a name that is not allowed, and one that is needed and missing."""
-    for name in [*data, *needed]:
-        if name not in allowed or name not in data:
+class _Tables(Part):
+    """Tables of a tuning file."""
+
+    hyperparameters: dict[str, Any]
+    curve_hyperparameters: dict[str, Any] | None = None
+    search: _SearchTable | None = None
+    status: dict[str, Any] | None = None
+    curve_status: dict[str, Any] | None = None
+
+
+def _judge_names(table: Mapping[str, Any], name: str) -> None:
+    """Refuse a table that does not name each hyper-parameter."""
+    for parameter in [*table, *NAMES]:
+        if parameter not in NAMES or parameter not in table:
+            is_unknown = parameter not in NAMES
             raise InputError(
-                f"no such {what}" if name not in allowed else f"the {what} is missing",
-                file=file.name,
-                field=prefix + name,
-                value=data.get(name),
-                limit=f"the {what}s " + ", ".join(allowed),
-                remedy=REMEDY if name in allowed else "remove it",
+                "no such hyper-parameter" if is_unknown else "the hyper-parameter is missing",
+                field=f"{name}.{parameter}",
+                value=table.get(parameter),
+                limit="the hyper-parameters " + ", ".join(NAMES),
+                remedy="remove it" if is_unknown else REMEDY,
             )
 
 
-def _judge_status(table: dict[str, Any], name: str, file: Path) -> None:
-    _judge_names(table, NAMES, needed=NAMES, file=file, what="hyper-parameter", prefix=f"{name}.")
+def _judge_status(table: Mapping[str, Any] | None, name: str) -> None:
+    if table is None:
+        return
+    _judge_names(table, name)
     for parameter, status in table.items():
         if status not in STATUSES:
             raise InputError(
                 "is no status",
-                file=file.name,
                 field=f"{name}.{parameter}",
                 value=status,
                 limit="one of " + ", ".join(STATUSES),
@@ -245,60 +233,18 @@ def _judge_status(table: dict[str, Any], name: str, file: Path) -> None:
             )
 
 
-def _hyperparameters(table: dict[str, Any], name: str, search: Search | None, file: Path) -> Hyperparameters:
-    _judge_names(table, NAMES, needed=NAMES, file=file, what="hyper-parameter", prefix=f"{name}.")
-    try:
-        hyperparameters = Hyperparameters(**table)
-        if search is not None:
-            search.space.check(hyperparameters)
-    except InputError as error:
-        raise InputError(
-            error.problem,
-            file=file.name,
-            field=f"{name}.{error.field}",
-            value=error.value,
-            limit=error.limit,
-            remedy=REMEDY,
-        ) from error
+def _hyperparameters(
+    table: Mapping[str, Any] | None, name: str, search: Search | None
+) -> Hyperparameters | None:
+    if table is None:
+        return None
+    _judge_names(table, name)
+    with blame(None, name):
+        try:
+            hyperparameters = Hyperparameters(**table)
+            if search is not None:
+                search.space.check(hyperparameters)
+        except InputError as error:
+            error.remedy = REMEDY
+            raise
     return hyperparameters
-
-
-KINDS: dict[str, tuple[str, type | tuple[type, ...], bool]] = {
-    "method": ("text", str, False),
-    "objective": ("an array of numbers", (int, float), True),
-    "unit": ("text", str, False),
-    "box": ("an array of two numbers", (int, float), True),
-    "constrained": ("an array of axes", str, True),
-    "position_m2": ("a number", (int, float), False),
-    "seed": ("a whole number", int, False),
-    "evaluations": ("a whole number", int, False),
-    "fitted_on": ("an array of text", str, True),
-    "command": ("text", str, False),
-    "finished": ("true or false", bool, False),
-}
-"""Of the table [search]: what each entry is in words, its type, and whether it is an array of them."""
-
-
-def _search(table: dict[str, Any], file: Path) -> Search:
-    needed = tuple(e.name for e in fields(Search) if e.default is MISSING and e.name != "space")
-    needed += ("box", "constrained")
-    _judge_names(table, tuple(KINDS), needed=needed, file=file, what="entry", prefix="search.")
-    values: dict[str, Any] = {}
-    for name, value in table.items():
-        words, kind, many = KINDS[name]
-        items = value if many else [value]
-        good = isinstance(items, list) and all(isinstance(item, kind) for item in items)
-        good = good and (kind is bool or not any(isinstance(item, bool) for item in items))
-        if not good or (name == "box" and len(items) != 2):
-            raise InputError(
-                "has the wrong type", file=file.name, field=f"search.{name}", value=value, limit=words
-            )
-        values[name] = tuple(items) if many else value
-    try:
-        space = SearchSpace(
-            **{entry.name: values.pop(entry.name) for entry in fields(SearchSpace) if entry.name in values}
-        )
-    except InputError as error:
-        error.file, error.field = file.name, f"search.{error.field}"
-        raise
-    return Search(space=space, **values)

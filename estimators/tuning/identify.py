@@ -13,7 +13,6 @@ import math
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -33,36 +32,6 @@ EDGE = 1e-3
 """Of an axis of the cube: closer to an end than this is at it."""
 
 
-@dataclass(frozen=True)
-class Identification:
-    """What is known of the hyper-parameters at an optimum.
-
-    Attributes
-    ----------
-    table : pandas.DataFrame
-        One row per hyper-parameter (index ``parameter``): ``value``; ``status``; ``tenth`` and ``tenfold``,
-        the rise of the objective if the value is divided by or multiplied with ten and the others stay
-        (negative where the optimum lies beyond what was allowed), ``tenth_allowed`` and ``tenfold_allowed``,
-        whether boxes and bounds allow it; ``curvature`` along its own axis and
-        ``profile_curvature`` along the valley, second derivatives by the natural logarithm; ``span_decades``,
-        how many powers of ten it can go along the valley until the objective has changed by the tolerance;
-        and, for a likelihood, ``sd_decades``, the standard deviation of its logarithm if the model were
-        true. The last four are of the parameters inside the box only, NaN for others.
-    inside : tuple of str
-        The parameters inside the box.
-    curvature : ndarray (k, k)
-        Second derivatives of the objective by their natural logarithms.
-    curvatures, directions : ndarray (k,), (k, k)
-        Its eigenvalues, smallest first, and in columns its eigenvectors: what only a combination shows.
-    """
-
-    table: pd.DataFrame
-    inside: tuple[str, ...]
-    curvature: FloatArray
-    curvatures: FloatArray
-    directions: FloatArray
-
-
 def identify(
     objective: Objective,
     values: Mapping[str, float],
@@ -70,7 +39,7 @@ def identify(
     *,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
-) -> Identification:
+) -> pd.DataFrame:
     """Judge every parameter at an optimum of a search.
 
     A parameter that is held is ``held``. One that can be divided by and multiplied with ten, as far as box
@@ -90,6 +59,19 @@ def identify(
         Rise of the objective that counts.
     threads : int, optional
         By default one per core.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per hyper-parameter (index ``parameter``): ``value``; ``status``; ``tenth`` and ``tenfold``,
+        the rise of the objective if the value is divided by or multiplied with ten and the others stay
+        (negative where the optimum lies beyond what was allowed), ``tenth_allowed`` and ``tenfold_allowed``,
+        whether boxes and bounds allow it; ``curvature`` along its own axis and
+        ``profile_curvature`` along the valley, second derivatives by the natural logarithm; ``span_decades``,
+        how many powers of ten it can go along the valley until the objective has changed by the tolerance;
+        and, for a likelihood, ``sd_decades``, the standard deviation of its logarithm if the model were
+        true. The last four are of the parameters inside the box only, NaN for others. Its ``attrs`` hold in
+        ``curvature`` the second derivatives (k, k) of the objective by the natural logarithms of these.
     """
     names, parameters = cube.names, cube.parameters
     optimum = np.array([values[name] for name in names])
@@ -146,9 +128,9 @@ def identify(
         },
         index=pd.Index(names, name="parameter"),
     )
-    inner = [names[number] for number in inside]
-    table = table.join(pd.DataFrame(columns, index=inner))
-    return Identification(table, tuple(inner), curvature, curvatures, directions)
+    table = table.join(pd.DataFrame(columns, index=[names[number] for number in inside]))
+    table.attrs["curvature"] = curvature
+    return table
 
 
 def _width(parameter: Parameter) -> float:

@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.trajectory.model import Model, kinds_of, with_noise
+from simrail.estimators.trajectory.kernel import Model
+from simrail.estimators.trajectory.model import kinds_of, with_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import OUTPUT, TrajectorySmoother, likelihoods, run_model
 from simrail.estimators.trajectory.track_geometry import track_geometry

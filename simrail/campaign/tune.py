@@ -25,7 +25,7 @@ from simrail.estimation.estimate import Estimator
 from simrail.estimation.tunable import tunables_of
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
-from simrail.estimators.tuning.identify import Identification, identify
+from simrail.estimators.tuning.identify import identify
 from simrail.estimators.tuning.tune import objective_of, tune
 from simrail.recording.recording import Recording
 from simrail.scenario.build import Parts
@@ -54,7 +54,7 @@ def tune_scenario(
     at_most: int | None = None,
     command: str = "",
     watcher: Watcher | None = None,
-) -> tuple[TuningResult, dict[str, Identification]]:
+) -> tuple[TuningResult, dict[str, pd.DataFrame]]:
     """Tune an estimator of a scenario and write the result.
 
     Parameters
@@ -95,7 +95,7 @@ def tune_scenario(
     -------
     result : TuningResult
         What the search found, as it was written into the file.
-    identified : dict of str to Identification
+    identified : dict of str to DataFrame
         What it knows of each parameter, by set of parameters.
 
     Raises
@@ -148,7 +148,7 @@ def tune_scenario(
             )
             for (name, tunable), values in zip(tunables.items(), result.values, strict=True)
         }
-    result = replace(result, status=tuple(dict(one.table["status"]) for one in identified.values()))
+    result = replace(result, status=tuple(dict(table["status"]) for table in identified.values()))
     result.write(out)
     return result, identified
 

@@ -13,10 +13,10 @@ from simrail.cli.options import DONE, Scenario, Seed, Settings
 from simrail.core.errors import InputError, one_of
 
 if TYPE_CHECKING:
+    import pandas as pd
     from rich.console import Console
 
     from simrail.estimators.tuning.file import TuningResult
-    from simrail.estimators.tuning.identify import Identification
 
 
 CONSTRAINED = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
@@ -173,7 +173,7 @@ def _command(context: typer.Context) -> str:
     return shlex.join(words)
 
 
-def _show(console: Console, search: TuningResult, identified: dict[str, Identification]) -> None:
+def _show(console: Console, search: TuningResult, identified: dict[str, pd.DataFrame]) -> None:
     """Print what was found, one table per set of parameters."""
     from rich import box as boxes
     from rich.table import Table
@@ -188,7 +188,7 @@ def _show(console: Console, search: TuningResult, identified: dict[str, Identifi
             table.add_column(
                 column, justify="left" if number in (0, 2) else "right", no_wrap=number in (0, 2)
             )
-        for parameter, row in identification.table.iterrows():
+        for parameter, row in identification.iterrows():
             span = "" if math.isnan(row["span_decades"]) else f"{row['span_decades']:.2g}"
             costs = []
             for column in ("tenth", "tenfold"):

@@ -54,6 +54,12 @@ class Estimate:
     geometry_draws: FloatArray | None = None
 
 
+def states_only(recording: Recording, states: FloatArray, columns: Sequence[str]) -> Estimate:
+    """The estimate that is nothing but states (n, m), one row per sample of the IMU."""
+    frame = pd.DataFrame(states, index=recording.imu.index, columns=list(columns))
+    return Estimate(states=frame, mount=recording.mount)
+
+
 NEEDS = ("odometry", "encoder", "magnetometer", "rail_sensor")
 """What an estimator may need beside the IMU, by the keys of a scenario."""
 
@@ -119,29 +125,28 @@ def description_of(estimator: Estimator) -> Description:
         "cites": (),
     }
     told = {name: getattr(estimator, name, default) for name, default in defaults.items()}
-    texts = {name: told[name] for name in ("needs", "cites")}
-    limits = {
-        name: "a tuple of str"
-        for name, words in texts.items()
-        if not (isinstance(words, tuple) and all(isinstance(word, str) for word in words))
-    }
-    if "needs" not in limits and not set(told["needs"]) <= set(NEEDS):
-        limits["needs"] = "some of " + ", ".join(NEEDS)
-    if not isinstance(told["uses_imu"], bool):
-        limits["uses_imu"] = "True or False"
-    if told["role"] not in ROLES:
-        limits["role"] = "one of " + ", ".join(ROLES)
-    if not (isinstance(told["label"], str) and told["label"]):
-        limits["label"] = "a text"
-    for name, limit in limits.items():
-        raise InputError(
-            f"{type(estimator).__name__} says of itself what nobody understands",
-            field=name,
-            value=told[name],
-            limit=limit,
-            remedy=f"mend '{name}' of the estimator",
-        )
+    has_texts = {name: _is_texts(told[name]) for name in ("needs", "cites")}
+    for name, is_good, limit in (
+        ("needs", has_texts["needs"], "a tuple of str"),
+        ("cites", has_texts["cites"], "a tuple of str"),
+        ("needs", has_texts["needs"] and set(told["needs"]) <= set(NEEDS), "some of " + ", ".join(NEEDS)),
+        ("uses_imu", isinstance(told["uses_imu"], bool), "True or False"),
+        ("role", told["role"] in ROLES, "one of " + ", ".join(ROLES)),
+        ("label", isinstance(told["label"], str) and bool(told["label"]), "a text"),
+    ):
+        if not is_good:
+            raise InputError(
+                f"{type(estimator).__name__} says of itself what nobody understands",
+                field=name,
+                value=told[name],
+                limit=limit,
+                remedy=f"mend '{name}' of the estimator",
+            )
     return Description(**told)
+
+
+def _is_texts(value: object) -> bool:
+    return isinstance(value, tuple) and all(isinstance(text, str) for text in value)
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from simrail.core.toml_files import label
+from simrail.core.toml_files import blame, label
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.files.ride_reader import read_signals, ride_file
@@ -30,5 +30,6 @@ def read_ride(path: Path) -> Recording:
     if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
         source = "encoder" if recording.odometer is None else "odometer"
         recording = with_odometry(recording, "encoder", source=source)
-    check_plausible(recording, file=label(ride_file(path)))
+    with blame(label(ride_file(path))):
+        check_plausible(recording)
     return recording

@@ -72,15 +72,13 @@ SHEETS = {
 """Sheet that each device needs, what it is worth without, and the remedy."""
 
 
-def check_recording(recording: Recording, *, file: object = None) -> None:
+def check_recording(recording: Recording) -> None:
     """Refuse a recording that no estimator should see.
 
     Parameters
     ----------
     recording : Recording
         The recording to judge.
-    file : object, optional
-        Where it came from, for the message.
 
     Raises
     ------
@@ -94,22 +92,21 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
     frames = {name: frame for name, frame in frames.items() if frame is not None}
     for name, frame in frames.items():
         timed = (EDGE_TIME,) if name == "encoder" and EDGE_TIME in frame else ()
-        _check_signal(frame, COLUMNS_OF[name] + timed, what=name, file=file)
+        _check_signal(frame, COLUMNS_OF[name] + timed, what=name)
         if name in SHEETS:
             sheet, worth, remedy = SHEETS[name]
             if getattr(recording, sheet) is None:
-                raise InputError(f"{name} without its sheet {worth}", file=file, field=sheet, remedy=remedy)
-    _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz, file)
+                raise InputError(f"{name} without its sheet {worth}", field=sheet, remedy=remedy)
+    _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz)
     for limit in LIMITS:
         if limit.frame in frames:
-            _check_size(frames[limit.frame], limit, file)
+            _check_size(frames[limit.frame], limit)
     for name in AT_IMU_TIMES:
         if name in frames and not np.array_equal(
             frames[name].index.to_numpy(), recording.imu.index.to_numpy()
         ):
             raise InputError(
                 "has other time stamps than the IMU",
-                file=file,
                 field=f"{name}.time_s",
                 value=f"{len(frames[name])} samples",
                 limit=f"the {len(recording.imu)} time stamps of the IMU",
@@ -117,15 +114,14 @@ def check_recording(recording: Recording, *, file: object = None) -> None:
             )
 
 
-def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, file: object) -> None:
-    require(frame, columns, what=what, file=file)
+def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str) -> None:
+    require(frame, columns, what=what)
     if len(frame) < 2:
-        raise InputError("is too short", file=file, field=what, value=f"{len(frame)} samples", limit=">= 2")
+        raise InputError("is too short", field=what, value=f"{len(frame)} samples", limit=">= 2")
     for column in columns:
         if not pd.api.types.is_numeric_dtype(frame[column]):
             raise InputError(
                 "holds no numbers",
-                file=file,
                 field=f"{what}.{column}",
                 value=str(frame[column].dtype),
                 limit="numbers",
@@ -135,7 +131,6 @@ def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, f
             raise InputError(
                 f"is not a finite number at time_s = {frame.index[int(np.argmax(bad))]} "
                 f"({int(bad.sum())} such samples)",
-                file=file,
                 field=f"{what}.{column}",
                 value=float(frame[column].iloc[int(np.argmax(bad))]),
                 limit="finite numbers",
@@ -144,15 +139,14 @@ def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str, f
     if frame.index.name != "time_s" or not pd.api.types.is_numeric_dtype(frame.index):
         raise InputError(
             "is not indexed by time",
-            file=file,
             field=what,
             value=f"{frame.index.name} ({frame.index.dtype})",
             limit="an index time_s of seconds",
         )
-    check_stamps(frame.index.to_numpy(dtype=np.float64), field=f"{what}.time_s", file=file)
+    check_stamps(frame.index.to_numpy(dtype=np.float64), field=f"{what}.time_s")
 
 
-def _check_size(frame: pd.DataFrame, bound: _Limit, file: object) -> None:
+def _check_size(frame: pd.DataFrame, bound: _Limit) -> None:
     """Refuse values beyond a limit."""
     for column in bound.columns:
         values = np.abs(frame[column].to_numpy(dtype=np.float64))
@@ -160,7 +154,6 @@ def _check_size(frame: pd.DataFrame, bound: _Limit, file: object) -> None:
             worst = int(np.argmax(values))
             raise InputError(
                 f"is beyond what a train does at time_s = {float(frame.index[worst]):.6g}",
-                file=file,
                 field=f"{bound.frame}.{column}",
                 value=float(frame[column].iloc[worst]),
                 limit=f"{bound.limit:g} {bound.unit}",
@@ -168,7 +161,7 @@ def _check_size(frame: pd.DataFrame, bound: _Limit, file: object) -> None:
             )
 
 
-def _check_uniform(time: np.ndarray, rate_hz: float, file: object) -> None:
+def _check_uniform(time: np.ndarray, rate_hz: float) -> None:
     """IMU samples must come at the rate of the sheet, to 1 % of an interval each and 0.01 % over all."""
     step = np.diff(time)
     off = np.abs(step * rate_hz - 1.0)
@@ -176,7 +169,6 @@ def _check_uniform(time: np.ndarray, rate_hz: float, file: object) -> None:
     if off[worst] > 0.01:
         raise InputError(
             f"is not uniform at sample {worst + 1}",
-            file=file,
             field="imu.time_s",
             value=f"{step[worst]:.6g} s after time_s = {time[worst]:.6g}",
             limit=f"{1.0 / rate_hz:.6g} s, as the sheet's rate of {rate_hz:g} Hz says",
@@ -186,7 +178,6 @@ def _check_uniform(time: np.ndarray, rate_hz: float, file: object) -> None:
     if abs(mean / rate_hz - 1.0) > 1e-4:
         raise InputError(
             "has another rate than the sheet says",
-            file=file,
             field="imu.time_s",
             value=f"{mean:.9g} Hz",
             limit=f"{rate_hz:g} Hz",

@@ -40,7 +40,7 @@ BEYOND_TRACK_M = 20.0
 """How far an odometry may be off the end of the track by its own error."""
 
 
-def check_plausible(recording: Recording, *, file: object = None) -> None:
+def check_plausible(recording: Recording) -> None:
     """Refuse a recording whose units, axes or signs cannot be those that are claimed.
 
     The specific force is judged at rest, where the ride begins with a second of it, else by its median.
@@ -55,13 +55,13 @@ def check_plausible(recording: Recording, *, file: object = None) -> None:
         track; if the gyro does not turn with the track: by none of its curves, the other way, or many times
         as much; if the accelerometer does not push when the train gains speed, or sideways, or backwards.
     """
-    _check_gravity(recording, file)
-    _check_turning(recording, file)
+    _check_gravity(recording)
+    _check_turning(recording)
     if recording.odometry is not None:
-        _check_motion(recording, recording.odometry, file)
+        _check_motion(recording, recording.odometry)
 
 
-def _check_gravity(recording: Recording, file: object) -> None:
+def _check_gravity(recording: Recording) -> None:
     resting = at_rest_initially(recording)
     force = recording.imu[list(ACCEL)].to_numpy()
     if resting >= recording.imu_sheet.rate_hz:
@@ -80,7 +80,6 @@ def _check_gravity(recording: Recording, file: object) -> None:
                     remedy = f'the values look like {unit}, given as {claimed}: set units.accel = "{unit}"'
         raise InputError(
             "is not as large as gravity",
-            file=file,
             field="imu.accel",
             value=shown,
             limit=f"{gravity:g} m/s2 to {slack:.2g} m/s2",
@@ -89,7 +88,6 @@ def _check_gravity(recording: Recording, file: object) -> None:
     if found[2] < -UPRIGHT * size:
         raise InputError(
             "points down: at rest an accelerometer shows +g on Z, which points up",
-            file=file,
             field="imu.accel",
             value=f"{found[2]:.4g} m/s2 on Z {when}",
             limit=f"> {UPRIGHT * gravity:.3g} m/s2",
@@ -100,7 +98,6 @@ def _check_gravity(recording: Recording, file: object) -> None:
         axis = int(np.argmax(np.abs(found)))
         raise InputError(
             f"gravity lies along {'-' if found[axis] < 0 else ''}{'XYZ'[axis]} of the body, not Z",
-            file=file,
             field="imu.axes",
             value=[round(float(part), 3) for part in found],
             limit=f"> {UPRIGHT * gravity:.3g} m/s2 on Z {when}",
@@ -108,7 +105,7 @@ def _check_gravity(recording: Recording, file: object) -> None:
         )
 
 
-def _check_turning(recording: Recording, file: object) -> None:
+def _check_turning(recording: Recording) -> None:
     rate = recording.imu_sheet.rate_hz
     window = max(1, min(round(MEAN_OVER_S * rate), len(recording.imu) - 1))
     for name in GYRO:
@@ -119,7 +116,6 @@ def _check_turning(recording: Recording, file: object) -> None:
             raise InputError(
                 f"turns faster than a train does, in the mean over {window / rate:.3g} s "
                 f"from time_s = {float(recording.imu.index[worst]):.6g}",
-                file=file,
                 field=f"imu.{name}",
                 value=float(f"{mean[worst]:.4g}"),
                 limit=f"{MEAN_RATE_RADPS:g} rad/s",
@@ -127,7 +123,7 @@ def _check_turning(recording: Recording, file: object) -> None:
             )
 
 
-def _check_motion(recording: Recording, odometry: pd.DataFrame, file: object) -> None:
+def _check_motion(recording: Recording, odometry: pd.DataFrame) -> None:
     """Hold gyro and accelerometer against what track and odometry say, in means over a second."""
     track = recording.track
     position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
@@ -135,7 +131,6 @@ def _check_motion(recording: Recording, odometry: pd.DataFrame, file: object) ->
         if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:
             raise InputError(
                 f"the ride leaves track {track.name!r}",
-                file=file,
                 field="odometry.position_m",
                 value=round(float(place), 2),
                 limit=f"{track.start_m:g} to {track.end_m:g} m",
@@ -145,17 +140,17 @@ def _check_motion(recording: Recording, odometry: pd.DataFrame, file: object) ->
     frame = track.frame_extended(_means(position, seconds))
     bend = frame.rates[:, 2] * _means(speed, seconds)
     if np.abs(bend).sum() > LEAST_TURN_RAD:
-        _judge_turn(recording, _slope(_means(recording.imu[GYRO[2]].to_numpy(), seconds), bend), file)
+        _judge_turn(recording, _slope(_means(recording.imu[GYRO[2]].to_numpy(), seconds), bend))
     acceleration = odometry["acceleration_mps2"].to_numpy()
     along = _means(acceleration, seconds) - recording.gravity_mps2 * np.sin(frame.pitch_rad)
     # A noisy regressor flattens the line: only an acceleration that the odometry knows is one to hold to.
     noise = float(np.mean(odometry["acceleration_sd_mps2"].to_numpy() ** 2))
     if np.ptp(position) > LEAST_WAY_M and np.var(along) > max(2.0 * noise, LEAST_VARIANCE_M2PS4):
         x, y = (_slope(_means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
-        _judge_push(x, y, file)
+        _judge_push(x, y)
 
 
-def _judge_turn(recording: Recording, line: tuple[float, float], file: object) -> None:
+def _judge_turn(recording: Recording, line: tuple[float, float]) -> None:
     slope, sd = line
     if 0.2 < slope < 5.0 or abs(slope - 1.0) < SURE * sd:
         return
@@ -173,7 +168,6 @@ def _judge_turn(recording: Recording, line: tuple[float, float], file: object) -
         remedy = 'mend units.gyro: the values look like "deg/s"'
     raise InputError(
         problem,
-        file=file,
         field=f"imu.{GYRO[2]}",
         value=f"{slope:.3g} times the curvature of {recording.track.name!r} times speed",
         limit="about 1",
@@ -181,17 +175,15 @@ def _judge_turn(recording: Recording, line: tuple[float, float], file: object) -
     )
 
 
-def _judge_push(x: tuple[float, float], y: tuple[float, float], file: object) -> None:
+def _judge_push(x: tuple[float, float], y: tuple[float, float]) -> None:
     if x[0] > 0.4 or 1.0 - x[0] < SURE * x[1]:
         return
     sideways = abs(y[0]) > max(abs(x[0]), 0.4)
     if x[0] < -0.4 and not sideways:
-        problem, remedy = (
-            "pushes backwards when the train gains speed",
-            (
-                'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards '
-                "smaller s has falling pulse counts (reverse = true)"
-            ),
+        problem = "pushes backwards when the train gains speed"
+        remedy = (
+            'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards smaller s '
+            "has falling pulse counts (reverse = true)"
         )
     elif sideways:
         axes = '["y", "-x", "z"]' if y[0] > 0.0 else '["-y", "x", "z"]'
@@ -200,7 +192,6 @@ def _judge_push(x: tuple[float, float], y: tuple[float, float], file: object) ->
         problem, remedy = "does not push when the train gains speed", "mend the axes, or the odometry"
     raise InputError(
         problem,
-        file=file,
         field=f"imu.{ACCEL[0]}",
         value=f"{x[0]:.2g} times the acceleration of the odometry along X, {y[0]:.2g} along Y",
         limit="about 1, and 0",

@@ -12,6 +12,7 @@ This module neither simulates nor estimates.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import pandas as pd
@@ -109,6 +110,11 @@ class EncoderSheet:
     wheel_radius_m: float
     rate_hz: float
     radius_relative_sd: float = 0.005
+
+    @property
+    def pulse_m(self) -> float:
+        """Way of one count, 2 pi r / N, in m."""
+        return 2.0 * math.pi * self.wheel_radius_m / self.pulses_per_revolution
 
 
 @dataclass(frozen=True)

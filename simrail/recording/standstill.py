@@ -14,7 +14,6 @@ import pandas as pd
 
 from simrail.core.jit import FloatArray, njit
 from simrail.recording.recording import Recording
-from simrail.recording.wheel_speed import pulse_way_m
 
 GUARD_S = 0.5
 """Rest is not trusted at least this long before a pulse."""
@@ -44,7 +43,7 @@ def guard_s(recording: Recording) -> float:
     """
     if recording.encoder_sheet is None:
         return GUARD_S
-    way = 2.0 * pulse_way_m(recording.encoder_sheet)
+    way = 2.0 * recording.encoder_sheet.pulse_m
     return max(GUARD_S, float(np.cbrt(6.0 * way / GENTLE_JERK_MPS3)))
 
 

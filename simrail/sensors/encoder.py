@@ -10,8 +10,7 @@ creeping under traction, turns as the contact makes it turn, and that angle come
 simulated contact did not do. What the train believes of the wheel's radius is not quite true; that belief
 is made here too, since it belongs to the device as much as its pulses.
 
-Not here: what a logger makes of the counts (`simrail.recording.wheel_speed`,
-`simrail.estimators.odometry.encoder`).
+Not here: what an odometry makes of the counts (`simrail.estimators.odometry.encoder`).
 """
 
 from dataclasses import dataclass

@@ -22,9 +22,13 @@ from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
 from simrail.estimators.attitude.kernel import attitude_ekf, attitude_gda
 from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
-from simrail.estimators.trajectory.kernel_back import trajectory_back
-from simrail.estimators.trajectory.kernel_filter import room_for_filtered, room_for_past, trajectory_filter
-from simrail.estimators.trajectory.model import Model
+from simrail.estimators.trajectory.kernel import (
+    Model,
+    room_for_filtered,
+    room_for_past,
+    trajectory_back,
+    trajectory_filter,
+)
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likelihood, run_model
 from twins.attitude import filterpy_ekf
 from twins.trajectory import filterpy_smoother

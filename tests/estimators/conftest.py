@@ -184,9 +184,12 @@ def record_bogie(speed_kmh: float, direction: int, draw: int) -> Recording:
 METRO_AT = {"axle": AXLE_AT, "frame": Mount("frame", "frame", (0.0, 0.0, 0.6))}
 
 
-def metro_ride(speed_kmh: float, direction: int) -> Ride:
-    """The bogie's ride by the compiled engine."""
-    start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
+LINE = (10.0, 2090.0)
+
+
+def metro_ride(speed_kmh: float, direction: int, way: tuple[float, float] = LINE) -> Ride:
+    """The bogie's ride by the compiled engine, over the whole line or a stretch of it."""
+    start, end = way if direction > 0 else way[::-1]
     return Ride(
         name="trajectory",
         track=track_by_name("condequinto_olivar"),
@@ -199,16 +202,18 @@ def metro_ride(speed_kmh: float, direction: int) -> Ride:
 
 
 @lru_cache
-def metro_truth(speed_kmh: float, direction: int) -> Truth:
+def metro_truth(speed_kmh: float, direction: int, way: tuple[float, float] = LINE) -> Truth:
     """The truth of that ride."""
-    return simulate(metro_ride(speed_kmh, direction))
+    return simulate(metro_ride(speed_kmh, direction, way))
 
 
 @lru_cache(maxsize=4)
-def record_metro(speed_kmh: float, direction: int, mount: str, draw: int) -> Recording:
+def record_metro(
+    speed_kmh: float, direction: int, mount: str, draw: int, way: tuple[float, float] = LINE
+) -> Recording:
     """That ride as recorded, with curve-matched odometry."""
     recording = measure(
-        metro_truth(speed_kmh, direction),
+        metro_truth(speed_kmh, direction, way),
         name=f"metro {mount} {speed_kmh:g} km/h {direction:+d}",
         mount=METRO_AT[mount],
         grade=load_grade("lord_3dm_gx4_25"),
@@ -235,8 +240,8 @@ def metro_rails() -> Callable[..., LaidTrack]:
 def metro_motion() -> Callable[..., pd.DataFrame]:
     """True motion of a mount on that ride."""
 
-    def motion(speed_kmh: float, direction: int, mount: str) -> pd.DataFrame:
-        return metro_truth(speed_kmh, direction).motion(METRO_AT[mount])
+    def motion(speed_kmh: float, direction: int, mount: str, way: tuple[float, float] = LINE) -> pd.DataFrame:
+        return metro_truth(speed_kmh, direction, way).motion(METRO_AT[mount])
 
     return motion
 

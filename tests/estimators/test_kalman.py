@@ -6,6 +6,7 @@ call there is its model.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +22,11 @@ from simrail.estimators.kalman import (
     chain_information,
     congruence,
     fixed_interval,
-    joint_draw,
+    keep,
     log_density,
     mirror,
     remember,
+    remember_prediction,
     room_for_history,
     update,
 )
@@ -66,7 +68,7 @@ def track_target(
                 p[i, i + 2] += q * dt**2 / 2.0
                 p[i + 2, i] += q * dt**2 / 2.0
                 p[i + 2, i + 2] += q * dt
-        past.states[k], past.covariances[k], past.transitions[k] = x, p, f
+        remember_prediction(past, k, x, p, f)
         for m in range(z.shape[1]):
             if np.isfinite(z[k, m]):
                 h = model.rows[k, m]
@@ -74,7 +76,7 @@ def track_target(
                 s = update(x, p, h, error, model.noise[k, m], gain, v)
                 remember(past, k, m, h, gain, error, s)
                 likelihood += log_density(error * error / s, s, 1)
-        states[k], covariances[k] = x, p
+        keep(states, covariances, k, x, p)
     return likelihood
 
 
@@ -154,11 +156,23 @@ class Run(NamedTuple):
     likelihood: float
 
 
+def run_by(track: Callable, model: Target, measured: np.ndarray) -> Run:
+    states, covariances, past = np.empty((STEPS, N)), np.empty((STEPS, N, N)), room_for_history(STEPS, N, M)
+    likelihood = track(model, measured, states, covariances, past)
+    return Run(states, covariances, past, likelihood)
+
+
 @pytest.fixture(scope="module")
 def run(model: Target, measured: np.ndarray) -> Run:
-    states, covariances, past = np.empty((STEPS, N)), np.empty((STEPS, N, N)), room_for_history(STEPS, N, M)
-    likelihood = track_target(model, measured, states, covariances, past)
-    return Run(states, covariances, past, likelihood)
+    """By the interpreter, which is faster than to compile it; what it calls is compiled."""
+    return run_by(track_target.py_func, model, measured)
+
+
+@pytest.mark.slow
+def test_the_example_compiles(run: Run, model: Target, measured: np.ndarray) -> None:
+    compiled = run_by(track_target, model, measured)
+    np.testing.assert_allclose(compiled.states, run.states, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(compiled.past.gains, run.past.gains, rtol=0, atol=1e-12)
 
 
 def test_filter_and_likelihood_are_the_joint_distributions(
@@ -184,20 +198,6 @@ def test_smoother_is_the_joint_distributions(run: Run, joint: Joint) -> None:
         np.testing.assert_allclose(covariances[k], covariance[at, at], rtol=0, atol=1e-9)
 
 
-def test_draws_have_the_joint_covariance_of_all_steps(run: Run, joint: Joint, model: Target) -> None:
-    """A draw is linear in its normal numbers: unit vectors give the matrix, and no statistics are needed."""
-    roots = np.array(
-        [np.linalg.cholesky(process(*of_step)) for of_step in zip(model.dt, model.q, strict=True)]
-    )
-    start_root, sds = np.linalg.cholesky(model.start_covariance), np.sqrt(model.noise)
-    columns, errors = [], np.empty((STEPS, N))
-    for unit in np.eye(STEPS * (N + M)):
-        joint_draw(run.past, start_root, roots, sds, unit.reshape(STEPS, N + M), errors)
-        columns.append(errors.ravel().copy())
-    drawn = np.column_stack(columns)
-    np.testing.assert_allclose(drawn @ drawn.T, joint.given(len(joint.z))[1], rtol=0, atol=1e-9)
-
-
 def test_filter_and_smoother_equal_filterpys(run: Run, model: Target, measured: np.ndarray) -> None:
     theirs = KalmanFilter(dim_x=N, dim_z=1)
     theirs.x, theirs.P = model.start.copy(), model.start_covariance.copy()
@@ -219,7 +219,13 @@ def test_filter_and_smoother_equal_filterpys(run: Run, model: Target, measured: 
     np.testing.assert_allclose(covariances, by_rts[1], rtol=0, atol=1e-7)
 
 
-def test_a_block_is_its_whitened_rows_one_by_one() -> None:
+@pytest.mark.parametrize(
+    "block_update",
+    # To compile it takes longer than all else here together, and its algebra is the same.
+    [block_update.py_func, pytest.param(block_update, marks=pytest.mark.slow)],
+    ids=["plain", "compiled"],
+)
+def test_a_block_is_its_whitened_rows_one_by_one(block_update: Callable) -> None:
     """Correlated noise; Joseph's form leaves P symmetric and positive where the measurement is far better."""
     rng = np.random.default_rng(3)
     root, rows, errors = rng.standard_normal((N, N)), rng.standard_normal((3, N)), rng.standard_normal(3)

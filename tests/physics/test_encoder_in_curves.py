@@ -16,7 +16,6 @@ import pytest
 
 from simrail.core.toml_files import judge, load
 from simrail.recording.recording import EncoderSheet
-from simrail.recording.wheel_speed import counted_way_m
 from simrail.ride.ride import Ride, simulate
 from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
@@ -66,7 +65,7 @@ def wheels_in_curve(name: str, radius_m: float, speed_mps: float) -> dict[str, W
         spec = EncoderSpec(wheel.name, pulses_per_revolution=20_000, rate_hz=1000.0, quadrature=True)
         counts = sample_encoder(truth.wheel_angle(wheel.name), truth.time_s, spec, seed=1, draw=0)
         sheet = EncoderSheet(wheel.name, spec.counts_per_revolution, wheel.radius_m, 1000.0)
-        way = counted_way_m(counts, sheet).to_numpy()
+        way = (counts["pulse_count"] - counts["pulse_count"].iloc[0]).to_numpy() * sheet.pulse_m
         read = (way[last] - way[first]) / (s[last] - s[first]) - 1.0
         pose = motion.iloc[inside].mean()
         state = contact_state(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +10,7 @@ from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.tuning.file import Tuning
 
 from simrail.core.errors import InputError
-from simrail.core.toml_files import shipped
+from simrail.core.toml_files import shipped, toml_text
 from simrail.scenario.build import Parts
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
@@ -26,6 +26,10 @@ tuning = "tunings/mine.toml"
 MINE = Tuning(Hyperparameters(lateral_m2ps5=3.0))
 
 
+def write(tuning: Tuning, path: Path) -> None:
+    path.write_text(toml_text({"hyperparameters": asdict(tuning.hyperparameters)}))
+
+
 @pytest.fixture
 def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scenario:
     """Read from a folder that is not the working one."""
@@ -34,7 +38,7 @@ def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scenario:
     folder = tmp_path / "scenarios"
     (folder / "tunings").mkdir(parents=True)
     (folder / "mine.toml").write_text(GOOD + SMOOTHER, encoding="utf-8")
-    MINE.write(folder / "tunings" / "mine.toml")
+    write(MINE, folder / "tunings" / "mine.toml")
     return load_scenario(folder / "mine.toml")
 
 
@@ -56,7 +60,7 @@ def test_a_copy_of_a_shipped_scenario_finds_what_is_shipped(
 
 def test_what_lies_beside_the_scenario_goes_before_what_is_shipped(scenario: Scenario) -> None:
     assert scenario.folder is not None
-    MINE.write(scenario.folder / "tunings" / "scale_track_cml.toml")
+    write(MINE, scenario.folder / "tunings" / "scale_track_cml.toml")
     setting = "estimator.smoother.options.tuning=tunings/scale_track_cml.toml"
     made = judge_scenario(load_scenario(scenario.folder / "mine.toml", overrides=[setting])).estimators
     assert made["smoother"].tuning == MINE  # type: ignore[attr-defined]
@@ -87,7 +91,7 @@ def test_its_content_is_in_the_hash(scenario: Scenario) -> None:
     assert judge_scenario(scenario, Parts(scenario)).content_hash == plain
     file.write_text("# a comment does not count\n" + file.read_text())
     assert judge_scenario(scenario).content_hash == plain
-    Tuning(replace(MINE.hyperparameters, yaw_rad2ps3=0.5)).write(file)
+    write(Tuning(replace(MINE.hyperparameters, yaw_rad2ps3=0.5)), file)
     assert judge_scenario(scenario).content_hash != plain
 
 
@@ -120,7 +124,7 @@ def test_an_option_that_is_a_file_takes_a_path_only(scenario: Scenario) -> None:
 
 def test_two_tunings_are_two_variants(scenario: Scenario) -> None:
     assert scenario.folder is not None
-    MINE.write(scenario.folder / "other.toml")
+    write(MINE, scenario.folder / "other.toml")
     listed = 'estimator.smoother.options.tuning=["tunings/mine.toml", "other.toml"]'
     both = judge_scenario(load_scenario(f"{scenario.folder}/mine.toml", overrides=[listed]))
     names = [name for name in both.estimators if name.startswith("smoother")]

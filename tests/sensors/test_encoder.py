@@ -11,7 +11,6 @@ from simrail.core.columns import EDGE_TIME
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray, njit
 from simrail.recording.recording import EncoderSheet
-from simrail.recording.wheel_speed import counted_way_m, pulse_way_m
 from simrail.sensors.encoder import EncoderSpec, Slip, nominal_radius, sample_encoder
 
 TIME = np.arange(60_001) / 1000.0
@@ -252,7 +251,7 @@ def speed_by_counting(encoder: pd.DataFrame, sheet: EncoderSheet, *, readings: i
     begin = np.maximum(np.arange(len(counts)) - readings, 0)
     elapsed = times - times[begin]
     elapsed[0] = np.inf
-    speed = (counts - counts[begin]) * pulse_way_m(sheet) / elapsed
+    speed = (counts - counts[begin]) * sheet.pulse_m / elapsed
     return pd.Series(speed, index=encoder.index, name="speed_mps")
 
 
@@ -262,7 +261,7 @@ def speed_by_period(encoder: pd.DataFrame, sheet: EncoderSheet, *, still_s: floa
         encoder.index.to_numpy(dtype=np.float64),
         encoder["pulse_count"].to_numpy(dtype=np.float64),
         encoder[EDGE_TIME].to_numpy(dtype=np.float64),
-        pulse_way_m(sheet),
+        sheet.pulse_m,
         still_s,
     )
     return pd.Series(speed, index=encoder.index, name="speed_mps")
@@ -300,8 +299,8 @@ def _by_period(time: FloatArray, count: FloatArray, edge: FloatArray, way: float
 def test_way_and_speed_by_counting_are_quantised_as_theory_says():
     frame, card = sample(9.0 * TIME, **FAST), sheet()
     quantum = TURN * 0.29 / 1024
-    assert pulse_way_m(card) == pytest.approx(quantum, rel=1e-15)
-    way = counted_way_m(frame, card)
+    assert card.pulse_m == pytest.approx(quantum, rel=1e-15)
+    way = (frame["pulse_count"] - frame["pulse_count"].iloc[0]) * card.pulse_m
     assert np.abs(way - 0.29 * 9.0 * TIME).max() <= quantum
     for readings in (1, 4, 250):
         speed = speed_by_counting(frame, card, readings=readings)
@@ -349,7 +348,7 @@ def test_speed_by_period_at_standstill_and_reversal():
     frame = sample(angle, edge_times=True)
     speed = speed_by_period(frame, sheet()).to_numpy()
     true = 0.29 * 0.5 * np.cos(0.1 * frame.index.to_numpy())
-    quantum = pulse_way_m(sheet())
+    quantum = sheet().pulse_m
     # The mean of the last period is half a period old when new and one and a half when the next edge comes;
     # the speed changes by 0.0145 m/s2 at most, and a period by little while it is short.
     brisk = np.abs(true) > 0.02

@@ -11,6 +11,7 @@ Not here: an odometry, where the file has none, and whether the ride can be true
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,7 +28,7 @@ from simrail.core.resample import (
     uniform_times,
 )
 from simrail.core.toml_files import blame, judge, label, load, read_toml
-from simrail.recording.check_form import check_recording
+from simrail.recording.check_form import SHEETS, check_recording
 from simrail.recording.files.ride_file import ImuSignalPart, RideFile
 from simrail.recording.files.signal_reader import SignalReader
 from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording
@@ -57,16 +58,27 @@ def read_signals(path: Path) -> Recording:
         `check_recording`.
     """
     path = ride_file(path)
-    file = label(path)
-    spec = judge(RideFile, read_toml(path), file=file)
-    with blame(file, "track"):
-        track = load(TrackFile, "track", spec.track, folder=path.parent).design(Path(spec.track).stem)
-    reader = SignalReader(path.parent, file)
-    imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu"), spec, file)
+    spec = judge(RideFile, read_toml(path), file=label(path))
+    with blame(label(path)):
+        recording = _recording(spec, path.parent)
+        check_recording(recording)
+    return recording
+
+
+def ride_file(path: Path) -> Path:
+    """The ride file that a path means."""
+    return path / RIDE_FILE if path.is_dir() else path
+
+
+def _recording(spec: RideFile, folder: Path) -> Recording:
+    with blame(None, "track"):
+        track = load(TrackFile, "track", spec.track, folder=folder).design(Path(spec.track).stem)
+    reader = SignalReader(folder)
+    imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu"), spec)
     if spec.gaps is not None:
         noted = reader.frame(spec.gaps, "gaps")
         gaps = noted if gaps is None else pd.concat([noted, gaps], ignore_index=True)
-    frames: dict[str, pd.DataFrame] = {}
+    others: dict[str, Any] = {}
     for name, longest_gap_s in (
         ("magnetometer", spec.longest_gap_s),
         ("rail_displacement", spec.longest_gap_s),
@@ -74,11 +86,13 @@ def read_signals(path: Path) -> Recording:
     ):
         part = getattr(spec, name)
         if part is not None:
-            frames[name] = _at(reader.frame(part, name), imu.index.to_numpy(), longest_gap_s, name, file)
+            others[name] = _at(reader.frame(part, name), imu.index.to_numpy(), longest_gap_s, name)
+            if name in SHEETS:
+                others[SHEETS[name][0]] = part.sheet
     recording = Recording(
         name=spec.name,
         imu=imu,
-        imu_sheet=replace(_sheet(spec.imu, path.parent, file), rate_hz=rate_hz),
+        imu_sheet=replace(_sheet(spec.imu, folder), rate_hz=rate_hz),
         mount=spec.imu.name,
         mount_body=spec.imu.body,
         mount_position_m=spec.imu.position_m,
@@ -89,30 +103,19 @@ def read_signals(path: Path) -> Recording:
         odometry_source="" if spec.odometry is None else spec.odometry.source,
         gravity_mps2=spec.gravity_mps2,
         gaps=gaps,
-        magnetometer_sheet=None if spec.magnetometer is None else spec.magnetometer.sheet,
-        rail_sensor_sheet=None if spec.rail_displacement is None else spec.rail_displacement.sheet,
-        magnetometer=frames.get("magnetometer"),
-        rail_displacement=frames.get("rail_displacement"),
-        odometry=frames.get("odometry"),
+        **others,
     )
-    recording = _with_way(recording, spec, reader, file)
-    check_recording(recording, file=file)
-    return recording
+    return _with_way(recording, spec, reader)
 
 
-def ride_file(path: Path) -> Path:
-    """The ride file that a path means."""
-    return path / RIDE_FILE if path.is_dir() else path
-
-
-def _at(frame: pd.DataFrame, times: FloatArray, longest_gap_s: float, what: str, file: str) -> pd.DataFrame:
+def _at(frame: pd.DataFrame, times: FloatArray, longest_gap_s: float, what: str) -> pd.DataFrame:
     """A signal at the IMU's times: as it is if it has them, else interpolated."""
     if np.array_equal(frame.index.to_numpy(), times):
         return frame
-    return resample(frame, times, longest_gap_s=longest_gap_s, what=what, file=file)[0]
+    return resample(frame, times, longest_gap_s=longest_gap_s, what=what)[0]
 
 
-def _uniform(imu: pd.DataFrame, spec: RideFile, file: str) -> tuple[pd.DataFrame, float, pd.DataFrame | None]:
+def _uniform(imu: pd.DataFrame, spec: RideFile) -> tuple[pd.DataFrame, float, pd.DataFrame | None]:
     """IMU at uniform times, its rate, and the gaps that were bridged (None if there were none)."""
     time = imu.index.to_numpy()
     measured = rate_of(time)
@@ -120,7 +123,6 @@ def _uniform(imu: pd.DataFrame, spec: RideFile, file: str) -> tuple[pd.DataFrame
     if stated is not None and abs(measured / stated - 1.0) > 0.01:
         raise InputError(
             "the time stamps have another rate than is stated",
-            file=file,
             field="imu.rate_hz" if spec.imu.rate_hz else "imu.sheet.rate_hz",
             value=stated,
             limit=f"{measured:.6g} Hz, to 1 %",
@@ -130,22 +132,22 @@ def _uniform(imu: pd.DataFrame, spec: RideFile, file: str) -> tuple[pd.DataFrame
     if is_uniform(time, rate):
         return imu, rate, None
     grid = uniform_times(float(time[0]), float(time[-1]), rate)
-    sampled, gaps = resample(imu, grid, longest_gap_s=spec.longest_gap_s, file=file)
+    sampled, gaps = resample(imu, grid, longest_gap_s=spec.longest_gap_s)
     return sampled, rate, gaps if len(gaps) else None
 
 
-def _sheet(part: ImuSignalPart, folder: Path, file: str) -> ImuSheet:
+def _sheet(part: ImuSignalPart, folder: Path) -> ImuSheet:
     if part.sheet is not None:
         return part.sheet
     if part.datasheet is not None:
         grade = part.datasheet.grade("datasheet")
     else:
-        with blame(file, "imu.grade"):
+        with blame(None, "imu.grade"):
             grade = load_grade(str(part.grade), folder=folder)
     return imu_sheet(grade, delay_s=part.delay_s)
 
 
-def _judge_way(frame: pd.DataFrame, table: str, imu: pd.DataFrame, step: float, file: str) -> None:
+def _judge_way(frame: pd.DataFrame, table: str, imu: pd.DataFrame, step: float) -> None:
     """Refuse a way that does not span the IMU's times, or is lost while the train moves."""
     time, interval = frame.index.to_numpy(), 1.0 / rate_of(frame.index.to_numpy())
     slack = max(0.5, 2.0 * interval)
@@ -153,7 +155,6 @@ def _judge_way(frame: pd.DataFrame, table: str, imu: pd.DataFrame, step: float, 
     if time[0] > first + slack or time[-1] < last - slack:
         raise InputError(
             "does not span the times of the IMU",
-            file=file,
             field=f"{table}.time",
             value=f"{time[0]:.6g} to {time[-1]:.6g} s",
             limit=f"{first:.6g} to {last:.6g} s",
@@ -164,28 +165,28 @@ def _judge_way(frame: pd.DataFrame, table: str, imu: pd.DataFrame, step: float, 
         way = frame.iloc[:, 0]
         moved = np.abs(way[gaps["end_s"]].to_numpy() - way[gaps["start_s"]].to_numpy()) > step
         gaps = gaps[moved]
-    refuse_long_gaps(gaps, max(WAY_GAP_S, 3.0 * interval), what=table, file=file)
+    refuse_long_gaps(gaps, max(WAY_GAP_S, 3.0 * interval), what=table)
 
 
-def _with_way(recording: Recording, spec: RideFile, reader: SignalReader, file: str) -> Recording:
+def _with_way(recording: Recording, spec: RideFile, reader: SignalReader) -> Recording:
     """Add the encoder or the odometer; a distance in steps is an encoder with one pulse per step."""
     if spec.encoder is not None:
         counts = reader.frame(spec.encoder, "encoder")
         if spec.encoder.reverse:
             counts["pulse_count"] = -counts["pulse_count"]
-        _judge_way(counts, "encoder", recording.imu, 1.0, file)
+        _judge_way(counts, "encoder", recording.imu, 1.0)
         return replace(recording, encoder=counts, encoder_sheet=spec.encoder.known)
     part = spec.odometer
     if part is None:
         return recording
     frame, sign = reader.frame(part, "odometer"), -1.0 if part.reverse else 1.0
     if "speed" in part.columns:
-        _judge_way(frame, "odometer", recording.imu, 0.0, file)
+        _judge_way(frame, "odometer", recording.imu, 0.0)
         odometer = frame[["speed_mps"]] * sign
         sheet = OdometerSheet(part.speed_sd_mps, part.radius_relative_sd)
         return replace(recording, odometer=odometer, odometer_sheet=sheet)
     step = float(part.resolution_m or 0.0)
-    _judge_way(frame[["distance_m"]], "odometer", recording.imu, step, file)
+    _judge_way(frame[["distance_m"]], "odometer", recording.imu, step)
     way = frame["distance_m"].to_numpy()
     steps = np.rint(sign * (way - way[0]) / step).astype(np.int64)
     return replace(

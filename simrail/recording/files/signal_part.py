@@ -7,6 +7,7 @@ and a device as one can be mounted. Which signals there are, and what each says 
 
 from typing import Annotated, ClassVar, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from simrail.core.errors import InputError
@@ -118,9 +119,8 @@ class VectorPart(SignalPart):
                 remedy='e.g. ["x", "-y", "-z"]',
             )
         order = ["xyz".index(letter) for letter in letters]
-        swaps = sum(order[i] > order[j] for i in range(3) for j in range(i + 1, 3))
         minus = sum(axis.startswith("-") for axis in value)
-        if (swaps + minus) % 2:
+        if np.linalg.det(np.eye(3)[order]) * (-1) ** minus < 0.0:
             raise InputError(
                 "is left-handed: no device can be mounted so",
                 value=list(value),

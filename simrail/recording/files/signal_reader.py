@@ -26,12 +26,10 @@ class SignalReader:
     ----------
     folder : Path
         Folder of the ride file, which the paths of its data files start from.
-    file : str
-        Name of the ride file, for messages.
     """
 
-    def __init__(self, folder: Path, file: str) -> None:
-        self._folder, self._file = folder, file
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self._zero_s: int | None = None
         self._dated: bool | None = None
 
@@ -51,13 +49,6 @@ class SignalReader:
             If its file, a column or a value is missing or bad, its times do not rise, or its clock is
             another than that of the first signal read.
         """
-        try:
-            return self._frame(part, table)
-        except InputError as error:
-            error.file = self._file if error.file is None else error.file
-            raise
-
-    def _frame(self, part: SignalPart, table: str) -> pd.DataFrame:
         signal = part.signal
         found = column_names(part, self._folder, table=table)
         names: dict[str, list[str]] = {}

@@ -13,6 +13,7 @@ from simrail.estimators.odometry.kernel import (
     DRIFT,
     LAG,
     LEAD,
+    SCALE,
     STATES,
     SWAY,
     TREAD,
@@ -160,7 +161,7 @@ def test_finds_wheel_and_bias():
         counts = recording.encoder["pulse_count"].to_numpy()
         position = truth.motion(AXLE)["position_m"].to_numpy()
         rolled = way * (counts[-1] - counts[0]) / (position[-1] - position[0]) - 1.0
-        assert CurveMatchedOdometry().wheel_scale(recording)[0] == pytest.approx(rolled, abs=3e-3)
+        assert trace.states[-1, SCALE] == pytest.approx(rolled, abs=3e-3)
         assert abs(rolled) > 0.007
         assert np.degrees(trace.states[-1, DRIFT] - BIAS_RADPS) == pytest.approx(0.0, abs=0.002)
 
@@ -319,7 +320,8 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     x[YAW] = np.interp(x[S], grid[0] + np.arange(len(table)) / grid[1], table[:, 0])
     p[V, V] = 0.1
     n = STATES
-    out = Steps(np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), np.empty((steps, 2)))
+    flags = np.empty((2, steps), dtype=bool)
+    out = Steps(time, np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), *flags)
     past = room_for_history(steps, n, UPDATES)
     curve_matched(
         0.02, imu[:, 1:4].copy(), counts[read], method._model(recording, pulse), 9.81,
@@ -327,7 +329,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
     fixed_interval(past, smoothed, covariance)
-    return (*out[:2], *past[:3], smoothed, covariance)
+    return (*out[1:3], *past[:3], smoothed, covariance)
 
 
 def test_smoother_equals_rauch_tung_striebel():

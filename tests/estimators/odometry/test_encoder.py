@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 from filterpy.common import Q_continuous_white_noise
 from filterpy.kalman import KalmanFilter
-from simrail.estimators.odometry.encoder import EncoderOdometry, _predict, _update
+from simrail.estimators.kalman import update
+from simrail.estimators.odometry.encoder import EncoderOdometry, ahead, predict
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.recording.recording import EncoderSheet
@@ -133,6 +134,8 @@ def test_predict_and_update_are_the_textbook_filter():
     oracle.P = root @ root.T
     oracle.x = rng.standard_normal((3, 1))
     x, p = oracle.x[:, 0].copy(), oracle.P.copy()
+    row, gain, work = np.array([1.0, 0.0, 0.0]), np.zeros(3), np.zeros(3)
+    answer = np.empty((1, 6))
     for _ in range(50):
         dt, intensity, z, r = (
             rng.uniform(0.001, 0.1),
@@ -143,11 +146,13 @@ def test_predict_and_update_are_the_textbook_filter():
         oracle.F = np.array([[1.0, dt, 0.5 * dt**2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
         oracle.Q = Q_continuous_white_noise(3, dt, intensity)
         oracle.predict()
-        _predict(x, p, dt, intensity)
+        ahead(x, p, dt, intensity, answer, 0)
+        predict(x, p, dt, intensity)
+        np.testing.assert_allclose(answer[0], [*x, *np.diag(p)], rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(x, oracle.x[:, 0], rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(p, oracle.P, rtol=1e-9, atol=1e-12)
         oracle.update(z, R=r)
-        _update(x, p, z, r)
+        update(x, p, row, z - x[0], r, gain, work)
         np.testing.assert_allclose(x, oracle.x[:, 0], rtol=1e-9, atol=1e-11)
         np.testing.assert_allclose(p, oracle.P, rtol=1e-8, atol=1e-11)
 

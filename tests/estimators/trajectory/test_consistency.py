@@ -12,12 +12,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scipy.linalg import block_diag
 from scipy.stats import chi2
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES, WIDTH, constant_rows, linearise
-from simrail.estimators.trajectory.model import Model, packed_process, process_noise, transition
+from simrail.estimators.trajectory.kernel import ROWS, STATES, WIDTH, Model, constant_rows, linearise
+from simrail.estimators.trajectory.model import process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import run_model
+from twins.trajectory import transition
 
 from simrail.core.seeds import stream
 
@@ -56,11 +56,11 @@ def run(scale: float = 1.0) -> dict[bool, tuple[np.ndarray, np.ndarray]]:
     """NEES of all states (draws, samples) and NIS, by smoothed or not; `scale` spoils the truth's noise."""
     rng = stream(5, "trajectory consistency")
     f, track = transition(STEP), curve()
-    q = block_diag(*process_noise(NOISE, STEP))
+    q = process_noise(NOISE, STEP)
     root, sd = np.linalg.cholesky(q), np.sqrt(NOISE.vector()[5:])
     start = np.zeros(STATES)
     start[[0, 5, 9]] = CANT, SPEED / RADIUS, 0.6
-    kinds, process = np.zeros(SAMPLES, dtype=np.int64), packed_process([NOISE], STEP)
+    kinds, process = np.zeros(SAMPLES, dtype=np.int64), q[None]
     upper, slips = np.triu_indices(STATES), np.empty((0, 3))
     g, rows = np.zeros(ROWS), np.zeros((ROWS, WIDTH))
     constant_rows(rows)

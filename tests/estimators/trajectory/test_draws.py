@@ -10,23 +10,26 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.linalg import block_diag
 from scipy.special import stdtrit
 from scipy.stats import binom
 from simrail.estimators.trajectory.draws import FELT, geometry_draws, state_errors, stream_of
-from simrail.estimators.trajectory.kernel_back import trajectory_error
-from simrail.estimators.trajectory.kernel_equations import ROWS, STATES, WIDTH, linearise
-from simrail.estimators.trajectory.kernel_filter import (
+from simrail.estimators.trajectory.kernel import (
+    ROWS,
+    STATES,
+    WIDTH,
+    Model,
     Past,
+    linearise,
     room_for_filtered,
     room_for_past,
+    trajectory_error,
     trajectory_filter,
 )
-from simrail.estimators.trajectory.model import Model, packed_process, process_noise, transition
+from simrail.estimators.trajectory.model import process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, run_model
 from simrail.estimators.trajectory.track_geometry import Sight, geometry_of, sight_of, track_geometry
-from twins.trajectory import measured
+from twins.trajectory import measured, transition
 
 from simrail.core.columns import (
     ACCEL,
@@ -86,11 +89,12 @@ def left(*, printed: bool = False) -> Left:
     start[[0, 5, 9]] = cant, turn, 0.6
     kinds = np.repeat(np.array([0, 1], dtype=np.int64), SAMPLES // 2)
     noise = np.array([ONE.vector()[5:], OTHER.vector()[5:]])
+    process = np.array([process_noise(values, STEP) for values in (ONE, OTHER)])
     signals = np.array([measured(start, term, GRAVITY)[0][:6] for term in track])
     signals += 0.05 * stream(1, "signals").standard_normal(signals.shape)
     model = Model(
         signals, track, np.full((SAMPLES if printed else 0, 3), 0.3), kinds,
-        packed_process([ONE, OTHER], STEP), noise, np.array([0.0, 0.6]), start, START_SD**2, STEP, GRAVITY,
+        process, noise, np.array([0.0, 0.6]), start, START_SD**2, STEP, GRAVITY,
     )  # fmt: skip
     past = room_for_past(SAMPLES)
     trajectory_filter(model, past, room_for_filtered())
@@ -123,7 +127,7 @@ class Dense(NamedTuple):
 def dense(*, printed: bool = False) -> Dense:
     model, past = left(printed=printed)
     f = transition(STEP)
-    both = [block_diag(*process_noise(values, STEP)) for values in (ONE, OTHER)]
+    both = [process_noise(values, STEP) for values in (ONE, OTHER)]
     q = [both[kind] for kind in model.kinds]
     slips = model.slips if printed else [None] * SAMPLES
     j = [
@@ -151,7 +155,7 @@ def dense(*, printed: bool = False) -> Dense:
 def drawn(normals: np.ndarray, *, printed: bool = False) -> np.ndarray:
     """A draw (n, 12) by the kernel."""
     model, past = left(printed=printed)
-    roots = np.array([np.linalg.cholesky(block_diag(*process_noise(v, STEP))) for v in (ONE, OTHER)])
+    roots = np.array([np.linalg.cholesky(process_noise(v, STEP)) for v in (ONE, OTHER)])
     errors, work = np.empty((SAMPLES, STATES)), np.empty((SAMPLES, ROWS))
     trajectory_error(model, past, roots, np.sqrt(model.noise), normals, work, errors)
     return errors
@@ -237,7 +241,7 @@ def made(name: str, noise: Hyperparameters = TRUE) -> tuple[Recording, Estimate]
     """A ride whose states and signals are drawn from the smoother's model, and its true states."""
     recording, rng = empty(name), stream(6, "ride", name)
     model = SMOOTHER.model(recording)
-    f, root = transition(STEP), np.linalg.cholesky(block_diag(*process_noise(noise, STEP)))
+    f, root = transition(STEP), np.linalg.cholesky(process_noise(noise, STEP))
     x = model.start + np.sqrt(model.start_variance) * rng.standard_normal(STATES)
     truth, signals = np.empty((RIDE, STATES)), np.empty((RIDE, 6))
     sd = np.sqrt(noise.vector()[5:11])
@@ -262,7 +266,7 @@ def shares(scale: float, rides: int) -> tuple[np.ndarray, int]:
 
     Places a longest wave apart, where an error of the band has forgotten itself.
     """
-    noise = Hyperparameters.from_vector(TRUE.vector() * np.r_[np.full(11, scale**2), 1.0, 1.0])
+    noise = Hyperparameters(*(TRUE.vector() * np.r_[np.full(11, scale**2), 1.0, 1.0]).tolist())
     inside, count = np.zeros(3), 0
     for ride in range(rides):
         recording, truth = made(f"ride {ride}", noise)

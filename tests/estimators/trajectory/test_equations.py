@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import sympy as sp
-from simrail.estimators.trajectory.kernel_equations import TERMS, constant_rows, linearise
+from simrail.estimators.trajectory.kernel import TERMS, constant_rows, linearise
 from simrail.estimators.trajectory.model import beyond_first_order, jacobian_slips, track_terms
 from twins.trajectory import measured as measured_by_vectors
 

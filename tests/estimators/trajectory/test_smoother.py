@@ -14,8 +14,8 @@ import pytest
 import twins.trajectory
 from scipy.signal import butter, sosfiltfilt
 from simrail.estimators.baselines import ZeroTrack
-from simrail.estimators.trajectory.kernel_equations import TERMS
-from simrail.estimators.trajectory.model import Model, kinds_of, packed_process
+from simrail.estimators.trajectory.kernel import TERMS, Model
+from simrail.estimators.trajectory.model import kinds_of, process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother, log_likelihood, run_model
 from simrail.estimators.trajectory.track_geometry import track_geometry
@@ -97,7 +97,7 @@ def test_two_sets_of_noise_equal_filterpy(line_recording: Callable) -> None:
         ours = replace(two, smoothed=smoothed)
         compare(ours.trace(recording), twins.trajectory.trace(ours, recording))
     likelihoods = {
-        smoother.log_likelihood(recording)
+        log_likelihood(smoother.model(recording))
         for smoother in (
             two,
             TrajectorySmoother(),
@@ -115,7 +115,7 @@ def test_the_likelihood_alone_and_the_means_alone_are_the_same(line_recording: C
     smoother = TrajectorySmoother()
     found = smoother.trace(recording)
     assert log_likelihood(smoother.model(recording)) == found.log_likelihood
-    assert smoother.log_likelihood(recording) == found.log_likelihood
+    assert log_likelihood(smoother.model(recording)) == found.log_likelihood
     means = replace(smoother, with_covariance=False).trace(recording)
     assert np.array_equal(means.states, found.states)
     assert len(means.covariance) == 0
@@ -183,17 +183,29 @@ LIMITS = {70.0: (0.1, 0.5), 20.0: (0.3, 1.0)}
 """By speed in km/h: sd of y and z between 3 and 25 m (mm), rms of yaw (deg)."""
 
 
+LINE, CURVE = (10.0, 2090.0), (400.0, 620.0)
+"""The whole line, and a stretch of it with a curve, m."""
+
+
 @pytest.mark.parametrize(
-    ("speed_kmh", "direction"),
-    [(70.0, 1), *(pytest.param(*way, marks=pytest.mark.slow) for way in ((70.0, -1), (20.0, 1), (20.0, -1)))],
+    ("speed_kmh", "direction", "way"),
+    [
+        (70.0, 1, LINE),
+        (20.0, 1, CURVE),
+        *(pytest.param(*ride, LINE, marks=pytest.mark.slow) for ride in ((70.0, -1), (20.0, 1), (20.0, -1))),
+    ],
 )
 def test_accuracy_on_the_simulated_bogie(
-    metro_recording: Callable, metro_motion: Callable, speed_kmh: float, direction: int
+    metro_recording: Callable,
+    metro_motion: Callable,
+    speed_kmh: float,
+    direction: int,
+    way: tuple[float, float],
 ) -> None:
     """Attitude to the accelerometer's bias; short waves to fractions of a mm; never worse than nothing."""
     for mount in ("axle", "frame"):
-        recording = metro_recording(speed_kmh, direction, mount, 0)
-        motion = metro_motion(speed_kmh, direction, mount)
+        recording = metro_recording(speed_kmh, direction, mount, 0, way)
+        motion = metro_motion(speed_kmh, direction, mount, way)
         error = errors(TrajectorySmoother(with_covariance=False).estimate(recording).states, motion)
         motion = motion.reindex(error.index, method="nearest", tolerance=1e-6)
         rms = np.degrees(np.sqrt((error**2).mean()))
@@ -208,7 +220,8 @@ def test_accuracy_on_the_simulated_bogie(
             of_error = 1e3 * band_sd(error[name].to_numpy()[moves], position, 3.0, 25.0)
             of_zero = 1e3 * band_sd(motion[name].to_numpy()[moves], position, 3.0, 25.0)
             assert of_error < short < 0.5 * of_zero
-            assert error[name].std() < (motion[name] - recording.mount_position_m[axis]).std()
+            if way == LINE:  # a stretch has too few of the waves beyond 37 m, which 20 km/h does not show
+                assert error[name].std() < (motion[name] - recording.mount_position_m[axis]).std()
 
 
 def test_time_and_memory_grow_with_the_ride(line_recording: Callable) -> None:
@@ -356,7 +369,7 @@ def test_steady_for_hours() -> None:
         track=np.zeros((n, len(TERMS))),
         slips=np.empty((0, 3)),
         kinds=np.zeros(n, dtype=np.int64),
-        process=packed_process([parameters], 0.1),
+        process=process_noise(parameters, 0.1)[None],
         noise=parameters.vector()[None, 5:],
         virtual=np.array([0.0, 0.6]),
         start=np.array([0.0] * 9 + [0.6, 0.0, 0.0]),

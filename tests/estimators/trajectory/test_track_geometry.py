@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from channels import harmonic
-from simrail.estimators.trajectory.over_space import over_space
-from simrail.estimators.trajectory.track_geometry import track_geometry, trusted
+from simrail.estimators.trajectory.track_geometry import over_space, track_geometry, trusted
 
 from simrail.core.columns import (
     ATTITUDE,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.tuning.file import Search, Tuning
+from simrail.estimators.tuning.file import Search, Tuning, TuningResult
 from simrail.estimators.tuning.space import FLAT, IDENTIFIED, LOWER, NAMES, SearchSpace
 
 from simrail.core.errors import InputError
@@ -28,36 +28,70 @@ SEARCH = Search(
 KNOWN = dict.fromkeys(NAMES, IDENTIFIED)
 
 
+RESULT = TuningResult(
+    method="cml",
+    objective=SEARCH.objective,
+    unit=SEARCH.unit,
+    settings=asdict(WIDE),
+    seed=3,
+    evaluations=1600,
+    fitted_on=SEARCH.fitted_on,
+    command=SEARCH.command,
+    finished=True,
+    values=(asdict(FOUND),),
+)
+OTHER = replace(FOUND, roll_rad2ps3=0.2)
+
+
 @pytest.mark.parametrize(
-    "tuning",
+    ("result", "tuning"),
     [
-        Tuning(HAND),
-        Tuning(HAND, FOUND),
-        Tuning(FOUND, replace(FOUND, roll_rad2ps3=0.2), SEARCH),
-        Tuning(FOUND, replace(FOUND, roll_rad2ps3=0.2), SEARCH, KNOWN, KNOWN | {"roll_rad2ps3": LOWER}),
-        Tuning(FOUND, None, replace(SEARCH, space=replace(WIDE, position_m2=3e-3), finished=False)),
+        (RESULT, Tuning(FOUND, None, SEARCH)),
+        (
+            replace(RESULT, values=(asdict(FOUND), asdict(OTHER)), finished=False),
+            Tuning(FOUND, OTHER, replace(SEARCH, finished=False)),
+        ),
+        (
+            replace(
+                RESULT,
+                values=(asdict(FOUND), asdict(OTHER)),
+                status=(KNOWN, KNOWN | {"roll_rad2ps3": LOWER}),
+            ),
+            Tuning(FOUND, OTHER, SEARCH, KNOWN, KNOWN | {"roll_rad2ps3": LOWER}),
+        ),
+        (
+            replace(RESULT, settings=asdict(replace(WIDE, position_m2=None))),
+            Tuning(FOUND, None, replace(SEARCH, space=replace(WIDE, position_m2=None))),
+        ),
     ],
 )
-def test_round_trip(tuning: Tuning, tmp_path: Path) -> None:
+def test_round_trip(result: TuningResult, tuning: Tuning, tmp_path: Path) -> None:
     path = tmp_path / "tuned.toml"
-    tuning.write(path)
+    result.write(path)
     assert Tuning.from_file(path) == tuning
     assert [entry.name for entry in tmp_path.iterdir()] == ["tuned.toml"]
-    if tuning.search is not None:
-        assert path.read_text(encoding="utf-8").startswith("# Made by: simrail tune mine")
+    assert path.read_text(encoding="utf-8").startswith("# Made by: simrail tune mine")
+
+
+def test_one_set_by_hand_and_two(tmp_path: Path) -> None:
+    path = tmp_path / "tuned.toml"
+    path.write_text(table("hyperparameters", asdict(HAND)))
+    assert Tuning.from_file(path) == Tuning(HAND)
+    path.write_text(table("hyperparameters", asdict(HAND)) + table("curve_hyperparameters", asdict(FOUND)))
+    assert Tuning.from_file(path) == Tuning(HAND, FOUND)
 
 
 def test_a_former_file_survives_a_write_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "tuned.toml"
-    Tuning(HAND).write(path)
+    RESULT.write(path)
 
     def broken(self: Path, target: Path) -> Path:
         raise OSError("disk full")
 
     monkeypatch.setattr(Path, "replace", broken)
     with pytest.raises(OSError, match="disk full"):
-        Tuning(FOUND).write(path)
-    assert Tuning.from_file(path).hyperparameters == HAND
+        replace(RESULT, values=(asdict(HAND),)).write(path)
+    assert Tuning.from_file(path).hyperparameters == FOUND
     assert [entry.name for entry in tmp_path.iterdir()] == ["tuned.toml"]
 
 
@@ -66,7 +100,7 @@ def table(name: str, values: dict[str, object]) -> str:
 
 
 GOOD = asdict(Hyperparameters())
-FITTED = Tuning(FOUND, None, SEARCH).text()
+FITTED = RESULT.text()
 
 
 def changed(old: str, new: str) -> str:
@@ -77,10 +111,10 @@ def changed(old: str, new: str) -> str:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("nonsense", ["no TOML"]),
-        ("", ["hyperparameters", "missing"]),
-        ("hyperparameters = 3", ["hyperparameters", "no table", "3"]),
-        (table("hyperparameter", GOOD), ["hyperparameter:", "no such table", "curve_hyperparameters"]),
+        ("nonsense", ["not valid TOML"]),
+        ("", ["hyperparameters", "is required"]),
+        ("hyperparameters = 3", ["hyperparameters", "wrong type", "3"]),
+        (table("hyperparameter", GOOD), ["hyperparameter:", "unknown key", "did you mean hyperparameters"]),
         (
             table("hyperparameters", {**GOOD, "accel_x_m2ps4": -1.0}),
             ["hyperparameters.accel_x_m2ps4", "-1.0"],
@@ -101,17 +135,17 @@ def changed(old: str, new: str) -> str:
             changed("lateral_position_m2 = 0.003", "lateral_position_m2 = 0.004"),
             ["lateral_position_m2", "0.004", "0.003"],
         ),
-        (changed("seed = 3", "sead = 3"), ["search.sead", "no such entry", "seed"]),
-        (changed("seed = 3\n", ""), ["search.seed", "missing"]),
+        (changed("seed = 3", "sead = 3"), ["search.sead", "unknown key", "seed"]),
+        (changed("seed = 3\n", ""), ["search.seed", "is required"]),
         (changed("seed = 3", "seed = true"), ["search.seed", "True", "whole number"]),
         (changed("seed = 3", "seed = 3.5"), ["search.seed", "3.5", "whole number"]),
-        (changed("box = [\n    1e-08,\n    10000.0,\n]", "box = [1e-8]"), ["search.box", "two numbers"]),
+        (changed("box = [\n    1e-08,\n    10000.0,\n]", "box = [1e-8]"), ["search.box"]),
         (
             changed("box = [\n    1e-08,\n    10000.0,\n]", "box = [1e4, 1e-8]"),
             ["search.box", "least < greatest"],
         ),
         (changed('constrained = [\n    "z",\n]', 'constrained = ["x"]'), ["search.constrained", "y, z"]),
-        (changed('method = "cml"', "method = 3"), ["search.method", "3", "text"]),
+        (changed('method = "cml"', "method = 3"), ["search.method", "3", "in quotes"]),
         (
             FITTED + table("status", KNOWN | {"roll_rad2ps3": "sure"}),
             ["status.roll_rad2ps3", "sure", "one of identified, flat", "leave the table out"],

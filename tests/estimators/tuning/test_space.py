@@ -35,7 +35,7 @@ def test_every_point_keeps_to_box_and_constraints(space: SearchSpace, data: st.D
     corners = st.sampled_from([0.0, 1.0, 0.5]) | st.floats(0.0, 1.0)
     point = np.array(data.draw(st.lists(corners, min_size=m, max_size=m)))
     values = cube.values(point)
-    space.check(Hyperparameters.from_vector(values))
+    space.check(Hyperparameters(*values.tolist()))
     low, high = space.box
     free = values[list(cube.searched)]
     assert (free >= low).all() and (free <= high).all()

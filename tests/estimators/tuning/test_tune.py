@@ -17,12 +17,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import simrail.estimators.tuning.objectives
-from scipy.linalg import block_diag
 from scipy.stats import chi2
-from simrail.estimators.trajectory.kernel_equations import STATES, TERMS
-from simrail.estimators.trajectory.model import Model, kinds_of, packed_process, process_noise, transition
+from simrail.estimators.trajectory.kernel import STATES, TERMS, Model
+from simrail.estimators.trajectory.model import kinds_of, process_noise
 from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.trajectory.smoother import TrajectorySmoother
+from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likelihood
 from simrail.estimators.tuning import tune as generic
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import Tuning
@@ -30,7 +29,7 @@ from simrail.estimators.tuning.identify import CONSTRAINT, FLAT, HELD, IDENTIFIE
 from simrail.estimators.tuning.objectives import Likelihood, SmootherTuning, likelihoods
 from simrail.estimators.tuning.search import least
 from simrail.estimators.tuning.space import NAMES, SearchSpace
-from twins.trajectory import measured
+from twins.trajectory import measured, transition
 
 from simrail.core.errors import InputError
 from simrail.core.seeds import stream
@@ -91,7 +90,7 @@ def tune(recordings: Sequence[Recording], *, settings: dict[str, Any] | None = N
 def drawn() -> tuple[Model, ...]:
     """Short rides along a straight line, so short that the model stays as good as linear."""
     rng = stream(7, "tuning synthetic")
-    f, root = transition(STEP_S), np.linalg.cholesky(block_diag(*process_noise(TRUE, STEP_S)))
+    f, root = transition(STEP_S), np.linalg.cholesky(process_noise(TRUE, STEP_S))
     sd, row = np.sqrt(TRUE.vector()[5:11]), np.zeros(len(TERMS))
     models = []
     for _ in range(RIDES):
@@ -107,7 +106,7 @@ def drawn() -> tuple[Model, ...]:
                 track=np.zeros((SAMPLES, len(TERMS))),
                 slips=np.empty((0, 3)),
                 kinds=np.zeros(SAMPLES, dtype=np.int64),
-                process=packed_process([TRUE], STEP_S),
+                process=process_noise(TRUE, STEP_S)[None],
                 noise=TRUE.vector()[None, 5:],
                 virtual=np.zeros(2),
                 start=np.zeros(STATES),
@@ -142,13 +141,13 @@ def test_cml_recovers_the_noise_of_its_own_model() -> None:
     goal = synthetic()
     found = found_in(goal)
     known = identify(goal, asdict(found), cube_of(SYNTHETIC))
-    assert list(known.table["status"][:11]) == [IDENTIFIED] * 11
-    assert list(known.table["status"][11:]) == [HELD] * 2
+    assert list(known["status"][:11]) == [IDENTIFIED] * 11
+    assert list(known["status"][11:]) == [HELD] * 2
     off = np.log(found.vector() / TRUE.vector())[:11]
-    sd = np.log(10.0) * known.table["sd_decades"].to_numpy()[:11]
+    sd = np.log(10.0) * known["sd_decades"].to_numpy()[:11]
     assert (np.abs(off / sd) < 4.0).all()
     assert sd.max() < 0.25
-    squares = goal.samples * off @ known.curvature @ off
+    squares = goal.samples * off @ known.attrs["curvature"] @ off
     low, high = chi2.ppf([0.0005, 0.9995], 11)
     assert low < squares < high
     # The truth costs no more than the fit of 11 parameters to noise gains: half of that chi-square.
@@ -171,7 +170,7 @@ def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytes
     monkeypatch.setattr(simrail.estimators.tuning.objectives, "likelihoods", spoilt)
     goal = Likelihood(drawn()[:4], synthetic().counts[:4])
     slope = [
-        at(goal, Hyperparameters.from_vector(TRUE.vector() * factor)) - at(goal, TRUE)
+        at(goal, Hyperparameters(*(TRUE.vector() * factor).tolist())) - at(goal, TRUE)
         for factor in (0.5, 2.0)
     ]
     assert min(slope) <= 0.0
@@ -191,7 +190,7 @@ def test_likelihoods_add_up(line_recording: Callable[..., Recording]) -> None:
     recording = line_recording(70.0, 1, 0)
     smoother = TrajectorySmoother()
     terms = likelihoods(smoother.model(recording))
-    assert terms.sum() == pytest.approx(smoother.log_likelihood(recording), rel=1e-12)
+    assert terms.sum() == pytest.approx(log_likelihood(smoother.model(recording)), rel=1e-12)
     kinds = kinds_of(recording)
     parts = [at(objective_of([recording], smoother, kind=kind), Hyperparameters()) for kind in (0, 1)]
     counts = np.bincount(kinds)
@@ -251,7 +250,7 @@ def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording, searched:
 def test_what_the_likelihood_does_not_identify(ride: Recording, searched: Callable) -> None:
     """The virtual positions are constants: ten times the confidence gains ln(10)/2 a sample, for nothing."""
     values = asdict(searched(ride, "paper").hyperparameters)
-    known = identify(objective_of([ride], TrajectorySmoother()), values, cube_of(SearchSpace())).table
+    known = identify(objective_of([ride], TrajectorySmoother()), values, cube_of(SearchSpace()))
     for name in ("lateral_position_m2", "vertical_position_m2"):
         assert known.loc[name, "status"] == LOWER
         assert known.loc[name, "tenth"] == pytest.approx(-0.5 * np.log(10.0), rel=0.1)
@@ -276,16 +275,16 @@ def test_ends_flats_and_constraints_are_told_apart() -> None:
     values[[5, 6, 9]] = low, high, 1e-3  # 9 is y's accelerometer, at a tenth of its position
     at_edges = dict(zip(NAMES, values, strict=True))
     known = identify(Bowl(), at_edges, cube_of(SearchSpace(box=(low, high))))
-    status = known.table["status"]
+    status = known["status"]
     assert list(status.iloc[[0, 1, 2, 3, 4, 5, 6, 9]]) == [
         IDENTIFIED, FLAT, FLAT, FLAT, FLAT, LOWER, UPPER, CONSTRAINT,
     ]  # fmt: skip
-    assert known.table.loc[NAMES[0], "curvature"] == pytest.approx(2.0, rel=1e-6)
-    assert known.table.loc[NAMES[0], "span_decades"] == pytest.approx(np.sqrt(1e-3) / np.log(10.0), rel=1e-6)
-    assert known.table.loc[NAMES[3], "curvature"] == pytest.approx(2.0, rel=1e-6)
+    assert known.loc[NAMES[0], "curvature"] == pytest.approx(2.0, rel=1e-6)
+    assert known.loc[NAMES[0], "span_decades"] == pytest.approx(np.sqrt(1e-3) / np.log(10.0), rel=1e-6)
+    assert known.loc[NAMES[3], "curvature"] == pytest.approx(2.0, rel=1e-6)
     # Two share a direction without end, which counts as ending at the box: half of each in it.
     least = 2e-3 / np.log(high / low) ** 2
-    assert known.table.loc[NAMES[3], "profile_curvature"] == pytest.approx(2.0 * least, rel=1e-2)
+    assert known.loc[NAMES[3], "profile_curvature"] == pytest.approx(2.0 * least, rel=1e-2)
 
 
 def rails_of(recording: Recording) -> pd.DataFrame:
@@ -352,9 +351,9 @@ def test_straights_and_curves_by_themselves(ride: Recording) -> None:
     explicit = TrajectorySmoother(
         hyperparameters=both.hyperparameters, curve_hyperparameters=both.curve_hyperparameters
     )
-    assert smoother.log_likelihood(ride) == explicit.log_likelihood(ride)
+    assert log_likelihood(smoother.model(ride)) == log_likelihood(explicit.model(ride))
     single = TrajectorySmoother(hyperparameters=both.hyperparameters)
-    assert smoother.log_likelihood(ride) > single.log_likelihood(ride)
+    assert log_likelihood(smoother.model(ride)) > log_likelihood(single.model(ride))
 
 
 def test_threads_do_not_matter_and_interrupted_is_resumed(ride: Recording, tmp_path: Path) -> None:
@@ -462,7 +461,7 @@ def test_any_tunable_is_searched_and_judged(ride: Recording) -> None:
     assert values["mean_radps"] == pytest.approx(gyro.mean(), rel=1e-3)
     assert values["sd_radps"] == pytest.approx(gyro.std(ddof=0), rel=1e-3)
     cube = Cube(tuple(Scale().parameters()))
-    judged = identify(Scale().likelihood([ride]), values, cube).table
+    judged = identify(Scale().likelihood([ride]), values, cube)
     assert list(judged["status"]) == [IDENTIFIED] * 2
     known_to = judged["sd_decades"] * np.log(10.0)
     assert known_to["sd_radps"] == pytest.approx(1.0 / np.sqrt(2 * len(gyro)), rel=0.02)

@@ -10,12 +10,19 @@ import math
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, rts_smoother
-from simrail.estimators.trajectory.kernel_equations import PACKED, STATES
-from simrail.estimators.trajectory.model import Model, dense_process, transition
+from scipy.linalg import block_diag
+from simrail.estimators.trajectory.kernel import PACKED, STATES, Model
 from simrail.estimators.trajectory.smoother import Trajectory, TrajectorySmoother
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
+
+
+def transition(step_s: float) -> np.ndarray:
+    """F (12, 12): angles turn with constant rates, places move with constant acceleration."""
+    pair = np.array([[1.0, step_s], [0.0, 1.0]])
+    triple = np.array([[1.0, step_s, 0.5 * step_s**2], [0.0, 1.0, step_s], [0.0, 0.0, 1.0]])
+    return np.asarray(block_diag(pair, pair, pair, triple, triple))
 
 
 def _cross(a: FloatArray) -> FloatArray:
@@ -69,7 +76,7 @@ def filterpy_smoother(model: Model, *, smoothed: bool, with_covariance: bool) ->
     upper = np.triu_indices(STATES)
     ekf = ExtendedKalmanFilter(dim_x=STATES, dim_z=8)
     ekf.x, ekf.P, ekf.F = model.start.copy(), np.diag(model.start_variance), f
-    noises = [(dense_process(q), np.diag(r)) for q, r in zip(model.process, model.noise, strict=True)]
+    noises = [(q, np.diag(r)) for q, r in zip(model.process, model.noise, strict=True)]
     states, covariances = np.empty((n, STATES)), np.empty((n, STATES, STATES))
     innovations, likelihood = np.empty((n, 7)), 0.0
     for k in range(n):

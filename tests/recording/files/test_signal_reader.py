@@ -82,5 +82,5 @@ columns = {{ gyro = ["p", "q", "r"], accel = ["u", "v", "w"] }}
 units = {{ gyro = "{gyro_unit}", accel = "{accel_unit}" }}
 """
     part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
-    found = SignalReader(folder, "t").frame(part, "imu").to_numpy()
+    found = SignalReader(folder).frame(part, "imu").to_numpy()
     np.testing.assert_allclose(found, body, rtol=0.0, atol=1e-14 if any(angles) else 2e-15)

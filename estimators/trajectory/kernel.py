@@ -1,0 +1,538 @@
+"""Compiled loops of the trajectory smoother: the filter, the way back, and draws of the smoother's error.
+
+Gonzalez-Carbajal et al. 2023 (paper 001), section 3 and appendix 1, with the errata of EQUATIONS 1.3; what
+the IMU should show in a state, and its Jacobian, are as EQUATIONS 3.2 and 3.3 have them, printed misprints
+apart. What happens along the track comes as `TERMS` of each sample, made by
+`simrail.estimators.trajectory.model`, so nothing here knows of tracks, recordings or data frames.
+
+The algebra is that of `simrail.estimators.kalman`; the structure of the model makes it fast: the transition
+is a few chains of integrators, and a row of the Jacobian has few entries (35 of 96). The ways back use what
+the filter left behind; the smoother replaces it, in place: a ride of an hour then needs no second copy of its
+covariances. Random numbers come from outside.
+
+Not here: the geometry of the rails that follows from a draw (`simrail.estimators.trajectory.draws`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from simrail.estimators.kalman import (
+    chain,
+    chain_back,
+    chain_covariance,
+    chain_information,
+    condition,
+    log_density,
+    mirror,
+    withdraw,
+    withdraw_information,
+)
+
+from simrail.core.jit import FloatArray, IntArray, njit, njit_borrowed, njit_inline
+
+STATES = 12
+ROLL, ROLL_RATE, PITCH, PITCH_RATE, YAW, YAW_RATE, Y, YD, YDD, Z, ZD, ZDD = range(STATES)
+
+ROWS = 8
+"""Measurements: three of the gyro, three of the accelerometer, two virtual positions."""
+
+PACKED = STATES * (STATES + 1) // 2
+"""Entries of a covariance's upper triangle, row by row."""
+
+BLOCKS = ((0, 2), (2, 4), (4, 6), (6, 9), (9, 12))
+"""First state of each block of Q, and the first beyond it."""
+
+TERMS = (
+    "roll_rad",
+    "pitch_rad",
+    "yaw_rad",
+    "ax_mps2",
+    "ay_mps2",
+    "az_mps2",
+    "ax_of_y",
+    "ay_of_y",
+    "az_of_y",
+    "ax_of_z",
+    "ay_of_z",
+    "az_of_z",
+    "turn_x",
+    "turn_y",
+    "turn_z",
+)
+"""What the filter takes of the track at each sample, in this order: angles of the track frame (rad), its
+acceleration (m/s2), acceleration per m of y and of z in it (1/s2), and twice its angular rate (rad/s)."""
+
+
+WIDTH = 16
+"""Length of a row of the covariance and of the Jacobian in the loops: the last four are always zero, and
+loops of sixteen fill the vector registers."""
+
+RATE_COLUMNS = np.array(
+    [[ROLL_RATE, PITCH, YAW_RATE], [PITCH_RATE, ROLL, YAW_RATE], [YAW_RATE, ROLL, PITCH_RATE]]
+)
+"""States that each row of the gyro depends on."""
+
+ANGLE_COLUMNS = np.array([[PITCH, YAW], [ROLL, YAW], [ROLL, PITCH]])
+"""Angles that each row of the accelerometer depends on, besides all of y to z''."""
+
+INTO = (ROLL, PITCH, YAW, Y, Y, YD, Z, Z, ZD)
+ORIGIN = (ROLL_RATE, PITCH_RATE, YAW_RATE, YD, YDD, YDD, ZD, ZDD, ZDD)
+"""Where F is not the identity (EQUATIONS 3.1), as `simrail.estimators.kalman.chain` takes it."""
+
+
+class Model(NamedTuple):
+    """What the filter takes of a ride of n samples.
+
+    Attributes
+    ----------
+    signals : ndarray (n, 6)
+        Angular rate less its bias, rad/s, and specific force, m/s2, body axes.
+    track : ndarray (n, 15)
+        `TERMS`.
+    slips : ndarray (n, 3) or (0, 3)
+        See `linearise`; of no rows for the corrected equations.
+    kinds : ndarray of int (n,)
+        Which of the c rows of ``process`` and ``noise`` holds at a sample, and over the step to it.
+    process : ndarray (c, 12, 12)
+        Q, in five blocks.
+    noise : ndarray (c, 8)
+        Variances U of the measurements.
+    virtual : ndarray (2,)
+        Virtual positions y and z, m.
+    start, start_variance : ndarray (12,)
+        State before the first update, and its variances.
+    step_s, gravity : float
+        Sample interval, s, and gravity, m/s2.
+    """
+
+    signals: FloatArray
+    track: FloatArray
+    slips: FloatArray
+    kinds: IntArray
+    process: FloatArray
+    noise: FloatArray
+    virtual: FloatArray
+    start: FloatArray
+    start_variance: FloatArray
+    step_s: float
+    gravity: float
+
+
+class Past(NamedTuple):
+    """What the filter leaves behind for the way back, of n samples; of no rows if nothing follows.
+
+    Attributes
+    ----------
+    states, covariance : ndarray (n, 12), (n, 78)
+        Predicted states, and their covariances' upper triangles row by row.
+    gains, scaled : ndarray (n, 8, 12), (n, 8, 2)
+        K, and (e/s, 1/s) of each scalar update.
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    gains: FloatArray
+    scaled: FloatArray
+
+
+class Filtered(NamedTuple):
+    """What the filter finds at each of n samples; an array of no rows is not wanted and not written.
+
+    Attributes
+    ----------
+    states, covariance : ndarray (n, 12), (n, 78)
+        Filtered, and packed as in `Past`.
+    innovations : ndarray (n, 7)
+        Measured minus predicted rates and forces, and the normalised innovation squared of these six.
+    likelihoods : ndarray (n,)
+        Log-likelihood of each sample given those before it.
+    """
+
+    states: FloatArray
+    covariance: FloatArray
+    innovations: FloatArray
+    likelihoods: FloatArray
+
+
+def room_for_past(n: int) -> Past:
+    """Arrays of n rows."""
+    shapes = (n, STATES), (n, PACKED), (n, ROWS, STATES), (n, ROWS, 2)
+    return Past(*(np.empty(shape) for shape in shapes))
+
+
+def room_for_filtered(*, states: int = 0, innovations: int = 0, likelihoods: int = 0) -> Filtered:
+    """Arrays of as many rows as are wanted of each."""
+    shapes = (states, STATES), (states, PACKED), (innovations, ROWS - 1), (likelihoods,)
+    return Filtered(*(np.empty(shape) for shape in shapes))
+
+
+@njit_borrowed
+def shares(dt: float) -> tuple[float, ...]:
+    """Entries of F at (`INTO`, `ORIGIN`): constant angular rates, constant accelerations of the place."""
+    half = 0.5 * dt * dt
+    return dt, dt, dt, dt, half, dt, dt, half, dt
+
+
+@njit_borrowed
+def constant_rows(rows: FloatArray) -> None:
+    """What is always one in the rows (8, 16) of the Jacobian, which are zero before."""
+    rows[0, ROLL_RATE] = rows[1, PITCH_RATE] = rows[2, YAW_RATE] = 1.0
+    rows[4, YDD] = rows[5, ZDD] = rows[6, Y] = rows[7, Z] = 1.0
+
+
+@njit_borrowed
+def linearise(
+    x: FloatArray,
+    track: FloatArray,
+    slips: FloatArray,
+    k: int,
+    gravity: float,
+    g: FloatArray,
+    rows: FloatArray,
+) -> None:
+    """What gyro and accelerometer should show in state x, and how that depends on x (EQUATIONS 3.2, 3.3).
+
+    Parameters
+    ----------
+    x : ndarray (12,)
+        State.
+    track : ndarray (n, 15), k : int
+        `TERMS` of all samples, and which sample.
+    slips : ndarray (n, 3) or (0, 3)
+        Not empty: spoil the Jacobian as the appendix of paper 001 prints it: J43, J5,10 and J61 (EQUATIONS
+        1.3), by v V - v V^2, h^2, h^2 V^2 with V the speed and v, h the curvatures.
+    gravity : float
+        m/s2.
+    g : ndarray (8,), out
+        Angular rate and specific force, body axes; y and z.
+    rows : ndarray (8, 16), in and out
+        Jacobian; what never changes must stand there already (`constant_rows`).
+    """
+    d, e, f = x[ROLL] - track[k, 0], x[PITCH] - track[k, 1], x[YAW] - track[k, 2]
+    xy, yy, zy = track[k, 6], track[k, 7], track[k, 8]
+    xz, yz, zz = track[k, 9], track[k, 10], track[k, 11]
+    t, v, h = track[k, 12], track[k, 13], track[k, 14]
+    y, yd, ydd, z, zd, zdd = x[Y], x[YD], x[YDD], x[Z], x[ZD], x[ZDD]
+    # Acceleration of the body in the axes of the track: origin + M r + 2 w x r' + r''.
+    ax = track[k, 3] + xy * y + xz * z - h * yd + v * zd
+    ay = track[k, 4] + yy * y + yz * z - t * zd + ydd
+    az = track[k, 5] + zy * y + zz * z + t * yd + zdd
+    # Body rates of first order in roll and pitch.
+    g[0] = x[ROLL_RATE] - x[PITCH] * x[YAW_RATE]
+    g[1] = x[PITCH_RATE] + x[ROLL] * x[YAW_RATE]
+    g[2] = x[YAW_RATE] - x[ROLL] * x[PITCH_RATE]
+    # Force = (I - [rho]x) a + g (-pitch, roll, 1), rho = (d, e, f).
+    g[3] = ax + f * ay - e * az - gravity * x[PITCH]
+    g[4] = ay - f * ax + d * az + gravity * x[ROLL]
+    g[5] = az + e * ax - d * ay + gravity
+    g[6], g[7] = y, z
+    # The same, differentiated.
+    rows[0, PITCH], rows[0, YAW_RATE] = -x[YAW_RATE], -x[PITCH]
+    rows[1, ROLL], rows[1, YAW_RATE] = x[YAW_RATE], x[ROLL]
+    rows[2, ROLL], rows[2, PITCH_RATE] = -x[PITCH_RATE], -x[ROLL]
+    rows[3, PITCH], rows[3, YAW] = -az - gravity, ay
+    rows[3, Y], rows[3, YD], rows[3, YDD] = xy + f * yy - e * zy, -h - e * t, f
+    rows[3, Z], rows[3, ZD], rows[3, ZDD] = xz + f * yz - e * zz, v - f * t, -e
+    rows[4, ROLL], rows[4, YAW] = az + gravity, -ax
+    rows[4, Y], rows[4, YD] = yy - f * xy + d * zy, f * h + d * t
+    rows[4, Z], rows[4, ZD], rows[4, ZDD] = yz - f * xz + d * zz, -t - f * v, d
+    rows[5, ROLL], rows[5, PITCH] = -ay, ax
+    rows[5, Y], rows[5, YD], rows[5, YDD] = zy + e * xy - d * yy, t - e * h, -d
+    rows[5, Z], rows[5, ZD] = zz + e * xz - d * yz, e * v + d * t
+    if slips.shape[0] > 0:
+        rows[3, PITCH] += slips[k, 0]
+        rows[4, Z] += slips[k, 1] + d * slips[k, 2]
+        rows[5, ROLL] += 2.0 * ydd
+
+
+@njit_borrowed
+def pack(p: FloatArray, packed: FloatArray, k: int) -> None:
+    """Upper triangle of P (12, 16), row by row, into row k of ``packed`` (n, 78)."""
+    at = 0
+    for i in range(STATES):
+        for c in range(i, STATES):
+            packed[k, at] = p[i, c]
+            at += 1
+
+
+@njit_borrowed
+def unpack(packed: FloatArray, k: int, p: FloatArray) -> None:
+    """Row k of ``packed`` (n, 78) as a full matrix (12, 16)."""
+    at = 0
+    for i in range(STATES):
+        for c in range(i, STATES):
+            p[i, c] = p[c, i] = packed[k, at]
+            at += 1
+
+
+@njit_borrowed
+def predict(x: FloatArray, p: FloatArray, process: FloatArray, kind: int, dt: float) -> None:
+    """X <- F x, P <- F P F' + Q in place (EQUATIONS 3.1); Q is ``process[kind]``, (c, 12, 12)."""
+    share = shares(dt)
+    chain(x, INTO, ORIGIN, share)
+    chain_covariance(p, INTO, ORIGIN, share)
+    for first, end in BLOCKS:
+        for i in range(first, end):
+            for c in range(i, end):
+                p[i, c] += process[kind, i, c]
+    mirror(p)
+
+
+@njit_inline
+def across(p: FloatArray, rows: FloatArray, m: int, dx: FloatArray, v: FloatArray) -> tuple[float, float]:
+    """V (16,) = P h' for row m of the Jacobian by the entries that it has; returns h v and h dx."""
+    if m < 3:
+        a, b, c = RATE_COLUMNS[m, 0], RATE_COLUMNS[m, 1], RATE_COLUMNS[m, 2]
+        ha, hb, hc = rows[m, a], rows[m, b], rows[m, c]
+        for i in range(WIDTH):
+            v[i] = ha * p[a, i] + hb * p[b, i] + hc * p[c, i]
+        return ha * v[a] + hb * v[b] + hc * v[c], ha * dx[a] + hb * dx[b] + hc * dx[c]
+    if m < 6:
+        a, b = ANGLE_COLUMNS[m - 3, 0], ANGLE_COLUMNS[m - 3, 1]
+        ha, hb, hy, hyd, hydd = rows[m, a], rows[m, b], rows[m, Y], rows[m, YD], rows[m, YDD]
+        hz, hzd, hzdd = rows[m, Z], rows[m, ZD], rows[m, ZDD]
+        for i in range(WIDTH):
+            v[i] = (
+                ha * p[a, i]
+                + hb * p[b, i]
+                + hy * p[Y, i]
+                + hyd * p[YD, i]
+                + hydd * p[YDD, i]
+                + hz * p[Z, i]
+                + hzd * p[ZD, i]
+                + hzdd * p[ZDD, i]
+            )
+        spread = ha * v[a] + hb * v[b] + hy * v[Y] + hyd * v[YD] + hydd * v[YDD]
+        moved = ha * dx[a] + hb * dx[b] + hy * dx[Y] + hyd * dx[YD] + hydd * dx[YDD]
+        spread += hz * v[Z] + hzd * v[ZD] + hzdd * v[ZDD]
+        return spread, moved + hz * dx[Z] + hzd * dx[ZD] + hzdd * dx[ZDD]
+    a = Y if m == 6 else Z
+    for i in range(WIDTH):
+        v[i] = p[a, i]
+    return v[a], dx[a]
+
+
+@njit
+def trajectory_filter(model: Model, past: Past, out: Filtered) -> float:
+    """Run the filter; fills ``past`` and ``out``.
+
+    With J_m the rows of the Jacobian at the predicted state x and dx = 0 at first, for m = 1..8:
+
+        e = z_m - g_m(x) - J_m dx,   s = J_m P J_m' + U_m,   K = P J_m'/s
+        dx += K e,   P -= K s K',    log-likelihood -= (e^2/s + ln 2 pi s)/2
+
+    which is the update with all eight at once.
+
+    Returns
+    -------
+    float
+        Log-likelihood of all measurements, the virtual ones among them.
+    """
+    # Named once, before the loop: numba counts references wherever an array is taken out of a tuple.
+    signals, track, slips, kinds, process, noise, virtual, start, variance, step_s, gravity = model
+    before, before_covariance, gains, scaled = past
+    after, after_covariance, innovations, likelihoods = out
+    x, p = start.copy(), np.zeros((STATES, WIDTH))
+    v, dx, gain = np.zeros(WIDTH), np.zeros(STATES), np.zeros(STATES)
+    residual, rows = np.zeros(ROWS), np.zeros((ROWS, WIDTH))
+    nis = likelihood = 0.0
+    constant_rows(rows)
+    for i in range(STATES):
+        p[i, i] = variance[i]
+    for k in range(signals.shape[0]):
+        kind = kinds[k]
+        if k > 0:
+            predict(x, p, process, kind, step_s)
+        if before.shape[0] > 0:
+            before[k] = x
+            pack(p, before_covariance, k)
+        linearise(x, track, slips, k, gravity, residual, rows)
+        for m in range(6):
+            residual[m] = signals[k, m] - residual[m]
+        residual[6], residual[7] = virtual[0] - residual[6], virtual[1] - residual[7]
+        dx[:] = 0.0
+        squares, product = 0.0, 1.0
+        for m in range(ROWS):
+            spread, moved = across(p, rows, m, dx, v)
+            error, s = residual[m] - moved, spread + noise[kind, m]
+            inverse = 1.0 / s
+            condition(dx, p, v, error, inverse, gain)
+            squares += error * error * inverse
+            product *= s
+            if m == 5:
+                nis = squares
+            if gains.shape[0] > 0:
+                for i in range(STATES):
+                    gains[k, m, i] = gain[i]
+                scaled[k, m, 0], scaled[k, m, 1] = error * inverse, inverse
+        for i in range(STATES):
+            x[i] += dx[i]
+        of_sample = log_density(squares, product, ROWS)
+        likelihood += of_sample
+        if likelihoods.shape[0] > 0:
+            likelihoods[k] = of_sample
+        if innovations.shape[0] > 0:
+            innovations[k, :6], innovations[k, 6] = residual[:6], nis
+        if after.shape[0] > 0:
+            after[k] = x
+            pack(p, after_covariance, k)
+    return likelihood
+
+
+@njit_borrowed
+def packed_product(packed: FloatArray, k: int, lam: FloatArray, out: FloatArray) -> None:
+    """Out (12,) = P lam, with P row k of ``packed`` (n, 78)."""
+    for i in range(STATES):
+        out[i] = 0.0
+    at = 0
+    for i in range(STATES):
+        out[i] += packed[k, at] * lam[i]
+        at += 1
+        for c in range(i + 1, STATES):
+            out[i] += packed[k, at] * lam[c]
+            out[c] += packed[k, at] * lam[i]
+            at += 1
+
+
+@njit_borrowed
+def row_times(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Out (16,) = a B with a row a (12,) and a matrix B (12, 16).
+
+    Written out, so that the compiler keeps the sums in vector registers.
+    """
+    a0, a1, a2, a3, a4, a5 = a[0], a[1], a[2], a[3], a[4], a[5]
+    a6, a7, a8, a9, a10, a11 = a[6], a[7], a[8], a[9], a[10], a[11]
+    for c in range(WIDTH):
+        out[c] = (
+            a0 * b[0, c]
+            + a1 * b[1, c]
+            + a2 * b[2, c]
+            + a3 * b[3, c]
+            + a4 * b[4, c]
+            + a5 * b[5, c]
+            + a6 * b[6, c]
+            + a7 * b[7, c]
+            + a8 * b[8, c]
+            + a9 * b[9, c]
+            + a10 * b[10, c]
+            + a11 * b[11, c]
+        )
+
+
+@njit_borrowed
+def shrink(
+    info: FloatArray, p: FloatArray, work: FloatArray, v: FloatArray, packed: FloatArray, k: int
+) -> None:
+    """Row k of ``packed``, which is P, becomes P - P Lam P."""
+    unpack(packed, k, p)
+    for i in range(STATES):
+        row_times(info[i], p, work[i])
+    at = 0
+    for i in range(STATES):
+        row_times(p[i], work, v)
+        for c in range(i, STATES):
+            packed[k, at] -= v[c]
+            at += 1
+
+
+@njit
+def trajectory_back(model: Model, past: Past, with_covariance: bool) -> None:
+    """Turn predicted states and covariances into smoothed ones, in place.
+
+    `simrail.estimators.kalman.fixed_interval` has the equations. The Jacobian is made again, which is cheaper
+    than to fetch it. Without covariances those of ``past`` stay as they are, predicted.
+    """
+    lam, v, out, g = np.zeros(STATES), np.zeros(WIDTH), np.zeros(STATES), np.zeros(ROWS)
+    rows, info = np.zeros((ROWS, WIDTH)), np.zeros((STATES, WIDTH))
+    p, work = np.zeros((STATES, WIDTH)), np.zeros((STATES, WIDTH))
+    share = shares(model.step_s)
+    constant_rows(rows)
+    for k in range(past.states.shape[0] - 1, -1, -1):
+        linearise(past.states[k], model.track, model.slips, k, model.gravity, g, rows)
+        for m in range(ROWS - 1, -1, -1):
+            withdraw(lam, rows[m], past.gains[k, m], past.scaled[k, m, 0])
+            if with_covariance:
+                row_times(past.gains[k, m], info, v)
+                withdraw_information(info, rows[m], past.gains[k, m], past.scaled[k, m, 1], v)
+        packed_product(past.covariance, k, lam, out)
+        if with_covariance:
+            shrink(info, p, work, v, past.covariance, k)
+            chain_information(info, INTO, ORIGIN, share)
+        for i in range(STATES):
+            past.states[k, i] -= out[i]
+        chain_back(lam, INTO, ORIGIN, share)
+
+
+@njit
+def trajectory_error(
+    model: Model,
+    past: Past,
+    roots: FloatArray,
+    noise_sd: FloatArray,
+    normals: FloatArray,
+    innovations: FloatArray,
+    errors: FloatArray,
+) -> None:
+    """One draw of truth minus smoothed state, at all samples; ``past`` is not changed.
+
+    Let e be the truth minus the filter's state. It obeys the filter's own recursion, whatever the truth is,
+    driven by the noise alone: with e ~ N(0, P0) at first, forwards, for m = first..last,
+
+        v = h e + u,   e <- e - K v;     then   e <- F e + w,   w ~ N(0, Q),  u ~ N(0, r)
+
+    and backwards, as the smoother goes,
+
+        lam <- lam - h' (K' lam + v/s);    error = e^- + P^- lam;    lam <- F' lam
+
+    The gains are at hand, so that a draw is two recursions of twelve numbers, without covariance (J. Durbin
+    and S. J. Koopman, Biometrika 89 (2002) 603-615: draws by mean corrections).
+
+    Parameters
+    ----------
+    model, past
+        What the filter had, and what it left behind.
+    roots : ndarray (c, 12, 12)
+        Lower triangular, root root' = Q, of the blocks of
+        `simrail.estimators.trajectory.model.process_noise`.
+    noise_sd : ndarray (c, 8)
+        Standard deviations of the measurements, virtual ones among them.
+    normals : ndarray (n, 20)
+        Independent standard normal numbers: of start or process, and of the measurements.
+    innovations : ndarray (n, 8), work
+    errors : ndarray (n, 12), out
+    """
+    # Named once, before the loops, as in the filter.
+    track, slips, kinds, gravity = model.track, model.slips, model.kinds, model.gravity
+    states, covariance, gains, scaled = past
+    e, lam, out, g = np.empty(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(ROWS)
+    rows = np.zeros((ROWS, WIDTH))
+    share = shares(model.step_s)
+    constant_rows(rows)
+    for i in range(STATES):
+        e[i] = np.sqrt(model.start_variance[i]) * normals[0, i]
+    n = states.shape[0]
+    for k in range(n):
+        kind = kinds[k]
+        if k > 0:
+            chain(e, INTO, ORIGIN, share)
+            for first, end in BLOCKS:
+                for i in range(first, end):
+                    for c in range(first, i + 1):
+                        e[i] += roots[kind, i, c] * normals[k, c]
+        errors[k] = e
+        linearise(states[k], track, slips, k, gravity, g, rows)
+        for m in range(ROWS):
+            v = noise_sd[kind, m] * normals[k, STATES + m]
+            for i in range(STATES):
+                v += rows[m, i] * e[i]
+            for i in range(STATES):
+                e[i] -= gains[k, m, i] * v
+            innovations[k, m] = v * scaled[k, m, 1]
+    for k in range(n - 1, -1, -1):
+        linearise(states[k], track, slips, k, gravity, g, rows)
+        for m in range(ROWS - 1, -1, -1):
+            withdraw(lam, rows[m], gains[k, m], innovations[k, m])
+        packed_product(covariance, k, lam, out)
+        for i in range(STATES):
+            errors[k, i] += out[i]
+        chain_back(lam, INTO, ORIGIN, share)
