@@ -112,13 +112,14 @@ def construct(known_class: type[Any], options: dict[str, Any], *, folder: Path |
 
     ``folder`` is where files that options name are looked for, before the working folder.
     """
-    if not dataclasses.is_dataclass(known_class):
+    judged: object = known_class
+    if not dataclasses.is_dataclass(judged):
         raise InputError(
             "is no dataclass, so its options cannot be judged",
             value=known_class.__qualname__,
             remedy="make the estimator a frozen dataclass, as in 'simrail new estimator'",
         )
-    known = {entry.name for entry in dataclasses.fields(known_class) if entry.init and entry.name != "causal"}
+    known = {entry.name for entry in dataclasses.fields(judged) if entry.init and entry.name != "causal"}
     types = get_type_hints(known_class)
     values: dict[str, Any] = {}
     for name, value in options.items():
