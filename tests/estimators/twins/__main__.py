@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from attitude import filterpy_ekf
@@ -21,7 +20,7 @@ from trajectory import trace
 
 from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import with_odometry
-from simrail.recording.recording import Recording, odometry_of
+from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
@@ -44,9 +43,7 @@ def ride() -> Recording:
         seed=1,
         draw=0,
     )
-    recording = with_odometry(recording, "encoder")
-    few = slice(0, SAMPLES)
-    return replace(recording, imu=recording.imu.iloc[few], odometry=odometry_of(recording).iloc[few])
+    return with_odometry(beginning(recording, samples=SAMPLES), "encoder")
 
 
 def beside(name: str, ours: Callable[[], FloatArray], theirs: Callable[[], FloatArray]) -> None:
