@@ -9,6 +9,7 @@ import pytest
 
 from simrail.core.columns import ENCODER, IMU, ODOMETRY, ODOMETRY_SD, RAIL_DISPLACEMENT
 from simrail.core.errors import InputError
+from simrail.core.toml_files import blame
 from simrail.recording.check_form import check_recording
 from simrail.recording.recording import EncoderSheet, ImuSheet, RailSensorSheet, Recording
 from simrail.track.design import Straight, TrackDesign
@@ -156,9 +157,10 @@ def test_a_sound_recording_passes():
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_refused_by_name(fault):
     damage, words = FAULTS[fault]
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as caught, blame("ride_7"):
         check_recording(damage(sound()))
     message = str(caught.value)
+    assert message.startswith("ride_7: ")
     assert "\n" not in message
     for word in words:
         assert word in message, message
