@@ -10,12 +10,11 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
@@ -31,6 +30,9 @@ from simrail.scoring.score import Reference, reference_of, score, score_odometry
 from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
 from simrail.track.laid_track import LaidTrack
+
+if TYPE_CHECKING:
+    from simrail.campaign.progress import Watcher  # how it is shown decides no score
 
 STAGES = ("simulate", "measure", "estimate", "score")
 
@@ -194,7 +196,7 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
     return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
 
 
-def simulated(cell: Cell, parts: Parts, watcher: Watcher, number: int, count: int) -> Truth:
+def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: int) -> Truth:
     """Ride ``number`` of ``count``, that of a cell, for what is no campaign: simulated, or from the cache."""
     watcher.ride_begins(number, count, cell.ride.name)
     with interruptible() as check:

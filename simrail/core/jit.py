@@ -109,5 +109,5 @@ class _Announcer(event.Listener):
         self._depth -= 1
 
 
-if multiprocessing.parent_process() is None:  # the workers of a campaign keep silent
+if multiprocessing.current_process().name == "MainProcess":  # the workers of a campaign keep silent
     event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]

@@ -253,7 +253,7 @@ def test_a_fault_is_refused_by_name(fault: str, ride: Path, capsys: pytest.Captu
         (["--estimator", "AttitudeEkf", "--set", "compensatd=true"], "did you mean compensated"),
         (["--estimator", "AttitudeEkf", "--set", "compensated=maybe"], "compensated"),
         (["--estimator", "AttitudeEkf", "--set", "compensated"], "key=value"),
-        (["--estimator", "DesignAngles", "--format", "xlsx"], "csv or parquet"),
+        (["--estimator", "DesignAngles", "--format", "xlsx"], "one of csv, parquet"),
         (["--estimator", "DesignAngles", "--out", "."], "other things than an estimate"),
     ],
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from simrail.estimators.trajectory.noise import Hyperparameters
-from simrail.estimators.tuning.file import Search, Tuning
+from simrail.estimators.tuning.file import Search, Tuning, TuningResult
 from simrail.estimators.tuning.space import (
     CONSTRAINT,
     FLAT,
@@ -181,6 +181,25 @@ def tuned(*, space: SearchSpace | None = None, **status: str) -> Tuning:
     values = Hyperparameters(**dict.fromkeys(NAMES, 0.0002))  # type: ignore[arg-type]
     values = replace(values, lateral_position_m2=2e-2, vertical_position_m2=2e-2)
     return Tuning(values, None, search, dict.fromkeys(NAMES, IDENTIFIED) | status)
+
+
+def write_tuning(tuning: Tuning, path: Path) -> None:
+    """Write a tuning as `simrail tune` does."""
+    search = tuning.search
+    assert search is not None
+    TuningResult(
+        method=search.method,
+        objective=search.objective,
+        unit=search.unit,
+        settings=asdict(search.space),
+        seed=search.seed,
+        evaluations=search.evaluations,
+        fitted_on=search.fitted_on,
+        command=search.command,
+        finished=search.finished,
+        values=(asdict(tuning.hyperparameters),),
+        status=(dict(tuning.status or {}),),
+    ).write(path)
 
 
 @pytest.mark.parametrize("axis", ["lateral", "vertical"])
@@ -452,7 +471,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
         patch.setattr("simrail.ride.cache.cache_folder", lambda: folder)
-        tuned(accel_y_m2ps4=CONSTRAINT).write(folder / "tuned.toml")
+        write_tuning(tuned(accel_y_m2ps4=CONSTRAINT), folder / "tuned.toml")
         scenario = read_scenario(TEXT, name="short", folder=folder)
         result = run_campaign(scenario, workers=1)
         path = tmp_path_factory.mktemp("page") / "report.html"
