@@ -132,6 +132,7 @@ def test_a_worker_gets_no_batch_before_its_last_result_is_here() -> None:
     assert [workers for workers, _ in asked] == ["one", "two", "two", None, "two", "one"]
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_it(
     cluster: Cluster,
     noting_file: Path,

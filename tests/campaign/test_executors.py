@@ -122,7 +122,8 @@ def test_a_result_that_was_taken_is_let_go_before_more_is_asked_for(
     assert len(held) > 3 and not any(held)
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [1, 2])
 def test_killed_workers_lose_nothing(
     kills: int, noting_file: Path, notes: Notes, tmp_path: Path, assert_same: Same
 ) -> None:

@@ -110,7 +110,7 @@ def wait_while(condition: Callable[[], bool], *, at_most_s: float) -> None:
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize(("kills", "cells"), [(2, 16), pytest.param(50, 600, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "cells"), [(1, 12), pytest.param(50, 600, marks=pytest.mark.slow)])
 def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     kills: int,
     cells: int,

@@ -63,6 +63,7 @@ def simplified(conicity: float):
     )
 
 
+@pytest.mark.slow
 def test_natural_frequencies_with_the_wheelsets_held():
     """Within 3 % (measured: 2.1 % at most, the body's pitch)."""
     found: dict[tuple[str, str], list[float]] = {}
