@@ -175,9 +175,10 @@ def estimator_class(method: str) -> type[Estimator]:
     )
 
 
-def registered() -> list[str]:
-    """Names of all estimators that installed packages register."""
-    return sorted({entry.name for entry in entry_points(group="simrail.estimators")})
+@cache
+def registered() -> tuple[str, ...]:
+    """Names of all estimators that installed packages register; looked up once, since it takes some ms."""
+    return tuple(sorted({entry.name for entry in entry_points(group="simrail.estimators")}))
 
 
 def estimate_many(estimator: Estimator, recordings: Sequence[Recording]) -> list[Estimate]:
