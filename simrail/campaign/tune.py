@@ -9,7 +9,6 @@ import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError, one_of
 from simrail.core.interrupts import interruptible
 from simrail.core.toml_files import blame
-from simrail.estimation.estimate import Estimator
+from simrail.estimation.estimate import Estimator, registered
 from simrail.estimation.tunable import tunables_of
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
@@ -179,14 +178,13 @@ def alone(scenario: Scenario, estimator: str) -> Scenario:
     """The scenario with one estimator, without its tuning; the others only keep places, for messages."""
     spec = scenario.spec
     names = [part.name for part in spec.estimator]
-    registered = sorted({entry.name for entry in entry_points(group="simrail.estimators")})
-    if estimator not in names and estimator not in registered and ".py:" not in estimator:
+    if estimator not in names and estimator not in registered() and ".py:" not in estimator:
         raise InputError(
             "the scenario has no such estimator",
             file=scenario.file,
             field="--estimator",
             value=estimator,
-            limit=f"one of {', '.join(names)}; registered: {', '.join(registered)}; or FILE.py:CLASS",
+            limit=f"one of {', '.join(names)}; registered: {', '.join(registered())}; or FILE.py:CLASS",
         )
     parts = [
         part.model_copy(update={"options": {k: v for k, v in part.options.items() if k != "tuning"}})

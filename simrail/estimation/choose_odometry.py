@@ -6,13 +6,12 @@ the recording. The true odometry, an ablation, is no estimator's work: it comes 
 (`simrail.sensors.measure`), labelled, or not at all.
 """
 
-import difflib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD, require
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 from simrail.estimation.estimate import Estimator, description_of, registered
 from simrail.estimation.user_modules import class_named
 from simrail.recording.recording import Recording
@@ -46,12 +45,11 @@ def odometry_named(name: str, folder: Path | None = None) -> Estimator:
     method, options = SHIPPED.get(name, (name, {}))
     known = [*SHIPPED, TRUTH, NONE]
     if ":" not in name and method not in registered():
-        near = difflib.get_close_matches(name, [*known, *registered()], n=1)
         raise InputError(
             "no such odometry",
             value=name,
             limit=f"one of {', '.join(known)}, a registered estimator, or FILE.py:CLASS",
-            remedy=f"did you mean {near[0]}?" if near else "see 'simrail new odometry NAME'",
+            remedy=did_you_mean(name, [*known, *registered()]) or "see 'simrail new odometry NAME'",
         )
     try:
         return class_named(method, folder)(**options)

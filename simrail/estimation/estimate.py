@@ -7,12 +7,12 @@ made in `simrail.scoring.score`, the only place where truth and estimate meet.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Protocol, runtime_checkable
 
 import pandas as pd
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, one_of
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
 
@@ -163,22 +163,23 @@ def estimator_class(method: str) -> type[Estimator]:
     InputError
         If no installed package registers that name; the message lists those that are there.
     """
-    for entry in entry_points(group="simrail.estimators"):
-        if entry.name == method:
-            loaded: type[Estimator] = entry.load()
-            return loaded
-    raise InputError(
+    one_of(
+        method,
+        registered(),
         "no such estimator",
-        value=method,
-        limit="one of " + ", ".join(registered()),
         remedy="install the package that registers it under the entry-point group simrail.estimators",
     )
+    loaded: type[Estimator] = registered()[method].load()
+    return loaded
 
 
 @cache
-def registered() -> tuple[str, ...]:
-    """Names of all estimators that installed packages register; looked up once, since it takes some ms."""
-    return tuple(sorted({entry.name for entry in entry_points(group="simrail.estimators")}))
+def registered() -> dict[str, EntryPoint]:
+    """Estimators that installed packages register, by name, sorted; looked up once: it takes some ms."""
+    entries: dict[str, EntryPoint] = {}
+    for entry in entry_points(group="simrail.estimators"):
+        entries.setdefault(entry.name, entry)
+    return dict(sorted(entries.items()))
 
 
 def estimate_many(estimator: Estimator, recordings: Sequence[Recording]) -> list[Estimate]:

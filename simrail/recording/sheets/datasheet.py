@@ -3,11 +3,10 @@
 The only place in simrail where degrees per hour, milli-g, ppm and their like are turned into SI units.
 """
 
-import difflib
 import math
 from typing import Any, Literal, NamedTuple
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 from simrail.recording.sheets.grades import ImuGrade, judge_choice
 
 STANDARD_GRAVITY_MPS2 = 9.80665
@@ -126,14 +125,11 @@ def grade_from_datasheet(
     said: dict[str, str] = {}
     for key, number in figures.items():
         if key not in FIGURES:
-            near = difflib.get_close_matches(key, FIGURES, n=1)
             raise InputError(
                 "no data sheet prints this figure",
                 field=key,
                 value=number,
-                remedy=f"did you mean {near[0]}?"
-                if near
-                else "see simrail.recording.sheets.datasheet.FIGURES",
+                remedy=did_you_mean(key, FIGURES) or "see simrail.recording.sheets.datasheet.FIGURES",
             )
         if number is None:
             continue
