@@ -126,8 +126,8 @@ def pack(parts: Parts) -> bytes:
     InputError
         If an estimator cannot be sent to another process.
     """
-    estimators = {**parts.estimators(0), **parts.odometries()}
-    for name, estimator in estimators.items():
+    estimators = [*parts.estimators(0).items(), *parts.odometries().items()]
+    for name, estimator in estimators:
         try:
             pickle.dumps(estimator)
         except Exception as error:
@@ -137,7 +137,7 @@ def pack(parts: Parts) -> bytes:
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
             ) from error
-    sources = sources_of(list(estimators.values()))
+    sources = sources_of([estimator for _, estimator in estimators])
     return pickle.dumps((score_code_hash(), sources, pickle.dumps(parts)))
 
 

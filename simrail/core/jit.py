@@ -1,8 +1,8 @@
 """Compiled kernels: one decorator and one cache that cannot go stale.
 
-numba does not notice a change in a kernel that another kernel imports, so its disk cache can
-silently hold old physics. Here the cache folder is named after a hash of every kernel source of
-simrail and of numba's version: a changed source is a new folder.
+numba does not notice a change in what a kernel takes from another module (a kernel, a constant, the layout
+of a record), so its disk cache can silently hold old physics. Here the cache folder is named after a hash of
+every source that a kernel can take something from, and of numba's version: a changed source is a new folder.
 """
 
 import hashlib
@@ -19,13 +19,16 @@ import platformdirs
 from numba.core import event
 from numba.core.options import DefaultOptions
 
-from simrail.core.source_hash import source_folders
+from simrail.core.source_hash import source_hash
 
 FloatArray = npt.NDArray[np.float64]
 """A float64 array; every hot loop takes these, C-contiguous."""
 
 IntArray = npt.NDArray[np.int64]
 """An int64 array, C-contiguous: which of several a sample belongs to."""
+
+KERNEL_FOLDERS = ("core", "track", "vehicle", "recording", "sensors", "estimators")
+"""Where kernels lie, and what is compiled into them."""
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -36,14 +39,9 @@ def cache_folder() -> Path:
 
 
 def kernel_hash() -> str:
-    """SHA-256 over the sources that hold compiled kernels, and numba's version."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for folder in source_folders():
-        for source in sorted(folder.rglob("*.py")):
-            text = source.read_bytes()
-            if b"@njit" in text:
-                digest.update(source.name.encode() + b"\0" + text)
-    return digest.hexdigest()[:16]
+    """SHA-256 over the sources of `KERNEL_FOLDERS`, and numba's version, 16 digits."""
+    text = numba.__version__ + source_hash(*KERNEL_FOLDERS)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 _KERNELS = str(cache_folder() / "kernels" / kernel_hash())

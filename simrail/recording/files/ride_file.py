@@ -236,7 +236,7 @@ class RideFile(Part):
         Longest gap in a signal that is bridged by a straight line.
     imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
         Its signals. Without an odometry it is made from encoder or odometer
-        (`simrail.estimation.choose_odometry.read_ride`); without those as well, nobody knows where it is.
+        (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
     """
 
     name: str = Field(min_length=1, max_length=200)

@@ -6,7 +6,7 @@ the body's own axes, uniform times) passes bit by bit. Nothing else is repaired:
 by name.
 
 Not here: an odometry, where the file has none, and whether the ride can be true, which are the matter of
-`simrail.estimation.choose_odometry.read_ride`.
+`simrail.estimation.recorded_ride.read_ride`.
 """
 
 from dataclasses import replace

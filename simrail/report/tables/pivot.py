@@ -35,7 +35,7 @@ class Case:
     labels : dict of str to str
         What the case is: `CASE_COLUMNS` and the axes.
     table : pandas.DataFrame
-        Rows of `simrail.scoring.table.aggregate` of this case.
+        Rows of `simrail.scoring.aggregate.aggregate` of this case.
     scores : dict
         (estimator, quantity, band, reference, window, metric) to `Mean`.
     """

@@ -4,8 +4,8 @@ The force data, poses and wrenches are arrays of records, so that a kernel reads
 not a numbered slot. Beside flat arrays of numbers this costs a ride nothing, and it compiles faster: numba
 takes a named field as a fixed offset, and resolves every index anew.
 
-Fields are 8 bytes each, floats or whole numbers, so that records lie in a float64 array without gaps
-(`simrail.vehicle.engines.exudyn_forces.spread`).
+Fields are 8 bytes each, floats or whole numbers, so that records have no gaps: Exudyn's kernel makes
+arrays of them from addresses (`simrail.vehicle.engines.exudyn_forces.records_at`).
 """
 
 from typing import Any, NamedTuple
