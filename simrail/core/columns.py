@@ -100,7 +100,7 @@ COLUMNS: dict[str, Column] = _expand()
 """Every column by name."""
 
 
-def require(frame: pd.DataFrame, columns: Iterable[str], *, what: str = "frame", file: object = None) -> None:
+def require(frame: pd.DataFrame, columns: Iterable[str], *, what: str = "frame") -> None:
     """Refuse a frame that lacks columns.
 
     Parameters
@@ -111,8 +111,6 @@ def require(frame: pd.DataFrame, columns: Iterable[str], *, what: str = "frame",
         Names that must be present, each a key of `COLUMNS`.
     what : str
         How the message calls the frame.
-    file : object, optional
-        File that the frame came from.
 
     Raises
     ------
@@ -124,7 +122,6 @@ def require(frame: pd.DataFrame, columns: Iterable[str], *, what: str = "frame",
         listed = ", ".join(f"{name} [{COLUMNS[name].unit}]" for name in missing)
         raise InputError(
             f"missing column {listed}",
-            file=file,
             field=what,
             value=sorted(map(str, frame.columns)),
             remedy="add the column or map it from the file's own name",

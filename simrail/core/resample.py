@@ -34,14 +34,14 @@ def interpolated(frame: pd.DataFrame, times: FloatArray, *columns: str) -> Float
     return np.column_stack([np.interp(times, stamps, frame[column].to_numpy()) for column in columns])
 
 
-def check_stamps(time: FloatArray, *, field: str, file: object = None) -> None:
+def check_stamps(time: FloatArray, *, field: str) -> None:
     """Refuse time stamps that are not numbers, or do not strictly increase.
 
     Parameters
     ----------
     time : ndarray (n,)
         Time stamps, s.
-    field, file : str, object
+    field : str
         Where they stand, for the message.
 
     Raises
@@ -57,7 +57,6 @@ def check_stamps(time: FloatArray, *, field: str, file: object = None) -> None:
         kind = "NaN" if bad[i] or bad[i + 1] else ("duplicate" if step[i] == 0.0 else "reversed")
         raise InputError(
             f"has {kind} time stamps at sample {i + 1}",
-            file=file,
             field=field,
             value=[float(time[i]), float(time[i + 1])],
             limit="strictly increasing",
@@ -131,7 +130,6 @@ def resample(
     *,
     longest_gap_s: float = LONGEST_GAP_S,
     what: str = "imu",
-    file: object = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Interpolate signals linearly at uniform times.
 
@@ -144,8 +142,8 @@ def resample(
         the frame, bit by bit, the sample is kept bit by bit.
     longest_gap_s : float
         Longest distance of two stamps that is bridged.
-    what, file : str, object
-        How messages call the signal, and where it came from.
+    what : str
+        How messages call the signal.
 
     Returns
     -------
@@ -161,25 +159,23 @@ def resample(
         reach beyond the stamps: nothing is extrapolated.
     """
     stamps = frame.index.to_numpy(dtype=np.float64)
-    check_stamps(stamps, field=f"{what}.time_s", file=file)
+    check_stamps(stamps, field=f"{what}.time_s")
     if times[0] < stamps[0] or times[-1] > stamps[-1]:
         raise InputError(
             "would be extrapolated",
-            file=file,
             field=f"{what}.time_s",
             value=[float(times[0]), float(times[-1])],
             limit=f"from {stamps[0]:.9g} to {stamps[-1]:.9g} s, the first and last time stamp",
             remedy="resample within the recorded time",
         )
     gaps = find_gaps(stamps, (times[-1] - times[0]) / (len(times) - 1))
-    refuse_long_gaps(gaps, longest_gap_s, what=what, file=file)
+    refuse_long_gaps(gaps, longest_gap_s, what=what)
     values = np.empty((len(times), frame.shape[1]))
     for column, name in enumerate(frame.columns):
         samples = frame[name].to_numpy(dtype=np.float64)
         if not np.isfinite(samples).all():
             raise InputError(
                 f"is not a finite number at time_s = {stamps[np.argmin(np.isfinite(samples))]:.9g}",
-                file=file,
                 field=f"{what}.{name}",
                 value=float(samples[np.argmin(np.isfinite(samples))]),
                 limit="finite numbers",
@@ -189,9 +185,7 @@ def resample(
     return pd.DataFrame(values, index=pd.Index(times, name="time_s"), columns=frame.columns), gaps
 
 
-def refuse_long_gaps(
-    gaps: pd.DataFrame, longest_gap_s: float, *, what: str = "imu", file: object = None
-) -> None:
+def refuse_long_gaps(gaps: pd.DataFrame, longest_gap_s: float, *, what: str = "imu") -> None:
     """Refuse gaps longer than can be bridged, naming the first of them.
 
     Raises
@@ -206,7 +200,6 @@ def refuse_long_gaps(
         more = f" (and {len(too_long) - 1} more such gaps)" if len(too_long) > 1 else ""
         raise InputError(
             f"has a gap of {gap['missing']:.0f} samples that is too long to bridge{more}",
-            file=file,
             field=f"{what}.time_s",
             value=f"{gap['end_s'] - gap['start_s']:.6g} s after time_s = {gap['start_s']:.9g}",
             limit=f"longest_gap_s = {longest_gap_s:g} s",

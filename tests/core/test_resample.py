@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from simrail.core.errors import InputError
 from simrail.core.resample import GAPS, find_gaps, rate_of, resample, uniform_times
+from simrail.core.toml_files import blame
 
 RATE = 100.0
 
@@ -61,8 +62,8 @@ def test_gaps_up_to_the_limit_are_bridged_and_longer_ones_refused():
     times = uniform_times(0.0, 9.99, RATE)
     found, gaps = resample(signals(ten), times, longest_gap_s=0.11)
     assert gaps["missing"].tolist() == [10] and len(found) == 1000
-    with pytest.raises(InputError) as caught:
-        resample(signals(ten), times, longest_gap_s=0.1, file="imu.csv")
+    with pytest.raises(InputError) as caught, blame("imu.csv"):
+        resample(signals(ten), times, longest_gap_s=0.1)
     message = str(caught.value)
     for words in (
         "imu.csv: imu.time_s",

@@ -13,7 +13,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.resample import check_stamps
 from simrail.core.rotation import rotation_matrix
-from simrail.core.toml_files import label
+from simrail.core.toml_files import blame, label
 from simrail.recording.files.data_file import column_names, line_of, read_columns
 from simrail.recording.files.signal_part import DATE_TIMES, SignalPart, VectorPart
 from simrail.recording.signals import TIMES, Quantity
@@ -85,7 +85,8 @@ class SignalReader:
             else:
                 assert part.rate_hz is not None
                 time = part.start_s + np.arange(len(frame)) / part.rate_hz
-            check_stamps(time, field=f"{table}.{time_name}", file=label(self._folder / part.file))
+            with blame(label(self._folder / part.file)):
+                check_stamps(time, field=f"{table}.{time_name}")
             frame.index = pd.Index(time, name="time_s")
         return frame
 
