@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from flaky import FLAKY
 
 import simrail
 from simrail import results
@@ -277,26 +278,6 @@ def test_runs_that_nobody_goes_on_with_are_dropped_after_a_month(tmp_path: Path)
         os.utime(folder, (time.time() - 86400.0 * days,) * 2)
     with checkpoint_of(tmp_path / "x", "key"):
         assert not old.exists() and young.exists()
-
-
-FLAKY = """
-from dataclasses import dataclass
-from pathlib import Path
-
-from simrail.estimators.baselines import DesignAngles
-
-
-@dataclass(frozen=True)
-class Noting:
-    "Fails on some recordings as long as a file is there."
-    sleep_s: float = 0.0
-    causal = True
-
-    def estimate(self, recording):
-        if len(recording.imu) > 64 and recording.imu.iloc[0, 0] > 0.0 and Path("broken").exists():
-            raise RuntimeError("the link was down")
-        return DesignAngles().estimate(recording)
-"""
 
 
 def test_retry_failed_runs_exactly_the_failed_cells(

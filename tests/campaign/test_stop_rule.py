@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from flaky import FLAKY
 
 from simrail import results
 from simrail.campaign import campaign
@@ -307,26 +308,6 @@ def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: Non
 def test_one_cell_alone_asks_no_rule(module_rides: None, short: Short) -> None:
     found = run_campaign(short("monte_carlo.sensor_draws=9", stop(9.0)), only=8)
     assert found.stopped is None and list(found.cells["cell"]) == [8]
-
-
-FLAKY = """
-from dataclasses import dataclass
-from pathlib import Path
-
-from simrail.estimators.baselines import DesignAngles
-
-
-@dataclass(frozen=True)
-class Noting:
-    "Fails on some recordings as long as a file is there."
-    sleep_s: float = 0.0
-    causal = True
-
-    def estimate(self, recording):
-        if len(recording.imu) > 64 and recording.imu.iloc[0, 0] > 0.0 and Path("broken").exists():
-            raise RuntimeError("the link was down")
-        return DesignAngles().estimate(recording)
-"""
 
 
 def test_results_tell_of_it_and_failed_cells_are_tried_again(

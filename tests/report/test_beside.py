@@ -9,31 +9,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from short_line import SHORT_LINE
 
 from simrail.campaign.stored_results import read_results
 from simrail.cli.main import BAD_INPUT, DONE, call
 
-TEXT = """
-title = "Rails of a short line"
-paper = "gonzalez_2023"
-seed = 3
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-odometry = "truth"
-[irregularity]
-spectrum = "erri_b176_low"
-[[ride]]
-name = "go"
-start_m = 10.0
-end_m = 460.0
-speed_kmh = 70.0
-rest_s = 5.0
-[[imu]]
-name = "axle"
-grade = "lord_3dm_gx4_25"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
+TEXT = (
+    SHORT_LINE
+    + """
 [geometry]
 own_bands = { paper = [3.0, 70.0] }
 [[estimator]]
@@ -45,6 +28,7 @@ name = "zero_track"
 stands_for = "zero"
 method = "ZeroTrack"
 """
+)
 
 # The same rails in another band: which size a run is of, its band tells.
 MODEL = TEXT.replace("[3.0, 70.0]", "[1.0, 7.0]").replace('"go"', '"out"').replace("seed = 3", "seed = 4")

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from short_line import SHORT_LINE
 from simrail.estimators.trajectory.noise import Hyperparameters
 from simrail.estimators.tuning.file import Search, Tuning, TuningResult
 from simrail.estimators.tuning.space import (
@@ -413,27 +414,9 @@ def test_indicators_are_held_against_limits() -> None:
 
 # ---- through a campaign ------------------------------------------------------------------------
 
-TEXT = """
-title = "Rails of a short line"
-paper = "gonzalez_2023"
-seed = 3
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-odometry = "truth"
-[irregularity]
-spectrum = "erri_b176_low"
-[[ride]]
-name = "go"
-start_m = 10.0
-end_m = 460.0
-speed_kmh = 70.0
-rest_s = 5.0
-[[imu]]
-name = "axle"
-grade = "lord_3dm_gx4_25"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
+TEXT = (
+    SHORT_LINE
+    + """
 [[imu]]
 name = "axle_noise"
 grade = "lord_3dm_gx4_25_noise_added"
@@ -464,6 +447,7 @@ name = "zero_track"
 stands_for = "zero"
 method = "ZeroTrack"
 """
+)
 
 
 @pytest.fixture(scope="module")
