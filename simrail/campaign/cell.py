@@ -190,6 +190,8 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         draw=cell.sensor_draw,
         earth_rate=resolved.earth_rate,
         temperature=resolved.temperature,
+        track_map=resolved.track_map,
+        map_errors=resolved.map_errors,
     )
     if resolved.odometry is None:
         return recording
@@ -231,6 +233,7 @@ def _labels(cell: Cell) -> dict[str, object]:
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
+        "map": cell.map_label,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
     }
@@ -241,6 +244,7 @@ def cell_record(cell: Cell) -> dict[str, object]:
     record: dict[str, object] = _labels(cell) | {
         "case": cell.case,
         "sample": cell.sample,
+        "map_draw": cell.map_draw,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
         "speed_kmh": cell.ride.speed_kmh or 0.0,
@@ -268,7 +272,7 @@ def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> _Recor
     with tally.timed("measure"):
         recording = record_cell(cell, truth, parts)
     with tally.timed("score"):
-        reference = reference_of(truth_at_imu(truth, recording), recording)
+        reference = reference_of(truth, recording)
         if recording.odometry is not None:
             figures = score_odometry(recording, reference, **_wanted(cell))
             tally.add(cell, f"odometry:{recording.odometry_source}", figures)

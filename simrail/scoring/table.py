@@ -37,6 +37,7 @@ LABEL_COLUMNS = (
     "mount",
     "imu",
     "odometry",
+    "map",
     "tuning",
     "track_draw",
     "sensor_draw",

@@ -116,7 +116,7 @@ def campaign(
     cells["sample"] = 0
     cells["speed_kmh"] = cells["ride.speed_kmh"]
     cells["direction"] = np.where(cells["ride.reverse"], "backward", "forward")
-    fixed = {"ride": "out", "vehicle": "none", "mount": "axle", "odometry": "encoder"}
+    fixed = {"ride": "out", "vehicle": "none", "mount": "axle", "odometry": "encoder", "map": "exact"}
     for name, value in (fixed | {"track": "test_line", "engine": "kinematic"}).items():
         cells[name] = value
     n, rows = len(cells), len(methods) * len(FIGURES)

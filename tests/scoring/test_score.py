@@ -434,6 +434,7 @@ LABELS: dict[str, object] = {
     "mount": "axle",
     "imu": "ideal",
     "odometry": "encoder",
+    "map": "exact",
     "tuning": "recommended",
     "track_draw": 0,
     "sensor_draw": 0,

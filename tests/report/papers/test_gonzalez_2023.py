@@ -321,7 +321,7 @@ def case(change: Change | None = None, **labels: str) -> Case:
             "failed": [0, 0, 0],
         }
     )
-    said = {"ride": "go", "vehicle": "v", "mount": "axle", "imu": "real", "odometry": "curve_smoothed"}
+    said = {"ride": "go", "vehicle": "v", "mount": "axle", "imu": "real", "odometry": "curve_smoothed", "map": "exact"}
     return Case({**said, **labels}, table, found)
 
 
