@@ -213,7 +213,11 @@ class Parts:
             return None
         with blame(self.scenario.file, "map"):
             return draw_map(
-                self.track(cell), part.errors(), seed=cell.map_seed, draw=cell.map_draw, defects=part.defects()
+                self.track(cell),
+                part.errors(),
+                seed=cell.map_seed,
+                draw=cell.map_draw,
+                defects=part.defects(),
             )
 
     def vehicle(self, cell: Cell) -> VehicleModel:

@@ -14,6 +14,7 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
 from simrail.scenario.axes import Listed, each
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors
+from simrail.track.map_file import map_errors_of
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
 """A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
@@ -184,18 +185,7 @@ class MapPart(Part):
 
     def errors(self) -> MapErrors:
         """The sizes in SI."""
-        if self.exact:
-            return EXACT
-        return MapErrors(
-            cant_sd_m=1e-3 * self.cant_sd_mm,
-            cant_along_sd_m=1e-3 * self.cant_along_sd_mm,
-            cant_along_length_m=self.cant_along_length_m,
-            radius_relative_sd=1e-2 * self.radius_sd_percent,
-            place_sd_m=self.place_sd_m,
-            gradient_sd=1e-3 * self.gradient_sd_permil,
-            chainage_scale_sd=1e-2 * self.chainage_scale_sd_percent,
-            chainage_offset_sd_m=self.chainage_offset_sd_m,
-        )
+        return EXACT if self.exact else map_errors_of(self, EXACT)
 
     def defects(self) -> tuple[MapDefect, ...]:
         """The single defects in SI; none of an exact map."""
@@ -248,7 +238,8 @@ class MonteCarloPart(Part):
 
     Each of the ``samples`` draws a value from every distribution of the scenario, jointly by ``method``,
     and has draws of its own: ``track_draws`` lay the rails anew, each ride over them is made with
-    ``map_draws`` draws of the map, and recorded with ``sensor_draws`` draws of the sensors. Without a distribution there is one sample.
+    ``map_draws`` draws of the map, and recorded with ``sensor_draws`` draws of the sensors.
+    Without a distribution there is one sample.
     """
 
     samples: Draws = 1

@@ -62,7 +62,9 @@ class Deviation:
     @cached_property
     def _splines(self) -> tuple[CubicSpline, CubicSpline]:
         places = self.from_m + self.step_m * np.arange(len(self.cant_m))
-        cant, height = (CubicSpline(places, values, bc_type="clamped") for values in (self.cant_m, self.height_m))
+        cant, height = (
+            CubicSpline(places, values, bc_type="clamped") for values in (self.cant_m, self.height_m)
+        )
         return cant, height
 
     def cant(self, s_m: npt.ArrayLike, *, derivatives: int) -> list[FloatArray]:
@@ -79,4 +81,6 @@ class Deviation:
         inside = np.clip(s, self.from_m, last)
         spline = self._splines[which]
         found = [spline(inside)]
-        return found + [np.where(inside == s, spline(inside, order), 0.0) for order in range(1, derivatives + 1)]
+        return found + [
+            np.where(inside == s, spline(inside, order), 0.0) for order in range(1, derivatives + 1)
+        ]

@@ -101,7 +101,7 @@ UNSTATED = MapErrors(
 )
 """What is taken of a map that nobody has said anything of: wide, and synthetic."""
 
-EXACT = MapErrors(**{name: 0.0 for name in _LIMITS})
+EXACT = MapErrors(**dict.fromkeys(_LIMITS, 0.0))
 """A map without errors: an ablation."""
 
 
@@ -242,7 +242,11 @@ def _with_defects(
                 limit=f"in a {wanted.word} for {defect.kind}; there is a {element.word}",
             )
         if defect.kind == "coarse_curve":
-            changed[index - 1 : index + 2] = _polyline(changed, index, defect.size_m)
+            ends = [changed[i] for i in (index - 1, index + 1) if 0 < i < len(changed) - 1]
+            if len(ends) < 2 or not all(isinstance(end, Transition) for end in ends):
+                raise InputError("a coarse curve needs a transition at either end", field="at_m")
+            require_number(defect.size_m, "chord_m", least=1.0)
+            changed[index - 2 : index + 3] = _polyline(design, changed[index - 2 : index + 3], defect.size_m)
         else:
             before, after = changed[index - 1], changed[index + 1]
             spare = element.length_m - min(SHORT_M, element.length_m)
@@ -253,33 +257,33 @@ def _with_defects(
     return tuple(changed)
 
 
-def _polyline(elements: Sequence[Element], index: int, size_m: float) -> list[Element]:
-    """A curve and its two transitions as vertices of a polyline give them.
+def _polyline(design: TrackDesign, elements: Sequence[Element], size_m: float) -> list[Element]:
+    """A curve, its transitions and their neighbours (5 elements) as vertices of a polyline give them.
 
     The curvature at a vertex is the turn from the middle of the chord before it to the middle of that after
-    it, per length; between vertices it is taken to be linear, as cant is.
+    it, per length; between vertices it is taken to be linear, as cant is. So the whole turn is kept, and the
+    neighbours lose a chord each.
     """
-    require_number(size_m, "size_m", above=2.0 * NODE_M)
-    if not 0 < index < len(elements) - 1 or not all(
-        isinstance(elements[i], Transition) for i in (index - 1, index + 1)
-    ):
-        raise InputError("a coarse curve needs a transition at either end", field="at_m")
-    ramp, curve, other = elements[index - 1 : index + 2]
-    assert isinstance(curve, Curve)
-    before, after = elements[index - 2], elements[index + 2]
-    group = TrackDesign("", 0.0, (replace(before, length_m=size_m), ramp, curve, other, replace(after, length_m=size_m)))
-    length = ramp.length_m + curve.length_m + other.length_m
-    chords = max(2, round(length / size_m))
-    step = length / chords
-    vertices = size_m + step * np.arange(1, chords)
+    before, *curve, after = elements
+    length = sum(element.length_m for element in curve)
+    step = length / max(2, round(length / size_m))
+    if min(before.length_m, after.length_m) <= step:
+        raise InputError(
+            "is longer than what lies before or after the curve",
+            field="chord_m",
+            value=step,
+            limit=f"less than {min(before.length_m, after.length_m):g} m",
+        )
+    group = replace(design, elements=tuple(elements), start_m=-before.length_m, gradients=(), deviation=None)
+    vertices = step * np.arange(round(length / step) + 1)
     turn = group.frame(vertices + 0.5 * step).yaw_rad - group.frame(vertices - 0.5 * step).yaw_rad
     slope = group.rail_base_m * np.sin(group.frame(vertices).roll_rad)
-    parts: list[Element] = [Transition(step - 0.5 * NODE_M)]
+    parts: list[Element] = [replace(before, length_m=before.length_m - step)]
     for bend, cant in zip(turn / step, slope, strict=True):
         node = Curve(NODE_M, 1.0 / bend, _in_mm(-cant if bend > 0.0 else cant)) if bend else Straight(NODE_M)
-        parts += [node, Transition(step - NODE_M)]
-    parts[-1] = Transition(step - 0.5 * NODE_M)
-    return parts
+        parts += [Transition(step - NODE_M), node]
+    parts[1] = Transition(step - 0.5 * NODE_M)
+    return [*parts, Transition(step - 0.5 * NODE_M), replace(after, length_m=after.length_m - step)]
 
 
 def _deviation(
@@ -288,7 +292,9 @@ def _deviation(
     """Cant that wanders, slopes that are wrong, and places that have settled; None if nothing is."""
     n = math.ceil(design.length_m / STEP_M) + 1
     places = design.start_m + STEP_M * np.arange(n)
-    cant = errors.cant_along_sd_m * _wandering(_normals(seed, draw, "cant_along", 2 * n), errors.cant_along_length_m)
+    cant = errors.cant_along_sd_m * _wandering(
+        _normals(seed, draw, "cant_along", 2 * n), errors.cant_along_length_m
+    )
     # One error of slope for each gradient, the level before the first among them.
     begins = np.array([gradient.from_m for gradient in design.gradients])
     slopes = errors.gradient_sd * _normals(seed, draw, "gradient", len(begins) + 1)
@@ -306,7 +312,10 @@ def _deviation(
     if not (cant.any() or height.any()):
         return None
     return Deviation(
-        design.start_m, STEP_M, tuple(_in_mm(value) for value in cant), tuple(_in_mm(value) for value in height)
+        design.start_m,
+        STEP_M,
+        tuple(_in_mm(value) for value in cant),
+        tuple(_in_mm(value) for value in height),
     )
 
 

@@ -321,7 +321,14 @@ def case(change: Change | None = None, **labels: str) -> Case:
             "failed": [0, 0, 0],
         }
     )
-    said = {"ride": "go", "vehicle": "v", "mount": "axle", "imu": "real", "odometry": "curve_smoothed", "map": "exact"}
+    said = {
+        "ride": "go",
+        "vehicle": "v",
+        "mount": "axle",
+        "imu": "real",
+        "odometry": "curve_smoothed",
+        "map": "exact",
+    }
     return Case({**said, **labels}, table, found)
 
 
