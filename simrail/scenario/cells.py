@@ -24,6 +24,7 @@ from simrail.scenario.axes import axes_of, drawn, each, expand
 from simrail.scenario.distributions import Value, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
+from simrail.scoring.table import DRAWN_MAP, EXACT_MAP
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
 SENSING = ("odometry", "map", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
@@ -86,8 +87,8 @@ class Cell:
 
     @property
     def map_label(self) -> str:
-        """What tables call the map: ``"exact"``, an ablation, or ``"drawn"``."""
-        return "exact" if self.spec.map is None or self.spec.map.exact else "drawn"
+        """What tables call the map."""
+        return EXACT_MAP if self.spec.map is None or self.spec.map.exact else DRAWN_MAP
 
     @property
     def _sample_name(self) -> tuple[str | int, ...]:

@@ -139,7 +139,17 @@ def campaign(
         name: pd.Categorical(cells[name].repeat(rows))
         if name not in INTEGER_COLUMNS
         else cells[name].repeat(rows).to_numpy()
-        for name in ("cell", "ride", "vehicle", "mount", "imu", "odometry", "track_draw", "sensor_draw")
+        for name in (
+            "cell",
+            "ride",
+            "vehicle",
+            "mount",
+            "imu",
+            "odometry",
+            "map",
+            "track_draw",
+            "sensor_draw",
+        )
     }
     units = {"nees": "1", "coverage95": "1", "us_per_sample": "us"}
     columns = repeated | {

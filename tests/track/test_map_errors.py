@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from simrail.core.errors import InputError
+from simrail.core.toml_files import judge, parse_toml
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
 from simrail.track.file import TrackFile, track_text
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors, draw_map
-from simrail.core.toml_files import judge, parse_toml
 
 DRAWS = 200
 LINE = TrackDesign(
