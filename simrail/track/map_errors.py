@@ -184,23 +184,25 @@ def _moved_joints(design: TrackDesign, errors: MapErrors, seed: int, draw: int) 
     joints = starts[1:-1] + np.clip(along, -most, most)
     joints = design.start_m + scale * (joints - design.start_m) + offset
     lengths = np.diff(joints, prepend=design.start_m, append=design.end_m)
-    if (lengths <= 0.0).any():
+    gradients = [
+        gradient
+        if gradient.from_m <= design.start_m
+        else replace(
+            gradient, from_m=float(design.start_m + scale * (gradient.from_m - design.start_m) + offset)
+        )
+        for gradient in design.gradients
+    ]
+    if (lengths <= 0.0).any() or any(gradient.from_m >= design.end_m for gradient in gradients):
         raise InputError(
             "errors of the chainage push the first or the last element off the map",
             field="chainage_offset_sd_m",
-            value=offset,
+            value=float(offset),
             limit="shorter than the first and the last element of the track",
             remedy="take smaller errors, or lengthen these elements",
         )
     elements = [
         replace(element, length_m=float(length))
         for element, length in zip(design.elements, lengths, strict=True)
-    ]
-    gradients = [
-        gradient
-        if gradient.from_m <= design.start_m
-        else replace(gradient, from_m=design.start_m + scale * (gradient.from_m - design.start_m) + offset)
-        for gradient in design.gradients
     ]
     return replace(design, elements=tuple(elements), gradients=tuple(gradients))
 
