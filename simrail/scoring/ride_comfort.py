@@ -24,12 +24,13 @@ ISO 8041-1 (Table B.1) is another one, with Q_4 = 0.55, Q_5 = 0.9 and Q_6 = 0.95
 
 k = 0.588 vertical, 0.737 lateral, f in Hz, a_w in m/s2 (Garg and Dukkipati 1984; Gangadharan et al. 2004,
 Eqs. 7 and 8; as comfpy has it). For a sine of amplitude A in cm/s2 it is the older form (A^2 B^2)^(1/6.67),
-of which 4.42 is the factor 100^0.3 2^0.15. From memory: k = 0.737 (programs found take 1.25 . 0.588 = 0.735, which
-is 0.002 less of a Wz of 2.5), and the customary band of 0.5 to 30 Hz. Other variants of the same name
+of which 4.42 is the factor 100^0.3 2^0.15. From memory: k = 0.737 (programs found take 0.735, 1.25 times
+0.588, which is 0.002 less of a Wz of 2.5), and the customary band of 0.5 to 30 Hz. Other variants of the same name
 are *not* this one: Sperling's ride index for vehicles has another B(f), and GB/T 5599 reckons
 W = 3.57 (A^3 F(f) / f)^0.1 with a table F(f).
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -115,7 +116,7 @@ def weighted(acceleration: FloatArray, rate_hz: float, weighting: Weighting) -> 
     _judge_rate(rate_hz)
     n = len(acceleration) + int(_SETTLING_S * rate_hz)
     spectrum = np.fft.rfft(acceleration - acceleration[0], n)
-    spectrum *= weighting.response(np.fft.rfftfreq(n, 1.0 / rate_hz))
+    spectrum *= weighting.response(_frequencies(n, rate_hz))
     result: FloatArray = np.fft.irfft(spectrum, n)[: len(acceleration)]
     return result
 
@@ -202,12 +203,18 @@ def sperling(
     """
     _judge_rate(rate_hz)
     n = len(acceleration)
-    frequency = np.fft.rfftfreq(n, 1.0 / rate_hz)
+    frequency = _frequencies(n, rate_hz)
     spectrum = np.abs(np.fft.rfft(acceleration - np.mean(acceleration))) / n
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     lines = spectrum[inside] * sperling_weighting(frequency[inside], direction)
     # Each line but that of zero stands for two of the whole spectrum: of a sine of amplitude A, A/2 each.
-    return 4.42 * float(2.0 * np.sum(lines**2)) ** 0.15
+    mean_square = float(2.0 * np.sum(lines**2))
+    return 4.42 * math.pow(mean_square, 0.15)
+
+
+def _frequencies(samples: int, rate_hz: float) -> FloatArray:
+    """Frequencies of a real spectrum, Hz."""
+    return np.asarray(np.fft.rfftfreq(samples, 1.0 / rate_hz), dtype=np.float64)
 
 
 def _judge_rate(rate_hz: float) -> None:
