@@ -18,6 +18,7 @@ import numpy as np
 
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
+from simrail.ride.contact_forces import contact_columns
 from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Truth, abeam
 from simrail.ride.truth_files import create_arrays, let_go, load_truth, save_truth, write_header
@@ -38,7 +39,15 @@ Progress = Callable[[float, float, float], None]
 """Called with (simulated seconds done, seconds in all, present speed in m/s)."""
 
 _SOURCES = (
-    *("track", "vehicle", "ride/ride.py", "ride/kinematic.py", "ride/truth.py", "ride/truth_files.py"),
+    *(
+        "track",
+        "vehicle",
+        "ride/ride.py",
+        "ride/contact_forces.py",
+        "ride/kinematic.py",
+        "ride/truth.py",
+        "ride/truth_files.py",
+    ),
     *("core/rotation.py", "core/seeds.py", "core/jit.py"),
 )
 
@@ -73,6 +82,9 @@ class Ride:
         Whether the guide pulls the vehicle along, or its wheels drive and brake it.
     conditions : tuple of RailCondition
         What lies on the rails.
+    contact_rate_hz : float
+        Rate of the kept samples of forces between wheels and rails, unfiltered: `rate_hz` over a whole
+        number; 0 keeps none.
     """
 
     name: str
@@ -87,6 +99,12 @@ class Ride:
     gravity_mps2: float = 9.81
     drive: Literal["guide", "wheels"] = "guide"
     conditions: tuple[RailCondition, ...] = ()
+    contact_rate_hz: float = 0.0
+
+    @property
+    def contact_every(self) -> int:
+        """Output rows from one with kept contact forces to the next; 0 if none are kept."""
+        return round(self.rate_hz / self.contact_rate_hz) if self.contact_rate_hz > 0.0 else 0
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this ride from every other, versions and sources included."""
@@ -104,6 +122,7 @@ class Ride:
             "gravity_mps2": self.gravity_mps2,
             "drive": self.drive,
             "conditions": [asdict(condition) for condition in self.conditions],
+            "contact_rate_hz": self.contact_rate_hz,
             "versions": {package: version(package) for package in packages},
             "sources": source_hash(*_SOURCES),
         }
@@ -218,7 +237,8 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     )
     engine = _engine_of(ride.engine)(setup)
     bodies, wheels = len(model.bodies), len(model.wheels)
-    arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4)
+    every = ride.contact_every
+    arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4, contact_every=every)
     at = arrays["reference_position_m"]
     place, led = profile.start_m, model.body_names.index(model.guide.body)
     spins = list(model.spin_inertia_kgm2)
@@ -250,6 +270,10 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
             turned[w] = box[-1]
             arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
             arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
+            if every:
+                kept = slice(-(-here.start // every), -(-here.stop // every))
+                told = segment.contacts[kept.start * every - here.start :: every, w]
+                arrays[f"contact_{w}"][kept] = contact_columns(told)
         done = here.stop
         let_go(arrays)
         if progress is not None:
@@ -267,6 +291,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         bodies={body.name: (body.position_m[0], body.position_m[2]) for body in model.bodies},
         wheels={wheel.name: wheel.radius_m for wheel in model.wheels},
         gravity_mps2=ride.gravity_mps2,
+        contact_every=every or 1,
         manifest={
             "ride": ride.name,
             "engine": ride.engine,

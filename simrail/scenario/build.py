@@ -183,6 +183,7 @@ class Parts:
                 rate_hz=spec.truth_rate_hz,
                 drive=cell.ride.drive,
                 conditions=_conditions(spec, vehicle),
+                contact_rate_hz=spec.contact_rate_hz,
             )
         return self._rides[key]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
-from simrail.ride.ride import rails_of
+from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
 from simrail.track.design import TrackDesign
 from simrail.track.rail_condition import check_conditions
@@ -70,6 +70,7 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
                 limit=f"{LONGEST_RIDE_S:.0f} s",
                 remedy="ride faster, shorter, or with less dwell time",
             )
+    _judge_contact_rate(resolved.ride)
     warnings = _judge_step(resolved)
     if not words.stands:
         warnings += _judge_dynamics(resolved)
@@ -111,6 +112,29 @@ def _judge_step(resolved: ResolvedCell) -> list[str]:
             f"it puts that off by {off:.0f} %; {advised} is within 1 %"
         ]
     return []
+
+
+def _judge_contact_rate(ride: Ride) -> None:
+    """Refuse to keep forces that there are none of, or at a rate that is none of the truth's."""
+    if ride.contact_rate_hz == 0.0:
+        return
+    if ride.engine == "kinematic":
+        raise InputError(
+            "a body that follows the rails has no forces to keep",
+            field="contact_rate_hz",
+            value=ride.contact_rate_hz,
+            limit="0 with engine kinematic",
+            remedy="remove it, or choose the engine compiled or exudyn",
+        )
+    ratio = ride.rate_hz / ride.contact_rate_hz
+    if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
+        raise InputError(
+            "is not the rate of the truth over a whole number",
+            field="contact_rate_hz",
+            value=ride.contact_rate_hz,
+            limit=f"truth_rate_hz = {ride.rate_hz:g} Hz divided by a whole number",
+            remedy=f"try {ride.rate_hz / max(round(ratio), 1):g}",
+        )
 
 
 def _judge_loads(vehicle: VehicleModel) -> None:

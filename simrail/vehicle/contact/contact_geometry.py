@@ -42,6 +42,7 @@ CONSTANTS = (
     "windup_rate_1ps",
     "derailed_shift_m",
     "touch_load_n",
+    "rail_offset_m",
     *CreepLaw().constants(),
 )
 """What `ContactTable.const` holds."""
@@ -233,6 +234,7 @@ def build_contact(
         "windup_rate_1ps": _WINDUP_RATE_1PS,
         "derailed_shift_m": derailed,
         "touch_load_n": 0.01 * static_load_n,
+        "rail_offset_m": pair.offset_m,
         **(creep_law or CreepLaw()).constants(),
     }
     lean = f"1:{1.0 / rail_inclination:.0f}" if rail_inclination else "upright"

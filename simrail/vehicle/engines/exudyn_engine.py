@@ -30,6 +30,7 @@ from exudyn.itemInterface import (
 from scipy.spatial.transform import Rotation
 
 from simrail.core.jit import FloatArray
+from simrail.vehicle.contact.contact import CONTACT
 from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
@@ -38,8 +39,9 @@ from simrail.vehicle.engines.engine import (
     start_poses,
     stretches,
 )
-from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces
+from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces, tell_contacts
 from simrail.vehicle.engines.force_data import states_of
+from simrail.vehicle.engines.records import RecordArray
 
 _NOTHING = [0.0]
 
@@ -61,6 +63,8 @@ class ExudynEngine:
         self.size = 6 * len(model.bodies) + len(data.spins) + self._states
         self.memory = start_memory(setup)
         self._arguments = Arguments(self.size, data, self.memory)
+        # What is told of the contact is evaluated apart, so that it leaves no trace in the ride.
+        self._telling = Arguments(self.size, data, start_memory(setup))
         # Compiled now, so that no clock of a ride counts it.
         compiled = generalized_forces.compile  # type: ignore[attr-defined]
         compiled((numba.float64, numba.typeof(self._arguments.places)))
@@ -95,7 +99,15 @@ class ExudynEngine:
                 angular_acceleration=slopes[:, :, 3:] * HALF_TURN,
                 spin_rad=rows[:, 0, 6 * bodies : 6 * bodies + spins],
                 states=rows[:, 1, 6 * bodies + spins :],
+                contacts=self._contacts(time_s, rows),
             )
+
+    def _contacts(self, time_s: FloatArray, rows: FloatArray) -> RecordArray:
+        """What the force kernel tells of the contact (n, w) at output rows."""
+        at = self._telling
+        told = np.zeros((len(rows), len(at.contacts)), CONTACT)
+        tell_contacts(time_s, np.ascontiguousarray(rows), at.state, at.contacts, at.places, told)
+        return told
 
     def _build(self) -> None:
         model = self.setup.model
