@@ -11,6 +11,8 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
 from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
+from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
+from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
 from simrail.track.design import TrackDesign
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
@@ -71,6 +73,7 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
                 remedy="ride faster, shorter, or with less dwell time",
             )
     _judge_contact_rate(resolved.ride)
+    _judge_ride_figures(resolved)
     warnings = _judge_step(resolved)
     if not words.stands:
         warnings += _judge_dynamics(resolved)
@@ -135,6 +138,25 @@ def _judge_contact_rate(ride: Ride) -> None:
             limit=f"truth_rate_hz = {ride.rate_hz:g} Hz divided by a whole number",
             remedy=f"try {ride.rate_hz / max(round(ratio), 1):g}",
         )
+
+
+def _judge_ride_figures(resolved: ResolvedCell) -> None:
+    """Refuse figures of the ride that its rates are too low for."""
+    ride, spec = resolved.ride, resolved.cell.spec
+    asked = {"running_safety": spec.running_safety, "ride_comfort": spec.ride_comfort}
+    rates = {
+        "running_safety": ("contact_rate_hz", ride.contact_rate_hz, SAFETY_HZ),
+        "ride_comfort": ("truth_rate_hz", ride.rate_hz, COMFORT_HZ),
+    }
+    for table, (field, rate_hz, least_hz) in rates.items():
+        if asked[table] is not None and rate_hz < least_hz:
+            raise InputError(
+                f"is too low for [{table}]",
+                field=field,
+                value=rate_hz,
+                limit=f">= {least_hz:g} Hz",
+                remedy=f"raise it, or take [{table}] out",
+            )
 
 
 def _judge_loads(vehicle: VehicleModel) -> None:

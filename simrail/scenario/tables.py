@@ -234,6 +234,21 @@ class ScorePart(Part):
     metrics: tuple[str, ...] | None = None
 
 
+class RunningSafetyPart(Part):
+    """``[running_safety]``: scores the forces between wheels and rails after EN 14363.
+
+    ``vehicle`` says which limit of Prud'homme's counts, and ``derailment_limit`` what the report holds Y/Q
+    against. Forces are kept at ``contact_rate_hz``, or at the rate of the truth if that is not given.
+    """
+
+    vehicle: Literal["passenger", "freight"] = "passenger"
+    derailment_limit: Annotated[float, Field(gt=0.0, le=3.0)] = 0.8
+
+
+class RideComfortPart(Part):
+    """``[ride_comfort]``: scores N_MV (EN 12299) and Sperling's Wz where each IMU sits."""
+
+
 class GeometryLimitsPart(Part):
     """``[geometry.limits.<quantity>]``: limits that the report holds sections of 200 m against, mm.
 

@@ -25,8 +25,8 @@ ISO 8041-1 (Table B.1) is another one, with Q_4 = 0.55, Q_5 = 0.9 and Q_6 = 0.95
 k = 0.588 vertical, 0.737 lateral, f in Hz, a_w in m/s2 (Garg and Dukkipati 1984; Gangadharan et al. 2004,
 Eqs. 7 and 8; as comfpy has it). For a sine of amplitude A in cm/s2 it is the older form (A^2 B^2)^(1/6.67),
 of which 4.42 is the factor 100^0.3 2^0.15. From memory: k = 0.737 (programs found take 0.735, 1.25 times
-0.588, which is 0.002 less of a Wz of 2.5), and the customary band of 0.5 to 30 Hz. Other variants of the same name
-are *not* this one: Sperling's ride index for vehicles has another B(f), and GB/T 5599 reckons
+0.588, which is 0.002 less of a Wz of 2.5), and the customary band of 0.5 to 30 Hz. Other variants of the same
+name are *not* this one: Sperling's ride index for vehicles has another B(f), and GB/T 5599 reckons
 W = 3.57 (A^3 F(f) / f)^0.1 with a table F(f).
 """
 

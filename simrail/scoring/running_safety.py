@@ -15,9 +15,8 @@ From memory, because no text of the standards could be read: the clauses (EN 143
 processing and limits; 6.1 for dQ/Q0 <= 0.6 on twisted track), the filter's slope of 24 dB per octave, and
 the factor 0.85 of freight wagons in Prud'homme's limit.
 
-Signs: Y along the lateral axis of the track, positive to the left for both wheels of an axle, Q normal to
-the plane of the rails, positive downwards on the rail. Nothing here knows truths; see
-`simrail.scoring.ride_figures`.
+Signs: Y along the lateral axis of the track, the same way for both wheels of an axle; Q normal to the plane
+of the rails, positive where wheel and rail press. Truths are met in `simrail.scoring.ride_figures` only.
 """
 
 from collections.abc import Sequence

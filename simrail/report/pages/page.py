@@ -21,9 +21,11 @@ from simrail.report.papers import SECTIONS as PAPERS
 from simrail.report.tables.geometry import geometry_table, overview_table
 from simrail.report.tables.pivot import Case
 from simrail.report.tables.provenance import facts, parts
+from simrail.report.tables.running import running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.running_safety import DERAILMENT_LIMIT, TRACK_SHIFT_FACTOR
 from simrail.scoring.table import LEFT_OPEN, NO_SAMPLES, OK
 from simrail.track.design import TrackDesign
 
@@ -117,6 +119,19 @@ def _rails(data: PageData) -> list[Section]:
     return [_section("rails", "Rails", rails=table)] if table is not None else []
 
 
+def _running(data: PageData) -> list[Section]:
+    """What the ride itself was like."""
+    spec = data.scenario.spec
+    safety = spec.running_safety
+    limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
+    table = running_table(data.cases, derailment_limit=limit)
+    if table is None:
+        return []
+    factor = 1.0 if safety is None else TRACK_SHIFT_FACTOR[safety.vehicle]
+    shown = {"running": table, "safety": safety, "factor": factor, "comfort": spec.ride_comfort is not None}
+    return [_section("running", "Running safety and comfort", **shown)]
+
+
 def _scores(data: PageData) -> list[Section]:
     shown = [_case(data, case) for case in data.cases[:MOST_TABLES]]
     left_out = max(len(data.cases) - MOST_TABLES, 0)
@@ -169,6 +184,7 @@ SECTIONS: tuple[Callable[[PageData], list[Section]], ...] = (
     ride_sections,
     _tracks,
     _rails,
+    _running,
     _scores,
     _odometry,
     _words,

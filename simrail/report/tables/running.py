@@ -1,0 +1,76 @@
+"""Running safety and ride comfort as a person reads them: a table of rides, and a line in a terminal."""
+
+from collections.abc import Sequence
+
+from simrail.report.tables.pivot import Case, Mean
+from simrail.report.tables.tables import Row, Table, mean_cell
+from simrail.report.words.sentences import axis_words
+from simrail.scoring.ride_figures import RIDE
+
+_COLUMNS = (
+    ("wheel load", "least Q/Q\u2080", "wheel_unloading", "max", 3),
+    ("wheel load", "\u0394Q/Q\u2080 rms", "wheel_unloading", "rms", 3),
+    ("wheel load", "Q max, kN", "wheel_load", "max", 1),
+    ("derailment, 2 m", "Y/Q max", "derailment_quotient", "max", 3),
+    ("derailment, 2 m", "of limit, %", "derailment_quotient", "max", 0),
+    ("track shift, 2 m", "\u03a3Y max, kN", "sum_y", "max", 1),
+    ("track shift, 2 m", "of limit, %", "sum_y_relative", "max", 0),
+    ("comfort", "N_MV", "comfort_nmv", "p95", 2),
+    ("comfort", "Wz lateral", "sperling_lateral", "rms", 2),
+    ("comfort", "Wz vertical", "sperling_vertical", "rms", 2),
+)
+
+
+def ride_mean(case: Case, quantity: str, metric: str) -> Mean:
+    """A figure of the ride itself over the whole of it."""
+    return case.get(RIDE, quantity, metric)
+
+
+def running_table(all_cases: Sequence[Case], *, derailment_limit: float) -> Table | None:
+    """Running safety and comfort, one row per case that differs; None if no case has them."""
+    own = [case for case in all_cases if RIDE in case.estimators()]
+    columns = [column for column in _COLUMNS if any(ride_mean(case, *column[2:4]).draws for case in own)]
+    rows, seen = [], set()
+    for case in own:
+        cells = []
+        for _, head, quantity, metric, decimals in columns:
+            mean = ride_mean(case, quantity, metric)
+            if head.startswith("least"):
+                mean = mean._replace(value=1.0 - mean.value)
+            share = 100.0 if quantity == "sum_y_relative" else 100.0 / derailment_limit
+            scale = share if head.startswith("of limit") else 1.0
+            cells.append(mean_cell(mean, decimals=decimals, scale=scale))
+        axes = {name: value for name, value in case.labels.items() if "." in name and name != "imu.grade"}
+        words = [case.labels["ride"], *(axis_words(*axis) for axis in axes.items())]
+        # Without comfort, which is felt where an IMU is, the IMUs of a ride are alike.
+        comfort = any(ride_mean(case, *column).draws for column in (("comfort_nmv", "p95"),))
+        label = " \u00b7 ".join([*words, *([case.labels["mount"]] if comfort else [])])
+        key = (label, *(cell.text for cell in cells))
+        if key not in seen:
+            seen.add(key)
+            rows.append(Row(label, "", "", cells))
+    heads = list(dict.fromkeys(group for group, *_ in columns))
+    groups = [(head, sum(group == head for group, *_ in columns)) for head in heads]
+    return Table(groups, [head for _, head, *_ in columns], rows) if rows else None
+
+
+def running_words(case: Case, *, derailment_limit: float) -> str:
+    """Running safety and comfort of a case in a line; empty if it has none."""
+    said = []
+    unloading = ride_mean(case, "wheel_unloading", "max")
+    if unloading.draws:
+        quotient = ride_mean(case, "derailment_quotient", "max").value
+        shift = ride_mean(case, "sum_y", "max").value
+        relative = ride_mean(case, "sum_y_relative", "max").value
+        said.append(f"least Q/Q0 {1.0 - unloading.value:.3f}, at most")
+        said[-1] += f" Q {ride_mean(case, 'wheel_load', 'max').value:.1f} kN"
+        if quotient >= 0.0:  # over less than 2 m there is none
+            said[-1] += f", Y/Q {quotient:.3f} ({100.0 * quotient / derailment_limit:.0f} % of its limit)"
+            said[-1] += f", sum Y {shift:.1f} kN ({100.0 * relative:.0f} %)"
+    comfort = ride_mean(case, "comfort_nmv", "p95")
+    if comfort.draws:
+        lateral, vertical = (
+            ride_mean(case, f"sperling_{way}", "rms").value for way in ("lateral", "vertical")
+        )
+        said.append(f"N_MV {comfort.value:.2f}, Wz {lateral:.2f} lateral, {vertical:.2f} vertical")
+    return "; ".join(said)
