@@ -20,7 +20,7 @@ from simrail.report.tables.geometry import (
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases
-from simrail.report.tables.running import running_words
+from simrail.report.tables.running import decay_words, running_words
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
 from simrail.scoring.ride_figures import RIDE
@@ -58,6 +58,9 @@ def print_scores(console: Console, results: Results) -> None:
             break
         rows = scores[scores["cell"].isin(members["cell"])]
         console.print(_case(console, rows, members, styles, bands, limit))
+    kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
+    for sentence in decay_words(cases(kicks, cells)):
+        console.print(Text(sentence), soft_wrap=True)
     if campaign.stopped is not None:
         # What was not reached is to be seen; what was, is no less than what was asked for.
         colour = "green" if campaign.stopped.reached else "yellow"

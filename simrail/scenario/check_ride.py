@@ -57,6 +57,15 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
                 value=words.end_m,
                 remedy="end_m > start_m runs forward, end_m < start_m backward",
             )
+        low, high = sorted((words.start_m, words.start_m if words.end_m is None else words.end_m))
+        if words.kick_end_m is not None and not low <= words.kick_end_m < high:
+            raise InputError(
+                "the ride does not pass the end of the kick",
+                field="kick_end_m",
+                value=words.kick_end_m,
+                limit=f"{low:g} to {high:g} m",
+                remedy="move it between start_m and end_m",
+            )
     with blame(f"vehicle {vehicle.name}", "axle"):
         _judge_loads(vehicle)
     _judge_places(resolved)

@@ -76,8 +76,9 @@ QUANTITY_UNITS = {
     "comfort_nmv": "1",
     "sperling_lateral": "1",
     "sperling_vertical": "1",
+    "lateral_growth": "1/s",
 }
-"""Every quantity that can be scored, with the unit of its error; the last eight are of the ride itself."""
+"""Every quantity that can be scored, with the unit of its error; the last nine are of the ride itself."""
 
 METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us"}
 """Metrics whose unit is not the quantity's."""

@@ -21,7 +21,7 @@ from simrail.report.papers import SECTIONS as PAPERS
 from simrail.report.tables.geometry import geometry_table, overview_table
 from simrail.report.tables.pivot import Case
 from simrail.report.tables.provenance import facts, parts
-from simrail.report.tables.running import running_table
+from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
@@ -128,7 +128,13 @@ def _running(data: PageData) -> list[Section]:
     if table is None:
         return []
     factor = 1.0 if safety is None else TRACK_SHIFT_FACTOR[safety.vehicle]
-    shown = {"running": table, "safety": safety, "factor": factor, "comfort": spec.ride_comfort is not None}
+    shown = {
+        "running": table,
+        "safety": safety,
+        "factor": factor,
+        "comfort": spec.ride_comfort is not None,
+        "kicks": decay_words(data.cases),
+    }
     return [_section("running", "Running safety and comfort", **shown)]
 
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from simrail.report.tables.pivot import Case, Mean
+from simrail.report.tables.pivot import CASE_COLUMNS, Case, Mean
 from simrail.report.tables.tables import Row, Table, mean_cell
 from simrail.report.words.sentences import axis_words
+from simrail.scoring.hunting import decay_limit
 from simrail.scoring.ride_figures import RIDE
 
 _COLUMNS = (
@@ -18,7 +19,11 @@ _COLUMNS = (
     ("comfort", "N_MV", "comfort_nmv", "p95", 2),
     ("comfort", "Wz lateral", "sperling_lateral", "rms", 2),
     ("comfort", "Wz vertical", "sperling_vertical", "rms", 2),
+    ("after the kick", "growth, 1/s", "lateral_growth", "mean", 3),
 )
+
+SPEED = "ride.speed_kmh"
+"""Axis along which a kick may cease to decay."""
 
 
 def ride_mean(case: Case, quantity: str, metric: str) -> Mean:
@@ -73,4 +78,30 @@ def running_words(case: Case, *, derailment_limit: float) -> str:
             ride_mean(case, f"sperling_{way}", "rms").value for way in ("lateral", "vertical")
         )
         said.append(f"N_MV {comfort.value:.2f}, Wz {lateral:.2f} lateral, {vertical:.2f} vertical")
+    growth = ride_mean(case, "lateral_growth", "mean")
+    if growth.draws:
+        verb = "grows" if growth.value > 0.0 else "decays"
+        said.append(f"the kick {verb} by {abs(growth.value):.3f} per second")
     return "; ".join(said)
+
+
+def decay_words(all_cases: Sequence[Case]) -> list[str]:
+    """Above which speed the kick of a ride no longer decays, a sentence per ride that has several speeds."""
+    growth: dict[tuple[tuple[str, str], ...], dict[float, float]] = {}
+    for case in all_cases:
+        mean = ride_mean(case, "lateral_growth", "mean")
+        if mean.draws and SPEED in case.labels:
+            others = tuple((name, value) for name, value in case.labels.items() if name != SPEED)
+            growth.setdefault(others, {})[float(case.labels[SPEED])] = mean.value
+    sentences = []
+    for others, of_speed in growth.items():
+        labels = dict(others)
+        axes = [axis_words(name, value) for name, value in others if name not in CASE_COLUMNS]
+        who = ", ".join([f"{labels['vehicle']} on ride {labels['ride']}", *axes])
+        limit = decay_limit(of_speed)
+        if limit is not None:
+            sentences.append(f"{who}: the kick no longer decays above {limit:.1f} km/h")
+        elif len(of_speed) > 1:
+            verb = "decays at all" if max(of_speed.values()) <= 0.0 else "grows at the lowest of the"
+            sentences.append(f"{who}: the kick {verb} speeds up to {max(of_speed):g} km/h")
+    return list(dict.fromkeys(sentences))
