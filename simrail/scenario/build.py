@@ -174,7 +174,7 @@ class Parts:
             self._rides[key] = Ride(
                 name=cell.ride.name,
                 track=self.track(cell),
-                irregularity=NO_IRREGULARITY if rough is None else Irregularity(**rough.model_dump()),
+                irregularity=NO_IRREGULARITY if rough is None else rough.irregularity(),
                 track_seed=cell.ride_seed,
                 vehicle=vehicle,
                 profile=_profile(cell.ride),

@@ -20,6 +20,7 @@ from scipy.interpolate import CubicSpline
 from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.track.defects import check_defects, deviations, shortest_wave_m
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
 from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
@@ -137,7 +138,8 @@ class LaidTrack:
 
 def knot_step_m(irregularity: Irregularity) -> float:
     """Distance of the spline knots: 0.125 m, or the half, quarter, ... of it that shorter waves need."""
-    needed = irregularity.wavelengths_m[0] / SAMPLES_PER_WAVE
+    shortest = min(irregularity.wavelengths_m[0], shortest_wave_m(irregularity.defects))
+    needed = shortest / SAMPLES_PER_WAVE
     return 0.125 * 0.5 ** max(0, math.ceil(math.log2(0.125 / needed)))
 
 
@@ -169,26 +171,20 @@ def lay(
     """
     design.check()
     irregularity.check()
-    table_step_m = knot_step_m(irregularity)
     check_conditions(conditions, design.start_m, design.end_m)
-    if not 2.0 * irregularity.fade_m <= design.length_m <= PERIOD_M:
-        raise InputError(
-            "track and irregularity do not fit",
-            field="irregularity.fade_m" if design.length_m <= PERIOD_M else "irregularity",
-            value=f"{irregularity.fade_m:g} m twice on a track of {design.length_m:g} m",
-            limit=f"twice the fade <= track <= {PERIOD_M:g} m, where the realisation would repeat",
-            remedy="shorten fade_m" if design.length_m <= PERIOD_M else "cut the track in two",
-        )
+    check_defects(irregularity.defects, design.start_m, design.end_m)
+    check_stretch(irregularity, design)
+    table_step_m = knot_step_m(irregularity)
     first = math.floor(design.start_m / table_step_m)
     last = max(math.ceil(design.end_m / table_step_m), first + 4)
     knots = np.arange(first, last + 1)
     s = np.asarray(knots * table_step_m, dtype=np.float64)
-    period = realise_all(irregularity, seed=seed, step_m=table_step_m)
-    drawn = period[knots % period.shape[0]]
-    drawn *= fade(s, design.start_m, end_m=design.end_m, length_m=irregularity.fade_m)[:, None]
+    rails = _rails(_drawn(design, irregularity, seed, knots, table_step_m))
+    if irregularity.defects:
+        rails += deviations(irregularity.defects, s)
     splines = (
         _design_splines(design, s),
-        _coefficients(CubicSpline(s, _rails(drawn))),
+        _coefficients(CubicSpline(s, rails)),
         _coefficients(CubicSpline(s, friction_factors(conditions, s))),
     )
     table = np.concatenate(splines, axis=1)
@@ -196,6 +192,66 @@ def lay(
     table.flags.writeable = False
     start = float(s[0])
     return LaidTrack(design, irregularity, int(seed), start, table_step_m, table, tuple(conditions))
+
+
+def stretch_m(irregularity: Irregularity, design: TrackDesign) -> tuple[float, float]:
+    """Where what the spectrum gives begins and ends."""
+    start, end = irregularity.start_m, irregularity.end_m
+    return design.start_m if start is None else start, design.end_m if end is None else end
+
+
+def check_stretch(irregularity: Irregularity, design: TrackDesign) -> None:
+    """Refuse irregularities that are off the track, or have no room to fade in and out.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the irregularity.
+    """
+    start, end = stretch_m(irregularity, design)
+    for name, place in (("start_m", start), ("end_m", end)):
+        if not design.start_m <= place <= design.end_m:
+            raise InputError(
+                "the irregularity is not on the track",
+                field=f"irregularity.{name}",
+                value=place,
+                limit=f"{design.start_m:g} to {design.end_m:g} m",
+                remedy="move it onto the track, or leave it out: the irregularity then has all of the track",
+            )
+    if irregularity.fade_m == 0.0 and (start, end) != (design.start_m, design.end_m):
+        raise InputError(
+            "the rails would have a step where the irregularity begins or ends",
+            field="irregularity.fade_m",
+            value=0.0,
+            limit="> 0 m with start_m or end_m",
+            remedy="e.g. 40.0",
+        )
+    whole = design.length_m <= PERIOD_M
+    if not (2.0 * irregularity.fade_m <= end - start and whole):
+        raise InputError(
+            "track and irregularity do not fit",
+            field="irregularity.fade_m" if whole else "irregularity",
+            value=f"{irregularity.fade_m:g} m twice on a track of {end - start:g} m",
+            limit=f"twice the fade <= track <= {PERIOD_M:g} m, where the realisation would repeat",
+            remedy="shorten fade_m" if whole else "cut the track in two",
+        )
+
+
+def _drawn(
+    design: TrackDesign,
+    irregularity: Irregularity,
+    seed: int,
+    knots: npt.NDArray[np.int64],
+    step_m: float,
+) -> FloatArray:
+    """What the spectrum gives at the knots, faded, in the order of `IRREGULARITY`, m; (n, 4)."""
+    if irregularity.spectrum == "none":
+        return np.zeros((len(knots), 4))
+    period = realise_all(irregularity, seed=seed, step_m=step_m)
+    drawn = period[knots % period.shape[0]]
+    start, end = stretch_m(irregularity, design)
+    drawn *= fade(knots * step_m, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+    return drawn
 
 
 def _rails(drawn: FloatArray) -> FloatArray:
