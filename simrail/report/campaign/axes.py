@@ -39,6 +39,10 @@ class CampaignAxis:
         """Its title without a unit."""
         return self.title.partition(",")[0]
 
+    def word_of(self, value: object) -> str:
+        """Word of a value; a dash where a cell has none, as a ride without the list that another one has."""
+        return self.words[self.values.index(value)] if value in self.values else "\u2013"
+
 
 def is_campaign(scenario: Scenario) -> bool:
     """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
@@ -104,7 +108,7 @@ def _follows(cells: pd.DataFrame, one: str, other: str) -> bool:
 
 
 def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:
-    values = list(cells[name].unique())
+    values = list(cells[name].dropna().unique())
     if pd.api.types.is_numeric_dtype(cells[name]) and not pd.api.types.is_bool_dtype(cells[name]):
         values = sorted(values)
     elif name == "direction":

@@ -147,12 +147,11 @@ def _scores(data: PageData) -> list[Section]:
 def _case(data: PageData, case: Case) -> dict[str, Any]:
     """The tables of one case."""
     labels = case.labels
-    axes = {name: value for name, value in labels.items() if "." in name and not name.startswith("imu.grade")}
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     return {
-        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in axes.items())]),
+        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in case.axes.items())]),
         "draws": (words if draws > 1 else "one draw") + f" over {tracks} draws of the track" * (tracks > 1),
         "truth": error_table(case, data.attitude_styles, reference="truth"),
         "design": error_table(case, data.attitude_styles, reference="design"),

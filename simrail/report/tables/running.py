@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from simrail.report.tables.pivot import CASE_COLUMNS, Case, Mean
+from simrail.report.tables.pivot import Case, Mean
 from simrail.report.tables.tables import Row, Table, mean_cell
 from simrail.report.words.sentences import axis_words
 from simrail.scoring.hunting import decay_limit
@@ -22,8 +22,8 @@ _COLUMNS = (
     ("after the kick", "growth, 1/s", "lateral_growth", "mean", 3),
 )
 
-SPEED = "ride.speed_kmh"
-"""Axis along which a kick may cease to decay."""
+SPEED = "speed_kmh"
+"""Column of the cells along which a kick may cease to decay."""
 
 
 def ride_mean(case: Case, quantity: str, metric: str) -> Mean:
@@ -45,8 +45,7 @@ def running_table(all_cases: Sequence[Case], *, derailment_limit: float) -> Tabl
             share = 100.0 if quantity == "sum_y_relative" else 100.0 / derailment_limit
             scale = share if head.startswith("of limit") else 1.0
             cells.append(mean_cell(mean, decimals=decimals, scale=scale))
-        axes = {name: value for name, value in case.labels.items() if "." in name and name != "imu.grade"}
-        words = [case.labels["ride"], *(axis_words(*axis) for axis in axes.items())]
+        words = [case.labels["ride"], *(axis_words(*axis) for axis in case.axes.items())]
         # Without comfort, which is felt where an IMU is, the IMUs of a ride are alike.
         comfort = any(ride_mean(case, *column).draws for column in (("comfort_nmv", "p95"),))
         label = " \u00b7 ".join([*words, *([case.labels["mount"]] if comfort else [])])
@@ -87,21 +86,20 @@ def running_words(case: Case, *, derailment_limit: float) -> str:
 
 def decay_words(all_cases: Sequence[Case]) -> list[str]:
     """Above which speed the kick of a ride no longer decays, a sentence per ride that has several speeds."""
-    growth: dict[tuple[tuple[str, str], ...], dict[float, float]] = {}
+    growth: dict[tuple[str, ...], dict[float, float]] = {}
     for case in all_cases:
         mean = ride_mean(case, "lateral_growth", "mean")
         if mean.draws and SPEED in case.labels:
-            others = tuple((name, value) for name, value in case.labels.items() if name != SPEED)
-            growth.setdefault(others, {})[float(case.labels[SPEED])] = mean.value
+            axes = [axis_words(*axis) for axis in case.axes.items() if not axis[0].endswith(SPEED)]
+            who = (f"{case.labels['vehicle']} on ride {case.labels['ride']}", *axes)
+            growth.setdefault(who, {})[float(case.labels[SPEED])] = mean.value
     sentences = []
-    for others, of_speed in growth.items():
-        labels = dict(others)
-        axes = [axis_words(name, value) for name, value in others if name not in CASE_COLUMNS]
-        who = ", ".join([f"{labels['vehicle']} on ride {labels['ride']}", *axes])
+    for who, of_speed in growth.items():
         limit = decay_limit(of_speed)
-        if limit is not None:
-            sentences.append(f"{who}: the kick no longer decays above {limit:.1f} km/h")
-        elif len(of_speed) > 1:
-            verb = "decays at all" if max(of_speed.values()) <= 0.0 else "grows at the lowest of the"
-            sentences.append(f"{who}: the kick {verb} speeds up to {max(of_speed):g} km/h")
-    return list(dict.fromkeys(sentences))
+        said = f"no longer decays above {limit:.1f} km/h" if limit is not None else ""
+        if not said and len(of_speed) > 1:
+            verb = "grows" if max(of_speed.values()) > 0.0 else "decays"
+            said = f"{verb} at all speeds from {min(of_speed):g} to {max(of_speed):g} km/h"
+        if said:
+            sentences.append(f"{', '.join(who)}: the kick {said}")
+    return sentences
