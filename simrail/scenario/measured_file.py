@@ -137,7 +137,8 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
         path = existing_file(part.file, folder)
     here = part.model_copy(update={"file": path.name})
     names = [name for column in part.columns.values() for name in column]
-    read = read_columns(here, path.parent, names, table="irregularity.measured")
+    columns = read_columns(here, path.parent, names, table="irregularity.measured")
+    read = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
     with blame(label(path)):
         if not len(read[names[0]]):
             raise InputError("holds no samples", remedy="write one line per place")

@@ -288,7 +288,8 @@ def _drawn(
     step_m: float,
 ) -> FloatArray:
     """What spectrum and file give at the knots, faded, in the order of `IRREGULARITY`, m; (n, 4)."""
-    s, drawn = knots * step_m, np.zeros((len(knots), 4))
+    s: FloatArray = np.asarray(knots * step_m, dtype=np.float64)
+    drawn: FloatArray = np.zeros((len(knots), 4))
     if irregularity.spectrum != "none":
         period = realise_all(irregularity, seed=seed, step_m=step_m)
         drawn = period[knots % period.shape[0]]
