@@ -111,7 +111,7 @@ class Ride:
         packages = ("simrail", "numpy", "scipy", "numba", "exudyn")
         return {
             "track": self.track.to_dict(),
-            "irregularity": asdict(self.irregularity),
+            "irregularity": self.irregularity.describe(),
             "track_seed": self.track_seed,
             "vehicle": asdict(self.vehicle),
             "profiles": profiles_digest(self.vehicle.wheel_rail),

@@ -198,6 +198,10 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 remedy="shorten the ride or lengthen the track",
             )
     first, last = min(places.values()), max(places.values())
+    measured = resolved.ride.irregularity.measured
+    if measured is not None:
+        with blame(None, "irregularity"):
+            measured.check_covers(first + ahead[0], last + ahead[1])
     for i, stop in enumerate(words.stops):
         if not first < stop.position_m < last:
             raise InputError(

@@ -13,8 +13,10 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
 from simrail.scenario.axes import Listed, each
+from simrail.scenario.measured_file import MeasuredPart
 from simrail.track.defects import Defect
 from simrail.track.irregularity import Irregularity
+from simrail.track.measured import MeasuredRails
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
 """A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
@@ -68,7 +70,8 @@ class DefectPart(Part):
 class IrregularityPart(Part):
     """``[irregularity]``: how the rails deviate from the design. Without it they do not.
 
-    What the spectrum gives lies from ``start_m`` to ``end_m``, or along the whole track; defects are added.
+    What the spectrum gives lies from ``start_m`` to ``end_m``, or along the whole track; rails from a file
+    and defects are added.
     """
 
     spectrum: Listed[str] = "none"
@@ -81,12 +84,13 @@ class IrregularityPart(Part):
     gauge_scale: Listed[Scale] = 1.0
     start_m: Listed[float] | None = None
     end_m: Listed[float] | None = None
+    measured: MeasuredPart | None = None
     defect: tuple[DefectPart, ...] = ()
 
-    def irregularity(self) -> Irregularity:
-        """The irregularity that it describes; nothing in it is a list or a distribution."""
-        own = self.model_dump(exclude={"defect"})
-        return Irregularity(**own, defects=tuple(part.defect() for part in self.defect))
+    def irregularity(self, measured: MeasuredRails | None) -> Irregularity:
+        """The irregularity that it describes, with the rails of its file; nothing in it is a list."""
+        own = self.model_dump(exclude={"defect", "measured"})
+        return Irregularity(**own, defects=tuple(part.defect() for part in self.defect), measured=measured)
 
 
 class StopPart(Part):

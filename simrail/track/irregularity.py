@@ -18,7 +18,8 @@ nominal in the mean, by c, and what lies well within the limits keeps the densit
 This module knows nothing of rails or splines: see `simrail.track.laid_track`.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 from simrail.track.defects import Defect
 from simrail.track.elements import require_number
+from simrail.track.measured import MeasuredRails
 from simrail.track.spectra import SPECTRA
 
 PERIOD_M = 65536.0
@@ -64,6 +66,8 @@ class Irregularity:
         Where what the spectrum gives begins and ends, s along the track; with the track if not given.
     defects : tuple of Defect
         Discrete defects, added to it.
+    measured : MeasuredRails, optional
+        Rails from a file, added to what the spectrum gives or in its place; they fade as it does.
     """
 
     spectrum: str = "none"
@@ -77,6 +81,15 @@ class Irregularity:
     start_m: float | None = None
     end_m: float | None = None
     defects: tuple[Defect, ...] = ()
+    measured: MeasuredRails | None = None
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data that tells this irregularity from every other; of measured rails their digest."""
+        plain = asdict(replace(self, measured=None))
+        if self.measured is not None:
+            of_file = self.measured
+            plain["measured"] = [of_file.digest, of_file.replaces_spectrum]
+        return plain
 
     def scale_of(self, column: str) -> float:
         """Factor on the amplitudes of one of `simrail.core.columns.IRREGULARITY`."""
@@ -105,6 +118,8 @@ class Irregularity:
                 value=self.wavelengths_m,
                 limit=f"{SHORTEST_WAVELENGTH_M:g} <= shortest < longest <= {PERIOD_M / 16:g} m",
             )
+        if self.measured is not None:
+            self.measured.check_carries(self.wavelengths_m[0])
 
 
 def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float) -> FloatArray:

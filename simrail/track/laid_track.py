@@ -23,6 +23,7 @@ from simrail.core.jit import FloatArray
 from simrail.track.defects import check_defects, deviations, shortest_wave_m
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
+from simrail.track.measured import FINEST_STEP_M, MeasuredRails
 from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
 
 CHANNELS = (
@@ -140,6 +141,8 @@ def knot_step_m(irregularity: Irregularity) -> float:
     """Distance of the spline knots: 0.125 m, or the half, quarter, ... of it that shorter waves need."""
     shortest = min(irregularity.wavelengths_m[0], shortest_wave_m(irregularity.defects))
     needed = shortest / SAMPLES_PER_WAVE
+    if irregularity.measured is not None:
+        needed = min(needed, max(irregularity.measured.step_m, FINEST_STEP_M))
     return 0.125 * 0.5 ** max(0, math.ceil(math.log2(0.125 / needed)))
 
 
@@ -174,6 +177,7 @@ def lay(
     check_conditions(conditions, design.start_m, design.end_m)
     check_defects(irregularity.defects, design.start_m, design.end_m)
     check_stretch(irregularity, design)
+    check_measured(irregularity, design)
     table_step_m = knot_step_m(irregularity)
     first = math.floor(design.start_m / table_step_m)
     last = max(math.ceil(design.end_m / table_step_m), first + 4)
@@ -237,6 +241,45 @@ def check_stretch(irregularity: Irregularity, design: TrackDesign) -> None:
         )
 
 
+def overlap_m(measured: MeasuredRails, design: TrackDesign) -> tuple[float, float]:
+    """Where measured rails lie on a track."""
+    return max(measured.start_m, design.start_m), min(measured.end_m, design.end_m)
+
+
+def check_measured(irregularity: Irregularity, design: TrackDesign) -> None:
+    """Refuse measured rails that are off the track, or have no room to fade in and out.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the irregularity.
+    """
+    measured = irregularity.measured
+    if measured is None:
+        return
+    start, end = overlap_m(measured, design)
+    value = f"{measured.name} lies from {measured.start_m:g} to {measured.end_m:g} m"
+    if not end - start > 2.0 * irregularity.fade_m:
+        off = end <= start
+        raise InputError(
+            "the measured rails are not on the track" if off else "the measured rails are too short to fade",
+            field="irregularity.measured.start_m" if off else "irregularity.fade_m",
+            value=value if off else f"{irregularity.fade_m:g} m twice; {value}",
+            limit=f"the track is {design.start_m:g} to {design.end_m:g} m"
+            if off
+            else f"< {0.5 * (end - start):g} m",
+            remedy="set start_m to where the first sample lies on the track" if off else "shorten fade_m",
+        )
+    if irregularity.fade_m == 0.0 and (start, end) != (design.start_m, design.end_m):
+        raise InputError(
+            "the rails would have a step where the measured ones begin or end",
+            field="irregularity.fade_m",
+            value=f"0 m; {value}",
+            limit=f"> 0 m, or a file from {design.start_m:g} to {design.end_m:g} m",
+            remedy="e.g. 20.0",
+        )
+
+
 def _drawn(
     design: TrackDesign,
     irregularity: Irregularity,
@@ -244,13 +287,21 @@ def _drawn(
     knots: npt.NDArray[np.int64],
     step_m: float,
 ) -> FloatArray:
-    """What the spectrum gives at the knots, faded, in the order of `IRREGULARITY`, m; (n, 4)."""
-    if irregularity.spectrum == "none":
-        return np.zeros((len(knots), 4))
-    period = realise_all(irregularity, seed=seed, step_m=step_m)
-    drawn = period[knots % period.shape[0]]
-    start, end = stretch_m(irregularity, design)
-    drawn *= fade(knots * step_m, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+    """What spectrum and file give at the knots, faded, in the order of `IRREGULARITY`, m; (n, 4)."""
+    s: FloatArray = np.asarray(knots * step_m, dtype=np.float64)
+    drawn: FloatArray = np.zeros((len(knots), 4))
+    if irregularity.spectrum != "none":
+        period = realise_all(irregularity, seed=seed, step_m=step_m)
+        drawn = period[knots % period.shape[0]]
+        start, end = stretch_m(irregularity, design)
+        drawn *= fade(s, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+    measured = irregularity.measured
+    if measured is not None:
+        start, end = overlap_m(measured, design)
+        here = fade(s, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+        if measured.replaces_spectrum:
+            drawn *= 1.0 - here
+        drawn += here * measured.at(s)
     return drawn
 
 
