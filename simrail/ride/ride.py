@@ -159,7 +159,7 @@ def simulate(
 
     Raises
     ------
-    simrail.vehicle.engines.engine.DerailedError
+    simrail.vehicle.engines.derailment.DerailedError
         If a wheel leaves the rail.
     """
     key = ride_cache.key_of(ride.describe())
