@@ -206,6 +206,8 @@ def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: 
             check()  # an engine in C++ may have made an error of its own of Ctrl-C
             raise
     watcher.ride_ends()
+    for warning in truth.manifest.get("warnings", ()):
+        watcher.told(f"warning: ride {cell.ride.name}: {warning}")
     return truth
 
 

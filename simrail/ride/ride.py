@@ -18,6 +18,7 @@ import numpy as np
 
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
+from simrail.ride.contact_extremes import ContactExtremes
 from simrail.ride.contact_forces import contact_columns
 from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Truth, abeam
@@ -44,6 +45,7 @@ _SOURCES = (
         "vehicle",
         "ride/ride.py",
         "ride/contact_forces.py",
+        "ride/contact_extremes.py",
         "ride/kinematic.py",
         "ride/truth.py",
         "ride/truth_files.py",
@@ -244,6 +246,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     spins = list(model.spin_inertia_kgm2)
     turned = np.zeros(wheels)
     yaw = np.zeros(bodies)
+    extremes = ContactExtremes(model, rate_hz=ride.rate_hz, gravity_mps2=ride.gravity_mps2)
     done = 0
     ready = time.perf_counter()
     for segment in engine.run(duration):
@@ -274,6 +277,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
                 kept = slice(-(-here.start // every), -(-here.stop // every))
                 told = segment.contacts[kept.start * every - here.start :: every, w]
                 arrays[f"contact_{w}"][kept] = contact_columns(told)
+        extremes.add(arrays["time_s"][here], segment.contacts)
         done = here.stop
         let_go(arrays)
         if progress is not None:
@@ -293,20 +297,29 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         gravity_mps2=ride.gravity_mps2,
         contact_every=every or 1,
         manifest={
-            "ride": ride.name,
-            "engine": ride.engine,
-            "vehicle": model.name,
-            "drive": ride.drive,
-            "conditions": [asdict(condition) for condition in ride.conditions],
-            "step_s": ride.step_s,
-            "rate_hz": ride.rate_hz,
+            **_facts(ride),
             "simulated_s": float(duration),
             "wall_s": wall,
             "setup_s": ready - started,
             "real_time_factor": float(duration) / wall,
+            "contact": extremes.summary(),
+            "warnings": extremes.warnings(),
             "versions": ride.describe()["versions"],
         },
     )
+
+
+def _facts(ride: Ride) -> dict[str, Any]:
+    """What a manifest says of a ride that an engine drives."""
+    return {
+        "ride": ride.name,
+        "engine": ride.engine,
+        "vehicle": ride.vehicle.name,
+        "drive": ride.drive,
+        "conditions": [asdict(condition) for condition in ride.conditions],
+        "step_s": ride.step_s,
+        "rate_hz": ride.rate_hz,
+    }
 
 
 def _places(ride: Ride, begin: float, segment: Segment, led: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simrail.core.jit import FloatArray
+from simrail.core.jit import FloatArray, IntArray
 from simrail.vehicle.contact.contact_geometry import ContactTable
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.engines.engine import Setup
@@ -213,7 +213,10 @@ def _y_over_q(told: RecordArray, side: int) -> float:
     return float(np.mean(outward_ratio(last["guiding_n"], last["load_n"], side)))
 
 
-def outward_ratio(guiding_n: FloatArray, load_n: FloatArray, side: int) -> FloatArray:
-    """Y/Q of a wheel, positive where it presses its rail outward; 0 where it carries nothing."""
+def outward_ratio(guiding_n: FloatArray, load_n: FloatArray, side: int | IntArray) -> FloatArray:
+    """Y/Q of wheels (..., w), positive where they press their rails outward; 0 where they carry nothing.
+
+    ``side`` is +1 of a left wheel and -1 of a right one, or (w,).
+    """
     ratio: FloatArray = -side * guiding_n / np.where(load_n > 0.0, load_n, np.inf)
     return ratio
