@@ -29,7 +29,9 @@ from simrail.track.laid_track import LaidTrack, lay
 from simrail.track.rail_condition import RailCondition
 from simrail.vehicle.contact.profile_files import profiles_digest
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.derailment import DerailedError, Derailment
 from simrail.vehicle.engines.engine import Segment, Setup
+from simrail.vehicle.hunting import critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -180,8 +182,23 @@ def simulate(
         if ride.engine == "kinematic":
             save_truth(_follow(ride), draft)
         else:
-            _drive(ride, draft, progress)
+            try:
+                _drive(ride, draft, progress)
+            except DerailedError as error:
+                raise DerailedError(_with_hunting(error.derailment, ride)) from error
     return load_truth(place)
+
+
+def _with_hunting(derailment: Derailment, ride: Ride) -> Derailment:
+    """A derailment that nothing of the rails explains, with hunting as its cause where the vehicle hunts."""
+    if derailment.from_the_track:
+        return derailment
+    model = on_gauge(ride.vehicle, mean_widening_m(rails_of(ride), ride.profile))
+    critical = critical_below(model, abs(derailment.speed_mps), gravity_mps2=ride.gravity_mps2)
+    if critical is None:
+        return derailment
+    cause = f"hunting, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
+    return replace(derailment, cause=cause)
 
 
 def _follow(ride: Ride) -> Truth:
