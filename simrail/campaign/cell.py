@@ -17,6 +17,7 @@ import pandas as pd
 
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
+from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
@@ -67,6 +68,8 @@ class CellResult:
         By the estimator's name in the scenario, in the scenario's order; failed ones are left out.
     rails : LaidTrack, optional
         The rails that the ride was run on, if an estimate speaks of rails.
+    contacts : dict of str to ndarray (k, 12)
+        Forces of each wheel (`simrail.ride.truth.Truth.contacts`), mapped from disk, if the ride kept them.
     """
 
     cell: dict[str, object]
@@ -74,6 +77,7 @@ class CellResult:
     motion: pd.DataFrame
     estimates: dict[str, Estimate]
     rails: LaidTrack | None = None
+    contacts: dict[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass
@@ -215,6 +219,8 @@ def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: 
             check()  # an engine in C++ may have made an error of its own of Ctrl-C
             raise
     watcher.ride_ends()
+    for warning in truth.manifest.get("warnings", ()):
+        watcher.told(f"warning: ride {cell.ride.name}: {warning}")
     return truth
 
 
@@ -228,7 +234,7 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
-    return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails)
+    return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails, truth.contacts)
 
 
 def _labels(cell: Cell) -> dict[str, object]:

@@ -65,8 +65,7 @@ def print_scores(console: Console, results: Results) -> None:
         # What was not reached is to be seen; what was, is no less than what was asked for.
         colour = "green" if campaign.stopped.reached else "yellow"
         console.print(Text(campaign.stopped.words, style=colour), soft_wrap=True)
-    for warning in campaign.plan.warnings:
-        console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False)
+    print_warnings(console, campaign)
     reasons = list(dict.fromkeys((failure.estimator, failure.reason) for failure in campaign.failures))
     for estimator, reason in reasons[:10]:
         console.print(f"[red]failed:[/red] {estimator}: {reason}", highlight=False)
@@ -88,6 +87,13 @@ def print_cell(console: Console, campaign: CampaignResult) -> None:
     )
     columns = ["estimator", "quantity", "band", "reference", "window", "metric", "value", "unit", "status"]
     print(campaign.scores[columns].to_string(index=False, float_format=lambda value: f"{value:.9g}"))
+    print_warnings(console, campaign)
+
+
+def print_warnings(console: Console, campaign: CampaignResult) -> None:
+    """Print what was unusual in the plan and in the rides."""
+    for warning in campaign.warnings:
+        console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False, soft_wrap=True)
 
 
 def _case(

@@ -18,6 +18,7 @@ import numpy as np
 
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
+from simrail.ride.contact_extremes import ContactExtremes
 from simrail.ride.contact_forces import contact_columns
 from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Truth, abeam
@@ -28,7 +29,9 @@ from simrail.track.laid_track import LaidTrack, lay
 from simrail.track.rail_condition import RailCondition
 from simrail.vehicle.contact.profile_files import profiles_digest
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.derailment import DerailedError, Derailment
 from simrail.vehicle.engines.engine import Segment, Setup
+from simrail.vehicle.hunting import critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -44,6 +47,7 @@ _SOURCES = (
         "vehicle",
         "ride/ride.py",
         "ride/contact_forces.py",
+        "ride/contact_extremes.py",
         "ride/kinematic.py",
         "ride/truth.py",
         "ride/truth_files.py",
@@ -159,7 +163,7 @@ def simulate(
 
     Raises
     ------
-    simrail.vehicle.engines.engine.DerailedError
+    simrail.vehicle.engines.derailment.DerailedError
         If a wheel leaves the rail.
     """
     key = ride_cache.key_of(ride.describe())
@@ -178,8 +182,23 @@ def simulate(
         if ride.engine == "kinematic":
             save_truth(_follow(ride), draft)
         else:
-            _drive(ride, draft, progress)
+            try:
+                _drive(ride, draft, progress)
+            except DerailedError as error:
+                raise DerailedError(_with_hunting(error.derailment, ride)) from error
     return load_truth(place)
+
+
+def _with_hunting(derailment: Derailment, ride: Ride) -> Derailment:
+    """A derailment that nothing of the rails explains, with hunting as its cause where the vehicle hunts."""
+    if derailment.from_the_track:
+        return derailment
+    model = on_gauge(ride.vehicle, mean_widening_m(rails_of(ride), ride.profile))
+    critical = critical_below(model, abs(derailment.speed_mps), gravity_mps2=ride.gravity_mps2)
+    if critical is None:
+        return derailment
+    cause = f"hunting, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
+    return replace(derailment, cause=cause)
 
 
 def _follow(ride: Ride) -> Truth:
@@ -244,6 +263,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     spins = list(model.spin_inertia_kgm2)
     turned = np.zeros(wheels)
     yaw = np.zeros(bodies)
+    extremes = ContactExtremes(model, rate_hz=ride.rate_hz, gravity_mps2=ride.gravity_mps2)
     done = 0
     ready = time.perf_counter()
     for segment in engine.run(duration):
@@ -274,6 +294,7 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
                 kept = slice(-(-here.start // every), -(-here.stop // every))
                 told = segment.contacts[kept.start * every - here.start :: every, w]
                 arrays[f"contact_{w}"][kept] = contact_columns(told)
+        extremes.add(arrays["time_s"][here], segment.contacts)
         done = here.stop
         let_go(arrays)
         if progress is not None:
@@ -293,20 +314,29 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         gravity_mps2=ride.gravity_mps2,
         contact_every=every or 1,
         manifest={
-            "ride": ride.name,
-            "engine": ride.engine,
-            "vehicle": model.name,
-            "drive": ride.drive,
-            "conditions": [asdict(condition) for condition in ride.conditions],
-            "step_s": ride.step_s,
-            "rate_hz": ride.rate_hz,
+            **_facts(ride),
             "simulated_s": float(duration),
             "wall_s": wall,
             "setup_s": ready - started,
             "real_time_factor": float(duration) / wall,
+            "contact": extremes.summary(),
+            "warnings": extremes.warnings(),
             "versions": ride.describe()["versions"],
         },
     )
+
+
+def _facts(ride: Ride) -> dict[str, Any]:
+    """What a manifest says of a ride that an engine drives."""
+    return {
+        "ride": ride.name,
+        "engine": ride.engine,
+        "vehicle": ride.vehicle.name,
+        "drive": ride.drive,
+        "conditions": [asdict(condition) for condition in ride.conditions],
+        "step_s": ride.step_s,
+        "rate_hz": ride.rate_hz,
+    }
 
 
 def _places(ride: Ride, begin: float, segment: Segment, led: int) -> np.ndarray:

@@ -14,8 +14,10 @@ from simrail.scenario.build import ResolvedCell
 from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
 from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
 from simrail.track.design import TrackDesign
+from simrail.track.laid_track import LaidTrack
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
+from simrail.vehicle.hunting import conicity_of, critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
 
 WARN_LATERAL_MPS2 = 1.0
@@ -70,7 +72,7 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
         _judge_loads(vehicle)
     _judge_places(resolved)
     _judge_wheels(resolved)
-    _judge_rails(resolved)
+    laid = _judge_rails(resolved)
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         duration = resolved.ride.profile.duration_s
         if not duration <= LONGEST_RIDE_S:
@@ -85,16 +87,16 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
     _judge_ride_figures(resolved)
     warnings = _judge_step(resolved)
     if not words.stands:
-        warnings += _judge_dynamics(resolved)
+        warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
     return duration, warnings
 
 
-def _judge_rails(resolved: ResolvedCell) -> None:
-    """Refuse irregularities that cannot be, and conditions off the track or without sense."""
+def _judge_rails(resolved: ResolvedCell) -> LaidTrack:
+    """Refuse irregularities that cannot be, and conditions off the track or without sense; lay the rails."""
     ride = resolved.ride
     check_conditions(ride.conditions, ride.track.start_m, ride.track.end_m)
     try:
-        rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
+        return rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
     except InputError as error:
         if error.file is None and not (error.field or "").startswith("irregularity"):
             error.field = f"irregularity.{error.field or ''}".rstrip(".")
@@ -145,7 +147,7 @@ def _judge_contact_rate(ride: Ride) -> None:
             field="contact_rate_hz",
             value=ride.contact_rate_hz,
             limit=f"truth_rate_hz = {ride.rate_hz:g} Hz divided by a whole number",
-            remedy=f"try {ride.rate_hz / max(round(ratio), 1):g}",
+            remedy=f"try {ride.rate_hz / max(round(ratio), 1):.12g}",
         )
 
 
@@ -253,6 +255,26 @@ def _judge_dynamics(resolved: ResolvedCell) -> list[str]:
             "between stops is too short for its acceleration and jerk"
         )
     return warnings
+
+
+def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
+    """Warn of a speed above that at which the vehicle begins to hunt on these rails."""
+    ride, words = resolved.ride, resolved.cell.ride
+    if ride.engine == "kinematic":
+        return []
+    fastest = float(np.max(np.abs(ride.profile.motion(np.arange(0.0, ride.profile.duration_s, 0.1))[1])))
+    model = on_gauge(ride.vehicle, mean_widening_m(laid, ride.profile))
+    critical = critical_below(model, fastest, gravity_mps2=ride.gravity_mps2)
+    if critical is None:
+        return []
+    cone = conicity_of(model, gravity_mps2=ride.gravity_mps2)
+    on = "" if cone is None else f" with equivalent conicity {cone:.2f} at 3 mm,"
+    gauge_mm = 1e3 * model.wheel_rail.gauge_m
+    return [
+        f"ride[{resolved.cell.ride_index}] ({words.name}) reaches {3.6 * fastest:.0f} km/h: "
+        f"{ride.vehicle.name} hunts above {3.6 * critical:.0f} km/h on these rails,{on} "
+        f"gauge {gauge_mm:.0f} mm; what grows there ends at the flanges only"
+    ]
 
 
 def _judge_wheels(resolved: ResolvedCell) -> None:

@@ -73,8 +73,8 @@ class WheelForce(NamedTuple):
     Attributes
     ----------
     flag : int
-        0 no contact, 1 tread, 2 flange, 3 both, -1 derailed: beyond the table's range, forces no
-        longer mean anything.
+        0 no contact, 1 tread, 2 flange, 3 both, -1 derailed: beyond the table's range, or lifted by more than
+        the flange is high; forces no longer mean anything.
     fx, fy, fz : float
         Force on the wheel in the track frame, N.
     mx, my, mz : float
@@ -100,7 +100,7 @@ CONTACT = np.dtype(
     [
         ("wanted", "i8"),
         ("flag", "i8"),
-        *((name, "f8") for name in ("position_m", "load_n", "guiding_n", "normal_n", "penetration_m")),
+        *((name, "f8") for name in ("position_m", "load_n", "guiding_n", "normal_n", "shift_m", "lift_m")),
         *((name, "f8") for name in ("creep_x_n", "creep_y_n", "creepage_x", "creepage_y", "spin_1pm")),
         *((name, "f8") for name in ("rail_m", "angle_rad", "carried_n")),
     ],
@@ -108,8 +108,9 @@ CONTACT = np.dtype(
 )
 """What is told of the contact of one wheel, where ``wanted`` is not 0.
 
-Of the wheel: the flag, vertical and lateral force in the track frame (Q and Y), normal force and largest
-penetration, as in `WheelForce`; place s of its axle. Of both patches together: creep forces along and
+Of the wheel, in any case: the flag, vertical and lateral force in the track frame (Q and Y) and normal force,
+as in `WheelForce`; place s of its axle; how far it stands outward of its place on the rail, and how high its
+tape circle over the head. Of both patches together: creep forces along and
 across in the contact's plane. Of the patch that carries more: creepages, spin creepage, abscissa on the
 rail from the middle of its head outward, contact angle, and ``carried_n``, its normal force.
 """
@@ -241,7 +242,7 @@ def wheel_force(
         Creep states (tread longitudinal, lateral; flange longitudinal, lateral), and their rates
         (written).
     told : record, optional
-        A `CONTACT`; its part on the patches is written if it is wanted.
+        A `CONTACT`; shift and lift are written, and its part on the patches if it is wanted.
 
     Returns
     -------
@@ -364,6 +365,9 @@ def wheel_force(
             if tell_patch(told, N, T1, T2, slip_x * rolled, v_2 * rolled, spin_slip * per_speed):
                 told.rail_m = s + u + const.rail_offset_m
                 told.angle_rad = np.arctan(t)
-    if u < const.first_shift_m or u > const.derailed_shift_m:
+    lift = height + side * phi * half
+    if u < const.first_shift_m or u > const.derailed_shift_m or lift > const.flange_height_m:
         flag = -1
+    if told is not None:
+        told.shift_m, told.lift_m = u, lift
     return WheelForce(flag, fx, fy, fz, mx, my, mz, normal, deepest)

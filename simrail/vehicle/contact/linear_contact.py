@@ -34,6 +34,8 @@ def linear_wheel_force(
     length = const.relaxation_length_m + const.relaxation_time_s * speed
     shift = motion.y - rail.y
     Y = side * const.tape_circle_half_m
+    if told is not None:
+        told.shift_m, told.lift_m = side * shift, motion.z + Y * motion.phi - rail.z
     zeta_dot[2] = zeta_dot[3] = 0.0
     # Normal force: the static load and a linear spring and damper.
     pen = rail.z - motion.z - Y * motion.phi

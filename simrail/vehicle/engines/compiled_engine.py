@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from simrail.core.jit import FloatArray
 from simrail.vehicle.contact.contact import CONTACT
+from simrail.vehicle.engines.derailment import refuse_derailed
 from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
-    refuse_derailed,
     start_memory,
     start_poses,
     stretches,
@@ -57,7 +57,7 @@ class CompiledEngine:
         Raises
         ------
         DerailedError
-            If a wheel leaves the rail beyond its flange tip.
+            If a wheel leaves its rail.
         """
         for time_s, rows, slopes in stretches(
             self.setup,
@@ -101,7 +101,8 @@ class CompiledEngine:
         told = np.zeros((len(output), len(self.data.wheels)), CONTACT)
         made = self._march(first, rows[1:], told)
         self._contacts = np.concatenate([self._contacts, told])
-        refuse_derailed(self.memory, self.setup.model)
+        reached = self._contacts[self._contacts["wanted"].any(axis=1)]
+        refuse_derailed(self.memory, self.setup, lambda _time_s: reached)
         if made < last - first or not np.isfinite(self.state).all():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

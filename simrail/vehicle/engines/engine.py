@@ -29,10 +29,6 @@ _DIFFERENCE = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
 _REACH = len(_DIFFERENCE)
 
 
-class DerailedError(RuntimeError):
-    """A wheel climbed beyond its flange tip: the ride ends there."""
-
-
 @dataclass(frozen=True)
 class Setup:
     """What an engine is given: one vehicle on one laid track, and how it is to run there.
@@ -153,13 +149,6 @@ def start_memory(setup: Setup) -> Memory:
     memory.guide_memo["s_m"] = start_m + model.body(model.guide.body).position_m[0]
     memory.axle_memos["s_m"] = [start_m + model.body(name).position_m[0] for name in model.axle_names]
     return memory
-
-
-def refuse_derailed(memory: Memory, model: VehicleModel) -> None:
-    """Raise `DerailedError` if a wheel has left its rail."""
-    for axle, memo in zip(model.axle_names, memory.axle_memos, strict=True):
-        if memo["derailed"]:
-            raise DerailedError(f"derailed: axle {axle} left the rail at s = {memo['derailed_s_m']:.1f} m")
 
 
 def stretches(

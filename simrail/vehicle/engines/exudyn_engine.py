@@ -31,10 +31,10 @@ from scipy.spatial.transform import Rotation
 
 from simrail.core.jit import FloatArray
 from simrail.vehicle.contact.contact import CONTACT
+from simrail.vehicle.engines.derailment import refuse_derailed
 from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
-    refuse_derailed,
     start_memory,
     start_poses,
     stretches,
@@ -76,7 +76,7 @@ class ExudynEngine:
         Raises
         ------
         DerailedError
-            If a wheel leaves the rail beyond its flange tip.
+            If a wheel leaves its rail.
         """
         bodies, spins = len(self.setup.model.bodies), len(self._spins)
         for time_s, rows, slopes in stretches(
@@ -108,6 +108,12 @@ class ExudynEngine:
         told = np.zeros((len(rows), len(at.contacts)), CONTACT)
         tell_contacts(time_s, np.ascontiguousarray(rows), at.state, at.contacts, at.places, told)
         return told
+
+    def _until(self, time_s: float, first: int) -> RecordArray:
+        """What the force kernel tells of the contact (n, w) at output rows from a step until a time."""
+        step_s, every = self.setup.step_s, self.setup.every
+        steps = np.arange(-(-max(first, 0) // every) * every, int(time_s / step_s) + 1, every)
+        return self._contacts(np.multiply(steps, step_s), self._rows[steps - first])
 
     def _build(self) -> None:
         model = self.setup.model
@@ -198,7 +204,7 @@ class ExudynEngine:
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
         )
-        refuse_derailed(self.memory, self.setup.model)
+        refuse_derailed(self.memory, self.setup, lambda time_s: self._until(time_s, first))
         if not solved or np.isnan(self._rows).any():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

@@ -87,7 +87,8 @@ def axle_forces(
             )
         # Before 0 the vehicle is still being set down on its rails: where it then stands counts.
         if contact.flag < 0 and memo.derailed == 0 and t >= 0.0:
-            memo.derailed, memo.derailed_s_m = 1, s
+            memo.derailed, memo.derailed_time_s, memo.derailed_s_m = n + 1, t, s
+            memo.speed_mps, memo.shift_m, memo.lift_m = speed, told.shift_m, told.lift_m
         gx, gy, gz = rotated(frame.rotation, contact.fx, contact.fy, contact.fz)
         mx, my, mz = rotated(frame.rotation, contact.mx, contact.my, contact.mz)
         # The bearing passes everything on to the axle but the moment about its own axis.
@@ -99,7 +100,7 @@ def axle_forces(
         w.mx += mx - about * ex - h * (b.wy * ez - b.wz * ey)
         w.my += my - about * ey - h * (b.wz * ex - b.wx * ez)
         w.mz += mz - about * ez - h * (b.wx * ey - b.wy * ex)
-        told.flag, told.position_m, told.penetration_m = contact.flag, s, contact.penetration
+        told.flag, told.position_m = contact.flag, s
         told.load_n, told.guiding_n, told.normal_n = contact.fz, contact.fy, contact.normal
 
 
