@@ -27,7 +27,7 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
 from simrail.scenario.tables import RidePart
 from simrail.scoring.geometry import score_geometry
-from simrail.scoring.hunting import score_hunting
+from simrail.scoring.kick import score_kick
 from simrail.scoring.ride_figures import RIDE, score_ride_comfort, score_running_safety
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
@@ -364,7 +364,7 @@ def _score_ride(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> No
         if spec.ride_comfort is not None:
             tally.add(cell, RIDE, score_ride_comfort(truth, resolved.mount))
         if cell.ride.kick_end_m is not None:
-            tally.add(cell, RIDE, score_hunting(truth, after_m=cell.ride.kick_end_m))
+            tally.add(cell, RIDE, score_kick(truth, after_m=cell.ride.kick_end_m))
 
 
 def _wanted(cell: Cell) -> dict[str, Any]:

@@ -106,7 +106,7 @@ class RidePart(Part):
     With ``reverse = true`` it is ridden the other way, from ``end_m`` to ``start_m``, stops in turn; with
     ``reverse = [false, true]`` both ways. Without ``end_m`` and ``speed_kmh`` the vehicle stands where it
     is, for ``rest_s + final_rest_s``. Over a small kick in smooth straight rails, ``kick_end_m`` says where
-    it ends: it is scored whether the wheelsets' lateral motion decays beyond (`simrail.scoring.hunting`).
+    it ends: it is scored whether the wheelsets' lateral motion decays beyond (`simrail.scoring.kick`).
     """
 
     name: Name

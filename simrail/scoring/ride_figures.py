@@ -4,9 +4,9 @@ They are of the truth, not of an estimate: in the table they stand under the est
 worst of the vehicle, over all its wheels or axles; `running_safety` has it wheel by wheel.
 
 * ``derailment_quotient``: (Y/Q)_2m, by size; ``sum_y``: (sum Y)_2m in kN, and ``sum_y_relative``, that over
-  Prud'homme's limit for the axle; ``wheel_load``: Q in kN; ``wheel_unloading``: dQ/Q0, 1 where a wheel
-  carries nothing. Metrics are ``max``, ``p9985`` (the percentile of EN 14363) and, of the unloading, ``rms``
-  (`simrail.scoring.running_safety`).
+  Prud'homme's limit for the axle; ``guiding_force`` and ``wheel_load``: Y and Q in kN; ``wheel_unloading``:
+  dQ/Q0, 1 where a wheel carries nothing. Metrics are ``max``, ``p9985`` (the percentile of EN 14363) and, of
+  the unloading, ``rms`` (`simrail.scoring.running_safety`).
 * ``comfort_nmv`` (its metric is ``p95``: it is made of 95th percentiles), ``sperling_lateral`` and
   ``sperling_vertical`` (``rms``: of rms accelerations), where an IMU sits (`simrail.scoring.ride_comfort`).
 """
@@ -144,10 +144,10 @@ def running_safety(truth: Truth, vehicle: VehicleModel, *, factor: float = 1.0) 
     Returns
     -------
     pandas.DataFrame
-        Indexed by ``wheel``: ``static_load_n``; greatest ``wheel_load_n``; ``least_load``, smallest Q/Q0;
-        ``unloading_rms``, of dQ/Q0; greatest ``derailment_quotient`` and its ``derailment_quotient_p9985``;
-        greatest ``sum_y_n`` of its axle, and ``sum_y_relative``, that over Prud'homme's limit. What needs 2 m
-        of way is NaN on a shorter one.
+        Indexed by ``wheel``: ``static_load_n``; greatest ``wheel_load_n`` and, by size,
+        ``guiding_force_n``; ``least_load``, smallest Q/Q0; ``unloading_rms``, of dQ/Q0; greatest
+        ``derailment_quotient`` and its ``derailment_quotient_p9985``; greatest ``sum_y_n`` of its axle, and
+        ``sum_y_relative``, that over Prud'homme's limit. What needs 2 m of way is NaN on a shorter one.
 
     Raises
     ------
@@ -163,6 +163,7 @@ def running_safety(truth: Truth, vehicle: VehicleModel, *, factor: float = 1.0) 
             records[wheel] = {
                 "static_load_n": float(series.static_load_n[i]),
                 "wheel_load_n": float(series.wheel_load_n[i].max()),
+                "guiding_force_n": _greatest(series.guiding_force_n[i]),
                 "least_load": float(1.0 - series.unloading[i].max()),
                 "unloading_rms": _rms(series.unloading[i]),
                 "derailment_quotient": _greatest(quotient),
@@ -239,11 +240,13 @@ def score_running_safety(
         quotients = [q[m.get(window, [])] for a, _, m in parts for q in a.series.derailment_quotient]
         shifts = [a.series.sum_y_n[m.get(window, [])] for a, _, m in parts]
         relative = [y / a.shift_limit_n for y, (a, _, _) in zip(shifts, parts, strict=True)]
+        guiding = [y[s.get(window, [])] for a, s, _ in parts for y in a.series.guiding_force_n]
         loads = [q[s.get(window, [])] for a, s, _ in parts for q in a.series.wheel_load_n]
         unloadings = [u[s.get(window, [])] for a, s, _ in parts for u in a.series.unloading]
         rows += _worst("derailment_quotient", window, quotients, _TWO_SIDED)
         rows += _worst("sum_y", window, [1e-3 * y for y in shifts], _TWO_SIDED)
         rows += _worst("sum_y_relative", window, relative, _TWO_SIDED)
+        rows += _worst("guiding_force", window, [1e-3 * y for y in guiding], _TWO_SIDED)
         rows += _worst("wheel_load", window, [1e-3 * q for q in loads], _ONE_SIDED)
         rows += _worst("wheel_unloading", window, unloadings, _ONE_SIDED | {"rms": _rms})
     return table_of(rows)

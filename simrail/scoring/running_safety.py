@@ -4,7 +4,8 @@ The quantities of EN 14363 (and UIC 518, from which it grew) from arrays of forc
 
 * (Y/Q)_2m, the derailment quotient, and (sum Y)_2m, the track shift force of an axle: each low-passed at
   20 Hz, then its sliding mean over 2 m of track, every 0.5 m;
-* Q, the wheel load, low-passed at 20 Hz, and the wheel unloading dQ/Q0 = (Q0 - Q)/Q0 by it.
+* Q and Y, the wheel load and the guiding force, low-passed at 20 Hz, and the wheel unloading
+  dQ/Q0 = (Q0 - Q)/Q0.
 
 Of each the greatest value, and the percentile that EN 14363 evaluates, 99.85 % (on either side where the
 quantity has two). Limits: Nadal's in closed form, the 0.8 that EN 14363 sets, and Prud'homme's.
@@ -231,8 +232,8 @@ class SafetySeries:
         (Y/Q)_2m of each wheel.
     sum_y_n : ndarray (k,)
         (sum Y)_2m of the axle.
-    wheel_load_n : ndarray (w, n)
-        Q of each wheel, low-passed.
+    wheel_load_n, guiding_force_n : ndarray (w, n)
+        Q and Y of each wheel, low-passed.
     static_load_n : ndarray (w,)
         Q0 of each wheel.
     """
@@ -243,6 +244,7 @@ class SafetySeries:
     derailment_quotient: FloatArray
     sum_y_n: FloatArray
     wheel_load_n: FloatArray
+    guiding_force_n: FloatArray
     static_load_n: FloatArray
 
     @property
@@ -288,6 +290,7 @@ def safety_series(
                 derailment_quotient=np.array([sliding_mean(distance, one)[1] for one in quotient]),
                 sum_y_n=shift,
                 wheel_load_n=load,
+                guiding_force_n=lateral,
                 static_load_n=static,
             )
         )

@@ -71,6 +71,7 @@ QUANTITY_UNITS = {
     "derailment_quotient": "1",
     "sum_y": "kN",
     "sum_y_relative": "1",
+    "guiding_force": "kN",
     "wheel_load": "kN",
     "wheel_unloading": "1",
     "comfort_nmv": "1",
@@ -78,7 +79,7 @@ QUANTITY_UNITS = {
     "sperling_vertical": "1",
     "lateral_growth": "1/s",
 }
-"""Every quantity that can be scored, with the unit of its error; the last nine are of the ride itself."""
+"""Every quantity that can be scored, with the unit of its error; the last ten are of the ride itself."""
 
 METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us"}
 """Metrics whose unit is not the quantity's."""

@@ -103,6 +103,7 @@ def test_the_worst_wheel_in_each_window(wagon):
     assert value(table, "sum_y_relative", window="curve") == pytest.approx(
         0.4 * kilonewtons / limit, rel=1e-3
     )
+    assert 0.5 <= value(table, "guiding_force", window="curve") / kilonewtons < 0.5 + 0.04
     # A step overshoots in a low-pass: by 8 % of it at most, as a Butterworth filter of fourth order does.
     assert 1.25 <= value(table, "wheel_load", window="curve") / kilonewtons < 1.25 + 0.02
     assert 0.4 <= value(table, "wheel_unloading", window="curve") < 0.4 + 0.032

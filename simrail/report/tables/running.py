@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from simrail.report.tables.pivot import Case, Mean
 from simrail.report.tables.tables import Row, Table, mean_cell
 from simrail.report.words.sentences import axis_words
-from simrail.scoring.hunting import decay_limit
+from simrail.scoring.kick import decay_limit
 from simrail.scoring.ride_figures import RIDE
 
 _COLUMNS = (
     ("wheel load", "least Q/Q\u2080", "wheel_unloading", "max", 3),
     ("wheel load", "\u0394Q/Q\u2080 rms", "wheel_unloading", "rms", 3),
     ("wheel load", "Q max, kN", "wheel_load", "max", 1),
+    ("guiding", "Y max, kN", "guiding_force", "max", 1),
     ("derailment, 2 m", "Y/Q max", "derailment_quotient", "max", 3),
     ("derailment, 2 m", "of limit, %", "derailment_quotient", "max", 0),
     ("track shift, 2 m", "\u03a3Y max, kN", "sum_y", "max", 1),
@@ -68,6 +69,7 @@ def running_words(case: Case, *, derailment_limit: float) -> str:
         relative = ride_mean(case, "sum_y_relative", "max").value
         said.append(f"least Q/Q0 {1.0 - unloading.value:.3f}, at most")
         said[-1] += f" Q {ride_mean(case, 'wheel_load', 'max').value:.1f} kN"
+        said[-1] += f", Y {ride_mean(case, 'guiding_force', 'max').value:.1f} kN"
         if quotient >= 0.0:  # over less than 2 m there is none
             said[-1] += f", Y/Q {quotient:.3f} ({100.0 * quotient / derailment_limit:.0f} % of its limit)"
             said[-1] += f", sum Y {shift:.1f} kN ({100.0 * relative:.0f} %)"

@@ -7,7 +7,7 @@ import pytest
 from simrail.core.toml_files import load
 from simrail.results import run
 from simrail.ride.ride import Ride, simulate
-from simrail.scoring.hunting import decay_limit, score_hunting
+from simrail.scoring.kick import decay_limit, score_kick
 from simrail.track.defects import Defect
 from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
@@ -36,7 +36,7 @@ def growth_1ps(speed_mps):
         profile=SpeedProfile(20.0, 1150.0, speed_mps, 10.0, 20.0, rest_s=0.5, final_rest_s=0.5),
         engine="compiled",
     )
-    table = score_hunting(simulate(ride), after_m=326.0)
+    table = score_kick(simulate(ride), after_m=326.0)
     assert table["status"].tolist() == ["ok"]
     return float(table["value"][0])
 
@@ -63,4 +63,4 @@ def test_manchester_case_4_is_the_critical_speed(tmp_path, engine):
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
     assert manifest["engine"] == [engine]
     safety = scores[(scores["quantity"] == "wheel_unloading") & (scores["metric"] == "max")]
-    assert safety[safety["ride"] == "case1"]["value"].max() < 1.0  # no wheel leaves its rail in the dip
+    assert safety[safety["ride"] == "case_1"]["value"].max() < 1.0  # no wheel leaves its rail in the dip

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from simrail.ride.kinematic import along, kinematic_truth
-from simrail.scoring.hunting import (
+from simrail.scoring.kick import (
     LARGEST_M,
     decay_limit,
     growth_rate_1ps,
     lateral_motion,
-    score_hunting,
+    score_kick,
 )
 from simrail.track.design import TrackDesign
 from simrail.track.elements import Straight
@@ -75,9 +75,9 @@ def test_lateral_motion_begins_when_all_axles_have_passed(places):
     beyond = (at > 200.0) if places[1] > places[0] else (at < 200.0)
     assert len(lateral) == np.count_nonzero(fast & beyond)
     np.testing.assert_allclose(lateral[:, 0], shape(at[fast & beyond], 0), atol=1e-12)
-    table = score_hunting(truth, after_m=200.0)
+    table = score_kick(truth, after_m=200.0)
     assert table["quantity"].tolist() == ["lateral_growth"]
     assert table["value"][0] == pytest.approx(0.0, abs=1e-3)
     assert table["unit"].tolist() == ["1/s"]
-    late = score_hunting(truth, after_m=350.0 if places[1] > places[0] else 50.0)
+    late = score_kick(truth, after_m=350.0 if places[1] > places[0] else 50.0)
     assert late["status"].tolist() == ["no three seconds of small lateral motion after the kick"]

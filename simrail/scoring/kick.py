@@ -88,7 +88,7 @@ def lateral_motion(truth: Truth, *, after_m: float) -> FloatArray:
     return np.column_stack(columns)
 
 
-def score_hunting(truth: Truth, *, after_m: float) -> pd.DataFrame:
+def score_kick(truth: Truth, *, after_m: float) -> pd.DataFrame:
     """Growth of the lateral motion after a kick as a figure, `simrail.scoring.table.FIGURE_COLUMNS`."""
     lateral = lateral_motion(truth, after_m=after_m)
     growth = growth_rate_1ps(lateral, truth.rate_hz)
