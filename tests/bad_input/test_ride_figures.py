@@ -33,6 +33,14 @@ FAULTS = {
         COMPILED + SAFETY + "derailment_limit = 0.0\n",
         ["running_safety.derailment_limit", "0.0", "> 0"],
     ),
+    "an estimator of the name that the ride has": (
+        QUICK.replace('name = "design_angles"', 'name = "truth"') + COMFORT,
+        ["estimator", "'truth'", "the ride itself", "another name"],
+    ),
+    "a stop rule on forces that are not scored": (
+        QUICK + '[stop]\nestimator = "truth"\nquantity = "wheel_unloading"\nmetric = "max"\nwidth = 0.01\n',
+        ["stop.estimator", "'truth'", "ekf_compensated"],
+    ),
     "a kick behind the ride": (
         QUICK.replace("end_m = 590.0", "end_m = 590.0\nkick_end_m = 595.0"),
         ["ride[0].kick_end_m", "595.0", "10 to 590 m", "between start_m and end_m"],
@@ -47,3 +55,10 @@ def test_one_message(fault):
         judge_scenario(read_scenario(text, name="faulty"))
     for word in wanted:
         assert word in str(caught.value)
+
+
+def test_a_stop_rule_may_ask_for_a_figure_of_the_ride():
+    rule = '[stop]\nestimator = "truth"\nquantity = "comfort_nmv"\nmetric = "p95"\nwidth = 0.1\n'
+    rule += "least_draws = 2\n"
+    draws = QUICK.replace("sensor_draws = 2", "track_draws = 3")
+    judge_scenario(read_scenario(draws + COMFORT + rule, name="stops"))
