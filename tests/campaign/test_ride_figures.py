@@ -5,7 +5,10 @@ import pytest
 from rich.console import Console
 
 from simrail.cli.score_tables import print_scores
+from simrail.report.tables.pivot import cases
+from simrail.report.tables.running import running_table
 from simrail.results import run
+from simrail.scoring.aggregate import aggregate
 from simrail.scoring.table import OK
 
 TEXT = """
@@ -110,9 +113,16 @@ def test_the_page_and_the_printed_lines(results, capsys):
     assert f"{1.0 - unloading['value'].iloc[0]:.3f}" in page
 
 
-def test_aggregates_say_that_growth_may_be_negative(results):
-    from simrail.scoring.aggregate import aggregate
+def test_the_table_of_the_page_holds_y_over_q_against_the_limit_of_the_scenario(results):
+    campaign = results.campaign
+    table = running_table(cases(campaign.scores, campaign.cells), derailment_limit=1.2)
+    quotient = figures(results, ride="out", quantity="derailment_quotient", metric="max", window="whole")
+    share = f"{100.0 * quotient['value'].iloc[0] / 1.2:.0f}"
+    assert table.rows[0].cells[table.columns.index("of limit, %")].text == share
+    assert len(table.rows) == 3
 
+
+def test_aggregates_say_that_growth_may_be_negative(results):
     table = aggregate(results.campaign.scores, results.campaign.cells)
     rows = table[table["quantity"] == "lateral_growth"]
     assert (rows["value"] < 0.0).all()
