@@ -21,7 +21,7 @@ odometry = "truth"
 truth_rate_hz = 250.0
 [running_safety]
 vehicle = "freight"
-derailment_limit = 1.2
+derailment_limit = 0.05
 [ride_comfort]
 [monte_carlo]
 sensor_draws = 2
@@ -104,7 +104,7 @@ def test_the_page_and_the_printed_lines(results, capsys):
         "value"
     ]
     quotient = float(value.iloc[0])
-    assert f"Y/Q {quotient:.3f} ({100.0 * quotient / 1.2:.0f} % of its limit)" in printed
+    assert f"Y/Q {quotient:.3f} ({100.0 * quotient / 0.05:.0f} % of its limit)" in printed
     growth = figures(results, ride="out", quantity="lateral_growth")["value"].to_numpy()
     assert np.all(growth < 0.0)
     assert f"the kick decays by {-growth[0]:.3f} per second" in printed
@@ -115,9 +115,9 @@ def test_the_page_and_the_printed_lines(results, capsys):
 
 def test_the_table_of_the_page_holds_y_over_q_against_the_limit_of_the_scenario(results):
     campaign = results.campaign
-    table = running_table(cases(campaign.scores, campaign.cells), derailment_limit=1.2)
+    table = running_table(cases(campaign.scores, campaign.cells), derailment_limit=0.05)
     quotient = figures(results, ride="out", quantity="derailment_quotient", metric="max", window="whole")
-    share = f"{100.0 * quotient['value'].iloc[0] / 1.2:.0f}"
+    share = f"{100.0 * quotient['value'].iloc[0] / 0.05:.0f}"
     assert table.rows[0].cells[table.columns.index("of limit, %")].text == share
     assert len(table.rows) == 3
 
