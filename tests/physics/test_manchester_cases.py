@@ -68,7 +68,6 @@ def test_a_kick_decays_below_the_critical_speed_and_grows_above_within_3_percent
         place = truth.reference_position_m
         lateral = abeam(ride.track, place + 10.78, truth.bodies["axle_f1"].position)[2][:, 1]
         sizes = [np.ptp(lateral[(place > low) & (place < low + 100.0)]) for low in (18265.0, 19050.0)]
-        print(factor, sizes)
         assert (sizes[1] > 1.1 * sizes[0]) == (factor > 1.0)
         assert (sizes[1] < sizes[0] / 1.1) == (factor < 1.0)
 

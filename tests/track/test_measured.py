@@ -73,6 +73,17 @@ def test_at_its_own_places_a_file_comes_back_as_it_is() -> None:
     assert np.abs(laid(measured(s, noise)).irregularities(s[here]).to_numpy() - noise[here]).max() < 1e-15
 
 
+def test_short_waves_of_a_fine_file_are_laid() -> None:
+    # 0.4 m with a sample every 0.05 m: knots as close carry them to 0.2 %, those of 0.125 m to a tenth.
+    s = np.arange(0.0, 600.01, 0.05)
+    wave = 1e-3 * np.sin(2.0 * np.pi * s / 0.4)
+    track = laid(measured_rails("file", s, {"vertical_profile_m": wave}))
+    assert track.table_step_m == 0.03125
+    there = np.arange(100.0, 110.0, 0.0037)
+    found = track.irregularities(there)["vertical_profile_m"].to_numpy()
+    assert np.abs(found - 1e-3 * np.sin(2.0 * np.pi * there / 0.4)).max() < 3e-6
+
+
 def test_a_start_moves_the_first_sample() -> None:
     s = STEPS["0.25 m"]
     moved = laid(measured(12_000.0 + s, rails(s), start_m=-5.0))
