@@ -39,6 +39,14 @@ class CampaignAxis:
         """Its title without a unit."""
         return self.title.partition(",")[0]
 
+    def word_of(self, value: object) -> str:
+        """Words for one of its values; a ride that has no value on an axis of another ride has NaN."""
+        return next(
+            word
+            for known, word in zip(self.values, self.words, strict=True)
+            if known == value or (pd.isna(known) and pd.isna(value))
+        )
+
 
 def is_campaign(scenario: Scenario) -> bool:
     """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
@@ -118,6 +126,8 @@ def _title(name: str) -> str:
 
 
 def _words(value: object) -> str:
+    if pd.isna(value):
+        return "-"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"{value:g}"
     text = str(value)
