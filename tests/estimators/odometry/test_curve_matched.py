@@ -32,6 +32,7 @@ from simrail.estimators.odometry.kernel import (
 )
 
 from simrail.campaign.cell import record_cell
+from simrail.campaign.worker import RememberedTruth
 from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
@@ -60,7 +61,7 @@ BIAS_RADPS = np.radians(0.05)
 @lru_cache
 def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> Truth:
     """The metro bogie on the line, irregular rails, compiled engine."""
-    return simulate(
+    ride = simulate(
         Ride(
             name="odometry",
             track=LINE,
@@ -71,6 +72,7 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> T
             engine="compiled",
         )
     )
+    return RememberedTruth.of(ride)
 
 
 @lru_cache(maxsize=8)
