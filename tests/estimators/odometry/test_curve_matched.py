@@ -312,7 +312,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     first = 2300
     imu = recording.imu.to_numpy()[: (first + steps) * 5].reshape(-1, 5, 6).mean(axis=1)[first:]
     counts = recording.encoder["pulse_count"].to_numpy(dtype=float)
-    time = recording.imu.index.to_numpy()[4::5][first : first + steps]
+    time = recording.imu.index.to_numpy()[4::5][first : first + steps].copy()
     read = np.searchsorted(recording.encoder.index.to_numpy(), time, side="right") - 1
     sheet = recording.encoder_sheet
     pulse = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
