@@ -21,6 +21,7 @@ from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import judge_stop_rule
 from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.table import CURVE_PREFIX, METRICS, WINDOWS
+from simrail.track.laid_track import LaidTrack
 
 MOST_CELLS = 1_000_000
 
@@ -104,6 +105,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
     last_ride = None
     durations: dict[tuple[object, ...], float] = {}
     judged_sensors: set[tuple[object, ...]] = set()
+    judged_rails: tuple[tuple[object, ...], LaidTrack] | None = None
     for cell in first_cells(scenario):
         resolved = parts.resolve(cell)
         ride = resolved.ride
@@ -118,7 +120,11 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
         )
         ride_key = (*way, ride.irregularity, ride.step_s)
         if ride_key not in durations:
-            durations[ride_key], unusual = judge_ride(resolved)
+            rails_key = (id(ride.track), ride.irregularity, ride.conditions)
+            # One is remembered: rides over the same rails come in a row, and rails of many are large.
+            same = judged_rails[1] if judged_rails is not None and judged_rails[0] == rails_key else None
+            durations[ride_key], unusual, laid = judge_ride(resolved, known_rails=same)
+            judged_rails = rails_key, laid
             warnings += unusual
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number

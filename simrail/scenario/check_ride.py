@@ -29,13 +29,17 @@ MOST_BASE_PER_GAUGE = 1.1
 """The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
 
 
-def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
+def judge_ride(
+    resolved: ResolvedCell, *, known_rails: LaidTrack | None = None
+) -> tuple[float, list[str], LaidTrack]:
     """Judge the ride of a cell.
 
     Parameters
     ----------
     resolved : ResolvedCell
         Any cell of the ride.
+    known_rails : LaidTrack, optional
+        Its rails, if another ride that has been judged had the same.
 
     Returns
     -------
@@ -43,6 +47,8 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
         How long the ride takes.
     warnings : list of str
         What is unusual, one line each.
+    rails : LaidTrack
+        Its rails.
 
     Raises
     ------
@@ -72,7 +78,7 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
         _judge_loads(vehicle)
     _judge_places(resolved)
     _judge_wheels(resolved)
-    laid = _judge_rails(resolved)
+    laid = known_rails or _judge_rails(resolved)
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         duration = resolved.ride.profile.duration_s
         if not duration <= LONGEST_RIDE_S:
@@ -88,7 +94,7 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
     warnings = _judge_step(resolved)
     if not words.stands:
         warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
-    return duration, warnings
+    return duration, warnings, laid
 
 
 def _judge_rails(resolved: ResolvedCell) -> LaidTrack:

@@ -57,6 +57,8 @@ class MeasuredPart(DataPart):
         Whether the spectrum is left out where the file lies; otherwise they add.
     partial : bool
         Whether the file may cover less than a ride.
+    cross_level_has_cant : bool
+        Whether the file's cross-level is that of the rails as they lie; the design's cant is then taken off.
     """
 
     columns: dict[str, Names]
@@ -67,6 +69,7 @@ class MeasuredPart(DataPart):
     bridge_gaps_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     instead_of_spectrum: bool = False
     partial: bool = False
+    cross_level_has_cant: bool = False
 
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
@@ -151,6 +154,7 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
             bridge_gaps_m=part.bridge_gaps_m,
             replaces_spectrum=part.instead_of_spectrum,
             partial=part.partial,
+            has_cant=part.cross_level_has_cant,
             where=lambda i: line_of(here, i),
         )
 

@@ -88,7 +88,7 @@ class Irregularity:
         plain = asdict(replace(self, measured=None))
         if self.measured is not None:
             of_file = self.measured
-            plain["measured"] = [of_file.digest, of_file.replaces_spectrum]
+            plain["measured"] = [of_file.digest, of_file.replaces_spectrum, of_file.has_cant]
         return plain
 
     def scale_of(self, column: str) -> float:

@@ -20,10 +20,11 @@ from scipy.interpolate import CubicSpline
 from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.toml_files import blame
 from simrail.track.defects import check_defects, deviations, shortest_wave_m
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
-from simrail.track.measured import FINEST_STEP_M, MeasuredRails
+from simrail.track.measured import FINEST_STEP_M, MeasuredRails, refuse_amplitude
 from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
 
 CHANNELS = (
@@ -278,6 +279,11 @@ def check_measured(irregularity: Irregularity, design: TrackDesign) -> None:
             limit=f"> 0 m, or a file from {design.start_m:g} to {design.end_m:g} m",
             remedy="e.g. 20.0",
         )
+    if measured.has_cant:
+        s = measured.position_m[(measured.position_m >= start) & (measured.position_m <= end)]
+        with blame(measured.name):
+            level = _less_cant(measured, design, s)[:, IRREGULARITY.index("cross_level_m")]
+            refuse_amplitude("cross_level_m", s, level)
 
 
 def _drawn(
@@ -301,8 +307,18 @@ def _drawn(
         here = fade(s, start, end_m=end, length_m=irregularity.fade_m)[:, None]
         if measured.replaces_spectrum:
             drawn *= 1.0 - here
-        drawn += here * measured.at(s)
+        drawn += here * _less_cant(measured, design, s)
     return drawn
+
+
+def _less_cant(measured: MeasuredRails, design: TrackDesign, s: FloatArray) -> FloatArray:
+    """Measured rails at places s (n,), less the cant of the design where their cross-level has it; (n, 4)."""
+    values = measured.at(s)
+    if measured.has_cant:
+        values[:, IRREGULARITY.index("cross_level_m")] -= design.rail_base_m * np.sin(
+            design.frame_extended(s).roll_rad
+        )
+    return values
 
 
 def _rails(drawn: FloatArray) -> FloatArray:

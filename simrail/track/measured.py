@@ -48,6 +48,9 @@ and 213.63); of cross-level its value on straight track, 3 in (213.63); of gauge
 (213.53). Rails beyond are another unit, or no rails.
 """
 
+LARGEST_CANT_M = 0.2
+"""What a cross-level may be larger if it has the cant of the design in it, before that is taken off."""
+
 SMALLEST_M = 5e-5
 """A whole file whose values stay within this of their mean is taken for another unit.
 
@@ -72,6 +75,8 @@ class MeasuredRails:
         Whether what the spectrum gives is left out where these lie.
     partial : bool
         Whether they may cover less than a ride.
+    has_cant : bool
+        Whether the cross-level is that of the rails as they lie, the cant of the design included.
     position_m : ndarray (n,)
         Places on the track, rising.
     values_m : ndarray (n, 4)
@@ -83,6 +88,7 @@ class MeasuredRails:
     step_m: float
     replaces_spectrum: bool
     partial: bool
+    has_cant: bool
     position_m: FloatArray = field(compare=False, repr=False)
     values_m: FloatArray = field(compare=False, repr=False)
 
@@ -147,6 +153,7 @@ def measured_rails(
     bridge_gaps_m: float = 0.0,
     replaces_spectrum: bool = False,
     partial: bool = False,
+    has_cant: bool = False,
     where: Callable[[int], str] = "sample {}".format,
 ) -> MeasuredRails:
     """Place measured rails on a track.
@@ -166,7 +173,7 @@ def measured_rails(
     bridge_gaps_m : float
         Up to this length gaps, and samples that are NaN, are bridged by a smooth step from the value before
         to that behind; longer ones are refused.
-    replaces_spectrum, partial : bool
+    replaces_spectrum, partial, has_cant : bool
         As in `MeasuredRails`.
     where : callable, optional
         Words for a sample's place, in messages.
@@ -198,7 +205,10 @@ def measured_rails(
         )
     _refuse_gap(position_m[samples], step, bridge_gaps_m, lambda i: where(int(samples[i])))
     for column in names:
-        _refuse_amplitude(column, position_m[samples], values[samples, IRREGULARITY.index(column)])
+        larger = LARGEST_CANT_M if has_cant and column == "cross_level_m" else 0.0
+        refuse_amplitude(
+            column, position_m[samples], values[samples, IRREGULARITY.index(column)], larger_m=larger
+        )
     places, values = _bridged(position_m[samples], scale * values[samples], step)
     places, values = _thinned(places, values)
     if start_m is not None:
@@ -207,7 +217,7 @@ def measured_rails(
     for array in (places, values):
         array.flags.writeable = False
     digest = hashlib.sha256(places.tobytes() + values.tobytes()).hexdigest()
-    return MeasuredRails(name, digest, step, replaces_spectrum, partial, places, values)
+    return MeasuredRails(name, digest, step, replaces_spectrum, partial, has_cant, places, values)
 
 
 def _refuse_disorder(position_m: FloatArray, where: Callable[[int], str]) -> None:
@@ -259,9 +269,11 @@ def _refuse_gap(
         )
 
 
-def _refuse_amplitude(column: str, position_m: FloatArray, values: FloatArray) -> None:
-    """Refuse amplitudes that only a wrong unit explains (`LARGEST_M`, `SMALLEST_M`)."""
-    quantity, limit = column.removesuffix("_m"), LARGEST_M[column]
+def refuse_amplitude(
+    column: str, position_m: FloatArray, values: FloatArray, *, larger_m: float = 0.0
+) -> None:
+    """Refuse amplitudes that only a wrong unit explains (`LARGEST_M` and ``larger_m``, `SMALLEST_M`)."""
+    quantity, limit = column.removesuffix("_m"), LARGEST_M[column] + larger_m
     if column == "gauge_m" and np.abs(np.median(values)) > 0.5:
         raise InputError(
             "is the gauge itself, not its deviation",
@@ -281,7 +293,8 @@ def _refuse_amplitude(column: str, position_m: FloatArray, values: FloatArray) -
             limit=f"{limit:.3g} m, twice what 49 CFR 213 allows class 1",
             remedy="mend its unit"
             + (" (millimetres?)" if largest > 100.0 * limit else "")
-            + "; cross-level is without the cant of the design" * (column == "cross_level_m"),
+            + "; if the file's cross-level has the cant in it, cross_level_has_cant = true"
+            * (column == "cross_level_m"),
         )
     spread = float(np.abs(values - values.mean()).max())
     if 0.0 < spread < SMALLEST_M:

@@ -11,7 +11,7 @@ from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.track.bands import BANDS, band_pass
 from simrail.track.defects import Defect
-from simrail.track.design import Straight, TrackDesign
+from simrail.track.design import Curve, Straight, TrackDesign, Transition
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import LaidTrack, lay
 from simrail.track.measured import FINEST_STEP_M, MeasuredRails, chord_offset, measured_rails
@@ -73,6 +73,17 @@ def test_at_its_own_places_a_file_comes_back_as_it_is() -> None:
     assert np.abs(laid(measured(s, noise)).irregularities(s[here]).to_numpy() - noise[here]).max() < 1e-15
 
 
+def test_short_waves_of_a_fine_file_are_laid() -> None:
+    # 0.4 m with a sample every 0.05 m: knots as close carry them to 0.2 %, those of 0.125 m to a tenth.
+    s = np.arange(0.0, 600.01, 0.05)
+    wave = 1e-3 * np.sin(2.0 * np.pi * s / 0.4)
+    track = laid(measured_rails("file", s, {"vertical_profile_m": wave}))
+    assert track.table_step_m == 0.03125
+    there = np.arange(100.0, 110.0, 0.0037)
+    found = track.irregularities(there)["vertical_profile_m"].to_numpy()
+    assert np.abs(found - 1e-3 * np.sin(2.0 * np.pi * there / 0.4)).max() < 3e-6
+
+
 def test_a_start_moves_the_first_sample() -> None:
     s = STEPS["0.25 m"]
     moved = laid(measured(12_000.0 + s, rails(s), start_m=-5.0))
@@ -104,6 +115,44 @@ def test_defects_add_to_a_file() -> None:
     dip = Defect("dip", 300.0, 6.0, 0.02)
     more = laid(measured(s), defects=(dip,)).rails([303.0]) - laid(measured(s)).rails([303.0])
     assert more == pytest.approx(np.array([[0.0, -0.02, 0.0, -0.02]]), abs=1e-6)
+
+
+def test_the_cant_of_the_design_is_taken_off() -> None:
+    design = TrackDesign(
+        "curve",
+        0.0,
+        (Straight(200.0), Transition(60.0), Curve(100.0, 400.0, 0.12), Transition(60.0), Straight(180.0)),
+    )
+    s = STEPS["0.25 m"]
+    # A left curve has its right rail raised: cross-level, left over right, of -120 mm, and linear in s.
+    cant = np.interp(s, [200.0, 260.0, 360.0, 420.0], [0.0, -0.12, -0.12, 0.0])
+    as_it_lies = rails(s) + np.array([0.0, 0.0, 1.0, 0.0]) * cant[:, None]
+    of_file = measured(s, as_it_lies, has_cant=True)
+    track = lay(
+        replace(design, cant_ramp="linear"),
+        Irregularity(wavelengths_m=(1.5, 100.0), fade_m=20.0, measured=of_file),
+        seed=1,
+    )
+    here = np.arange(20.0, 580.0, 0.25)
+    off = track.irregularities(here).to_numpy() - rails(here)
+    assert np.abs(off[:, [0, 1, 3]]).max() < 1e-9
+    # Asine of the cant over the base: the ramp is linear in the angle, off from one in height by 2e-5 m.
+    assert np.abs(off[:, 2]).max() < 1e-4
+    straight = lay(
+        design, Irregularity(wavelengths_m=(1.5, 100.0), fade_m=20.0, measured=measured(s)), seed=1
+    )
+    assert np.array_equal(straight.rails(here[:600]), track.rails(here[:600]))
+    with pytest.raises(InputError, match="larger than") as caught:
+        lay(
+            TRACK,
+            Irregularity(
+                wavelengths_m=(1.5, 100.0),
+                fade_m=20.0,
+                measured=measured(s, as_it_lies - np.array([0.0, 0.0, 0.1, 0.0]), has_cant=True),
+            ),
+            seed=1,
+        )
+    assert (caught.value.file, caught.value.field) == ("file", "cross_level")
 
 
 def test_missing_columns_are_zero_and_a_scale_scales() -> None:
