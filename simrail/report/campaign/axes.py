@@ -122,8 +122,6 @@ def _title(name: str) -> str:
 
 
 def _words(value: object) -> str:
-    if pd.isna(value):
-        return "-"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"{value:g}"
     text = str(value)

@@ -36,6 +36,7 @@ def running_table(all_cases: Sequence[Case], *, derailment_limit: float) -> Tabl
     """Running safety and comfort, one row per case that differs; None if no case has them."""
     own = [case for case in all_cases if RIDE in case.estimators()]
     columns = [column for column in _COLUMNS if any(ride_mean(case, *column[2:4]).draws for case in own)]
+    several = _several(own)
     rows, seen = [], set()
     for case in own:
         cells = []
@@ -46,7 +47,8 @@ def running_table(all_cases: Sequence[Case], *, derailment_limit: float) -> Tabl
             share = 100.0 if quantity == "sum_y_relative" else 100.0 / derailment_limit
             scale = share if head.startswith("of limit") else 1.0
             cells.append(mean_cell(mean, decimals=decimals, scale=scale))
-        words = [case.labels["ride"], *(axis_words(*axis) for axis in case.axes.items())]
+        words = [case.labels["ride"], *(case.labels[name] for name in several)]
+        words += [axis_words(*axis) for axis in case.axes.items()]
         # Without comfort, which is felt where an IMU is, the IMUs of a ride are alike.
         comfort = any(ride_mean(case, *column).draws for column in (("comfort_nmv", "p95"),))
         label = " \u00b7 ".join([*words, *([case.labels["mount"]] if comfort else [])])
@@ -89,11 +91,13 @@ def running_words(case: Case, *, derailment_limit: float) -> str:
 def decay_words(all_cases: Sequence[Case]) -> list[str]:
     """Above which speed the kick of a ride no longer decays, a sentence per ride that has several speeds."""
     growth: dict[tuple[str, ...], dict[float, float]] = {}
+    several = [name for name in _several(all_cases) if name != "vehicle"]
     for case in all_cases:
         mean = ride_mean(case, "lateral_growth", "mean")
         if mean.draws and SPEED in case.labels:
             axes = [axis_words(*axis) for axis in case.axes.items() if not axis[0].endswith(SPEED)]
-            who = (f"{case.labels['vehicle']} on ride {case.labels['ride']}", *axes)
+            words = [case.labels[name] for name in several]
+            who = (f"{case.labels['vehicle']} on ride {case.labels['ride']}", *words, *axes)
             growth.setdefault(who, {})[float(case.labels[SPEED])] = mean.value
     sentences = []
     for who, of_speed in growth.items():
@@ -105,3 +109,9 @@ def decay_words(all_cases: Sequence[Case]) -> list[str]:
         if said:
             sentences.append(f"{', '.join(who)}: the kick {said}")
     return sentences
+
+
+def _several(all_cases: Sequence[Case]) -> list[str]:
+    """What decides the motion and differs between cases, beside the axes that have a dot in their names."""
+    names = [name for name in ("vehicle", "track", "engine") if all(name in c.labels for c in all_cases)]
+    return [name for name in names if len({case.labels[name] for case in all_cases}) > 1]
