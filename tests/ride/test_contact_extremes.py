@@ -25,7 +25,7 @@ def told_of(place_m, load_n, guiding_n):
 
 
 def ride(seed=3, *, seconds=8.0):
-    """Stands for a second, runs at a changing speed, stands again, and turns back: forces are smooth noise."""
+    """Stands for a second, runs at a changing speed, stands again, and turns back; forces are smooth."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     speed = np.where((time_s < 1.0) | (np.abs(time_s - 5.0) < 0.4), 0.0, 6.0 + 3.0 * np.sin(2.0 * time_s))
