@@ -41,7 +41,7 @@ class CampaignAxis:
 
     def word_of(self, value: object) -> str:
         """Word of a value; a dash where a cell has none, as a ride without the list that another one has."""
-        return self.words[self.values.index(value)] if value in self.values else "\u2013"
+        return self.words[self.values.index(value)] if value in self.values else "-"
 
 
 def is_campaign(scenario: Scenario) -> bool:
