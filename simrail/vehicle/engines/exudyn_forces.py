@@ -123,6 +123,8 @@ def generalized_forces(t: float, places: RecordArray) -> None:
         records_at(at.springs[0], (at.springs[1],), records.SPRING),
         records_at(at.series[0], (at.series[1],), records.SERIES),
         records_at(at.rotations[0], (at.rotations[1],), records.ROTATION),
+        records_at(at.rods[0], (at.rods[1],), records.ROD),
+        records_at(at.arms[0], (at.arms[1],), records.ARMS),
         records_at(at.stops[0], (at.stops[1],), records.STOP),
         records_at(at.laws[0], (at.laws[1],), records.LAW),
         records_at(at.wheels[0], (at.wheels[1],), records.WHEEL),

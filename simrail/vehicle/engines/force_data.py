@@ -29,8 +29,10 @@ class ForceData(NamedTuple):
 
     Attributes
     ----------
-    bodies, springs, series, rotations, stops, laws, wheels, spins, axles, drive : ndarray of records
-        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
+    bodies, springs, series, rotations, rods, arms : ndarray of records
+        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `ROD`, `ARMS`.
+    stops, laws, wheels, spins, axles, drive : ndarray of records
+        Of each, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
     guide, traction, options : ndarray of records (1,)
         `GUIDE`, `TRACTION`, `OPTIONS`.
     track : ndarray of records
@@ -43,6 +45,8 @@ class ForceData(NamedTuple):
     springs: RecordArray
     series: RecordArray
     rotations: RecordArray
+    rods: RecordArray
+    arms: RecordArray
     stops: RecordArray
     laws: RecordArray
     wheels: RecordArray
@@ -127,6 +131,8 @@ def pack(
             ],
             records.ROTATION,
         ),
+        rods=_rods(model, gravity_mps2),
+        arms=_arms(model),
         stops=stops,
         laws=laws,
         wheels=np.array(wheels, records.WHEEL),
@@ -150,6 +156,38 @@ def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
         sag = force / spring.stiffness_npm[2] if spring.stiffness_npm[2] > 0.0 else 0.0
         springs[i] = (*_ends(model, spring), spring.stiffness_npm, spring.damping_nspm, sag)
     return springs
+
+
+def _rods(model: VehicleModel, gravity_mps2: float) -> RecordArray:
+    """Rods; one that carries weight is stretched or shortened by it at rest."""
+    rods = np.zeros(len(model.rods), records.ROD)
+    for i, (rod, tension) in enumerate(zip(model.rods, model.rod_tension_n(gravity_mps2), strict=True)):
+        inner, outer = model.body(rod.inner), model.body(rod.outer)
+        rods[i] = (
+            model.body_names.index(rod.inner),
+            model.body_names.index(rod.outer),
+            np.subtract(rod.inner_position_m, inner.position_m),
+            np.subtract(rod.outer_position_m, outer.position_m),
+            rod.length_m - tension / rod.stiffness_npm,
+            rod.stiffness_npm,
+            rod.damping_nspm,
+        )
+    return rods
+
+
+def _arms(model: VehicleModel) -> RecordArray:
+    """Trailing arms, without force at rest."""
+    arms = np.zeros(len(model.arms), records.ARMS)
+    for i, pair in enumerate(model.arms):
+        arms[i] = (
+            model.body_names.index(pair.axle),
+            model.body_names.index(pair.frame),
+            np.subtract(pair.bushings_m, model.body(pair.axle).position_m),
+            np.subtract(pair.bushings_m, model.body(pair.frame).position_m),
+            pair.stiffness_npm,
+            pair.damping_nspm,
+        )
+    return arms
 
 
 def _guide(model: VehicleModel, gravity_mps2: float) -> RecordArray:
