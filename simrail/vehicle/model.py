@@ -325,6 +325,11 @@ class VehicleModel:
         return list(dict.fromkeys(wheel.axle for wheel in self.wheels))
 
     @property
+    def has_wheelsets(self) -> bool:
+        """Whether both wheels of some axle turn as one: only then there is conicity, and hunting by it."""
+        return len(self.spin_inertia_kgm2) < len(self.wheels)
+
+    @property
     def reach_m(self) -> tuple[float, float]:
         """Smallest and largest x of an axle: how far the vehicle reaches from its reference point."""
         x = [body.position_m[0] for body in self.bodies if body.name in self.axle_names]

@@ -1,8 +1,8 @@
-"""Wheel loads and places of the shipped vehicles: on good track, over a dip in a sharp curve, against SIMPACK.
+"""Loads and places of the shipped vehicles' wheels: on good track, over a dip in a curve, against SIMPACK.
 
 SIMPACK's figures are those of the vehicles' source (see `scenarios/vehicles/metro_car_gz18.toml`), read off
-its pictures to 5 %. They belong to the profile LM, whose arcs could not be had; S1002 stands on LM's tape circle
-here, so what hangs on the profile is not compared.
+its pictures to 5 %. They belong to the profile LM, whose arcs could not be had; S1002 stands on LM's tape
+circle here, so what hangs on the profile is not compared.
 """
 
 from dataclasses import replace
@@ -82,7 +82,7 @@ def test_gz18_keeps_its_wheel_loads_on_good_track():
     ],
 )
 def test_vehicles_keep_their_wheel_loads_on_good_track(name, speed_kmh):
-    """dQ/Q0 below 0.10 rms over all wheels; the wagon has no top speed in its file, 100 km/h is a usual one."""
+    """dQ/Q0 below 0.10 rms over all wheels; the wagon's file has no top speed, 100 km/h is a usual one."""
     variation = load_variation(name, speed_kmh / 3.6)
     print(f"\n{name}: dQ/Q0 {rms(variation):.4f} rms, worst wheel {variation.std(axis=0).max():.4f}")
     assert rms(variation) < 0.10
