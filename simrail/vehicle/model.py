@@ -108,7 +108,7 @@ class TrailingArms:
     An arm is rigid and has no mass; its far end hangs in a bushing of the frame. It follows the axle in roll
     and yaw. What swings it up or down at one end only meets no resistance; both together turn the
     axle's body, which stands for the axle boxes. The springs that carry the frame stand on the boxes, over
-    the axle's line. Equations: `simrail.vehicle.engines.suspension_forces.arm_forces`.
+    the axle's line. Equations: `simrail.vehicle.engines.suspension_forces.arm_force`.
 
     Attributes
     ----------

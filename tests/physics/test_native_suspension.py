@@ -19,6 +19,7 @@ from simrail.track.laid_track import lay
 from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.engines.exudyn_engine import ExudynEngine
 from simrail.vehicle.engines.exudyn_forces import HALF_TURN
+from simrail.vehicle.engines.records import ROD
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -40,7 +41,7 @@ class Springless(Setup):
 
     def pack(self):
         data = super().pack()
-        return data._replace(springs=data.springs[:0], rods=data.rods[:0])
+        return data._replace(springs=data.springs[:0], links=data.links[data.links["kind"] != ROD])
 
 
 def natively_sprung(model, laid):
@@ -51,18 +52,18 @@ def natively_sprung(model, laid):
     """
     engine = ExudynEngine(Springless(model, laid, PROFILE, settle_s=1.0))
     packed = Setup(model, laid, PROFILE).pack()
-    for rod in packed.rods:
+    for rod in packed.links[packed.links["kind"] == ROD]:
         markers = [
             engine.mbs.AddMarker(
-                MarkerBodyPosition(bodyNumber=int(rod[end]), localPosition=rod[f"{end}_arm"] * HALF_TURN)
+                MarkerBodyPosition(bodyNumber=int(rod[end]), localPosition=rod[f"{end}_arm"][0] * HALF_TURN)
             )
             for end in ("inner", "outer")
         ]
         engine.mbs.AddObject(
             SpringDamper(
                 markerNumbers=markers,
-                stiffness=rod["stiffness"],
-                damping=rod["damping"],
+                stiffness=rod["stiffness"][0],
+                damping=rod["damping"][0],
                 referenceLength=rod["length_m"],
             )
         )

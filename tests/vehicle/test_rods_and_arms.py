@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation as Turn
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import judge, load, parse_toml, shipped
-from simrail.vehicle.engines.records import ARMS, POSE, ROD, WRENCH
-from simrail.vehicle.engines.suspension_forces import arm_forces, rod_forces
+from simrail.vehicle.engines.records import ARMS, LINK, POSE, ROD, WRENCH
+from simrail.vehicle.engines.suspension_forces import link_forces
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle
 from simrail.vehicle.model import Body, Rod
@@ -52,17 +52,19 @@ def points(pose, k, places):
     return at, speed + np.cross([row["wx"], row["wy"], row["wz"]], arm)
 
 
-def rod(stiffness=K, damping=C, places=PLACES):
-    return np.array([(0, 1, *places, LENGTH, stiffness, damping)], ROD)
+def rod(stiffness=K, damping=C, places=PLACES, length=LENGTH):
+    inner, outer = ((place, np.zeros(3)) for place in places)
+    row = (ROD, 0, 1, inner, outer, (stiffness, 0.0, 0.0), (damping, 0.0, 0.0), length)
+    return np.array([row], LINK)
 
 
 def arms(stiffness=ARM_K, damping=ARM_C, on_axle=ON_AXLE, on_frame=ON_FRAME):
-    return np.array([(0, 1, on_axle, on_frame, stiffness, damping)], ARMS)
+    return np.array([(ARMS, 0, 1, on_axle, on_frame, stiffness, damping, 0.0)], LINK)
 
 
-def wrenches(kernel, records, pose):
+def wrenches(links, pose):
     out = np.zeros(2, WRENCH)
-    kernel(records, pose, out)
+    link_forces(links, pose, out)
     return numbers(out)
 
 
@@ -74,7 +76,7 @@ def test_a_rod_pulls_along_its_line_at_any_rotation(seed):
     length = np.linalg.norm(b - a)
     line = (b - a) / length
     force = (K * (length - LENGTH) + C * (vb - va) @ line) * line
-    found = wrenches(rod_forces, rod(), pose)
+    found = wrenches(rod(), pose)
     for k, (sign, place) in enumerate(((1.0, PLACES[0]), (-1.0, PLACES[1]))):
         arm = pose["rotation"][k] @ place
         expected = np.concatenate([sign * force, np.cross(arm, sign * force)])
@@ -91,7 +93,7 @@ def test_a_conical_pendulum_on_a_rod():
     pose["rotation"] = np.eye(3)
     pose["x"][1], pose["z"][1] = radius, -length * np.cos(angle)
     pose["vy"][1] = np.sqrt(square) * radius
-    found = wrenches(rod_forces, rod(places=np.zeros((2, 3))), pose)[1]
+    found = wrenches(rod(places=np.zeros((2, 3))), pose)[1]
     expected = [-mass * square * radius, 0.0, mass * G, 0.0, 0.0, 0.0]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-6 * mass * G)
 
@@ -170,7 +172,7 @@ def potential(pose):
 def test_arms_forces_are_the_slope_of_their_energy(seed):
     """Forces and moments on both bodies, far from rest, by central differences: to 1e-6."""
     pose = anywhere(seed, apart=(-1.3, 0.0, 0.1), relative=0.05)
-    found = wrenches(arm_forces, arms(damping=np.zeros(3)), pose)
+    found = wrenches(arms(damping=np.zeros(3)), pose)
     step, expected = 1e-5, np.zeros((2, 6))
     for k in range(2):
         for i in range(6):
@@ -192,7 +194,7 @@ def test_arms_damping_takes_the_power_of_its_rates(seed):
     """c_x r'^2 + c_y y'^2 of each arm and 2 c_z r0^2 T'^2 of both, the rates by differences in time."""
     pose = anywhere(seed, apart=(-1.3, 0.0, 0.1), relative=0.05)
     pose["rotation"] = Turn.from_matrix(pose["rotation"]).as_matrix()
-    found = wrenches(arm_forces, arms(stiffness=np.zeros(3)), pose)
+    found = wrenches(arms(stiffness=np.zeros(3)), pose)
     motion = np.array([[row[n] for n in ("vx", "vy", "vz", "wx", "wy", "wz")] for row in pose])
     dt, sides = 1e-6, []
     for sign in (1.0, -1.0):
@@ -223,19 +225,19 @@ def test_arms_hold_the_axle_in_pitch_and_in_line_but_not_in_roll():
     small = 1e-7
     pose = at_rest()
     pose["rotation"][0] = Turn.from_rotvec([0.0, small, 0.0]).as_matrix()
-    found = wrenches(arm_forces, arms(), pose)[0]
+    found = wrenches(arms(), pose)[0]
     assert found[4] / small == pytest.approx(-2.0 * ARM_K[2] * square, rel=1e-6)
     # Along x both arms stretch, and both turn by z/r0^2: k_x (x/r)^2 + k_z (z/r)^2 of each.
     cos2, sin2 = ON_AXLE[0, 0] ** 2 / square, ON_AXLE[0, 2] ** 2 / square
     for axis, expected in (("x", ARM_K[0] * cos2 + ARM_K[2] * sin2), ("y", ARM_K[1])):
         pose = at_rest()
         pose[axis][0] = small
-        found = wrenches(arm_forces, arms(), pose)[0]
+        found = wrenches(arms(), pose)[0]
         assert found["xy".index(axis)] / small == pytest.approx(-2.0 * expected, rel=1e-6)
     # In roll an arm's far end moves by y upward across it: z/r of that stretches it.
     pose = at_rest()
     pose["rotation"][0] = Turn.from_rotvec([small, 0.0, 0.0]).as_matrix()
-    found = wrenches(arm_forces, arms(), pose)[0]
+    found = wrenches(arms(), pose)[0]
     expected = 2.0 * (ARM_K[0] * sin2 * ON_AXLE[0, 1] ** 2 + ARM_K[1] * ON_AXLE[0, 2] ** 2)
     assert found[3] / small == pytest.approx(-expected, rel=1e-6)
     assert expected < 5e-3 * 2.0 * ARM_K[2] * ON_AXLE[0, 1] ** 2
@@ -250,7 +252,7 @@ def test_a_weight_that_hangs_on_arms_swings_as_a_pendulum():
     length = r0 + mass * G / (2.0 * 2e6)
     pose, way = at_rest(upright, flat), 1e-5
     pose["x"][1], pose["y"][1], pose["z"][1] = way, 0.0, -length
-    found = wrenches(arm_forces, loose, pose)[1]
+    found = wrenches(loose, pose)[1]
     assert found[2] == pytest.approx(mass * G, rel=1e-6)
     assert np.sqrt(-found[0] / way / mass) == pytest.approx(np.sqrt(G / length), rel=1e-6)
 
@@ -267,7 +269,7 @@ def test_roll_of_gz18s_axle_is_held_by_its_springs_alone():
     for name, a, b in zip("xyz", axle.position_m, frame.position_m, strict=True):
         pose[name] = a, b
     pose["rotation"][0] = Turn.from_rotvec([small, 0.0, 0.0]).as_matrix()
-    of_arms = -wrenches(arm_forces, record, pose)[0, 3] / small
+    of_arms = -wrenches(record, pose)[0, 3] / small
     of_springs = sum(
         s.stiffness_npm[2] * s.position_m[1] ** 2 for s in model.suspensions if s.inner == pair.axle
     )
@@ -305,13 +307,16 @@ def test_irw_cars_guiding_rods_let_an_axle_yaw_about_their_meeting_point(axle):
         pose["rotation"] = np.eye(3), rotation
         arm = np.array([pivot_x, 0.0, 0.0])
         pose["x"][1], pose["y"][1], pose["z"][1] = centre + arm - rotation @ arm
-        on_axle_m = [np.subtract(r.outer_position_m, centre) for r in pair]
-        rows = [
-            (0, 1, r.inner_position_m, at, r.length_m, r.stiffness_npm, 0.0)
-            for r, at in zip(pair, on_axle_m, strict=True)
+        records = [
+            rod(
+                r.stiffness_npm,
+                0.0,
+                (r.inner_position_m, np.subtract(r.outer_position_m, centre)),
+                r.length_m,
+            )
+            for r in pair
         ]
-        records = np.array(rows, ROD)
-        on_axle = wrenches(rod_forces, records, pose)[1]
+        on_axle = wrenches(np.concatenate(records), pose)[1]
         return on_axle[5] + np.cross(rotation @ -arm, on_axle[:3])[2]
 
     about_axle = -rods_moment(1e-6, 0.0) / 1e-6

@@ -29,10 +29,8 @@ class ForceData(NamedTuple):
 
     Attributes
     ----------
-    bodies, springs, series, rotations, rods, arms : ndarray of records
-        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `ROD`, `ARMS`.
-    stops, laws, wheels, spins, axles, drive : ndarray of records
-        Of each, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
+    bodies, springs, series, links, stops, laws, wheels, spins, axles, drive : ndarray of records
+        Of each, `BODY`, `SPRING`, `SERIES`, `LINK`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
     guide, traction, options : ndarray of records (1,)
         `GUIDE`, `TRACTION`, `OPTIONS`.
     track : ndarray of records
@@ -44,9 +42,7 @@ class ForceData(NamedTuple):
     bodies: RecordArray
     springs: RecordArray
     series: RecordArray
-    rotations: RecordArray
-    rods: RecordArray
-    arms: RecordArray
+    links: RecordArray
     stops: RecordArray
     laws: RecordArray
     wheels: RecordArray
@@ -124,15 +120,7 @@ def pack(
             [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series],
             records.SERIES,
         ),
-        rotations=np.array(
-            [
-                (index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad)
-                for e in model.rotations
-            ],
-            records.ROTATION,
-        ),
-        rods=_rods(model, gravity_mps2),
-        arms=_arms(model),
+        links=_links(model, gravity_mps2),
         stops=stops,
         laws=laws,
         wheels=np.array(wheels, records.WHEEL),
@@ -158,36 +146,29 @@ def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
     return springs
 
 
-def _rods(model: VehicleModel, gravity_mps2: float) -> RecordArray:
-    """Rods; one that carries weight is stretched or shortened by it at rest."""
-    rods = np.zeros(len(model.rods), records.ROD)
-    for i, (rod, tension) in enumerate(zip(model.rods, model.rod_tension_n(gravity_mps2), strict=True)):
-        inner, outer = model.body(rod.inner), model.body(rod.outer)
-        rods[i] = (
-            model.body_names.index(rod.inner),
-            model.body_names.index(rod.outer),
-            np.subtract(rod.inner_position_m, inner.position_m),
-            np.subtract(rod.outer_position_m, outer.position_m),
-            rod.length_m - tension / rod.stiffness_npm,
-            rod.stiffness_npm,
-            rod.damping_nspm,
+def _links(model: VehicleModel, gravity_mps2: float) -> RecordArray:
+    """Springs of rotations, rods and trailing arms. A rod that carries weight is strained by it at rest."""
+    index, nowhere = model.body_names.index, np.zeros((2, 3))
+    rows: list[tuple[Any, ...]] = [
+        (
+            *(records.ROTATION, index(e.inner), index(e.outer), nowhere, nowhere),
+            *(e.stiffness_nmprad, e.damping_nmsprad, 0.0),
         )
-    return rods
-
-
-def _arms(model: VehicleModel) -> RecordArray:
-    """Trailing arms, without force at rest."""
-    arms = np.zeros(len(model.arms), records.ARMS)
-    for i, pair in enumerate(model.arms):
-        arms[i] = (
-            model.body_names.index(pair.axle),
-            model.body_names.index(pair.frame),
-            np.subtract(pair.bushings_m, model.body(pair.axle).position_m),
-            np.subtract(pair.bushings_m, model.body(pair.frame).position_m),
-            pair.stiffness_npm,
-            pair.damping_nspm,
+        for e in model.rotations
+    ]
+    for rod, tension in zip(model.rods, model.rod_tension_n(gravity_mps2), strict=True):
+        ends = (
+            [np.subtract(place, model.body(body).position_m), np.zeros(3)]
+            for body, place in ((rod.inner, rod.inner_position_m), (rod.outer, rod.outer_position_m))
         )
-    return arms
+        factors = (rod.stiffness_npm, 0.0, 0.0), (rod.damping_nspm, 0.0, 0.0)
+        length_m = rod.length_m - tension / rod.stiffness_npm
+        rows.append((records.ROD, index(rod.inner), index(rod.outer), *ends, *factors, length_m))
+    for pair in model.arms:
+        ends = (np.subtract(pair.bushings_m, model.body(b).position_m) for b in (pair.axle, pair.frame))
+        factors = pair.stiffness_npm, pair.damping_nspm
+        rows.append((records.ARMS, index(pair.axle), index(pair.frame), *ends, *factors, 0.0))
+    return np.array(rows, records.LINK)
 
 
 def _guide(model: VehicleModel, gravity_mps2: float) -> RecordArray:

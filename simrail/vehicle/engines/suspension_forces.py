@@ -14,7 +14,16 @@ import numpy as np
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.cubic import value
 from simrail.vehicle.engines.lookup import driven, find_on_track, place_in, track_at
-from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
+from simrail.vehicle.engines.records import (
+    ROD,
+    ROTATION,
+    Record,
+    RecordArray,
+    push,
+    relative,
+    rotated,
+    rotated_back,
+)
 
 
 class Between(NamedTuple):
@@ -131,29 +140,26 @@ def stop_forces(stops: RecordArray, laws: RecordArray, pose: RecordArray, wrench
         pull_along(p, stop.axis, a, wrench[stop.inner], wrench[stop.outer], force)
 
 
-@njit_borrowed
-def rotation_forces(rotations: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
-    """Add rotational springs and dampers, of the small rotation of the outer body in the inner body's axes.
+@njit_inner
+def rotation_force(spring: Record, a: Record, b: Record, wa: Record, wb: Record) -> None:
+    """Add a rotational spring and damper, of the small rotation of the outer body in the inner body's axes.
 
     The rotation is the antisymmetric part of A^T B.
     """
-    for m in range(rotations.shape[0]):
-        spring = rotations[m]
-        a, b, wa, wb = pose[spring.inner], pose[spring.outer], wrench[spring.inner], wrench[spring.outer]
-        A, B = a.rotation, b.rotation
-        for k in range(3):
-            q, u = (k + 1) % 3, (k + 2) % 3
-            angle = 0.0
-            for n in range(3):
-                angle += 0.5 * (A[n, u] * B[n, q] - A[n, q] * B[n, u])
-            rate = A[0, k] * (b.wx - a.wx) + A[1, k] * (b.wy - a.wy) + A[2, k] * (b.wz - a.wz)
-            moment = spring.stiffness[k] * angle + spring.damping[k] * rate
-            wa.mx += A[0, k] * moment
-            wa.my += A[1, k] * moment
-            wa.mz += A[2, k] * moment
-            wb.mx -= A[0, k] * moment
-            wb.my -= A[1, k] * moment
-            wb.mz -= A[2, k] * moment
+    A, B = a.rotation, b.rotation
+    for k in range(3):
+        q, u = (k + 1) % 3, (k + 2) % 3
+        angle = 0.0
+        for n in range(3):
+            angle += 0.5 * (A[n, u] * B[n, q] - A[n, q] * B[n, u])
+        rate = A[0, k] * (b.wx - a.wx) + A[1, k] * (b.wy - a.wy) + A[2, k] * (b.wz - a.wz)
+        moment = spring.stiffness[k] * angle + spring.damping[k] * rate
+        wa.mx += A[0, k] * moment
+        wa.my += A[1, k] * moment
+        wa.mz += A[2, k] * moment
+        wb.mx -= A[0, k] * moment
+        wb.my -= A[1, k] * moment
+        wb.mz -= A[2, k] * moment
 
 
 class Seen(NamedTuple):
@@ -186,18 +192,15 @@ class Seen(NamedTuple):
     turn_rate: float
 
 
-@njit_borrowed
-def rod_forces(rods: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
-    """Add rods: a spring and damper along the line between two points, F = k (L - L0) + c L'."""
-    for m in range(rods.shape[0]):
-        rod = rods[m]
-        a, b = pose[rod.inner], pose[rod.outer]
-        p = between(rod.inner_arm, rod.outer_arm, a, b)
-        length = np.sqrt(p.x * p.x + p.y * p.y + p.z * p.z)
-        x, y, z = p.x / length, p.y / length, p.z / length
-        rate = x * p.x_rate + y * p.y_rate + z * p.z_rate
-        force = rod.stiffness * (length - rod.length_m) + rod.damping * rate
-        pull(p, a, wrench[rod.inner], wrench[rod.outer], force * x, force * y, force * z)
+@njit_inner
+def rod_force(rod: Record, a: Record, b: Record, wa: Record, wb: Record) -> None:
+    """Add a rod: a spring and damper along the line between two points, F = k (L - L0) + c L'."""
+    p = between(rod.inner_arm[0], rod.outer_arm[0], a, b)
+    length = np.sqrt(p.x * p.x + p.y * p.y + p.z * p.z)
+    x, y, z = p.x / length, p.y / length, p.z / length
+    rate = x * p.x_rate + y * p.y_rate + z * p.z_rate
+    force = rod.stiffness[0] * (length - rod.length_m) + rod.damping[0] * rate
+    pull(p, a, wa, wb, force * x, force * y, force * z)
 
 
 @njit_inner
@@ -218,9 +221,9 @@ def seen(axle_arm: FloatArray, frame_arm: FloatArray, a: Record, b: Record) -> S
     return Seen(x, y, z, x_rate, y_rate, z_rate, ux, uy, uz, length, length_rate, turn, turn_rate)
 
 
-@njit_borrowed
-def arm_forces(arms: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
-    """Add trailing arms: the left and the right one of each axle turn about its line one by one.
+@njit_inner
+def arm_force(pair: Record, a: Record, b: Record, wa: Record, wb: Record) -> None:
+    """Add trailing arms: the left and the right one of an axle turn about its line one by one.
 
     In the axle's axes an arm of the length r0 at rest, its bushing at a distance r from the axle's line and
     turned by the angle t about it, feels
@@ -232,32 +235,40 @@ def arm_forces(arms: RecordArray, pose: RecordArray, wrench: RecordArray) -> Non
     The force acts at the bushing, on both bodies. An arm without mass bears no moment about the line that it
     turns on, so no force across it comes of its own turn; the mean of both is that of the axle boxes, which
     the axle's body stands for, and their moment holds that body. The potential is
-    ``sum k_x (r - r0)^2/2 + k_y (y - y0)^2/2 + k_z r0^2 T^2``.
+    ``sum (k_x (r - r0)^2 + k_y (y - y0)^2)/2 + k_z r0^2 T^2``.
     """
-    for m in range(arms.shape[0]):
-        pair = arms[m]
-        a, b = pose[pair.axle], pose[pair.frame]
-        left = seen(pair.axle_arm[0], pair.frame_arm[0], a, b)
-        right = seen(pair.axle_arm[1], pair.frame_arm[1], a, b)
-        turn = 0.5 * (left.turn + right.turn)
-        turn_rate = 0.5 * (left.turn_rate + right.turn_rate)
-        for k in range(2):
-            at = left if k == 0 else right
-            rest, arm = pair.axle_arm[k], pair.frame_arm[k]
-            square = rest[0] * rest[0] + rest[2] * rest[2]
-            along_arm = (
-                pair.stiffness[0] * (at.length - np.sqrt(square)) + pair.damping[0] * at.length_rate
-            ) / at.length
-            side = pair.stiffness[1] * (at.y - rest[1]) + pair.damping[1] * at.y_rate
-            across = (
-                square * (pair.stiffness[2] * turn + pair.damping[2] * turn_rate) / (at.length * at.length)
-            )
-            gx, gy, gz = rotated(
-                a.rotation, along_arm * at.x + across * at.z, side, along_arm * at.z - across * at.x
-            )
-            bx, by, bz = rotated(b.rotation, arm[0], arm[1], arm[2])
-            push(wrench[pair.axle], at.ux, at.uy, at.uz, gx, gy, gz)
-            push(wrench[pair.frame], bx, by, bz, -gx, -gy, -gz)
+    left = seen(pair.inner_arm[0], pair.outer_arm[0], a, b)
+    right = seen(pair.inner_arm[1], pair.outer_arm[1], a, b)
+    k, c = pair.stiffness, pair.damping
+    turning = k[2] * 0.5 * (left.turn + right.turn) + c[2] * 0.5 * (left.turn_rate + right.turn_rate)
+    for n in range(2):
+        at = left if n == 0 else right
+        rest, arm = pair.inner_arm[n], pair.outer_arm[n]
+        square = rest[0] * rest[0] + rest[2] * rest[2]
+        # Over the length, so that the way to the bushing gives the direction.
+        along_arm = (k[0] * (at.length - np.sqrt(square)) + c[0] * at.length_rate) / at.length
+        across = square * turning / (at.length * at.length)
+        side = k[1] * (at.y - rest[1]) + c[1] * at.y_rate
+        gx, gy, gz = rotated(
+            a.rotation, along_arm * at.x + across * at.z, side, along_arm * at.z - across * at.x
+        )
+        bx, by, bz = rotated(b.rotation, arm[0], arm[1], arm[2])
+        push(wa, at.ux, at.uy, at.uz, gx, gy, gz)
+        push(wb, bx, by, bz, -gx, -gy, -gz)
+
+
+@njit_borrowed
+def link_forces(links: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
+    """Add rotational springs, rods and trailing arms."""
+    for m in range(links.shape[0]):
+        link = links[m]
+        a, b, wa, wb = pose[link.inner], pose[link.outer], wrench[link.inner], wrench[link.outer]
+        if link.kind == ROTATION:
+            rotation_force(link, a, b, wa, wb)
+        elif link.kind == ROD:
+            rod_force(link, a, b, wa, wb)
+        else:
+            arm_force(link, a, b, wa, wb)
 
 
 @njit_inner
