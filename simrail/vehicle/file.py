@@ -249,7 +249,9 @@ class VehicleFile(Part):
         """Every body must hang together with the guide's body by springs."""
         held = {self.guide.body}
         pairs = [set(entry.between) for entry in self.suspension if any(entry.stiffness_npm)]
-        pairs += [set(entry.between) for entry in (*self.rod, *self.trailing_arm)]
+        pairs += [set(entry.between) for entry in self.rod] + [
+            set(entry.between) for entry in self.trailing_arm
+        ]
         for _ in names:
             held = held.union(*(pair for pair in pairs if pair & held))
         for i, name in enumerate(names):

@@ -157,15 +157,15 @@ def _links(model: VehicleModel, gravity_mps2: float) -> RecordArray:
         for e in model.rotations
     ]
     for rod, tension in zip(model.rods, model.rod_tension_n(gravity_mps2), strict=True):
-        ends = (
-            [np.subtract(place, model.body(body).position_m), np.zeros(3)]
+        inner, outer = (
+            (np.subtract(place, model.body(body).position_m), np.zeros(3))
             for body, place in ((rod.inner, rod.inner_position_m), (rod.outer, rod.outer_position_m))
         )
         factors = (rod.stiffness_npm, 0.0, 0.0), (rod.damping_nspm, 0.0, 0.0)
         length_m = rod.length_m - tension / rod.stiffness_npm
-        rows.append((records.ROD, index(rod.inner), index(rod.outer), *ends, *factors, length_m))
+        rows.append((records.ROD, index(rod.inner), index(rod.outer), inner, outer, *factors, length_m))
     for pair in model.arms:
-        ends = (np.subtract(pair.bushings_m, model.body(b).position_m) for b in (pair.axle, pair.frame))
+        ends = [np.subtract(pair.bushings_m, model.body(b).position_m) for b in (pair.axle, pair.frame)]
         factors = pair.stiffness_npm, pair.damping_nspm
         rows.append((records.ARMS, index(pair.axle), index(pair.frame), *ends, *factors, 0.0))
     return np.array(rows, records.LINK)
