@@ -54,6 +54,7 @@ from simrail.estimators.odometry.kernel import (
     Steps,
     V,
     curve_matched,
+    room_to_work,
 )
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
@@ -189,17 +190,13 @@ class CurveMatchedOdometry:
         pulse = wheel.pulse_m
         grid, table = line_table(recording.track)
         x, p = self._start(recording, pulse)
-        states, covariance, flags = (
-            np.empty((n, STATES)),
-            np.empty((n, STATES, STATES)),
-            np.empty((2, n), bool),
-        )
-        steps = Steps(ends, states, covariance, np.empty(n), *flags)
-        past = room_for_history(n if self.smoothed else 0, STATES, UPDATES)
+        states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
+        steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
+        past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
         model = self._model(recording, pulse)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
-        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, past)
-        if self.smoothed:
+        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
+        if past is not None:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
 
