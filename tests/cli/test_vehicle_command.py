@@ -53,6 +53,7 @@ def test_page_stands_alone_and_shows_three_figures(bogie: tuple[str, str, float]
     page = bogie[1]
     assert page.count("<svg") == 3 and "<script" not in page
     assert "No equivalent conicity is given" in page
+    assert "What is reduced" in page and "trailing arms" not in page  # it has none
     assert not re.search(r"""(?:src|href)=["'](?:https?:)?//""", page)
     assert "Synthetic: its figures are not those of a real vehicle" in page
     for heading in ("Masses and loads", "Contact", "Modes", "Root locus"):
