@@ -184,7 +184,7 @@ class CurveMatchedOdometry:
         names = [GYRO[1], GYRO[2], ACCEL[0]]
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
         signals = signals.reshape(n, block, 3).mean(axis=1)
-        ends = time[block - 1 :: block][:n]
+        ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
         read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
         counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
         pulse = wheel.pulse_m

@@ -113,9 +113,9 @@ class EncoderOdometry:
         """
         quantum = sheet.pulse_m
         states = _filter(
-            np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
+            np.array(encoder.index.to_numpy(dtype=np.float64)),
             encoder["pulse_count"].to_numpy(dtype=np.float64),
-            np.ascontiguousarray(times, dtype=np.float64),
+            np.array(times, dtype=np.float64),
             quantum,
             self.jerk_intensity_m2ps5,
             self.still_s,
@@ -129,9 +129,9 @@ class EncoderOdometry:
     ) -> pd.DataFrame:
         """Odometry from readings of the speed (column ``speed_mps``), otherwise as `from_counts`."""
         states = _speed_filter(
-            np.ascontiguousarray(odometer.index.to_numpy(dtype=np.float64)),
-            np.ascontiguousarray(odometer["speed_mps"].to_numpy(dtype=np.float64)),
-            np.ascontiguousarray(times, dtype=np.float64),
+            np.array(odometer.index.to_numpy(dtype=np.float64)),
+            np.array(odometer["speed_mps"].to_numpy(dtype=np.float64)),
+            np.array(times, dtype=np.float64),
             sheet.speed_sd_mps**2,
             self.jerk_intensity_m2ps5,
             self.still_mps,

@@ -32,6 +32,7 @@ from simrail.estimators.odometry.kernel import (
 )
 
 from simrail.campaign.cell import record_cell
+from simrail.campaign.worker import RememberedTruth
 from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
@@ -60,7 +61,7 @@ BIAS_RADPS = np.radians(0.05)
 @lru_cache
 def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> Truth:
     """The metro bogie on the line, irregular rails, compiled engine."""
-    return simulate(
+    ride = simulate(
         Ride(
             name="odometry",
             track=LINE,
@@ -71,6 +72,7 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> T
             engine="compiled",
         )
     )
+    return RememberedTruth.of(ride)
 
 
 @lru_cache(maxsize=8)
@@ -310,7 +312,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     first = 2300
     imu = recording.imu.to_numpy()[: (first + steps) * 5].reshape(-1, 5, 6).mean(axis=1)[first:]
     counts = recording.encoder["pulse_count"].to_numpy(dtype=float)
-    time = recording.imu.index.to_numpy()[4::5][first : first + steps]
+    time = recording.imu.index.to_numpy()[4::5][first : first + steps].copy()
     read = np.searchsorted(recording.encoder.index.to_numpy(), time, side="right") - 1
     sheet = recording.encoder_sheet
     pulse = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
