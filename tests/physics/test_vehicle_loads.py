@@ -40,8 +40,8 @@ def vehicle(name):
 
 
 def loads_over_time(engine, duration_s):
-    """Times and loads (n, w) of the wheels, every 4 ms."""
-    rows = [(part.time_s[-1], wheel_loads_n(engine)) for part in engine.run(duration_s, segment_s=4e-3)]
+    """Times and loads (n, w) of the wheels, every 8 ms."""
+    rows = [(part.time_s[-1], wheel_loads_n(engine)) for part in engine.run(duration_s, segment_s=8e-3)]
     times, loads = zip(*rows, strict=True)
     return np.array(times), np.array(loads)
 
