@@ -293,10 +293,9 @@ class VehicleFile(Part):
                 )
         return wheels, spins
 
-    def model(self, name: str) -> VehicleModel:
-        """Build the vehicle that the file describes."""
+    def _axles(self) -> list[Body]:
+        """The axles' bodies."""
         bodies: list[Body] = []
-        wheels, spins = self._wheels()
         for axle in self.axle:
             # The wheels ride on the bridge at the tape circles: their mass and transverse inertia count.
             carried = 2.0 * (axle.wheel_mass_kg * axle.wheel_y_m[0] ** 2 + axle.wheel_transverse_inertia_kgm2)
@@ -309,7 +308,10 @@ class VehicleFile(Part):
                     position_m=(axle.x_m, 0.0, axle.wheel_radius_m),
                 )
             )
-        bodies += self.body
+        return bodies
+
+    def _springs(self) -> tuple[list[Suspension], list[SeriesDamper]]:
+        """Springs with the dampers beside them, and the dampers on mounts that give way."""
         springs: list[Suspension] = []
         series: list[SeriesDamper] = []
         for entry in self.suspension:
@@ -328,6 +330,12 @@ class VehicleFile(Part):
                     for k in range(3)
                     if elastic[k] > 0.0
                 ]
+        return springs, series
+
+    def model(self, name: str) -> VehicleModel:
+        """Build the vehicle that the file describes."""
+        wheels, spins = self._wheels()
+        springs, series = self._springs()
         traction = self.traction
         if traction is not None:
             driven, braked = (_shares(traction, kind, wheels) for kind in ("driven", "braked"))
@@ -337,7 +345,7 @@ class VehicleFile(Part):
             title=self.title,
             source=self.source,
             synthetic=self.synthetic,
-            bodies=tuple(bodies),
+            bodies=(*self._axles(), *self.body),
             suspensions=tuple(springs),
             wheels=tuple(wheels),
             spin_inertia_kgm2=spins,
@@ -370,19 +378,22 @@ class VehicleFile(Part):
                 for ends in _ends(entry)
             ),
             rods=self._rods(),
-            arms=tuple(
-                TrailingArms(
-                    name=entry.name,
-                    axle=entry.between[0],
-                    frame=entry.between[1],
-                    bushings_m=entry.bushings_m,
-                    stiffness_npm=entry.stiffness_npm,
-                    damping_nspm=entry.damping_nspm,
-                )
-                for entry in self.trailing_arm
-            ),
+            arms=self._arms(),
             gyroscopic=self.gyroscopic,
             traction=traction,
+        )
+
+    def _arms(self) -> tuple[TrailingArms, ...]:
+        return tuple(
+            TrailingArms(
+                name=entry.name,
+                axle=entry.between[0],
+                frame=entry.between[1],
+                bushings_m=entry.bushings_m,
+                stiffness_npm=entry.stiffness_npm,
+                damping_nspm=entry.damping_nspm,
+            )
+            for entry in self.trailing_arm
         )
 
     def _rods(self) -> tuple[Rod, ...]:
