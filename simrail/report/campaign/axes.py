@@ -44,7 +44,7 @@ class CampaignAxis:
         return next(
             word
             for known, word in zip(self.values, self.words, strict=True)
-            if known == value or (pd.isna(known) and pd.isna(value))
+            if known == value or (_is_none(known) and _is_none(value))
         )
 
 
@@ -125,8 +125,13 @@ def _title(name: str) -> str:
     return _TITLES.get(name) or (f"{words}, {unit}" if unit else words)
 
 
+def _is_none(value: object) -> bool:
+    """Whether a cell has no value here: NaN, which alone differs from itself, or None."""
+    return value is None or value != value
+
+
 def _words(value: object) -> str:
-    if pd.isna(value):
+    if _is_none(value):
         return "-"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"{value:g}"
