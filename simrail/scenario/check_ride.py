@@ -25,13 +25,15 @@ MOST_BASE_PER_GAUGE = 1.1
 """The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
 
 
-def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
+def judge_ride(resolved: ResolvedCell, *, new_rails: bool = True) -> tuple[float, list[str]]:
     """Judge the ride of a cell.
 
     Parameters
     ----------
     resolved : ResolvedCell
         Any cell of the ride.
+    new_rails : bool
+        Whether its rails are to be judged; another ride may have had the same.
 
     Returns
     -------
@@ -59,7 +61,8 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
         _judge_loads(vehicle)
     _judge_places(resolved)
     _judge_wheels(resolved)
-    _judge_rails(resolved)
+    if new_rails:
+        _judge_rails(resolved)
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         duration = resolved.ride.profile.duration_s
         if not duration <= LONGEST_RIDE_S:
@@ -143,6 +146,10 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 remedy="shorten the ride or lengthen the track",
             )
     first, last = min(places.values()), max(places.values())
+    measured = resolved.ride.irregularity.measured
+    if measured is not None:
+        with blame(None, "irregularity"):
+            measured.check_covers(first + ahead[0], last + ahead[1])
     for i, stop in enumerate(words.stops):
         if not first < stop.position_m < last:
             raise InputError(
