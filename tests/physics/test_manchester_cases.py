@@ -29,8 +29,8 @@ def test_each_case_has_its_rails() -> None:
     one, two, three, *four = rides()
     laid = rails_of(one)
     # The outer rail of the left curve is the right one: 20 mm in the middle of 6 m, half of it a quarter on.
-    assert laid.rails([151.5, 153.0, 156.0])[:, 3] == pytest.approx([-0.010, -0.020, 0.0], abs=1e-6)
-    assert not laid.rails([151.5, 153.0])[:, :3].any()
+    assert laid.rails([171.5, 173.0, 176.0])[:, 3] == pytest.approx([-0.010, -0.020, 0.0], abs=1e-6)
+    assert not laid.rails([171.5, 173.0])[:, :3].any()
     # Both rails go 5 mm outward over 5 m, and stay for 200 m.
     assert laid.rails([699.9, 702.5, 705.0, 905.0, 910.1])[:, 0] == pytest.approx(
         [0, -0.0025, -0.005, -0.005, 0], abs=1e-6
@@ -41,7 +41,7 @@ def test_each_case_has_its_rails() -> None:
     rough = laid.irregularities(np.arange(1500.0, 16800.0, 5.0)).to_numpy()
     assert (rough.std(axis=0) > 2e-4).all()
     assert (
-        np.abs(laid.rails(np.concatenate([np.arange(0.0, 150.0), np.arange(17000.0, 18249.0)]))).max() < 1e-9
+        np.abs(laid.rails(np.concatenate([np.arange(0.0, 170.0), np.arange(17000.0, 18249.0)]))).max() < 1e-9
     )
     times = np.arange(0.0, three.profile.duration_s, 0.5)
     s, v, _ = three.profile.motion(times)

@@ -40,8 +40,12 @@ class CampaignAxis:
         return self.title.partition(",")[0]
 
     def word_of(self, value: object) -> str:
-        """Word of a value; a dash where a cell has none, as a ride without the list that another one has."""
-        return self.words[self.values.index(value)] if value in self.values else "-"
+        """Words for one of its values; a ride that has no value on an axis of another ride has NaN."""
+        return next(
+            word
+            for known, word in zip(self.values, self.words, strict=True)
+            if known == value or (_is_none(known) and _is_none(value))
+        )
 
 
 def is_campaign(scenario: Scenario) -> bool:
@@ -108,7 +112,7 @@ def _follows(cells: pd.DataFrame, one: str, other: str) -> bool:
 
 
 def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:
-    values = list(cells[name].dropna().unique())
+    values = list(cells[name].unique())
     if pd.api.types.is_numeric_dtype(cells[name]) and not pd.api.types.is_bool_dtype(cells[name]):
         values = sorted(values)
     elif name == "direction":
@@ -121,7 +125,14 @@ def _title(name: str) -> str:
     return _TITLES.get(name) or (f"{words}, {unit}" if unit else words)
 
 
+def _is_none(value: object) -> bool:
+    """Whether a cell has no value here: NaN, which alone differs from itself, or None."""
+    return value is None or value != value
+
+
 def _words(value: object) -> str:
+    if _is_none(value):
+        return "-"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"{value:g}"
     text = str(value)
