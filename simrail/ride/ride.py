@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -112,7 +113,6 @@ class Ride:
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this ride from every other, versions and sources included."""
-        packages = ("simrail", "numpy", "scipy", "numba", "exudyn")
         return {
             "track": self.track.to_dict(),
             "irregularity": asdict(self.irregularity),
@@ -127,9 +127,15 @@ class Ride:
             "drive": self.drive,
             "conditions": [asdict(condition) for condition in self.conditions],
             "contact_rate_hz": self.contact_rate_hz,
-            "versions": {package: version(package) for package in packages},
+            "versions": dict(_versions()),
             "sources": source_hash(*_SOURCES),
         }
+
+
+@lru_cache(maxsize=1)
+def _versions() -> tuple[tuple[str, str], ...]:
+    """Names and versions of the packages that make a ride; looked up once, each takes milliseconds."""
+    return tuple((package, version(package)) for package in ("simrail", "numpy", "scipy", "numba", "exudyn"))
 
 
 def rails_of(ride: Ride) -> LaidTrack:

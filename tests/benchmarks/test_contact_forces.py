@@ -32,7 +32,7 @@ def parts(vehicle):
 
 
 def best_of_turns(ways):
-    """Least processor time of each way, s, of rounds in which each has its turn; the first round is not counted."""
+    """Least processor time of each way, s, of rounds in which each has its turn; the first does not count."""
     times = {name: [] for name in ways}
     for _ in range(ROUNDS + 1):
         for name, way in ways.items():

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import re
-import subprocess
-import sys
 import time
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -19,19 +19,10 @@ def bogie(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str, float]:
     """What ``simrail vehicle metro_irw_bogie --out`` says, its page, and the seconds that it took."""
     folder = tmp_path_factory.mktemp("vehicle")
     begun = time.perf_counter()
-    command = [
-        sys.executable,
-        "-m",
-        "simrail",
-        "vehicle",
-        "metro_irw_bogie",
-        "--out",
-        str(folder / "new"),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=None)
-    assert done.returncode == DONE, done.stderr
+    with redirect_stdout(io.StringIO()) as said:
+        assert call(["vehicle", "metro_irw_bogie", "--out", str(folder / "new")]) == DONE
     page = (folder / "new" / "metro_irw_bogie.html").read_text(encoding="utf-8")
-    return done.stdout, page, time.perf_counter() - begun
+    return said.getvalue(), page, time.perf_counter() - begun
 
 
 def test_prints_what_is_asked_of_a_vehicle(bogie: tuple[str, str, float]) -> None:
