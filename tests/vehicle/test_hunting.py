@@ -30,7 +30,7 @@ def model_of(name):
 
 
 def test_it_is_the_critical_speed_of_the_whole_search():
-    """The suspended wheelset; `tests/vehicle/test_linear.py` holds the search to its closed form. 0.05 m/s."""
+    """The suspended wheelset; `tests/vehicle/test_linear.py` holds the search to its closed form."""
     model = model_of("suspended_wheelset")
     vehicle = running_vehicle(model)
     whole = critical_speed(vehicle, root_locus(vehicle, np.linspace(40.0, 110.0, 8))).speed_mps
