@@ -182,6 +182,8 @@ def first_crossing(
     eigenvalues: Callable[[float], ComplexArray],
     speeds_mps: FloatArray,
     known: Sequence[ComplexArray] | None = None,
+    *,
+    accuracy_mps: float = 1e-7,
 ) -> CriticalSpeed:
     """Critical speed of anything whose eigenvalues (1/s) are known as a function of the speed.
 
@@ -203,7 +205,7 @@ def first_crossing(
         return max(growth_1ps(eigenvalues(v)), -1e3)
 
     low, high = float(speeds_mps[i - 1]), float(speeds_mps[i])
-    speed_mps = low if growth(low) >= 0.0 else float(brentq(growth, low, high, xtol=1e-7, rtol=1e-9))
+    speed_mps = low if growth(low) >= 0.0 else float(brentq(growth, low, high, xtol=accuracy_mps, rtol=1e-9))
     return CriticalSpeed(speed_mps, _fastest_growing_hz(eigenvalues(speed_mps)), searched)
 
 

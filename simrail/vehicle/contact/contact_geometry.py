@@ -42,6 +42,8 @@ CONSTANTS = (
     "windup_rate_1ps",
     "derailed_shift_m",
     "touch_load_n",
+    "rail_offset_m",
+    "flange_height_m",
     *CreepLaw().constants(),
 )
 """What `ContactTable.const` holds."""
@@ -240,6 +242,8 @@ def build_contact(
         "windup_rate_1ps": _WINDUP_RATE_1PS,
         "derailed_shift_m": derailed,
         "touch_load_n": 0.01 * static_load_n,
+        "rail_offset_m": pair.offset_m,
+        "flange_height_m": float(depth(pair.s).max() - depth(0.0)),
         **(creep_law or CreepLaw()).constants(),
     }
     lean = f"1:{1.0 / rail_inclination:.0f}" if rail_inclination else "upright"

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.track.laid_track import LaidTrack
+from simrail.vehicle.contact.contact import CONTACT
 from simrail.vehicle.contact.contact_geometry import CONST
 from simrail.vehicle.contact.contact_tables import contacts_of, rest_drops_m
 from simrail.vehicle.engines import records
@@ -66,17 +67,24 @@ class Memory(NamedTuple):
         `GUIDE_MEMO` and, for each axle, `AXLE_MEMO`.
     frame : ndarray of records (1,)
         `FRAME`, overwritten at every look at the track.
+    contacts : ndarray of records (w,)
+        `simrail.vehicle.contact.contact.CONTACT` of each wheel: forces and penetration of the last call,
+        the rest of the last call in which they were wanted.
     """
 
     guide_memo: RecordArray
     axle_memos: RecordArray
     frame: RecordArray
+    contacts: RecordArray
 
 
 def memory_of(axles: int) -> Memory:
-    """A `Memory` of nothing."""
+    """A `Memory` of nothing; each axle has two wheels."""
     return Memory(
-        np.zeros(1, records.GUIDE_MEMO), np.zeros(axles, records.AXLE_MEMO), np.zeros(1, records.FRAME)
+        np.zeros(1, records.GUIDE_MEMO),
+        np.zeros(axles, records.AXLE_MEMO),
+        np.zeros(1, records.FRAME),
+        np.zeros(2 * axles, CONTACT),
     )
 
 

@@ -108,8 +108,9 @@ DRIVE = np.dtype([("start_s", "f8"), ("cubic", "f8", (4,))], align=True)
 """A piece of the speed profile: s(t) from its start on."""
 GUIDE_MEMO = _record("s_m", piece=_INDEX)
 """What the kernel remembers from call to call: the piece of the profile and the s of the guide's body."""
-AXLE_MEMO = _record("s_m derailed_s_m load_left_n load_right_n", derailed=_INDEX)
-"""The same of an axle: its s, whether and where it derailed, vertical wheel loads of the last call."""
+AXLE_MEMO = _record("s_m derailed_time_s derailed_s_m speed_mps shift_m lift_m", derailed=_INDEX)
+"""The same of an axle: its s; and where a wheel derailed (1 its first, 2 its second), when, where, how fast,
+and its shift and lift (`simrail.vehicle.contact.contact.CONTACT`)."""
 
 
 class Relative(NamedTuple):
