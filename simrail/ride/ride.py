@@ -115,7 +115,7 @@ class Ride:
         """Plain data that tells this ride from every other, versions and sources included."""
         return {
             "track": self.track.to_dict(),
-            "irregularity": asdict(self.irregularity),
+            "irregularity": self.irregularity.describe(),
             "track_seed": self.track_seed,
             "vehicle": asdict(self.vehicle),
             "profiles": profiles_digest(self.vehicle.wheel_rail),

@@ -103,6 +103,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
     last_ride = None
     durations: dict[tuple[object, ...], float] = {}
     judged_sensors: set[tuple[object, ...]] = set()
+    judged_rails: set[tuple[object, ...]] = set()
     for cell in first_cells(scenario):
         resolved = parts.resolve(cell)
         ride = resolved.ride
@@ -117,7 +118,9 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
         )
         ride_key = (*way, ride.irregularity, ride.step_s)
         if ride_key not in durations:
-            durations[ride_key], unusual = judge_ride(resolved)
+            rails_key = (id(ride.track), ride.irregularity, ride.conditions)
+            durations[ride_key], unusual = judge_ride(resolved, new_rails=rails_key not in judged_rails)
+            judged_rails.add(rails_key)
             warnings += unusual
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number

@@ -5,6 +5,8 @@ lateral acceleration is warned of and one above 1.5 m/s2 is refused. Sensors are
 `simrail.scenario.check_sensors`. Faults name no file: the caller knows the scenario's.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from simrail.core.errors import InputError
@@ -12,11 +14,13 @@ from simrail.core.toml_files import blame
 from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
 from simrail.track.design import TrackDesign
-from simrail.track.laid_track import LaidTrack
+from simrail.track.irregularity import Irregularity
+from simrail.track.laid_track import lay
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
 from simrail.vehicle.hunting import conicity_of, critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.speed_profile import SpeedProfile
 
 WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5
@@ -27,13 +31,15 @@ MOST_BASE_PER_GAUGE = 1.1
 """The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
 
 
-def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
+def judge_ride(resolved: ResolvedCell, *, new_rails: bool = True) -> tuple[float, list[str]]:
     """Judge the ride of a cell.
 
     Parameters
     ----------
     resolved : ResolvedCell
         Any cell of the ride.
+    new_rails : bool
+        Whether its rails are to be judged; another ride may have had the same.
 
     Returns
     -------
@@ -61,7 +67,8 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
         _judge_loads(vehicle)
     _judge_places(resolved)
     _judge_wheels(resolved)
-    laid = _judge_rails(resolved)
+    if new_rails:
+        _judge_rails(resolved)
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         duration = resolved.ride.profile.duration_s
         if not duration <= LONGEST_RIDE_S:
@@ -75,16 +82,16 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
     _judge_contact_rate(resolved.ride)
     warnings = _judge_step(resolved)
     if not words.stands:
-        warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
+        warnings += _judge_dynamics(resolved) + _judge_hunting(resolved)
     return duration, warnings
 
 
-def _judge_rails(resolved: ResolvedCell) -> LaidTrack:
-    """Refuse irregularities that cannot be, and conditions off the track or without sense; lay the rails."""
+def _judge_rails(resolved: ResolvedCell) -> None:
+    """Refuse irregularities that cannot be, and conditions off the track or without sense."""
     ride = resolved.ride
     check_conditions(ride.conditions, ride.track.start_m, ride.track.end_m)
     try:
-        return rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
+        rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
     except InputError as error:
         if error.file is None and not (error.field or "").startswith("irregularity"):
             error.field = f"irregularity.{error.field or ''}".rstrip(".")
@@ -169,6 +176,10 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 remedy="shorten the ride or lengthen the track",
             )
     first, last = min(places.values()), max(places.values())
+    measured = resolved.ride.irregularity.measured
+    if measured is not None:
+        with blame(None, "irregularity"):
+            measured.check_covers(first + ahead[0], last + ahead[1])
     for i, stop in enumerate(words.stops):
         if not first < stop.position_m < last:
             raise InputError(
@@ -222,13 +233,19 @@ def _judge_dynamics(resolved: ResolvedCell) -> list[str]:
     return warnings
 
 
-def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
+@lru_cache(maxsize=32)
+def _widening_m(track: TrackDesign, irregularity: Irregularity, profile: SpeedProfile) -> float:
+    """Mean widening of the gauge over a ride, of one realisation: over a ride's length they differ little."""
+    return mean_widening_m(lay(track, irregularity, seed=0), profile)
+
+
+def _judge_hunting(resolved: ResolvedCell) -> list[str]:
     """Warn of a speed above that at which the vehicle begins to hunt on these rails."""
     ride, words = resolved.ride, resolved.cell.ride
     if ride.engine == "kinematic":
         return []
     fastest = float(np.max(np.abs(ride.profile.motion(np.arange(0.0, ride.profile.duration_s, 0.1))[1])))
-    model = on_gauge(ride.vehicle, mean_widening_m(laid, ride.profile))
+    model = on_gauge(ride.vehicle, _widening_m(ride.track, ride.irregularity, ride.profile))
     critical = critical_below(model, fastest, gravity_mps2=ride.gravity_mps2)
     if critical is None:
         return []

@@ -1,8 +1,8 @@
 """The kernel's springs against Exudyn's own: two codes that share only the description of the vehicle.
 
-One `RigidBodySpringDamper` per spring, taken out of the kernel. Rotations, stops and series dampers stay in
-the kernel: Exudyn's rotational springs work on Tait-Bryan angles, another definition, and the other two are
-no item of its.
+One `RigidBodySpringDamper` per spring and one `SpringDamper` per rod, taken out of the kernel. Rotations,
+stops, series dampers and trailing arms stay in the kernel: Exudyn's rotational springs work on Tait-Bryan
+angles, another definition, and the others are no item of its.
 """
 
 from dataclasses import replace
@@ -10,7 +10,7 @@ from dataclasses import replace
 import exudyn as exu
 import numpy as np
 import pytest
-from exudyn.itemInterface import MarkerBodyRigid, RigidBodySpringDamper
+from exudyn.itemInterface import MarkerBodyPosition, MarkerBodyRigid, RigidBodySpringDamper, SpringDamper
 
 from simrail.core.toml_files import load
 from simrail.track.file import TrackFile
@@ -19,6 +19,7 @@ from simrail.track.laid_track import lay
 from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.engines.exudyn_engine import ExudynEngine
 from simrail.vehicle.engines.exudyn_forces import HALF_TURN
+from simrail.vehicle.engines.records import ROD
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -36,21 +37,37 @@ def vehicle(name):
 
 
 class Springless(Setup):
-    """A setup whose springs the kernel does not see."""
+    """A setup whose springs and rods the kernel does not see."""
 
     def pack(self):
         data = super().pack()
-        return data._replace(springs=data.springs[:0])
+        return data._replace(springs=data.springs[:0], links=data.links[data.links["kind"] != ROD])
 
 
 def natively_sprung(model, laid):
-    """An engine with Exudyn's own springs.
+    """An engine with Exudyn's own springs and rods.
 
     Markers and axes are given in the axes of the nodes, from which half a turn leads to the body's. The
     bodies are the first objects of the system, in the vehicle's order.
     """
     engine = ExudynEngine(Springless(model, laid, PROFILE, settle_s=1.0))
-    for spring in Setup(model, laid, PROFILE).pack().springs:
+    packed = Setup(model, laid, PROFILE).pack()
+    for rod in packed.links[packed.links["kind"] == ROD]:
+        markers = [
+            engine.mbs.AddMarker(
+                MarkerBodyPosition(bodyNumber=int(rod[end]), localPosition=rod[f"{end}_arm"][0] * HALF_TURN)
+            )
+            for end in ("inner", "outer")
+        ]
+        engine.mbs.AddObject(
+            SpringDamper(
+                markerNumbers=markers,
+                stiffness=rod["stiffness"][0],
+                damping=rod["damping"][0],
+                referenceLength=rod["length_m"],
+            )
+        )
+    for spring in packed.springs:
         markers = [
             engine.mbs.AddMarker(
                 MarkerBodyRigid(
@@ -89,7 +106,7 @@ def worst_rms(one, other):
     return float(np.sqrt(np.mean((one - other) ** 2, axis=(0, 2))).max())
 
 
-@pytest.mark.parametrize("name", ["metro_irw_bogie", "two_axle_wagon"])
+@pytest.mark.parametrize("name", ["metro_irw_bogie", "two_axle_wagon", "irw_car"])
 def test_kernel_and_native_springs_agree(laid, name):
     """1e-6 m/s2 and rad/s2 rms at the same step of RK44 (measured 1e-9); it moves by 0.1 m/s2 and more."""
     hook, native = (motion(vehicle(name), laid, suspension) for suspension in ("hook", "native"))

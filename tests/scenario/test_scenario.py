@@ -320,7 +320,7 @@ def test_an_empty_magnetometer_table_is_a_clean_field() -> None:
 def test_what_is_judged_is_what_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """A campaign gets the nouns of a cell that the checks have had; draws of the sensors share them."""
     judged = []
-    monkeypatch.setattr(check, "judge_ride", lambda resolved: (judged.append(resolved), (1.0, []))[1])
+    monkeypatch.setattr(check, "judge_ride", lambda resolved, **_: (judged.append(resolved), (1.0, []))[1])
     scenario = load_scenario("quick_kinematic")
     parts = check.judge_scenario(scenario).parts
     first, second = (cell for cell in cells(scenario) if cell.case == 0)

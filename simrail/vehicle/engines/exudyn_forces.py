@@ -125,7 +125,7 @@ def generalized_forces(t: float, places: RecordArray) -> None:
         records_at(at.bodies[0], (at.bodies[1],), records.BODY),
         records_at(at.springs[0], (at.springs[1],), records.SPRING),
         records_at(at.series[0], (at.series[1],), records.SERIES),
-        records_at(at.rotations[0], (at.rotations[1],), records.ROTATION),
+        records_at(at.links[0], (at.links[1],), records.LINK),
         records_at(at.stops[0], (at.stops[1],), records.STOP),
         records_at(at.laws[0], (at.laws[1],), records.LAW),
         records_at(at.wheels[0], (at.wheels[1],), records.WHEEL),

@@ -30,8 +30,8 @@ class ForceData(NamedTuple):
 
     Attributes
     ----------
-    bodies, springs, series, rotations, stops, laws, wheels, spins, axles, drive : ndarray of records
-        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
+    bodies, springs, series, links, stops, laws, wheels, spins, axles, drive : ndarray of records
+        Of each, `BODY`, `SPRING`, `SERIES`, `LINK`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
     guide, traction, options : ndarray of records (1,)
         `GUIDE`, `TRACTION`, `OPTIONS`.
     track : ndarray of records
@@ -43,7 +43,7 @@ class ForceData(NamedTuple):
     bodies: RecordArray
     springs: RecordArray
     series: RecordArray
-    rotations: RecordArray
+    links: RecordArray
     stops: RecordArray
     laws: RecordArray
     wheels: RecordArray
@@ -128,13 +128,7 @@ def pack(
             [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series],
             records.SERIES,
         ),
-        rotations=np.array(
-            [
-                (index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad)
-                for e in model.rotations
-            ],
-            records.ROTATION,
-        ),
+        links=_links(model, gravity_mps2),
         stops=stops,
         laws=laws,
         wheels=np.array(wheels, records.WHEEL),
@@ -158,6 +152,31 @@ def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
         sag = force / spring.stiffness_npm[2] if spring.stiffness_npm[2] > 0.0 else 0.0
         springs[i] = (*_ends(model, spring), spring.stiffness_npm, spring.damping_nspm, sag)
     return springs
+
+
+def _links(model: VehicleModel, gravity_mps2: float) -> RecordArray:
+    """Springs of rotations, rods and trailing arms. A rod that carries weight is strained by it at rest."""
+    index, nowhere = model.body_names.index, np.zeros((2, 3))
+    rows: list[tuple[Any, ...]] = [
+        (
+            *(records.ROTATION, index(e.inner), index(e.outer), nowhere, nowhere),
+            *(e.stiffness_nmprad, e.damping_nmsprad, 0.0),
+        )
+        for e in model.rotations
+    ]
+    for rod, tension in zip(model.rods, model.rod_tension_n(gravity_mps2), strict=True):
+        inner, outer = (
+            (np.subtract(place, model.body(body).position_m), np.zeros(3))
+            for body, place in ((rod.inner, rod.inner_position_m), (rod.outer, rod.outer_position_m))
+        )
+        factors = (rod.stiffness_npm, 0.0, 0.0), (rod.damping_nspm, 0.0, 0.0)
+        length_m = rod.length_m - tension / rod.stiffness_npm
+        rows.append((records.ROD, index(rod.inner), index(rod.outer), inner, outer, *factors, length_m))
+    for pair in model.arms:
+        ends = [np.subtract(pair.bushings_m, model.body(b).position_m) for b in (pair.axle, pair.frame)]
+        factors = pair.stiffness_npm, pair.damping_nspm
+        rows.append((records.ARMS, index(pair.axle), index(pair.frame), *ends, *factors, 0.0))
+    return np.array(rows, records.LINK)
 
 
 def _guide(model: VehicleModel, gravity_mps2: float) -> RecordArray:

@@ -15,7 +15,7 @@ from simrail.vehicle.engines.lookup import find_on_track
 from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
 from simrail.vehicle.engines.suspension_forces import (
     guide_force,
-    rotation_forces,
+    link_forces,
     series_forces,
     spring_forces,
     stop_forces,
@@ -152,7 +152,7 @@ def forces(
     brakes = creep + data.series.shape[0]
     spring_forces(data.springs, pose, wrench)
     series_forces(data.series, pose, zeta[creep:brakes], wrench, zeta_rate[creep:brakes])
-    rotation_forces(data.rotations, pose, wrench)
+    link_forces(data.links, pose, wrench)
     stop_forces(data.stops, data.laws, pose, wrench)
     wheels_drive = traction.wheels_drive > 0
     behind, wanted, speed = guide_force(

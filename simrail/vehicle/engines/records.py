@@ -63,8 +63,21 @@ BODY = _record("mass_kg", inertia=_VECTOR)
 SPRING = _record("sag_m", **_ENDS, stiffness=_VECTOR, damping=_VECTOR)
 """``sag_m``: deflection at rest along z."""
 SERIES = _record("stiffness damping", **_ENDS, axis=_INDEX)
-ROTATION = _record("", inner=_INDEX, outer=_INDEX, stiffness=_VECTOR, damping=_VECTOR)
-"""A spring and damper of the rotation between two bodies."""
+ROTATION, ROD, ARMS = 0, 1, 2
+"""Kinds of `LINK`."""
+LINK = _record(
+    "length_m",
+    kind=_INDEX,
+    inner=_INDEX,
+    outer=_INDEX,
+    inner_arm=("f8", (2, 3)),
+    outer_arm=("f8", (2, 3)),
+    stiffness=_VECTOR,
+    damping=_VECTOR,
+)
+"""A spring and damper of the rotation between two bodies; or a rod, with its length without force; or both
+trailing arms of an axle (inner) on a frame (outer). In one array, since every further one that a kernel takes
+costs it a per cent. A rod has its places and factors first of their fields, a rotation has no places."""
 STOP = _record("", **_ENDS, axis=_INDEX, over_rate=_INDEX, first=_INDEX, pieces=_INDEX)
 """An element with a tabled law: the pieces from ``first`` on, over its deflection or its rate."""
 LAW = np.dtype([("start", "f8"), ("cubic", "f8", (4,))], align=True)
