@@ -274,11 +274,14 @@ def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
     if critical is None:
         return []
     cone = conicity_of(model, gravity_mps2=ride.gravity_mps2)
+    # Wheels that all turn apart have no conicity to hunt by; what grows is another swing.
+    apart = len(ride.vehicle.spin_inertia_kgm2) == len(ride.vehicle.wheels)
+    does = "runs unstably" if apart else "hunts"
     on = "" if cone is None else f" with equivalent conicity {cone:.2f} at 3 mm,"
     gauge_mm = 1e3 * model.wheel_rail.gauge_m
     return [
         f"ride[{resolved.cell.ride_index}] ({words.name}) reaches {3.6 * fastest:.0f} km/h: "
-        f"{ride.vehicle.name} hunts above {3.6 * critical:.0f} km/h on these rails,{on} "
+        f"{ride.vehicle.name} {does} above {3.6 * critical:.0f} km/h on these rails,{on} "
         f"gauge {gauge_mm:.0f} mm; what grows there ends at the flanges only"
     ]
 

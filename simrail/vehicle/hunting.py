@@ -21,7 +21,7 @@ from simrail.track.laid_track import LaidTrack
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.profile_files import profiles_digest
 from simrail.vehicle.contact.wheelset import conicity
-from simrail.vehicle.linear import ComplexArray, running_vehicle
+from simrail.vehicle.linear import running_vehicle
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 from simrail.vehicle.stability import first_crossing
@@ -94,16 +94,16 @@ def conicity_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> float | N
 
 def _search(model: VehicleModel, stable_mps: float, top_mps: float, gravity_mps2: float) -> float | None:
     """Critical speed up to a top speed, if running is stable up to another."""
-    vehicle = running_vehicle(model, gravity_mps2=gravity_mps2)
-
-    def eigenvalues(speed_mps: float) -> ComplexArray:
-        return np.linalg.eigvals(vehicle.linearised(speed_mps)).astype(complex)
-
     slowest = max(stable_mps, min(SLOWEST_MPS, 0.25 * top_mps))
     speeds = np.array([slowest, *(share * top_mps for share in SHARES if share * top_mps > slowest)])
     try:
-        return first_crossing(eigenvalues, speeds, accuracy_mps=ACCURACY_MPS).speed_mps
-    except InputError:
+        vehicle = running_vehicle(model, gravity_mps2=gravity_mps2)
+        return first_crossing(
+            lambda v: np.linalg.eigvals(vehicle.linearised(v)).astype(complex),
+            speeds,
+            accuracy_mps=ACCURACY_MPS,
+        ).speed_mps
+    except InputError:  # no steady running, or wheels that do not fit between these rails
         return None
 
 
