@@ -27,6 +27,9 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
 from simrail.scenario.tables import RidePart
 from simrail.scoring.geometry import score_geometry
+from simrail.scoring.kick import score_kick
+from simrail.scoring.ride_figures import RIDE, score_ride_comfort, score_running_safety
+from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
@@ -163,6 +166,12 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
             check()
             for name in tally.estimators:
                 tally.fail(cell, name, error)
+        if cell.sensor_draw == 0:  # sensors change nothing of the ride itself
+            try:
+                _score_ride(cell, truth, parts, tally)
+            except Exception as error:
+                check()
+                tally.fail(cell, RIDE, error)
     if not recorded:
         return
     for name, estimator in tally.estimators.items():
@@ -342,6 +351,20 @@ def _score(
     if bad:
         reason = f"estimate not finite in {bad} of {len(estimate.states)} samples"
         tally.failures.append(Failure(cell.number, name, reason, reason + "\n"))
+
+
+def _score_ride(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> None:
+    """Score the ride itself, where the scenario asks for it."""
+    spec, resolved = cell.spec, parts.resolve(cell)
+    with tally.timed("score"):
+        if spec.running_safety is not None:
+            factor = TRACK_SHIFT_FACTOR[spec.running_safety.vehicle]
+            vehicle, windows = resolved.ride.vehicle, spec.score.windows
+            tally.add(cell, RIDE, score_running_safety(truth, vehicle, factor=factor, windows=windows))
+        if spec.ride_comfort is not None:
+            tally.add(cell, RIDE, score_ride_comfort(truth, resolved.mount))
+        if cell.ride.kick_end_m is not None:
+            tally.add(cell, RIDE, score_kick(truth, after_m=cell.ride.kick_end_m))
 
 
 def _wanted(cell: Cell) -> dict[str, Any]:

@@ -20,8 +20,11 @@ from simrail.report.tables.geometry import (
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases
+from simrail.report.tables.running import decay_words, running_words
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
+from simrail.scoring.ride_figures import RIDE
+from simrail.scoring.running_safety import DERAILMENT_LIMIT
 from simrail.scoring.table import OK
 from simrail.track.bands import Band
 
@@ -47,12 +50,17 @@ def print_scores(console: Console, results: Results) -> None:
     scores, cells = campaign.scores, campaign.cells
     styles = list(method_styles(results.scenario).values())
     bands = bands_by_name(results.scenario.spec)
+    safety = results.scenario.spec.running_safety
+    limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
     for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
         if number == MOST_GROUPS:
             console.print(f"... and {cells['case'].nunique() - number} more cases: see scores.csv")
             break
         rows = scores[scores["cell"].isin(members["cell"])]
-        console.print(_case(console, rows, members, styles, bands))
+        console.print(_case(console, rows, members, styles, bands, limit))
+    kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
+    for sentence in decay_words(cases(kicks, cells)):
+        console.print(Text(sentence), soft_wrap=True)
     if campaign.stopped is not None:
         # What was not reached is to be seen; what was, is no less than what was asked for.
         colour = "green" if campaign.stopped.reached else "yellow"
@@ -94,8 +102,12 @@ def _case(
     members: pd.DataFrame,
     styles: list[MethodStyle],
     bands: dict[str, Band],
+    derailment_limit: float,
 ) -> Group:
-    """Title, rails where they are scored, attitude, and notes; title and notes may be wider than a table."""
+    """Title, the ride itself and rails where they are scored, attitude, and notes.
+
+    Title and notes may be wider than a table.
+    """
     first = members.iloc[0]
     draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
     title = Text(
@@ -103,13 +115,17 @@ def _case(
         f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}",
         style="bold",
     )
-    shown = rows[(rows["status"] == OK) & rows["metric"].isin(("rms", "sd", "us_per_sample"))]
+    wanted = rows["metric"].isin(("rms", "sd", "us_per_sample")) | (rows["estimator"] == RIDE)
+    shown = rows[(rows["status"] == OK) & wanted]
     of_cases = cases(shown, members)
     if not of_cases:
         return Group(title)
     case = of_cases[0]
     notes: list[str] = []
     parts: list[RenderableType] = [title]
+    ride = running_words(case, derailment_limit=derailment_limit)
+    if ride:
+        parts.append(Text(f"The ride itself: {ride}"))
     mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
     if mapping:
         band = judged_band(case)

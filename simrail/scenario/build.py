@@ -184,7 +184,7 @@ class Parts:
                 rate_hz=spec.truth_rate_hz,
                 drive=cell.ride.drive,
                 conditions=_conditions(spec, vehicle),
-                contact_rate_hz=spec.contact_rate_hz,
+                contact_rate_hz=contact_rate_hz(spec),
             )
         return self._rides[key]
 
@@ -317,6 +317,13 @@ def _mount(imu: ImuPart) -> Mount:
         pitch_rad=radians(imu.pitch_deg),
         yaw_rad=radians(imu.yaw_deg),
     )
+
+
+def contact_rate_hz(spec: ScenarioFile) -> float:
+    """Rate at which contact forces are kept; that of the truth if they are scored and it is not given."""
+    if spec.running_safety is None or spec.contact_rate_hz > 0.0:
+        return spec.contact_rate_hz
+    return float(spec.truth_rate_hz)
 
 
 def bands_by_name(spec: ScenarioFile) -> dict[str, Band]:

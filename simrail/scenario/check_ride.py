@@ -5,22 +5,20 @@ lateral acceleration is warned of and one above 1.5 m/s2 is refused. Sensors are
 `simrail.scenario.check_sensors`. Faults name no file: the caller knows the scenario's.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
 from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
+from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
+from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
 from simrail.track.design import TrackDesign
-from simrail.track.irregularity import Irregularity
-from simrail.track.laid_track import lay
+from simrail.track.laid_track import LaidTrack
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
 from simrail.vehicle.hunting import conicity_of, critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.speed_profile import SpeedProfile
 
 WARN_LATERAL_MPS2 = 1.0
 REFUSE_LATERAL_MPS2 = 1.5
@@ -31,15 +29,17 @@ MOST_BASE_PER_GAUGE = 1.1
 """The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
 
 
-def judge_ride(resolved: ResolvedCell, *, new_rails: bool = True) -> tuple[float, list[str]]:
+def judge_ride(
+    resolved: ResolvedCell, *, known_rails: LaidTrack | None = None
+) -> tuple[float, list[str], LaidTrack]:
     """Judge the ride of a cell.
 
     Parameters
     ----------
     resolved : ResolvedCell
         Any cell of the ride.
-    new_rails : bool
-        Whether its rails are to be judged; another ride may have had the same.
+    known_rails : LaidTrack, optional
+        Its rails, if another ride that has been judged had the same.
 
     Returns
     -------
@@ -47,6 +47,8 @@ def judge_ride(resolved: ResolvedCell, *, new_rails: bool = True) -> tuple[float
         How long the ride takes.
     warnings : list of str
         What is unusual, one line each.
+    rails : LaidTrack
+        Its rails.
 
     Raises
     ------
@@ -63,12 +65,20 @@ def judge_ride(resolved: ResolvedCell, *, new_rails: bool = True) -> tuple[float
                 value=words.end_m,
                 remedy="end_m > start_m runs forward, end_m < start_m backward",
             )
+        low, high = sorted((words.start_m, words.start_m if words.end_m is None else words.end_m))
+        if words.kick_end_m is not None and not low <= words.kick_end_m < high:
+            raise InputError(
+                "the ride does not pass the end of the kick",
+                field="kick_end_m",
+                value=words.kick_end_m,
+                limit=f"{low:g} to {high:g} m",
+                remedy="move it between start_m and end_m",
+            )
     with blame(f"vehicle {vehicle.name}", "axle"):
         _judge_loads(vehicle)
     _judge_places(resolved)
     _judge_wheels(resolved)
-    if new_rails:
-        _judge_rails(resolved)
+    laid = known_rails or _judge_rails(resolved)
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         duration = resolved.ride.profile.duration_s
         if not duration <= LONGEST_RIDE_S:
@@ -80,18 +90,19 @@ def judge_ride(resolved: ResolvedCell, *, new_rails: bool = True) -> tuple[float
                 remedy="ride faster, shorter, or with less dwell time",
             )
     _judge_contact_rate(resolved.ride)
+    _judge_ride_figures(resolved)
     warnings = _judge_step(resolved)
     if not words.stands:
-        warnings += _judge_dynamics(resolved) + _judge_hunting(resolved)
-    return duration, warnings
+        warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
+    return duration, warnings, laid
 
 
-def _judge_rails(resolved: ResolvedCell) -> None:
-    """Refuse irregularities that cannot be, and conditions off the track or without sense."""
+def _judge_rails(resolved: ResolvedCell) -> LaidTrack:
+    """Refuse irregularities that cannot be, and conditions off the track or without sense; lay the rails."""
     ride = resolved.ride
     check_conditions(ride.conditions, ride.track.start_m, ride.track.end_m)
     try:
-        rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
+        return rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
     except InputError as error:
         if error.file is None and not (error.field or "").startswith("irregularity"):
             error.field = f"irregularity.{error.field or ''}".rstrip(".")
@@ -144,6 +155,25 @@ def _judge_contact_rate(ride: Ride) -> None:
             limit=f"truth_rate_hz = {ride.rate_hz:g} Hz divided by a whole number",
             remedy=f"try {ride.rate_hz / max(round(ratio), 1):.12g}",
         )
+
+
+def _judge_ride_figures(resolved: ResolvedCell) -> None:
+    """Refuse figures of the ride that its rates are too low for."""
+    ride, spec = resolved.ride, resolved.cell.spec
+    asked = {"running_safety": spec.running_safety, "ride_comfort": spec.ride_comfort}
+    rates = {
+        "running_safety": ("contact_rate_hz", ride.contact_rate_hz, SAFETY_HZ),
+        "ride_comfort": ("truth_rate_hz", ride.rate_hz, COMFORT_HZ),
+    }
+    for table, (field, rate_hz, least_hz) in rates.items():
+        if asked[table] is not None and rate_hz < least_hz:
+            raise InputError(
+                f"is too low for [{table}]",
+                field=field,
+                value=rate_hz,
+                limit=f">= {least_hz:g} Hz",
+                remedy=f"raise it, or take [{table}] out",
+            )
 
 
 def _judge_loads(vehicle: VehicleModel) -> None:
@@ -233,19 +263,13 @@ def _judge_dynamics(resolved: ResolvedCell) -> list[str]:
     return warnings
 
 
-@lru_cache(maxsize=32)
-def _widening_m(track: TrackDesign, irregularity: Irregularity, profile: SpeedProfile) -> float:
-    """Mean widening of the gauge over a ride, of one realisation: over a ride's length they differ little."""
-    return mean_widening_m(lay(track, irregularity, seed=0), profile)
-
-
-def _judge_hunting(resolved: ResolvedCell) -> list[str]:
+def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
     """Warn of a speed above that at which the vehicle begins to hunt on these rails."""
     ride, words = resolved.ride, resolved.cell.ride
     if ride.engine == "kinematic":
         return []
     fastest = float(np.max(np.abs(ride.profile.motion(np.arange(0.0, ride.profile.duration_s, 0.1))[1])))
-    model = on_gauge(ride.vehicle, _widening_m(ride.track, ride.irregularity, ride.profile))
+    model = on_gauge(ride.vehicle, mean_widening_m(laid, ride.profile))
     critical = critical_below(model, fastest, gravity_mps2=ride.gravity_mps2)
     if critical is None:
         return []

@@ -56,6 +56,8 @@ class ScenarioFile(Part):
     score: tables.ScorePart = tables.ScorePart()
     stop: tables.StopRulePart | None = None
     geometry: tables.GeometryPart = tables.GeometryPart()
+    running_safety: tables.RunningSafetyPart | None = None
+    ride_comfort: tables.RideComfortPart | None = None
 
     @field_validator("step_s")
     @classmethod

@@ -105,7 +105,8 @@ class RidePart(Part):
 
     With ``reverse = true`` it is ridden the other way, from ``end_m`` to ``start_m``, stops in turn; with
     ``reverse = [false, true]`` both ways. Without ``end_m`` and ``speed_kmh`` the vehicle stands where it
-    is, for ``rest_s + final_rest_s``.
+    is, for ``rest_s + final_rest_s``. Over a small kick in smooth straight rails, ``kick_end_m`` says where
+    it ends: it is scored whether the wheelsets' lateral motion decays beyond (`simrail.scoring.kick`).
     """
 
     name: Name
@@ -119,6 +120,7 @@ class RidePart(Part):
     stops: tuple[StopPart, ...] = ()
     drive: Listed[Literal["guide", "wheels"]] = "guide"
     reverse: Listed[bool] = False
+    kick_end_m: float | None = None
 
     @model_validator(mode="after")
     def _goes_or_stands(self) -> RidePart:
@@ -281,6 +283,21 @@ class ScorePart(Part):
 
     windows: tuple[str, ...] | None = None
     metrics: tuple[str, ...] | None = None
+
+
+class RunningSafetyPart(Part):
+    """``[running_safety]``: scores the forces between wheels and rails after EN 14363.
+
+    ``vehicle`` says which limit of Prud'homme's counts, and ``derailment_limit`` what the report holds Y/Q
+    against. Forces are kept at ``contact_rate_hz``, or at the rate of the truth if that is not given.
+    """
+
+    vehicle: Literal["passenger", "freight"] = "passenger"
+    derailment_limit: Annotated[float, Field(gt=0.0, le=3.0)] = 0.8
+
+
+class RideComfortPart(Part):
+    """``[ride_comfort]``: scores N_MV (EN 12299) and Sperling's Wz where each IMU sits."""
 
 
 class GeometryLimitsPart(Part):

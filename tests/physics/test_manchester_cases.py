@@ -36,7 +36,7 @@ def test_each_case_has_its_rails() -> None:
         [0, -0.0025, -0.005, -0.005, 0], abs=1e-6
     )
     kick = laid.rails(np.arange(18250.0, 18260.0, 0.5))
-    assert kick[:, 0].min() == pytest.approx(-0.0002, abs=1e-7)
+    assert kick[:, 0].min() == pytest.approx(-2e-5, abs=1e-8)
     # Irregular track lies under all of the third ride at speed, and under no other.
     rough = laid.irregularities(np.arange(1500.0, 16800.0, 5.0)).to_numpy()
     assert (rough.std(axis=0) > 2e-4).all()
@@ -48,7 +48,7 @@ def test_each_case_has_its_rails() -> None:
     at_speed = v > 160.0 / 3.6 - 1e-6
     assert at_speed.sum() * 0.5 >= 300.0
     assert s[at_speed].min() > 1440.0 and s[at_speed].max() < 16860.0
-    assert (two.profile.speed_mps, len(four)) == (pytest.approx(100.0 / 3.6), 6)
+    assert (two.profile.speed_mps, len(four)) == (pytest.approx(100.0 / 3.6), 3)
 
 
 @pytest.mark.slow
