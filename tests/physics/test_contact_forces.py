@@ -197,11 +197,6 @@ def moment_of_contacts(truth, model, row, frame):
     return total
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a suspension element pushes its two bodies at two points: the couple of its force and its "
-    "deflection (a body that leans out on its springs) is in no balance, and loads of a side are off by it",
-)
 def test_steady_curving_transfers_the_load_of_the_quasi_static_formula(own_cache, curving):
     """Moment of Q and Y about the track's middle = sum of m (y f_up - h f_across), less the gyroscopes'.
 

@@ -1,9 +1,12 @@
 """Forces of suspension elements and of the guide, compiled: what `simrail.vehicle.engines.forces` adds up.
 
-Most elements act between an *inner* and an *outer* body, along or about the axes of the inner one, and
-push each at that body's own attachment point. With A the rotation of the inner body and u the way from
-its attachment point to the outer body's, an element sees the deflection A^T u and the rate A^T u'. Rods
-pull along their own line, and trailing arms turn about their axle's. The records are those of
+Most elements act between an *inner* and an *outer* body, along or about the axes of the inner one. With A
+the rotation of the inner body, w its rate, p the way from its centre of gravity to the attachment point on
+the outer body and r to its own, an element sees the deflection d = A^T p - r and the rate
+d' = A^T (p' - w x p). What follows from the energy of d alone is that the force acts on both bodies at the
+outer point: pushed each at its own point, the couple of force and deflection would be in no balance, and a
+car body that leans out on its springs would not load the outer wheels. Rods pull along their own line, and
+trailing arms turn about their axle's. The records are those of
 `simrail.vehicle.engines.records`.
 """
 
@@ -27,10 +30,10 @@ from simrail.vehicle.engines.records import (
 
 
 class Between(NamedTuple):
-    """The two attachment points of an element.
+    """Where an element acts, and what it feels.
 
-    Arms from the centres of gravity, global axes (inner ``ax, ay, az``, outer ``bx, by, bz``), m; deflection
-    (m) and its rate (m/s) in the inner body's axes.
+    Arms from the centres of gravity (inner ``ax, ay, az``, outer ``bx, by, bz``) to the attachment point on the
+    outer body, global axes, m; deflection (m) and its rate (m/s) in the inner body's axes.
     """
 
     ax: float
@@ -49,15 +52,16 @@ class Between(NamedTuple):
 
 @njit_inner
 def between(inner_arm: FloatArray, outer_arm: FloatArray, a: Record, b: Record) -> Between:
-    """Attachment points of an element, from its arms on the bodies and the poses of these."""
-    ax, ay, az = rotated(a.rotation, inner_arm[0], inner_arm[1], inner_arm[2])
+    """An element from its arms on the bodies, in their axes, and the poses of these."""
     bx, by, bz = rotated(b.rotation, outer_arm[0], outer_arm[1], outer_arm[2])
+    ax, ay, az = b.x + bx - a.x, b.y + by - a.y, b.z + bz - a.z
     # A point of a body moves with v + w x r.
     ex = b.vx + b.wy * bz - b.wz * by - a.vx - a.wy * az + a.wz * ay
     ey = b.vy + b.wz * bx - b.wx * bz - a.vy - a.wz * ax + a.wx * az
     ez = b.vz + b.wx * by - b.wy * bx - a.vz - a.wx * ay + a.wy * ax
-    x, y, z = rotated_back(a.rotation, b.x + bx - a.x - ax, b.y + by - a.y - ay, b.z + bz - a.z - az)
+    x, y, z = rotated_back(a.rotation, ax, ay, az)
     x_rate, y_rate, z_rate = rotated_back(a.rotation, ex, ey, ez)
+    x, y, z = x - inner_arm[0], y - inner_arm[1], z - inner_arm[2]
     return Between(ax, ay, az, bx, by, bz, x, y, z, x_rate, y_rate, z_rate)
 
 
