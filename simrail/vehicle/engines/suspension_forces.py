@@ -32,8 +32,8 @@ from simrail.vehicle.engines.records import (
 class Between(NamedTuple):
     """Where an element acts, and what it feels.
 
-    Arms from the centres of gravity (inner ``ax, ay, az``, outer ``bx, by, bz``) to the attachment point on the
-    outer body, global axes, m; deflection (m) and its rate (m/s) in the inner body's axes.
+    Arms from the centres of gravity (inner ``ax, ay, az``, outer ``bx, by, bz``) to the attachment point on
+    the outer body, global axes, m; deflection (m) and its rate (m/s) in the axes of the inner body.
     """
 
     ax: float
