@@ -6,7 +6,7 @@ from simrail.core.toml_files import load
 from simrail.ride.ride import Ride, simulate
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.irregularity import Irregularity
-from simrail.vehicle.engines.engine import DerailedError
+from simrail.vehicle.engines.derailment import DerailedError
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
