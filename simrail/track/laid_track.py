@@ -193,8 +193,8 @@ def lay(
         _coefficients(CubicSpline(s, friction_factors(conditions, s))),
     )
     table = np.concatenate(splines, axis=1)
-    table = np.ascontiguousarray(table)
-    table.flags.writeable = False
+    table = np.ascontiguousarray(table).view()
+    table.flags.writeable = False  # of this view: kernels get what it is a view of
     start = float(s[0])
     return LaidTrack(design, irregularity, int(seed), start, table_step_m, table, tuple(conditions))
 

@@ -138,10 +138,16 @@ def pack(
         traction=traction,
         options=_options(model, track, gravity_mps2),
         drive=np.array([(start, cubic) for start, cubic in zip(times, cubics, strict=False)], records.DRIVE),
-        track=track.table.reshape(len(track.table), -1).view(records.TRACK)[:, 0],
+        track=_writable(track.table).reshape(len(track.table), -1).view(records.TRACK)[:, 0],
         patches=np.stack([table.patches for table in contacts.tables]),
         const=np.array([table.const for table in contacts.tables], CONST),
     )
+
+
+def _writable(table: FloatArray) -> FloatArray:
+    """The array that a read-only view is of: kernels, which write into neither, would be compiled for both."""
+    base = table.base
+    return base if isinstance(base, np.ndarray) and base.shape == table.shape else table
 
 
 def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
