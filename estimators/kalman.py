@@ -52,7 +52,7 @@ class History(NamedTuple):
 
 
 def room_for_history(steps: int, n: int, m: int) -> History:
-    """Room for a filter's history; of no steps for a filter that nothing follows."""
+    """Room for a filter's history."""
     square, updates = (steps, n, n), (steps, m, n)
     shapes = ((steps, n), square, square, updates, updates, (steps, m), (steps, m))
     return History(*(np.zeros(shape) for shape in shapes))

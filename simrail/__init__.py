@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from simrail.scenario.check import judge_scenario
     from simrail.scenario.scenario import Scenario, load_scenario
     from simrail.scoring.geometry import score_geometry
+    from simrail.scoring.ride_figures import ride_comfort, running_safety
     from simrail.scoring.score import score, score_odometry
     from simrail.sensors.encoder import EncoderSpec
     from simrail.sensors.magnetometer import MagnetometerSpec
@@ -98,6 +99,7 @@ _HOMES = {
     "scenario.check": ("judge_scenario",),
     "scenario.scenario": ("Scenario", "load_scenario"),
     "scoring.geometry": ("score_geometry",),
+    "scoring.ride_figures": ("ride_comfort", "running_safety"),
     "scoring.score": ("score", "score_odometry"),
     "sensors.encoder": ("EncoderSpec",),
     "recording.sheets.grades": ("ImuGrade",),
@@ -140,7 +142,9 @@ __all__ = [
     "load_scenario",
     "measure",
     "read_ride",
+    "ride_comfort",
     "run",
+    "running_safety",
     "score",
     "score_geometry",
     "score_odometry",

@@ -261,7 +261,7 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
             for failure in campaign.failures
         ],
         "stop": None if campaign.stopped is None else campaign.stopped.record,
-        "warnings": list(campaign.plan.warnings),
+        "warnings": campaign.warnings,
         "wall_s": dict(campaign.wall_s),
         "cpu_s": dict(campaign.cpu_s),
         "versions": {"python": platform.python_version(), **versions},

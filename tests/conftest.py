@@ -1,9 +1,24 @@
-"""Folders of their own for tests that run scenarios."""
+"""Folders of their own for tests that run scenarios; how the tests are collected."""
 
-from collections.abc import Iterator
+import gc
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Look for no garbage while tests are collected, and afterwards not among what was collected.
+
+    Collecting makes millions of objects that stay: looking through them takes a fifth of its time.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simrail.core.columns import GYRO
-from simrail.core.jit import FloatArray, njit
+from simrail.core.jit import FloatArray, njit_borrowed
 from simrail.recording.recording import Recording
 from simrail.recording.standstill import SETTLE_S, SHORTEST_S, guard_s, motion_times
 
@@ -101,7 +101,7 @@ def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
     return found
 
 
-@njit
+@njit_borrowed
 def average_rests(
     sums: FloatArray,
     moves: np.ndarray,
@@ -144,13 +144,12 @@ def average_rests(
         Number of samples used so far, and variance of the bias' error, (rad/s)^2.
     """
     begin, needed, j = 0, 1, 0
-    past, past_variance, past_samples, past_end = np.zeros(3), math.inf, 0, 0
-    here, here_variance, here_samples, here_end = np.zeros(3), math.inf, 0, 0
+    past, past_variance, past_samples, past_end = 0, math.inf, 0, 0
+    here_variance, here_samples, here_end = math.inf, 0, 0
     for k in range(len(bias)):
         while j < len(moves) and moves[j] < k:
-            # The rest that was under way, if one was, is over: it is the past of the next.
-            past[:] = here
-            past_variance, past_samples, past_end = here_variance, here_samples, here_end
+            # The rest that was under way, if one was, is over: the last row's bias is the past of the next.
+            past, past_variance, past_samples, past_end = k - 1, here_variance, here_samples, here_end
             begin, needed = settled[j], shortest
             j += 1
         count = k - guard - begin
@@ -169,8 +168,10 @@ def average_rests(
             here_samples, here_end = past_samples + count, k - guard
             for i in range(3):
                 mean = (sums[here_end, i] - sums[begin, i]) / count
-                here[i] = mean if past_samples == 0 else past[i] + gain * (mean - past[i])
-        bias[k] = here
+                bias[k, i] = mean if past_samples == 0 else bias[past, i] + gain * (mean - bias[past, i])
+        else:
+            for i in range(3):
+                bias[k, i] = bias[k - 1, i] if k > 0 else 0.0
         samples[k] = here_samples
         if here_samples == 0:
             variance[k] = unknown

@@ -54,6 +54,7 @@ from simrail.estimators.odometry.kernel import (
     Steps,
     V,
     curve_matched,
+    room_to_work,
 )
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
@@ -183,23 +184,19 @@ class CurveMatchedOdometry:
         names = [GYRO[1], GYRO[2], ACCEL[0]]
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
         signals = signals.reshape(n, block, 3).mean(axis=1)
-        ends = time[block - 1 :: block][:n]
+        ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
         read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
         counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
         pulse = wheel.pulse_m
         grid, table = line_table(recording.track)
         x, p = self._start(recording, pulse)
-        states, covariance, flags = (
-            np.empty((n, STATES)),
-            np.empty((n, STATES, STATES)),
-            np.empty((2, n), bool),
-        )
-        steps = Steps(ends, states, covariance, np.empty(n), *flags)
-        past = room_for_history(n if self.smoothed else 0, STATES, UPDATES)
+        states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
+        steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
+        past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
         model = self._model(recording, pulse)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
-        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, past)
-        if self.smoothed:
+        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
+        if past is not None:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
 

@@ -113,9 +113,9 @@ class EncoderOdometry:
         """
         quantum = sheet.pulse_m
         states = _filter(
-            np.ascontiguousarray(encoder.index.to_numpy(dtype=np.float64)),
+            np.array(encoder.index.to_numpy(dtype=np.float64)),
             encoder["pulse_count"].to_numpy(dtype=np.float64),
-            np.ascontiguousarray(times, dtype=np.float64),
+            np.array(times, dtype=np.float64),
             quantum,
             self.jerk_intensity_m2ps5,
             self.still_s,
@@ -129,9 +129,9 @@ class EncoderOdometry:
     ) -> pd.DataFrame:
         """Odometry from readings of the speed (column ``speed_mps``), otherwise as `from_counts`."""
         states = _speed_filter(
-            np.ascontiguousarray(odometer.index.to_numpy(dtype=np.float64)),
-            np.ascontiguousarray(odometer["speed_mps"].to_numpy(dtype=np.float64)),
-            np.ascontiguousarray(times, dtype=np.float64),
+            np.array(odometer.index.to_numpy(dtype=np.float64)),
+            np.array(odometer["speed_mps"].to_numpy(dtype=np.float64)),
+            np.array(times, dtype=np.float64),
             sheet.speed_sd_mps**2,
             self.jerk_intensity_m2ps5,
             self.still_mps,
@@ -176,16 +176,16 @@ def predict(x: FloatArray, p: FloatArray, dt: float, intensity: float) -> None:
 
 
 @njit_inline
-def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: FloatArray, k: int) -> None:
-    """Write s, V, A and their variances into row k of ``out`` (n, 6), as `predict` by a time has them."""
+def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: FloatArray) -> None:
+    """Write s, V, A and their variances into ``out`` (6,), as `predict` by a time has them."""
     half = 0.5 * lead * lead
-    out[k, S] = x[S] + lead * x[V] + half * x[A]
-    out[k, V] = x[V] + lead * x[A]
-    out[k, A] = x[A]
+    out[S] = x[S] + lead * x[V] + half * x[A]
+    out[V] = x[V] + lead * x[A]
+    out[A] = x[A]
     across = lead * p[S, V] + half * p[S, A] + lead * half * p[V, A]
-    out[k, 3] = p[S, S] + lead**2 * p[V, V] + half**2 * p[A, A] + 2.0 * across + intensity * lead**5 / 20.0
-    out[k, 4] = p[V, V] + lead**2 * p[A, A] + 2.0 * lead * p[V, A] + intensity * lead**3 / 3.0
-    out[k, 5] = p[A, A] + intensity * lead
+    out[3] = p[S, S] + lead**2 * p[V, V] + half**2 * p[A, A] + 2.0 * across + intensity * lead**5 / 20.0
+    out[4] = p[V, V] + lead**2 * p[A, A] + 2.0 * lead * p[V, A] + intensity * lead**3 / 3.0
+    out[5] = p[A, A] + intensity * lead
 
 
 @njit
@@ -194,8 +194,9 @@ def _filter(
 ) -> FloatArray:
     """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
     out = np.empty((len(wanted), 6))
-    x, p, rows = np.zeros(STATES), np.zeros((STATES, STATES)), np.eye(STATES)
+    x, p, h = np.zeros(STATES), np.zeros((STATES, STATES)), np.zeros(STATES)
     gain, work = np.zeros(STATES), np.zeros(STATES)
+    h[S] = 1.0
     # A start with constant jerk from rest: speed and acceleration when the first pulse comes.
     jerk = 0.5
     start_speed = 0.5 * jerk ** (1.0 / 3.0) * (6.0 * q) ** (2.0 / 3.0)
@@ -227,14 +228,14 @@ def _filter(
             if steps == 1.0:
                 width = min(q, max(0.1 * q, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
             middle = way - 0.5 * direction * (q - width)
-            update(x, p, rows[S], middle - x[S], width * width / 12.0, gain, work)
+            update(x, p, h, middle - x[S], width * width / 12.0, gain, work)
             idle = 0.0
             patience = min(max(3.0 * q / max(abs(x[V]), 1e-9), still), 10.0 * still)
         elif not resting:
             # No pulse although one was due: the train is at most at the edge.
             if abs(x[S] - way) > 0.5 * q:
                 edge = way + np.sign(x[S] - way) * 0.5 * q
-                update(x, p, rows[S], edge - x[S], q * q / 12.0, gain, work)
+                update(x, p, h, edge - x[S], q * q / 12.0, gain, work)
             if x[V] * direction <= 0.0 or idle > patience:
                 resting = True
         if resting:
@@ -248,7 +249,7 @@ def _filter(
             p[A, A] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
-            ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out, next_out)
+            ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out[next_out])
             next_out += 1
     return out
 
@@ -259,8 +260,9 @@ def _speed_filter(
 ) -> FloatArray:
     """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
     out = np.empty((len(wanted), 6))
-    x, p, rows = np.zeros(STATES), np.zeros((STATES, STATES)), np.eye(STATES)
+    x, p, h = np.zeros(STATES), np.zeros((STATES, STATES)), np.zeros(STATES)
     gain, work = np.zeros(STATES), np.zeros(STATES)
+    h[V] = 1.0
     resting = True
     next_out = 0
     for k in range(len(time)):
@@ -280,9 +282,9 @@ def _speed_filter(
                 p[V, V] = variance
                 p[A, A] = 1.0
                 resting = False
-            update(x, p, rows[V], speed[k] - x[V], variance, gain, work)
+            update(x, p, h, speed[k] - x[V], variance, gain, work)
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
-            ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out, next_out)
+            ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out[next_out])
             next_out += 1
     return out

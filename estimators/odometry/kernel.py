@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
 
-from simrail.core.jit import FloatArray, njit
+from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -106,25 +106,65 @@ class Steps(NamedTuple):
     resting: BoolArray
 
 
-@njit
-def line_at(grid: FloatArray, table: FloatArray, s: float, out: FloatArray) -> None:
-    """Design at s into out (5,): heading, its slope, roll, pitch, the slope of the pitch."""
+class Scratch(NamedTuple):
+    """What the filter works in. A kernel that makes its own arrays takes a second longer to compile.
+
+    Attributes
+    ----------
+    f, work : ndarray (13, 13)
+        F, and what `simrail.estimators.kalman.congruence` needs.
+    rows : ndarray (3, 13)
+        h of each update.
+    gain, v : ndarray (13,)
+        What `simrail.estimators.kalman.update` writes.
+    """
+
+    f: FloatArray
+    work: FloatArray
+    rows: FloatArray
+    gain: FloatArray
+    v: FloatArray
+
+
+def room_to_work() -> Scratch:
+    """Scratch, all zero."""
+    n, m = STATES, UPDATES
+    return Scratch(*(np.zeros(shape) for shape in ((n, n), (n, n), (m, n), n, n)))
+
+
+class Line(NamedTuple):
+    """The design at one place: heading, its slope, roll, pitch, the slope of the pitch; rad, and per m."""
+
+    heading: float
+    curvature: float
+    roll: float
+    pitch: float
+    pitch_slope: float
+
+
+@njit_borrowed
+def line_at(grid: FloatArray, table: FloatArray, s: float) -> Line:
+    """Design at s."""
     at = min(max((s - grid[0]) * grid[1], 0.0), table.shape[0] - 1.000001)
     i = int(at)
-    x = at - i
-    for j in range(4):
-        out[j] = table[i, j] + x * (table[i + 1, j] - table[i, j])
-    out[4] = (table[i + 1, 3] - table[i, 3]) * grid[1]
+    x, a, b = at - i, table[i], table[i + 1]
+    return Line(
+        a[0] + x * (b[0] - a[0]),
+        a[1] + x * (b[1] - a[1]),
+        a[2] + x * (b[2] - a[2]),
+        a[3] + x * (b[3] - a[3]),
+        (b[3] - a[3]) * grid[1],
+    )
 
 
-@njit
+@njit_borrowed
 def predict(
     x: FloatArray,
     p: FloatArray,
     f: FloatArray,
     work: FloatArray,
-    here: FloatArray,
-    lean: FloatArray,
+    here: Line,
+    lean: Line,
     signal: FloatArray,
     dt: float,
     model: LineModel,
@@ -139,22 +179,22 @@ def predict(
     """
     n = x.shape[0]
     # Heading rate of a body in the design's cant and slope; the effort less what squat and slope feign.
-    turn = (signal[0] * np.sin(here[2]) + signal[1] * np.cos(here[2])) / np.cos(here[3])
-    level = np.cos(lean[3])
+    turn = (signal[0] * np.sin(here.roll) + signal[1] * np.cos(here.roll)) / np.cos(here.pitch)
+    level = np.cos(lean.pitch)
     share = 1.0 / (1.0 + x[SQUAT])
     effort = (signal[2] - x[PUSH]) * share
-    acceleration = level * (effort + gravity * np.sin(lean[3]))
+    acceleration = level * (effort + gravity * np.sin(lean.pitch))
     # Way of the train, and of its wheel (`rolls` per metre); what is Markov in distance forgets.
     half = 0.5 * dt * dt
     way = dt * x[V] + half * acceleration
     run = abs(way)
-    rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here[1]
+    rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here.curvature
     wears, sways = np.exp(-run / model.tread_length_m), np.exp(-run / model.sway_length_m)
     # F, the derivative of all that follows by the state.
     for i in range(n):
         for j in range(n):
             f[i, j] = 1.0 if i == j else 0.0
-    by_place = level * gravity * level * lean[4]
+    by_place = level * gravity * level * lean.pitch_slope
     for place, slope in (
         (S, by_place),
         (LEAD, -by_place),
@@ -165,7 +205,7 @@ def predict(
         f[S, place] += half * slope
         f[WAY, place] += rolls * half * slope
     f[S, V], f[WAY, V] = dt, rolls * dt
-    f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * here[1]
+    f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * here.curvature
     f[TREAD, TREAD], f[SWAY, SWAY] = wears, sways
     f[YAW, DRIFT] = -dt
     # The state itself.
@@ -195,7 +235,7 @@ def predict(
     return acceleration, rolls
 
 
-@njit
+@njit_inner
 def wheel_reading(
     change: float, measured: float, x: FloatArray, p: FloatArray, pulse: float, dt: float
 ) -> tuple[float, float]:
@@ -213,7 +253,7 @@ def wheel_reading(
     return error, pulse
 
 
-@njit
+@njit_inner
 def start_anew(x: FloatArray, p: FloatArray, f: FloatArray, measured: float, pulse: float) -> None:
     """Forget the wheel's way, which says nothing while the wheel slips: it is what the wheel reads."""
     for i in range(x.shape[0]):
@@ -222,7 +262,7 @@ def start_anew(x: FloatArray, p: FloatArray, f: FloatArray, measured: float, pul
     x[WAY] = measured
 
 
-@njit
+@njit_borrowed
 def curve_matched(
     dt: float,
     signals: FloatArray,
@@ -234,7 +274,8 @@ def curve_matched(
     x: FloatArray,
     p: FloatArray,
     steps: Steps,
-    past: History,
+    scratch: Scratch,
+    past: History | None,
 ) -> None:
     """Run the filter over n steps.
 
@@ -257,26 +298,22 @@ def curve_matched(
         State and covariance at the start; replaced by the last ones.
     steps : Steps, output
         Of n rows.
-    past : History, output
-        For `simrail.estimators.kalman.fixed_interval`; of no rows where no smoother follows.
+    scratch : Scratch
+        All zero.
+    past : History or None, output
+        For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
     """
-    n = x.shape[0]
-    f, work, v = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-    h, gain = np.zeros((UPDATES, n)), np.zeros(n)
-    line, lean = np.zeros(5), np.zeros(5)
-    error, variance, wanted = np.zeros(UPDATES), np.zeros(UPDATES), np.zeros(UPDATES)
+    f, work, h, gain, v = scratch
     pulse = model.pulse_m
     h[WHEEL, WAY] = h[HEADING, YAW] = h[REST, V] = 1.0
     h[HEADING, SWAY] = -1.0
-    variance[HEADING], variance[REST] = model.heading_sd_rad**2, REST_VARIANCE
     direction = idle = moving = agreed = wheel_speed = steady = 0.0
     resting, slipping = True, False
     for k in range(signals.shape[0]):
-        line_at(grid, table, x[S], line)
-        line_at(grid, table, x[S] - x[LEAD], lean)
+        here, lean = line_at(grid, table, x[S]), line_at(grid, table, x[S] - x[LEAD])
         steady += dt / STEADY_S * (signals[k, 2] - x[PUSH] - steady)
         steps.acceleration[k], rolls = predict(
-            x, p, f, work, line, lean, signals[k], dt, model, gravity, steady
+            x, p, f, work, here, lean, signals[k], dt, model, gravity, steady
         )
 
         # The wheel: where it stands, and since when it rests or rolls.
@@ -295,8 +332,8 @@ def curve_matched(
                 p[V, V] += (0.5 * np.cbrt(START_JERK_MPS3 * 36.0 * pulse * pulse)) ** 2
                 moving = 0.0
             resting = False
-        error[WHEEL], width = wheel_reading(change, measured, x, p, pulse, dt)
-        variance[WHEEL] = width * width / 12.0
+        off_way, width = wheel_reading(change, measured, x, p, pulse, dt)
+        way_variance = width * width / 12.0
 
         # Slip: the innovation gives it away, and it ends when wheel and filter agree on the speed again.
         if slipping:
@@ -304,27 +341,29 @@ def curve_matched(
             agrees = off < AGREE_SDS * np.sqrt(p[V, V]) + AGREE_SHARE * abs(x[V])
             agreed = agreed + dt if agrees else 0.0
             slipping = agreed <= AGREE_S
-        elif moving > START_S and error[WHEEL] ** 2 > model.gate**2 * (p[WAY, WAY] + variance[WHEEL]):
+        elif moving > START_S and off_way**2 > model.gate**2 * (p[WAY, WAY] + way_variance):
             slipping, agreed = True, 0.0
         if slipping:
             start_anew(x, p, f, measured, pulse)
         resting = resting or (idle > model.still_s and abs(x[V]) * idle < 2.0 * pulse)
-        wanted[WHEEL] = not slipping and (change != 0.0 or error[WHEEL] != 0.0)
-        wanted[HEADING], wanted[REST] = 1.0, resting
-        if past.states.shape[0] > 0:
+        if past is not None:
             remember_prediction(past, k, x, p, f)
 
         for m in range(UPDATES):
-            if m == HEADING:
+            if m == WHEEL:
+                error, variance = off_way, way_variance
+                wanted = not slipping and (change != 0.0 or off_way != 0.0)
+            elif m == HEADING:
                 # That of the design where the body points, and its sway about that.
-                line_at(grid, table, x[S] - direction * x[LAG], line)
-                h[HEADING, S], h[HEADING, LAG] = -line[1], direction * line[1]
-                error[HEADING] = line[0] - x[YAW] + x[SWAY]
-            elif m == REST:
-                error[REST] = -x[V]
-            if wanted[m] > 0.0:
-                s = update(x, p, h[m], error[m], variance[m], gain, v)
-                if past.states.shape[0] > 0:
-                    remember(past, k, m, h[m], gain, error[m], s)
+                line = line_at(grid, table, x[S] - direction * x[LAG])
+                h[HEADING, S], h[HEADING, LAG] = -line.curvature, direction * line.curvature
+                error, variance = line.heading - x[YAW] + x[SWAY], model.heading_sd_rad**2
+                wanted = True
+            else:
+                error, variance, wanted = -x[V], REST_VARIANCE, resting
+            if wanted:
+                s = update(x, p, h[m], error, variance, gain, v)
+                if past is not None:
+                    remember(past, k, m, h[m], gain, error, s)
         keep(steps.states, steps.covariance, k, x, p)
         steps.slipping[k], steps.resting[k] = slipping, resting

@@ -17,6 +17,7 @@ import pandas as pd
 
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
+from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
@@ -26,6 +27,9 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
 from simrail.scenario.tables import RidePart
 from simrail.scoring.geometry import score_geometry
+from simrail.scoring.kick import score_kick
+from simrail.scoring.ride_figures import RIDE, score_ride_comfort, score_running_safety
+from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
@@ -64,6 +68,8 @@ class CellResult:
         By the estimator's name in the scenario, in the scenario's order; failed ones are left out.
     rails : LaidTrack, optional
         The rails that the ride was run on, if an estimate speaks of rails.
+    contacts : dict of str to ndarray (k, 12)
+        Forces of each wheel (`simrail.ride.truth.Truth.contacts`), mapped from disk, if the ride kept them.
     """
 
     cell: dict[str, object]
@@ -71,6 +77,7 @@ class CellResult:
     motion: pd.DataFrame
     estimates: dict[str, Estimate]
     rails: LaidTrack | None = None
+    contacts: dict[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass
@@ -159,6 +166,12 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
             check()
             for name in tally.estimators:
                 tally.fail(cell, name, error)
+        if cell.sensor_draw == 0:  # sensors change nothing of the ride itself
+            try:
+                _score_ride(cell, truth, parts, tally)
+            except Exception as error:
+                check()
+                tally.fail(cell, RIDE, error)
     if not recorded:
         return
     for name, estimator in tally.estimators.items():
@@ -208,6 +221,8 @@ def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: 
             check()  # an engine in C++ may have made an error of its own of Ctrl-C
             raise
     watcher.ride_ends()
+    for warning in truth.manifest.get("warnings", ()):
+        watcher.told(f"warning: ride {cell.ride.name}: {warning}")
     return truth
 
 
@@ -221,7 +236,7 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
-    return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails)
+    return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails, truth.contacts)
 
 
 def _labels(cell: Cell) -> dict[str, object]:
@@ -340,6 +355,20 @@ def _score(
     if bad:
         reason = f"estimate not finite in {bad} of {len(estimate.states)} samples"
         tally.failures.append(Failure(cell.number, name, reason, reason + "\n"))
+
+
+def _score_ride(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> None:
+    """Score the ride itself, where the scenario asks for it."""
+    spec, resolved = cell.spec, parts.resolve(cell)
+    with tally.timed("score"):
+        if spec.running_safety is not None:
+            factor = TRACK_SHIFT_FACTOR[spec.running_safety.vehicle]
+            vehicle, windows = resolved.ride.vehicle, spec.score.windows
+            tally.add(cell, RIDE, score_running_safety(truth, vehicle, factor=factor, windows=windows))
+        if spec.ride_comfort is not None:
+            tally.add(cell, RIDE, score_ride_comfort(truth, resolved.mount))
+        if cell.ride.kick_end_m is not None:
+            tally.add(cell, RIDE, score_kick(truth, after_m=cell.ride.kick_end_m))
 
 
 def _wanted(cell: Cell) -> dict[str, Any]:

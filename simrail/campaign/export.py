@@ -13,8 +13,10 @@ import pandas as pd
 from simrail.campaign.cell import cell_record, record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
+from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
+from simrail.ride.truth import Truth
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
@@ -22,6 +24,7 @@ from simrail.scoring.score import truth_at_imu
 
 INDEX_FILE = "recordings.csv"
 TRUTH_STEM = "truth_not_part_of_the_recording"
+CONTACT_FOLDER = "contact_not_part_of_the_recording"
 OF_A_RUN = ("cell", "case", "sample", "track_draw")
 """Labels of a cell that say something within a campaign only."""
 
@@ -33,6 +36,7 @@ def export(
     format: Format = "csv",
     draw: int = 0,
     truth: bool = False,
+    contact: bool = False,
     watcher: Watcher | None = None,
 ) -> list[str]:
     """Write every recording of a scenario, for one draw of track and sensors.
@@ -49,6 +53,8 @@ def export(
         Draw of the sensors; the track is that of its first draw.
     truth : bool
         Writes the true motion of the mount at the IMU's times beside each recording, too.
+    contact : bool
+        Writes the forces between wheels and rails beside each recording, too: one file per wheel.
     watcher : Watcher, optional
         Is told of the progress.
 
@@ -66,6 +72,15 @@ def export(
     watcher = watcher or Watcher()
     refuse_existing(folder)
     parts = judge_scenario(scenario).parts
+    if contact and not scenario.spec.contact_rate_hz:
+        raise InputError(
+            "the scenario keeps no forces between wheels and rails",
+            file=scenario.file,
+            field="contact_rate_hz",
+            value=0.0,
+            limit="> 0 Hz",
+            remedy="add --set contact_rate_hz=200.0, or another rate that divides truth_rate_hz",
+        )
     chosen = [replace(cell, sensor_draw=draw) for cell in first_cells(scenario)]
     rides = len({cell.ride_number for cell in chosen})
     names = _names(chosen)
@@ -82,6 +97,8 @@ def export(
                 if truth:
                     true = truth_at_imu(motion, recording)
                     write_frame(true, draft / name / f"{TRUTH_STEM}.{format}", format=format)
+                if contact:
+                    _write_contact(motion, draft / name / CONTACT_FOLDER, format=format)
                 labels = cell_record(cell).items()
                 records.append(
                     {"folder": name} | {key: value for key, value in labels if key not in OF_A_RUN}
@@ -89,6 +106,13 @@ def export(
                 watcher.recording_written(len(records), len(chosen), name)
         pd.DataFrame.from_records(records).to_csv(draft / INDEX_FILE, index=False)
     return list(names.values())
+
+
+def _write_contact(truth: Truth, folder: Path, *, format: Format) -> None:
+    """Write the forces of every wheel, a file each."""
+    folder.mkdir()
+    for wheel in truth.wheel_names:
+        write_frame(truth.contact(wheel), folder / f"{wheel}.{format}", format=format)
 
 
 def _names(chosen: list[Cell]) -> dict[int, str]:

@@ -58,6 +58,14 @@ class CampaignResult:
     plan: Plan
     stopped: StopState | None = None
 
+    @property
+    def warnings(self) -> list[str]:
+        """What was unusual in the plan, and in the rides, one line each."""
+        of_rides = [
+            f"ride {ride['ride']}: {line}" for ride in self.rides for line in ride.get("warnings", ())
+        ]
+        return [*self.plan.warnings, *dict.fromkeys(of_rides)]
+
 
 def chosen_cells(plan: Plan, only: int | None = None, *, draws: int | None = None) -> Iterator[Cell]:
     """The cells of a plan: all, the one that is wanted, or those of the first draws of its stop rule."""

@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, Self
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
@@ -68,10 +68,15 @@ class BatchResult:
 
 
 @dataclass(frozen=True)
-class _RememberedTruth(Truth):
+class RememberedTruth(Truth):
     """A truth that works out the motion of each place once: all draws of a ride ask for it again."""
 
     remembered: dict[Mount, pd.DataFrame] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, truth: Truth) -> Self:
+        """What remembers the motions of a truth, which must not be written to."""
+        return cls(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
 
     def motion(self, mount: Mount) -> pd.DataFrame:
         """See `Truth.motion`; IMUs of any name in one place share it."""
@@ -106,7 +111,7 @@ class _Worker:
             begun = time.perf_counter()
             truth = simulate(ride, progress=progress, told=notes.append)
             took = time.perf_counter() - begun
-            truth = _RememberedTruth(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
+            truth = RememberedTruth.of(truth)
             facts = {key: value for key, value in truth.manifest.items() if key != "versions"}
             facts |= {"number": cell.ride_number, "ride": cell.ride.name, "track_draw": cell.track_draw}
             self.ride = cell.ride_number, truth, facts | {"from_cache": cached, "took_s": took}

@@ -20,6 +20,10 @@ def export(
     truth: Annotated[
         bool, typer.Option("--truth", help="Write the true motion beside each recording, too.")
     ] = False,
+    contact: Annotated[
+        bool,
+        typer.Option("--contact", help="Write the forces between wheels and rails, a file per wheel, too."),
+    ] = False,
     seed: Seed = None,
     settings: Settings = None,
 ) -> int:
@@ -32,7 +36,9 @@ def export(
 
     chosen, read = _format(form), load_scenario(scenario, overrides=settings or [], seed=seed)
     with ProgressWatcher(Console(stderr=True)) as watcher:
-        names = export_scenario(read, out, format=chosen, draw=draw, truth=truth, watcher=watcher)
+        names = export_scenario(
+            read, out, format=chosen, draw=draw, truth=truth, contact=contact, watcher=watcher
+        )
     print(f"wrote {number(len(names), 'recording')} into {out}:")
     for name in names:
         print(f"  {name}")

@@ -20,8 +20,11 @@ from simrail.report.tables.geometry import (
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases, map_words
+from simrail.report.tables.running import decay_words, running_words
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
+from simrail.scoring.ride_figures import RIDE
+from simrail.scoring.running_safety import DERAILMENT_LIMIT
 from simrail.scoring.table import OK
 from simrail.track.bands import Band
 
@@ -47,18 +50,22 @@ def print_scores(console: Console, results: Results) -> None:
     scores, cells = campaign.scores, campaign.cells
     styles = list(method_styles(results.scenario).values())
     bands = bands_by_name(results.scenario.spec)
+    safety = results.scenario.spec.running_safety
+    limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
     for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
         if number == MOST_GROUPS:
             console.print(f"... and {cells['case'].nunique() - number} more cases: see scores.csv")
             break
         rows = scores[scores["cell"].isin(members["cell"])]
-        console.print(_case(console, rows, members, styles, bands))
+        console.print(_case(console, rows, members, styles, bands, limit))
+    kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
+    for sentence in decay_words(cases(kicks, cells)):
+        console.print(Text(sentence), soft_wrap=True)
     if campaign.stopped is not None:
         # What was not reached is to be seen; what was, is no less than what was asked for.
         colour = "green" if campaign.stopped.reached else "yellow"
         console.print(Text(campaign.stopped.words, style=colour), soft_wrap=True)
-    for warning in campaign.plan.warnings:
-        console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False)
+    print_warnings(console, campaign)
     reasons = list(dict.fromkeys((failure.estimator, failure.reason) for failure in campaign.failures))
     for estimator, reason in reasons[:10]:
         console.print(f"[red]failed:[/red] {estimator}: {reason}", highlight=False)
@@ -80,6 +87,13 @@ def print_cell(console: Console, campaign: CampaignResult) -> None:
     )
     columns = ["estimator", "quantity", "band", "reference", "window", "metric", "value", "unit", "status"]
     print(campaign.scores[columns].to_string(index=False, float_format=lambda value: f"{value:.9g}"))
+    print_warnings(console, campaign)
+
+
+def print_warnings(console: Console, campaign: CampaignResult) -> None:
+    """Print what was unusual in the plan and in the rides."""
+    for warning in campaign.warnings:
+        console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False, soft_wrap=True)
 
 
 def _case(
@@ -88,8 +102,12 @@ def _case(
     members: pd.DataFrame,
     styles: list[MethodStyle],
     bands: dict[str, Band],
+    derailment_limit: float,
 ) -> Group:
-    """Title, rails where they are scored, attitude, and notes; title and notes may be wider than a table."""
+    """Title, the ride itself and rails where they are scored, attitude, and notes.
+
+    Title and notes may be wider than a table.
+    """
     first = members.iloc[0]
     draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
     title = Text(
@@ -97,13 +115,17 @@ def _case(
         f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}, {map_words(first['map'])}",
         style="bold",
     )
-    shown = rows[(rows["status"] == OK) & rows["metric"].isin(("rms", "sd", "us_per_sample"))]
+    wanted = rows["metric"].isin(("rms", "sd", "us_per_sample")) | (rows["estimator"] == RIDE)
+    shown = rows[(rows["status"] == OK) & wanted]
     of_cases = cases(shown, members)
     if not of_cases:
         return Group(title)
     case = of_cases[0]
     notes: list[str] = []
     parts: list[RenderableType] = [title]
+    ride = running_words(case, derailment_limit=derailment_limit)
+    if ride:
+        parts.append(Text(f"The ride itself: {ride}"))
     mapping = [style for style in styles if case.get(style.name, JUDGED[0], "sd").draws]
     if mapping:
         band = judged_band(case)

@@ -45,6 +45,10 @@ MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + R
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")
 RATE_INNOVATION = ("innovation_x_radps", "innovation_y_radps", "innovation_z_radps")
 IRREGULARITY = ("alignment_m", "vertical_profile_m", "cross_level_m", "gauge_m")
+CONTACT_FORCE = ("wheel_load_n", "guiding_force_n", "normal_force_n", "creep_force_x_n", "creep_force_y_n")
+CREEPAGE = ("creepage_x", "creepage_y", "spin_creepage_1pm")
+CONTACT_PLACE = ("rail_contact_m", "contact_angle_rad", "flange_contact")
+CONTACT = ("position_m", *CONTACT_FORCE, *CREEPAGE, *CONTACT_PLACE)
 IRREGULARITY_SD = ("alignment_sd_m", "vertical_profile_sd_m", "cross_level_sd_m", "gauge_sd_m")
 
 _TABLE = [
@@ -78,6 +82,19 @@ _TABLE = [
     Column("vertical_profile_m", "m", "track", "mean vertical deviation of the rails, positive up"),
     Column("cross_level_m", "m", "track", "left minus right rail height"),
     Column("gauge_m", "m", "track", "left minus right lateral deviation, positive wider"),
+    Column("wheel_load_n", "N", "track", "Q: vertical force of the rail on the wheel, positive up"),
+    Column("guiding_force_n", "N", "track", "Y: lateral force of the rail on the wheel, positive left"),
+    Column("normal_force_n", "N", "contact", "normal force, the sum over the patches of the wheel"),
+    Column("creep_force_x_n", "N", "contact", "creep force on the wheel along the rail, positive forward"),
+    Column("creep_force_y_n", "N", "contact", "creep force on the wheel across, in the contact's plane"),
+    Column("creepage_x", "1", "contact", "longitudinal creepage: slip of the wheel forward over |speed|"),
+    Column("creepage_y", "1", "contact", "lateral creepage, in the contact's plane, positive left"),
+    Column("spin_creepage_1pm", "1/m", "contact", "rate of turn about the contact's normal over the speed"),
+    Column(
+        "rail_contact_m", "m", "rail", "contact on the rail, from the middle of its head to the field side"
+    ),
+    Column("contact_angle_rad", "rad", "rail", "angle of the contact, positive where the flange touches"),
+    Column("flange_contact", "1", "rail", "1 where the flange touches its rail, else 0"),
 ]
 
 

@@ -12,7 +12,7 @@ anything itself.
 import numpy as np
 import pandas as pd
 
-from simrail.core.jit import FloatArray, njit
+from simrail.core.jit import FloatArray, njit_borrowed
 from simrail.recording.recording import Recording
 
 GUARD_S = 0.5
@@ -56,7 +56,8 @@ def motion_times(recording: Recording) -> FloatArray:
     nothing tells of motion, nothing tells of rest: every time.
     """
     if recording.encoder is not None:
-        turned = _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64))
+        turned = np.zeros(len(recording.encoder), dtype=np.bool_)
+        _moves(recording.encoder["pulse_count"].to_numpy(dtype=np.float64), turned)
         return _times(recording.encoder[turned])
     way = recording.odometer if recording.odometry is None else recording.odometry
     if way is None:
@@ -69,10 +70,9 @@ def _times(frame: pd.DataFrame) -> FloatArray:
     return times
 
 
-@njit
-def _moves(count: FloatArray) -> np.ndarray:
-    """Mask (n,) of the readings that say that the wheel turned."""
-    moved = np.zeros(len(count), dtype=np.bool_)
+@njit_borrowed
+def _moves(count: FloatArray, moved: np.ndarray) -> None:
+    """Mark in ``moved`` (n,), all False, the readings that say that the wheel turned."""
     low = high = count[0]
     band = 0.0  # nothing is known of the edges at first; later one count to and fro is no motion
     for k in range(1, len(count)):
@@ -81,7 +81,6 @@ def _moves(count: FloatArray) -> np.ndarray:
             moved[k] = True
             low = high = count[k]
             band = 1.0
-    return moved
 
 
 def rest_periods(recording: Recording) -> pd.DataFrame:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -18,6 +19,8 @@ import numpy as np
 
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
+from simrail.ride.contact_extremes import ContactExtremes
+from simrail.ride.contact_forces import contact_columns
 from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Truth, abeam
 from simrail.ride.truth_files import create_arrays, let_go, load_truth, save_truth, write_header
@@ -27,7 +30,9 @@ from simrail.track.laid_track import LaidTrack, lay
 from simrail.track.rail_condition import RailCondition
 from simrail.vehicle.contact.profile_files import profiles_digest
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.derailment import DerailedError, Derailment
 from simrail.vehicle.engines.engine import Segment, Setup
+from simrail.vehicle.hunting import critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -38,7 +43,16 @@ Progress = Callable[[float, float, float], None]
 """Called with (simulated seconds done, seconds in all, present speed in m/s)."""
 
 _SOURCES = (
-    *("track", "vehicle", "ride/ride.py", "ride/kinematic.py", "ride/truth.py", "ride/truth_files.py"),
+    *(
+        "track",
+        "vehicle",
+        "ride/ride.py",
+        "ride/contact_forces.py",
+        "ride/contact_extremes.py",
+        "ride/kinematic.py",
+        "ride/truth.py",
+        "ride/truth_files.py",
+    ),
     *("core/rotation.py", "core/seeds.py", "core/jit.py"),
 )
 
@@ -73,6 +87,9 @@ class Ride:
         Whether the guide pulls the vehicle along, or its wheels drive and brake it.
     conditions : tuple of RailCondition
         What lies on the rails.
+    contact_rate_hz : float
+        Rate of the kept samples of forces between wheels and rails, unfiltered: `rate_hz` over a whole
+        number; 0 keeps none.
     """
 
     name: str
@@ -87,13 +104,18 @@ class Ride:
     gravity_mps2: float = 9.81
     drive: Literal["guide", "wheels"] = "guide"
     conditions: tuple[RailCondition, ...] = ()
+    contact_rate_hz: float = 0.0
+
+    @property
+    def contact_every(self) -> int:
+        """Output rows from one with kept contact forces to the next; 0 if none are kept."""
+        return round(self.rate_hz / self.contact_rate_hz) if self.contact_rate_hz > 0.0 else 0
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this ride from every other, versions and sources included."""
-        packages = ("simrail", "numpy", "scipy", "numba", "exudyn")
         return {
             "track": self.track.to_dict(),
-            "irregularity": asdict(self.irregularity),
+            "irregularity": self.irregularity.describe(),
             "track_seed": self.track_seed,
             "vehicle": asdict(self.vehicle),
             "profiles": profiles_digest(self.vehicle.wheel_rail),
@@ -104,9 +126,16 @@ class Ride:
             "gravity_mps2": self.gravity_mps2,
             "drive": self.drive,
             "conditions": [asdict(condition) for condition in self.conditions],
-            "versions": {package: version(package) for package in packages},
+            "contact_rate_hz": self.contact_rate_hz,
+            "versions": dict(_versions()),
             "sources": source_hash(*_SOURCES),
         }
+
+
+@lru_cache(maxsize=1)
+def _versions() -> tuple[tuple[str, str], ...]:
+    """Names and versions of the packages that make a ride; looked up once, each takes milliseconds."""
+    return tuple((package, version(package)) for package in ("simrail", "numpy", "scipy", "numba", "exudyn"))
 
 
 def rails_of(ride: Ride) -> LaidTrack:
@@ -140,7 +169,7 @@ def simulate(
 
     Raises
     ------
-    simrail.vehicle.engines.engine.DerailedError
+    simrail.vehicle.engines.derailment.DerailedError
         If a wheel leaves the rail.
     """
     key = ride_cache.key_of(ride.describe())
@@ -159,8 +188,23 @@ def simulate(
         if ride.engine == "kinematic":
             save_truth(_follow(ride), draft)
         else:
-            _drive(ride, draft, progress)
+            try:
+                _drive(ride, draft, progress)
+            except DerailedError as error:
+                raise DerailedError(_with_hunting(error.derailment, ride)) from error
     return load_truth(place)
+
+
+def _with_hunting(derailment: Derailment, ride: Ride) -> Derailment:
+    """A derailment that nothing of the rails explains, with hunting as its cause where the vehicle hunts."""
+    if derailment.from_the_track:
+        return derailment
+    model = on_gauge(ride.vehicle, mean_widening_m(rails_of(ride), ride.profile))
+    critical = critical_below(model, abs(derailment.speed_mps), gravity_mps2=ride.gravity_mps2)
+    if critical is None:
+        return derailment
+    cause = f"hunting, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
+    return replace(derailment, cause=cause)
 
 
 def _follow(ride: Ride) -> Truth:
@@ -218,12 +262,14 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     )
     engine = _engine_of(ride.engine)(setup)
     bodies, wheels = len(model.bodies), len(model.wheels)
-    arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4)
+    every = ride.contact_every
+    arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4, contact_every=every)
     at = arrays["reference_position_m"]
     place, led = profile.start_m, model.body_names.index(model.guide.body)
     spins = list(model.spin_inertia_kgm2)
     turned = np.zeros(wheels)
     yaw = np.zeros(bodies)
+    extremes = ContactExtremes(model, rate_hz=ride.rate_hz, gravity_mps2=ride.gravity_mps2)
     done = 0
     ready = time.perf_counter()
     for segment in engine.run(duration):
@@ -250,6 +296,11 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
             turned[w] = box[-1]
             arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
             arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
+            if every:
+                kept = slice(-(-here.start // every), -(-here.stop // every))
+                told = segment.contacts[kept.start * every - here.start :: every, w]
+                arrays[f"contact_{w}"][kept] = contact_columns(told)
+        extremes.add(arrays["time_s"][here], segment.contacts)
         done = here.stop
         let_go(arrays)
         if progress is not None:
@@ -267,21 +318,31 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         bodies={body.name: (body.position_m[0], body.position_m[2]) for body in model.bodies},
         wheels={wheel.name: wheel.radius_m for wheel in model.wheels},
         gravity_mps2=ride.gravity_mps2,
+        contact_every=every or 1,
         manifest={
-            "ride": ride.name,
-            "engine": ride.engine,
-            "vehicle": model.name,
-            "drive": ride.drive,
-            "conditions": [asdict(condition) for condition in ride.conditions],
-            "step_s": ride.step_s,
-            "rate_hz": ride.rate_hz,
+            **_facts(ride),
             "simulated_s": float(duration),
             "wall_s": wall,
             "setup_s": ready - started,
             "real_time_factor": float(duration) / wall,
+            "contact": extremes.summary(),
+            "warnings": extremes.warnings(),
             "versions": ride.describe()["versions"],
         },
     )
+
+
+def _facts(ride: Ride) -> dict[str, Any]:
+    """What a manifest says of a ride that an engine drives."""
+    return {
+        "ride": ride.name,
+        "engine": ride.engine,
+        "vehicle": ride.vehicle.name,
+        "drive": ride.drive,
+        "conditions": [asdict(condition) for condition in ride.conditions],
+        "step_s": ride.step_s,
+        "rate_hz": ride.rate_hz,
+    }
 
 
 def _places(ride: Ride, begin: float, segment: Segment, led: int) -> np.ndarray:

@@ -7,13 +7,13 @@ mount follows from them by rigid-body kinematics, exactly; no engine is asked ag
 Nothing here is seen by an estimator.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import MOTION
+from simrail.core.columns import CONTACT, MOTION
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import euler_angles, rotation_matrix
@@ -98,6 +98,10 @@ class Truth:
         Gravity.
     manifest : dict
         Engine, step, versions, wall time, real-time factor, vehicle; plain JSON values.
+    contacts : dict of str to ndarray (k, 12)
+        Forces and contact of each wheel, columns `simrail.core.columns.CONTACT`, if the ride kept them.
+    contact_every : int
+        Rows from one of them to the next: they belong to ``time_s[::contact_every]``.
     """
 
     time_s: FloatArray
@@ -109,6 +113,8 @@ class Truth:
     wheel_radius_m: dict[str, float]
     gravity_mps2: float
     manifest: dict[str, Any]
+    contacts: dict[str, FloatArray] = field(default_factory=dict)
+    contact_every: int = 1
 
     @property
     def rate_hz(self) -> float:
@@ -132,6 +138,42 @@ class Truth:
                 "the vehicle has no such wheel", field="wheel", value=wheel, limit=", ".join(self.wheel_names)
             )
         return self.wheel_angles[wheel]
+
+    def contact(self, wheel: str) -> pd.DataFrame:
+        """Forces between a wheel and its rail, and where they touch, as the engine that ran had them.
+
+        Parameters
+        ----------
+        wheel : str
+            Name of the wheel, or its place as in `wheel_at`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by ``time_s``, columns `simrail.core.columns.CONTACT`: forces on the wheel; Q, Y and s in
+            the track frame at its axle, creep forces and creepages in the contact's plane. Where two patches
+            touch, forces are of both, and creepages, place and angle of the one that carries more.
+            Where none does, all but ``position_m`` is 0.
+
+        Raises
+        ------
+        InputError
+            If there is no such wheel, or the ride kept no contact.
+        """
+        name = self.wheel_at(wheel)
+        if name not in self.wheel_angles:
+            raise InputError(
+                "the vehicle has no such wheel", field="wheel", value=wheel, limit=", ".join(self.wheel_names)
+            )
+        if name not in self.contacts:
+            raise InputError(
+                "this ride kept no forces between wheels and rails",
+                field="contact_rate_hz",
+                value=0.0,
+                remedy="set contact_rate_hz, e.g. to 200.0; the kinematic engine has no forces",
+            )
+        index = pd.Index(self.time_s[:: self.contact_every], name="time_s")
+        return pd.DataFrame(np.array(self.contacts[name]), index=index, columns=list(CONTACT))
 
     def wheel_at(self, place: str) -> str:
         """Name of a wheel from its place in the direction of travel, e.g. ``"trailing.left"``.

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from simrail.core.columns import CONTACT
 from simrail.core.jit import FloatArray
 from simrail.ride.truth import BodyMotion, Truth
 from simrail.track.design import TrackDesign
@@ -22,7 +23,7 @@ BODY_ARRAYS = ("position", "velocity", "acceleration", "angles", "rate", "angula
 
 
 def create_arrays(
-    folder: Path, rows: int, *, bodies: int, wheels: int, wheel_states: int
+    folder: Path, rows: int, *, bodies: int, wheels: int, wheel_states: int, contact_every: int = 0
 ) -> dict[str, FloatArray]:
     """Create the arrays of a truth on disk, to be filled piece by piece in bounded memory.
 
@@ -30,7 +31,8 @@ def create_arrays(
     -------
     dict of str to ndarray
         ``time_s`` and ``reference_position_m`` (rows,), ``body_<i>`` (rows, 18), ``wheel_<i>`` (rows,)
-        and, if `wheel_states` > 0, ``wheel_state_<i>`` (rows, wheel_states), mapped to .npy files.
+        and, if `wheel_states` > 0, ``wheel_state_<i>`` (rows, wheel_states), and, if `contact_every` > 0,
+        ``contact_<i>`` (k, 12) of every such row, mapped to .npy files.
 
     Raises
     ------
@@ -42,6 +44,9 @@ def create_arrays(
     shapes |= {f"wheel_{i}": (rows,) for i in range(wheels)}
     if wheel_states:
         shapes |= {f"wheel_state_{i}": (rows, wheel_states) for i in range(wheels)}
+    if contact_every:
+        kept = -(-rows // contact_every)
+        shapes |= {f"contact_{i}": (kept, len(CONTACT)) for i in range(wheels)}
     folder.mkdir(parents=True, exist_ok=True)
     made: dict[str, FloatArray] = {}
     for name, shape in shapes.items():
@@ -70,6 +75,7 @@ def write_header(
     wheels: dict[str, float],
     gravity_mps2: float,
     manifest: dict[str, Any],
+    contact_every: int = 1,
 ) -> None:
     """Write what goes with the arrays. Done last: a folder without it was interrupted, and is no truth.
 
@@ -81,6 +87,7 @@ def write_header(
         "wheels": wheels,
         "gravity_mps2": gravity_mps2,
         "manifest": manifest,
+        "contact_every": contact_every,
         "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))},
     }
     (folder / "truth.json").write_text(json.dumps(plain), encoding="utf-8")
@@ -95,6 +102,7 @@ def save_truth(truth: Truth, folder: Path) -> None:
         bodies=len(truth.bodies),
         wheels=len(truth.wheel_angles),
         wheel_states=states,
+        contact_every=truth.contact_every if truth.contacts else 0,
     )
     arrays["time_s"][:] = truth.time_s
     arrays["reference_position_m"][:] = truth.reference_position_m
@@ -104,6 +112,8 @@ def save_truth(truth: Truth, folder: Path) -> None:
         arrays[f"wheel_{i}"][:] = truth.wheel_angles[wheel]
         if states:
             arrays[f"wheel_state_{i}"][:] = truth.wheel_states[wheel]
+        if truth.contacts:
+            arrays[f"contact_{i}"][:] = truth.contacts[wheel]
     write_header(
         folder,
         track=truth.track,
@@ -111,6 +121,7 @@ def save_truth(truth: Truth, folder: Path) -> None:
         wheels={name: truth.wheel_radius_m[name] for name in truth.wheel_angles},
         gravity_mps2=truth.gravity_mps2,
         manifest=truth.manifest,
+        contact_every=truth.contact_every,
     )
 
 
@@ -140,6 +151,7 @@ def load_truth(folder: Path) -> Truth:
         parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(BODY_ARRAYS)}
         bodies[name] = BodyMotion(offset_m=offset, height_m=height, **parts)
     wheels = plain["wheels"]
+    has_contacts = (folder / "contact_0.npy").exists()
     has_states = (folder / "wheel_state_0.npy").exists()
     return Truth(
         time_s=time_s,
@@ -153,6 +165,8 @@ def load_truth(folder: Path) -> Truth:
         wheel_radius_m=wheels,
         gravity_mps2=plain["gravity_mps2"],
         manifest=plain["manifest"],
+        contacts={wheel: read(f"contact_{i}") for i, wheel in enumerate(wheels)} if has_contacts else {},
+        contact_every=plain["contact_every"],
     )
 
 

@@ -24,8 +24,9 @@ from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import distributions_of
+from simrail.scenario.measured_file import read_measured
 from simrail.scenario.scenario import Scenario, ScenarioFile
-from simrail.scenario.tables import ImuPart, RidePart
+from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
@@ -183,7 +184,7 @@ class Parts:
             self._rides[key] = Ride(
                 name=cell.ride.name,
                 track=self.track(cell),
-                irregularity=NO_IRREGULARITY if rough is None else Irregularity(**rough.model_dump()),
+                irregularity=NO_IRREGULARITY if rough is None else self._irregularity(rough),
                 track_seed=cell.ride_seed,
                 vehicle=vehicle,
                 profile=_profile(cell.ride),
@@ -192,8 +193,20 @@ class Parts:
                 rate_hz=spec.truth_rate_hz,
                 drive=cell.ride.drive,
                 conditions=_conditions(spec, vehicle),
+                contact_rate_hz=contact_rate_hz(spec),
             )
         return self._rides[key]
+
+    def _irregularity(self, part: IrregularityPart) -> Irregularity:
+        """Irregularity of a cell; a file of measured rails is read once."""
+        if part.measured is None:
+            return part.irregularity(None)
+        key = ("measured", part.measured.model_dump_json())
+        if key not in self._nouns:
+            with blame(self.scenario.file):
+                self._nouns[key] = read_measured(part.measured, self.scenario.folder)
+            self._content[" ".join(key)] = self._nouns[key].digest
+        return part.irregularity(self._nouns[key])
 
     def rails(self, cell: Cell) -> LaidTrack:
         """The rails of a cell's ride; the last ones are remembered, since cells come ride by ride."""
@@ -327,6 +340,13 @@ def _mount(imu: ImuPart) -> Mount:
         pitch_rad=radians(imu.pitch_deg),
         yaw_rad=radians(imu.yaw_deg),
     )
+
+
+def contact_rate_hz(spec: ScenarioFile) -> float:
+    """Rate at which contact forces are kept; that of the truth if they are scored and it is not given."""
+    if spec.running_safety is None or spec.contact_rate_hz > 0.0:
+        return spec.contact_rate_hz
+    return float(spec.truth_rate_hz)
 
 
 def bands_by_name(spec: ScenarioFile) -> dict[str, Band]:

@@ -19,7 +19,9 @@ from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.distributions import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import judge_stop_rule
+from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.table import CURVE_PREFIX, METRICS, WINDOWS
+from simrail.track.laid_track import LaidTrack
 
 MOST_CELLS = 1_000_000
 
@@ -88,7 +90,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         estimators = parts.estimators(0)
         for sample in range(1, sample_count(scenario.spec)):
             parts.estimators(sample)
-        judge_stop_rule(scenario, estimators)
+        judge_stop_rule(scenario, [*estimators, *_judge_ride_figures(scenario, estimators)])
         simulated, unusual = _judge_cells(scenario, parts)
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
     return Plan(
@@ -103,6 +105,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
     last_ride = None
     durations: dict[tuple[object, ...], float] = {}
     judged_sensors: set[tuple[object, ...]] = set()
+    judged_rails: tuple[tuple[object, ...], LaidTrack] | None = None
     for cell in first_cells(scenario):
         resolved = parts.resolve(cell)
         ride = resolved.ride
@@ -117,7 +120,11 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
         )
         ride_key = (*way, ride.irregularity, ride.step_s)
         if ride_key not in durations:
-            durations[ride_key], unusual = judge_ride(resolved)
+            rails_key = (id(ride.track), ride.irregularity, ride.conditions)
+            # One is remembered: rides over the same rails come in a row, and rails of many are large.
+            same = judged_rails[1] if judged_rails is not None and judged_rails[0] == rails_key else None
+            durations[ride_key], unusual, laid = judge_ride(resolved, known_rails=same)
+            judged_rails = rails_key, laid
             warnings += unusual
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number
@@ -139,6 +146,22 @@ def _judge_score(scenario: Scenario) -> None:
         for i, word in enumerate(words or ()):
             if name == "metrics" or not word.startswith(CURVE_PREFIX):
                 one_of(word, possible, f"is not one of the {name}", field=f"score.{name}[{i}]")
+
+
+def _judge_ride_figures(scenario: Scenario, estimators: Mapping[str, Estimator]) -> list[str]:
+    """Name under which figures of the ride itself stand, if there are any; refused if an estimator has it."""
+    spec = scenario.spec
+    kicked = any(ride.kick_end_m is not None for ride in spec.ride)
+    if spec.running_safety is None and spec.ride_comfort is None and not kicked:
+        return []
+    if RIDE in estimators:
+        raise InputError(
+            "figures of the ride itself stand under this name in the tables",
+            field="estimator",
+            value=RIDE,
+            remedy="give the estimator another name",
+        )
+    return [RIDE]
 
 
 def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> list[str]:

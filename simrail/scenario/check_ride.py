@@ -9,11 +9,15 @@ import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
-from simrail.ride.ride import rails_of
+from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
+from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
+from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
 from simrail.track.design import TrackDesign
+from simrail.track.laid_track import LaidTrack
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
+from simrail.vehicle.hunting import conicity_of, critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
 
 WARN_LATERAL_MPS2 = 1.0
@@ -25,13 +29,17 @@ MOST_BASE_PER_GAUGE = 1.1
 """The middles of the heads of two rails are farther apart than their gauge, by less than a tenth of it."""
 
 
-def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
+def judge_ride(
+    resolved: ResolvedCell, *, known_rails: LaidTrack | None = None
+) -> tuple[float, list[str], LaidTrack]:
     """Judge the ride of a cell.
 
     Parameters
     ----------
     resolved : ResolvedCell
         Any cell of the ride.
+    known_rails : LaidTrack, optional
+        Its rails, if another ride that has been judged had the same.
 
     Returns
     -------
@@ -39,6 +47,8 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
         How long the ride takes.
     warnings : list of str
         What is unusual, one line each.
+    rails : LaidTrack
+        Its rails.
 
     Raises
     ------
@@ -55,11 +65,20 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
                 value=words.end_m,
                 remedy="end_m > start_m runs forward, end_m < start_m backward",
             )
+        low, high = sorted((words.start_m, words.start_m if words.end_m is None else words.end_m))
+        if words.kick_end_m is not None and not low <= words.kick_end_m < high:
+            raise InputError(
+                "the ride does not pass the end of the kick",
+                field="kick_end_m",
+                value=words.kick_end_m,
+                limit=f"{low:g} to {high:g} m",
+                remedy="move it between start_m and end_m",
+            )
     with blame(f"vehicle {vehicle.name}", "axle"):
         _judge_loads(vehicle)
     _judge_places(resolved)
     _judge_wheels(resolved)
-    _judge_rails(resolved)
+    laid = known_rails or _judge_rails(resolved)
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         duration = resolved.ride.profile.duration_s
         if not duration <= LONGEST_RIDE_S:
@@ -70,18 +89,20 @@ def judge_ride(resolved: ResolvedCell) -> tuple[float, list[str]]:
                 limit=f"{LONGEST_RIDE_S:.0f} s",
                 remedy="ride faster, shorter, or with less dwell time",
             )
+    _judge_contact_rate(resolved.ride)
+    _judge_ride_figures(resolved)
     warnings = _judge_step(resolved)
     if not words.stands:
-        warnings += _judge_dynamics(resolved)
-    return duration, warnings
+        warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
+    return duration, warnings, laid
 
 
-def _judge_rails(resolved: ResolvedCell) -> None:
-    """Refuse irregularities that cannot be, and conditions off the track or without sense."""
+def _judge_rails(resolved: ResolvedCell) -> LaidTrack:
+    """Refuse irregularities that cannot be, and conditions off the track or without sense; lay the rails."""
     ride = resolved.ride
     check_conditions(ride.conditions, ride.track.start_m, ride.track.end_m)
     try:
-        rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
+        return rails_of(ride)  # laying them is the judgement: it takes a moment and no rule can be forgotten
     except InputError as error:
         if error.file is None and not (error.field or "").startswith("irregularity"):
             error.field = f"irregularity.{error.field or ''}".rstrip(".")
@@ -111,6 +132,48 @@ def _judge_step(resolved: ResolvedCell) -> list[str]:
             f"it puts that off by {off:.0f} %; {advised} is within 1 %"
         ]
     return []
+
+
+def _judge_contact_rate(ride: Ride) -> None:
+    """Refuse to keep forces that there are none of, or at a rate that is none of the truth's."""
+    if ride.contact_rate_hz == 0.0:
+        return
+    if ride.engine == "kinematic":
+        raise InputError(
+            "a body that follows the rails has no forces to keep",
+            field="contact_rate_hz",
+            value=ride.contact_rate_hz,
+            limit="0 with engine kinematic",
+            remedy="remove it, or choose the engine compiled or exudyn",
+        )
+    ratio = ride.rate_hz / ride.contact_rate_hz
+    if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
+        raise InputError(
+            "is not the rate of the truth over a whole number",
+            field="contact_rate_hz",
+            value=ride.contact_rate_hz,
+            limit=f"truth_rate_hz = {ride.rate_hz:g} Hz divided by a whole number",
+            remedy=f"try {ride.rate_hz / max(round(ratio), 1):.12g}",
+        )
+
+
+def _judge_ride_figures(resolved: ResolvedCell) -> None:
+    """Refuse figures of the ride that its rates are too low for."""
+    ride, spec = resolved.ride, resolved.cell.spec
+    asked = {"running_safety": spec.running_safety, "ride_comfort": spec.ride_comfort}
+    rates = {
+        "running_safety": ("contact_rate_hz", ride.contact_rate_hz, SAFETY_HZ),
+        "ride_comfort": ("truth_rate_hz", ride.rate_hz, COMFORT_HZ),
+    }
+    for table, (field, rate_hz, least_hz) in rates.items():
+        if asked[table] is not None and rate_hz < least_hz:
+            raise InputError(
+                f"is too low for [{table}]",
+                field=field,
+                value=rate_hz,
+                limit=f">= {least_hz:g} Hz",
+                remedy=f"raise it, or take [{table}] out",
+            )
 
 
 def _judge_loads(vehicle: VehicleModel) -> None:
@@ -143,6 +206,10 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 remedy="shorten the ride or lengthen the track",
             )
     first, last = min(places.values()), max(places.values())
+    measured = resolved.ride.irregularity.measured
+    if measured is not None:
+        with blame(None, "irregularity"):
+            measured.check_covers(first + ahead[0], last + ahead[1])
     for i, stop in enumerate(words.stops):
         if not first < stop.position_m < last:
             raise InputError(
@@ -194,6 +261,29 @@ def _judge_dynamics(resolved: ResolvedCell) -> list[str]:
             "between stops is too short for its acceleration and jerk"
         )
     return warnings
+
+
+def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
+    """Warn of a speed above that at which the vehicle begins to hunt on these rails."""
+    ride, words = resolved.ride, resolved.cell.ride
+    if ride.engine == "kinematic":
+        return []
+    fastest = float(np.max(np.abs(ride.profile.motion(np.arange(0.0, ride.profile.duration_s, 0.1))[1])))
+    model = on_gauge(ride.vehicle, mean_widening_m(laid, ride.profile))
+    critical = critical_below(model, fastest, gravity_mps2=ride.gravity_mps2)
+    if critical is None:
+        return []
+    cone = conicity_of(model, gravity_mps2=ride.gravity_mps2)
+    # Wheels that all turn apart have no conicity to hunt by; what grows is another swing.
+    apart = len(ride.vehicle.spin_inertia_kgm2) == len(ride.vehicle.wheels)
+    does = "runs unstably" if apart else "hunts"
+    on = "" if cone is None else f" with equivalent conicity {cone:.2f} at 3 mm,"
+    gauge_mm = 1e3 * model.wheel_rail.gauge_m
+    return [
+        f"ride[{resolved.cell.ride_index}] ({words.name}) reaches {3.6 * fastest:.0f} km/h: "
+        f"{ride.vehicle.name} {does} above {3.6 * critical:.0f} km/h on these rails,{on} "
+        f"gauge {gauge_mm:.0f} mm; what grows there ends at the flanges only"
+    ]
 
 
 def _judge_wheels(resolved: ResolvedCell) -> None:

@@ -27,7 +27,9 @@ class ScenarioFile(Part):
 
     ``paper`` names the publication whose tables and figures the report sets beside the scenario's own.
     ``odometry`` names that which the estimators work with (`simrail.estimation.choose_odometry`); if it is
-    not given, ``"curve_matched"`` with an ``[encoder]`` and ``"none"`` without.
+    not given, ``"curve_matched"`` with an ``[encoder]`` and ``"none"`` without. ``contact_rate_hz`` is the
+    rate at which forces between wheels and rails are kept, ``truth_rate_hz`` over a whole number; 0 keeps
+    none.
     """
 
     title: str
@@ -38,6 +40,7 @@ class ScenarioFile(Part):
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
     step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=1000.0)]] = 1000.0
+    contact_rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
     odometry: Listed[str] = ""
     irregularity: tables.IrregularityPart | None = None
@@ -54,6 +57,8 @@ class ScenarioFile(Part):
     score: tables.ScorePart = tables.ScorePart()
     stop: tables.StopRulePart | None = None
     geometry: tables.GeometryPart = tables.GeometryPart()
+    running_safety: tables.RunningSafetyPart | None = None
+    ride_comfort: tables.RideComfortPart | None = None
 
     @field_validator("step_s")
     @classmethod

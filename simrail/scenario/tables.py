@@ -13,8 +13,12 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
 from simrail.scenario.axes import Listed, each
+from simrail.scenario.measured_file import MeasuredPart
+from simrail.track.defects import Defect
+from simrail.track.irregularity import Irregularity
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors
 from simrail.track.map_file import map_errors_of
+from simrail.track.measured import MeasuredRails
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
 """A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
@@ -37,13 +41,58 @@ Wavelengths = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
 """The shortest and the longest wavelength, m."""
 
 
-class IrregularityPart(Part):
-    """``[irregularity]``: how the rails deviate from the design. Without it they do not."""
+Scale = Annotated[float, Field(ge=0.0, le=10.0)]
+"""A factor on amplitudes."""
 
-    spectrum: Listed[str]
+
+class DefectPart(Part):
+    """``[[irregularity.defect]]``: a discrete defect by form and place (`simrail.track.defects`)."""
+
+    form: Literal["ramp", "step", "dip", "joint", "twist"]
+    at_m: float
+    length_m: Positive
+    size_mm: float
+    direction: Literal["vertical", "lateral"] = "vertical"
+    rails: Literal["both", "left", "right"] = "both"
+    hold_m: Annotated[float, Field(ge=0.0)] | None = None
+
+    def defect(self) -> Defect:
+        """The defect that it describes."""
+        return Defect(
+            form=self.form,
+            at_m=self.at_m,
+            length_m=self.length_m,
+            size_m=self.size_mm / 1000.0,
+            direction=self.direction,
+            rails=self.rails,
+            hold_m=self.hold_m,
+        )
+
+
+class IrregularityPart(Part):
+    """``[irregularity]``: how the rails deviate from the design. Without it they do not.
+
+    What the spectrum gives lies from ``start_m`` to ``end_m``, or along the whole track; rails from a file
+    and defects are added.
+    """
+
+    spectrum: Listed[str] = "none"
     wavelengths_m: Wavelengths = (1.5, 100.0)
     fade_m: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 40.0
-    scale: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = 1.0
+    scale: Listed[Scale] = 1.0
+    alignment_scale: Listed[Scale] = 1.0
+    vertical_profile_scale: Listed[Scale] = 1.0
+    cross_level_scale: Listed[Scale] = 1.0
+    gauge_scale: Listed[Scale] = 1.0
+    start_m: Listed[float] | None = None
+    end_m: Listed[float] | None = None
+    measured: MeasuredPart | None = None
+    defect: tuple[DefectPart, ...] = ()
+
+    def irregularity(self, measured: MeasuredRails | None) -> Irregularity:
+        """The irregularity that it describes, with the rails of its file; nothing in it is a list."""
+        own = self.model_dump(exclude={"defect", "measured"})
+        return Irregularity(**own, defects=tuple(part.defect() for part in self.defect), measured=measured)
 
 
 class StopPart(Part):
@@ -58,7 +107,8 @@ class RidePart(Part):
 
     With ``reverse = true`` it is ridden the other way, from ``end_m`` to ``start_m``, stops in turn; with
     ``reverse = [false, true]`` both ways. Without ``end_m`` and ``speed_kmh`` the vehicle stands where it
-    is, for ``rest_s + final_rest_s``.
+    is, for ``rest_s + final_rest_s``. Over a small kick in smooth straight rails, ``kick_end_m`` says where
+    it ends: it is scored whether the wheelsets' lateral motion decays beyond (`simrail.scoring.kick`).
     """
 
     name: Name
@@ -72,6 +122,7 @@ class RidePart(Part):
     stops: tuple[StopPart, ...] = ()
     drive: Listed[Literal["guide", "wheels"]] = "guide"
     reverse: Listed[bool] = False
+    kick_end_m: float | None = None
 
     @model_validator(mode="after")
     def _goes_or_stands(self) -> RidePart:
@@ -286,6 +337,21 @@ class ScorePart(Part):
 
     windows: tuple[str, ...] | None = None
     metrics: tuple[str, ...] | None = None
+
+
+class RunningSafetyPart(Part):
+    """``[running_safety]``: scores the forces between wheels and rails after EN 14363.
+
+    ``vehicle`` says which limit of Prud'homme's counts, and ``derailment_limit`` what the report holds Y/Q
+    against. Forces are kept at ``contact_rate_hz``, or at the rate of the truth if that is not given.
+    """
+
+    vehicle: Literal["passenger", "freight"] = "passenger"
+    derailment_limit: Annotated[float, Field(gt=0.0, le=3.0)] = 0.8
+
+
+class RideComfortPart(Part):
+    """``[ride_comfort]``: scores N_MV (EN 12299) and Sperling's Wz where each IMU sits."""
 
 
 class GeometryLimitsPart(Part):

@@ -69,8 +69,18 @@ QUANTITY_UNITS = {
     "distance_relative": "1",
     "gyro_bias": "deg/s",
     "accel_bias": "m/s2",
+    "derailment_quotient": "1",
+    "sum_y": "kN",
+    "sum_y_relative": "1",
+    "guiding_force": "kN",
+    "wheel_load": "kN",
+    "wheel_unloading": "1",
+    "comfort_nmv": "1",
+    "sperling_lateral": "1",
+    "sperling_vertical": "1",
+    "lateral_growth": "1/s",
 }
-"""Every quantity that can be scored, with the unit of its error."""
+"""Every quantity that can be scored, with the unit of its error; the last ten are of the ride itself."""
 
 METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us"}
 """Metrics whose unit is not the quantity's."""
@@ -80,7 +90,7 @@ FULL = "full"
 BANDS = (FULL, *_STANDARD_BANDS)
 REFERENCES = ("truth", "design")
 WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", "moving")
-METRICS = ("rms", "mean", "sd", "p95", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
+METRICS = ("rms", "mean", "sd", "p95", "p9985", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 EXACT_MAP, DRAWN_MAP = "exact", "drawn"
 """What the train knows of the line: all of it, an ablation, or a map with errors."""
 OK = "ok"

@@ -8,10 +8,18 @@ on a frequency grid that never changes. So the value at s depends on s, the seed
 the length of the track or on what was sampled before; another band keeps the phases of the waves that
 remain. The four irregularities have independent streams.
 
+Where a spectrum names limits [low, high] of the gauge, the sum r is bent into them,
+
+    g = c + h tanh(r / h),   c = (high + low)/2,   h = (high - low)/2,
+
+the middle of the limits being where a Gaussian process of its width fits best: the gauge is then wider than
+nominal in the mean, by c, and what lies well within the limits keeps the density of the spectrum.
+
 This module knows nothing of rails or splines: see `simrail.track.laid_track`.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +27,9 @@ from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
+from simrail.track.defects import Defect
 from simrail.track.elements import require_number
+from simrail.track.measured import MeasuredRails
 from simrail.track.spectra import SPECTRA
 
 PERIOD_M = 65536.0
@@ -30,6 +40,10 @@ SHORTEST_WAVELENGTH_M = 0.25
 
 SAMPLES_PER_WAVE = 8
 """Knots that the shortest wave needs to be carried by a cubic spline (to 0.2 % of its amplitude)."""
+
+
+SCALES = ("scale", *(f"{column.removesuffix('_m')}_scale" for column in IRREGULARITY))
+"""Names of the factors on the amplitudes."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +57,44 @@ class Irregularity:
     wavelengths_m : tuple of float
         Shortest and longest wavelength.
     fade_m : float
-        Length over which the irregularities rise from zero at the start of the track and fall at its end.
+        Length over which the irregularities rise from zero where they begin and fall where they end.
     scale : float
-        Factor on the amplitudes.
+        Factor on the amplitudes of all four.
+    alignment_scale, vertical_profile_scale, cross_level_scale, gauge_scale : float
+        Factor on the amplitudes of one, beside `scale`.
+    start_m, end_m : float, optional
+        Where what the spectrum gives begins and ends, s along the track; with the track if not given.
+    defects : tuple of Defect
+        Discrete defects, added to it.
+    measured : MeasuredRails, optional
+        Rails from a file, added to what the spectrum gives or in its place; they fade as it does.
     """
 
     spectrum: str = "none"
     wavelengths_m: tuple[float, float] = (3.0, 100.0)
     fade_m: float = 40.0
     scale: float = 1.0
+    alignment_scale: float = 1.0
+    vertical_profile_scale: float = 1.0
+    cross_level_scale: float = 1.0
+    gauge_scale: float = 1.0
+    start_m: float | None = None
+    end_m: float | None = None
+    defects: tuple[Defect, ...] = ()
+    measured: MeasuredRails | None = None
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data that tells this irregularity from every other; of measured rails their digest."""
+        plain = asdict(replace(self, measured=None))
+        if self.measured is not None:
+            of_file = self.measured
+            plain["measured"] = [of_file.digest, of_file.replaces_spectrum, of_file.has_cant]
+        return plain
+
+    def scale_of(self, column: str) -> float:
+        """Factor on the amplitudes of one of `simrail.core.columns.IRREGULARITY`."""
+        own: float = getattr(self, f"{column.removesuffix('_m')}_scale")
+        return self.scale * own
 
     def check(self) -> None:
         """Refuse what cannot be drawn.
@@ -66,7 +109,8 @@ class Irregularity:
                 "is unknown", field="spectrum", value=self.spectrum, limit="one of " + ", ".join(SPECTRA)
             )
         require_number(self.fade_m, "fade_m", least=0.0)
-        require_number(self.scale, "scale", least=0.0)
+        for name in SCALES:
+            require_number(getattr(self, name), name, least=0.0)
         if not SHORTEST_WAVELENGTH_M <= self.wavelengths_m[0] < self.wavelengths_m[1] <= PERIOD_M / 16:
             raise InputError(
                 "is not a band",
@@ -74,6 +118,8 @@ class Irregularity:
                 value=self.wavelengths_m,
                 limit=f"{SHORTEST_WAVELENGTH_M:g} <= shortest < longest <= {PERIOD_M / 16:g} m",
             )
+        if self.measured is not None:
+            self.measured.check_carries(self.wavelengths_m[0])
 
 
 def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float) -> FloatArray:
@@ -115,11 +161,23 @@ def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float
     shortest, longest = irregularity.wavelengths_m
     first, last = int(np.ceil(PERIOD_M / longest)), int(np.floor(PERIOD_M / shortest))
     harmonics = np.arange(first, last + 1)
-    density = SPECTRA[irregularity.spectrum].densities[column].density(harmonics / PERIOD_M)
-    amplitudes = irregularity.scale * np.sqrt(2.0 * density / PERIOD_M)
+    spectrum, scale = SPECTRA[irregularity.spectrum], irregularity.scale_of(column)
+    limits = spectrum.gauge_limits_m if column == "gauge_m" else None
+    # Within limits a factor above 1 must not lead out of them: it widens what is bent into them.
+    before = scale if limits is None else max(scale, 1.0)
+    density = spectrum.densities[column].density(harmonics / PERIOD_M)
+    amplitudes = before * np.sqrt(2.0 * density / PERIOD_M)
     lines = np.zeros(n // 2 + 1, dtype=complex)
     lines[harmonics] = 0.5 * n * amplitudes * np.exp(1j * phases[harmonics - 1])
-    return np.fft.irfft(lines, n)
+    drawn = np.fft.irfft(lines, n)
+    return drawn if limits is None else min(scale, 1.0) * within_limits(drawn, limits)
+
+
+def within_limits(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
+    """Values (n,) bent into limits: c + h tanh(value / h), c the middle of the limits, h half their width."""
+    low, high = limits
+    middle, half = 0.5 * (high + low), 0.5 * (high - low)
+    return middle + half * np.tanh(values / half)
 
 
 def realise_all(irregularity: Irregularity, *, seed: int, step_m: float) -> FloatArray:

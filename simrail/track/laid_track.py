@@ -20,8 +20,11 @@ from scipy.interpolate import CubicSpline
 from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.toml_files import blame
+from simrail.track.defects import check_defects, deviations, shortest_wave_m
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
+from simrail.track.measured import FINEST_STEP_M, MeasuredRails, refuse_amplitude
 from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
 
 CHANNELS = (
@@ -137,7 +140,10 @@ class LaidTrack:
 
 def knot_step_m(irregularity: Irregularity) -> float:
     """Distance of the spline knots: 0.125 m, or the half, quarter, ... of it that shorter waves need."""
-    needed = irregularity.wavelengths_m[0] / SAMPLES_PER_WAVE
+    shortest = min(irregularity.wavelengths_m[0], shortest_wave_m(irregularity.defects))
+    needed = shortest / SAMPLES_PER_WAVE
+    if irregularity.measured is not None:
+        needed = min(needed, max(irregularity.measured.step_m, FINEST_STEP_M))
     return 0.125 * 0.5 ** max(0, math.ceil(math.log2(0.125 / needed)))
 
 
@@ -169,33 +175,150 @@ def lay(
     """
     design.check()
     irregularity.check()
-    table_step_m = knot_step_m(irregularity)
     check_conditions(conditions, design.start_m, design.end_m)
-    if not 2.0 * irregularity.fade_m <= design.length_m <= PERIOD_M:
-        raise InputError(
-            "track and irregularity do not fit",
-            field="irregularity.fade_m" if design.length_m <= PERIOD_M else "irregularity",
-            value=f"{irregularity.fade_m:g} m twice on a track of {design.length_m:g} m",
-            limit=f"twice the fade <= track <= {PERIOD_M:g} m, where the realisation would repeat",
-            remedy="shorten fade_m" if design.length_m <= PERIOD_M else "cut the track in two",
-        )
+    check_defects(irregularity.defects, design.start_m, design.end_m)
+    check_stretch(irregularity, design)
+    check_measured(irregularity, design)
+    table_step_m = knot_step_m(irregularity)
     first = math.floor(design.start_m / table_step_m)
     last = max(math.ceil(design.end_m / table_step_m), first + 4)
     knots = np.arange(first, last + 1)
     s = np.asarray(knots * table_step_m, dtype=np.float64)
-    period = realise_all(irregularity, seed=seed, step_m=table_step_m)
-    drawn = period[knots % period.shape[0]]
-    drawn *= fade(s, design.start_m, end_m=design.end_m, length_m=irregularity.fade_m)[:, None]
+    rails = _rails(_drawn(design, irregularity, seed, knots, table_step_m))
+    if irregularity.defects:
+        rails += deviations(irregularity.defects, s)
     splines = (
         _design_splines(design, s),
-        _coefficients(CubicSpline(s, _rails(drawn))),
+        _coefficients(CubicSpline(s, rails)),
         _coefficients(CubicSpline(s, friction_factors(conditions, s))),
     )
     table = np.concatenate(splines, axis=1)
-    table = np.ascontiguousarray(table)
-    table.flags.writeable = False
+    table = np.ascontiguousarray(table).view()
+    table.flags.writeable = False  # of this view: kernels get what it is a view of
     start = float(s[0])
     return LaidTrack(design, irregularity, int(seed), start, table_step_m, table, tuple(conditions))
+
+
+def stretch_m(irregularity: Irregularity, design: TrackDesign) -> tuple[float, float]:
+    """Where what the spectrum gives begins and ends."""
+    start, end = irregularity.start_m, irregularity.end_m
+    return design.start_m if start is None else start, design.end_m if end is None else end
+
+
+def check_stretch(irregularity: Irregularity, design: TrackDesign) -> None:
+    """Refuse irregularities that are off the track, or have no room to fade in and out.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the irregularity.
+    """
+    start, end = stretch_m(irregularity, design)
+    for name, place in (("start_m", start), ("end_m", end)):
+        if not design.start_m <= place <= design.end_m:
+            raise InputError(
+                "the irregularity is not on the track",
+                field=f"irregularity.{name}",
+                value=place,
+                limit=f"{design.start_m:g} to {design.end_m:g} m",
+                remedy="move it onto the track, or leave it out: the irregularity then has all of the track",
+            )
+    if irregularity.fade_m == 0.0 and (start, end) != (design.start_m, design.end_m):
+        raise InputError(
+            "the rails would have a step where the irregularity begins or ends",
+            field="irregularity.fade_m",
+            value=0.0,
+            limit="> 0 m with start_m or end_m",
+            remedy="e.g. 40.0",
+        )
+    whole = design.length_m <= PERIOD_M
+    if not (2.0 * irregularity.fade_m <= end - start and whole):
+        raise InputError(
+            "track and irregularity do not fit",
+            field="irregularity.fade_m" if whole else "irregularity",
+            value=f"{irregularity.fade_m:g} m twice on a track of {end - start:g} m",
+            limit=f"twice the fade <= track <= {PERIOD_M:g} m, where the realisation would repeat",
+            remedy="shorten fade_m" if whole else "cut the track in two",
+        )
+
+
+def overlap_m(measured: MeasuredRails, design: TrackDesign) -> tuple[float, float]:
+    """Where measured rails lie on a track."""
+    return max(measured.start_m, design.start_m), min(measured.end_m, design.end_m)
+
+
+def check_measured(irregularity: Irregularity, design: TrackDesign) -> None:
+    """Refuse measured rails that are off the track, or have no room to fade in and out.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the irregularity.
+    """
+    measured = irregularity.measured
+    if measured is None:
+        return
+    start, end = overlap_m(measured, design)
+    value = f"{measured.name} lies from {measured.start_m:g} to {measured.end_m:g} m"
+    if not end - start > 2.0 * irregularity.fade_m:
+        off = end <= start
+        raise InputError(
+            "the measured rails are not on the track" if off else "the measured rails are too short to fade",
+            field="irregularity.measured.start_m" if off else "irregularity.fade_m",
+            value=value if off else f"{irregularity.fade_m:g} m twice; {value}",
+            limit=f"the track is {design.start_m:g} to {design.end_m:g} m"
+            if off
+            else f"< {0.5 * (end - start):g} m",
+            remedy="set start_m to where the first sample lies on the track" if off else "shorten fade_m",
+        )
+    if irregularity.fade_m == 0.0 and (start, end) != (design.start_m, design.end_m):
+        raise InputError(
+            "the rails would have a step where the measured ones begin or end",
+            field="irregularity.fade_m",
+            value=f"0 m; {value}",
+            limit=f"> 0 m, or a file from {design.start_m:g} to {design.end_m:g} m",
+            remedy="e.g. 20.0",
+        )
+    if measured.has_cant:
+        s = measured.position_m[(measured.position_m >= start) & (measured.position_m <= end)]
+        with blame(measured.name):
+            level = _less_cant(measured, design, s)[:, IRREGULARITY.index("cross_level_m")]
+            refuse_amplitude("cross_level_m", s, level)
+
+
+def _drawn(
+    design: TrackDesign,
+    irregularity: Irregularity,
+    seed: int,
+    knots: npt.NDArray[np.int64],
+    step_m: float,
+) -> FloatArray:
+    """What spectrum and file give at the knots, faded, in the order of `IRREGULARITY`, m; (n, 4)."""
+    s: FloatArray = np.asarray(knots * step_m, dtype=np.float64)
+    drawn: FloatArray = np.zeros((len(knots), 4))
+    if irregularity.spectrum != "none":
+        period = realise_all(irregularity, seed=seed, step_m=step_m)
+        drawn = period[knots % period.shape[0]]
+        start, end = stretch_m(irregularity, design)
+        drawn *= fade(s, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+    measured = irregularity.measured
+    if measured is not None:
+        start, end = overlap_m(measured, design)
+        here = fade(s, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+        if measured.replaces_spectrum:
+            drawn *= 1.0 - here
+        drawn += here * _less_cant(measured, design, s)
+    return drawn
+
+
+def _less_cant(measured: MeasuredRails, design: TrackDesign, s: FloatArray) -> FloatArray:
+    """Measured rails at places s (n,), less the cant of the design where their cross-level has it; (n, 4)."""
+    values = measured.at(s)
+    if measured.has_cant:
+        values[:, IRREGULARITY.index("cross_level_m")] -= design.rail_base_m * np.sin(
+            design.frame_extended(s).roll_rad
+        )
+    return values
 
 
 def _rails(drawn: FloatArray) -> FloatArray:

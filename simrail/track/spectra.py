@@ -7,6 +7,15 @@ This module draws no random numbers: see `simrail.track.irregularity`.
 Sources: ORE/ERRI B176 ("German low and high disturbance") with alignment, vertical, cross-level (an
 angle over the half base b = 0.75 m, taken here as a height over 2 b) and gauge; the amplitude of gauge
 is the least certain, +-30 %. FRA (AAR form) with k = 0.25.
+
+The FRA form gives gauge the density of cross-level. As a Gaussian process that goes far below what the law
+allows (class 1: -52 mm in 65 km, where 1422 mm, -13 mm, is the least gauge of every class), and no wheelset
+fits between such rails. So ``fra_1`` to ``fra_6`` name limits of the gauge, within which
+`simrail.track.irregularity` keeps the realisation; ``fra_1_formula`` to ``fra_6_formula`` are the form as it
+is published. Limits: U.S. Code of Federal Regulations, title 49, section 213.53 (b), read at
+law.lawstack.com: at least 4 ft 8 in in every class; at most 4 ft 10 in in class 1, 4 ft 9 3/4 in in classes 2
+and 3, 4 ft 9 1/2 in in classes 4 and 5. Class 6 has a table of its own (section 213.323), which could not be
+had; it is given the limits of class 5, which it must keep too.
 """
 
 from collections.abc import Mapping
@@ -79,11 +88,15 @@ class Spectrum:
     densities : mapping of str to RationalPsd
         One for each of `simrail.core.columns.IRREGULARITY`: alignment and vertical profile (mean of the
         rails), cross-level (left minus right height), gauge (left minus right lateral).
+    gauge_limits_m : tuple of float, optional
+        Least and greatest deviation of the gauge from the nominal one that a realisation may have; None
+        for a gauge that is Gaussian, as the density says.
     """
 
     name: str
     source: str
     densities: Mapping[str, RationalPsd]
+    gauge_limits_m: tuple[float, float] | None = None
 
 
 def _spectrum(
@@ -94,8 +107,10 @@ def _spectrum(
     *,
     level: RationalPsd,
     gauge: RationalPsd,
+    gauge_limits_m: tuple[float, float] | None = None,
 ) -> Spectrum:
-    return Spectrum(name, source, dict(zip(IRREGULARITY, (alignment, vertical, level, gauge), strict=True)))
+    densities = dict(zip(IRREGULARITY, (alignment, vertical, level, gauge), strict=True))
+    return Spectrum(name, source, densities, gauge_limits_m)
 
 
 def _erri(name: str, alignment: float, vertical: float, *, gauge: float) -> Spectrum:
@@ -112,19 +127,41 @@ def _erri(name: str, alignment: float, vertical: float, *, gauge: float) -> Spec
     )
 
 
-def _fra(number: int, vertical: float, alignment: float, *, level: float) -> Spectrum:
+INCH_M, NOMINAL_GAUGE_M = 0.0254, 1.435
+
+LEAST_GAUGE_IN = 56.0
+GREATEST_GAUGE_IN = {1: 58.0, 2: 57.75, 3: 57.75, 4: 57.5, 5: 57.5, 6: 57.5}
+"""49 CFR 213.53 (b), inches, by FRA class; that of class 6 is class 5's."""
+
+
+def _fra(number: int, vertical: float, alignment: float, *, level: float, limited: bool = True) -> Spectrum:
     """FRA class in the AAR form; amplitudes in cm^2 rad/m, `level` the corner of cross-level in rad/m."""
     corner, k = 0.8245, 0.25
     scale = k * 1e-4 * corner**2
     across = RationalPsd(4.0 * scale * vertical, 0, (corner, level))
+    limits = tuple(
+        inches * INCH_M - NOMINAL_GAUGE_M for inches in (LEAST_GAUGE_IN, GREATEST_GAUGE_IN[number])
+    )
     return _spectrum(
-        f"fra_{number}",
-        f"FRA track class {number}, AAR form",
+        f"fra_{number}" if limited else f"fra_{number}_formula",
+        f"FRA track class {number}, AAR form" + (", gauge within 49 CFR 213.53" if limited else ""),
         RationalPsd(scale * alignment, 0, (0.0, corner)),
         RationalPsd(scale * vertical, 0, (0.0, corner)),
         level=across,
         gauge=across,
+        gauge_limits_m=(limits[0], limits[1]) if limited else None,
     )
+
+
+_FRA: tuple[tuple[int, float, float, float], ...] = (
+    (1, 1.2107, 3.3634, 0.6046),
+    (2, 1.0181, 1.2107, 0.9308),
+    (3, 0.6816, 0.4128, 0.8520),
+    (4, 0.5376, 0.3027, 1.1312),
+    (5, 0.2095, 0.0762, 0.8209),
+    (6, 0.0339, 0.0339, 0.4380),
+)
+"""Class, amplitudes of vertical profile and alignment in cm^2 rad/m, corner of cross-level in rad/m."""
 
 
 _SMOOTH = RationalPsd(0.0, 0, (1.0, 2.0))
@@ -135,12 +172,8 @@ SPECTRA: dict[str, Spectrum] = {
         _spectrum("none", "no irregularity", _SMOOTH, _SMOOTH, level=_SMOOTH, gauge=_SMOOTH),
         _erri("erri_b176_low", 2.119e-7, 4.032e-7, gauge=5.32e-8),
         _erri("erri_b176_high", 6.125e-7, 1.08e-6, gauge=1.032e-7),
-        _fra(1, 1.2107, 3.3634, level=0.6046),
-        _fra(2, 1.0181, 1.2107, level=0.9308),
-        _fra(3, 0.6816, 0.4128, level=0.8520),
-        _fra(4, 0.5376, 0.3027, level=1.1312),
-        _fra(5, 0.2095, 0.0762, level=0.8209),
-        _fra(6, 0.0339, 0.0339, level=0.4380),
+        *(_fra(number, up, across, level=corner) for number, up, across, corner in _FRA),
+        *(_fra(number, up, across, level=corner, limited=False) for number, up, across, corner in _FRA),
     )
 }
 """Every spectrum by name."""

@@ -20,11 +20,13 @@ from simrail.vehicle.model import (
     NotNegative,
     Point,
     Positive,
+    Rod,
     Rotation,
     SeriesDamper,
     Suspension,
     Tabled,
     Traction,
+    TrailingArms,
     Triple,
     VehicleModel,
     Wheel,
@@ -83,6 +85,26 @@ class TabledEntry(Part):
     points: Annotated[list[tuple[Positive, NotNegative]], Field(min_length=2)]
 
 
+class RodEntry(Part):
+    """Equal rods between two bodies: the first end of each is on the first body."""
+
+    name: str
+    between: tuple[str, str]
+    ends_m: Annotated[list[tuple[Point, Point]], Field(min_length=1)]
+    stiffness_npm: Positive
+    damping_nspm: NotNegative
+
+
+class TrailingArmEntry(Part):
+    """Left and right trailing arm of an axle: bushings on the frame; along the arm, lateral, across it."""
+
+    name: str
+    between: tuple[str, str]
+    bushings_m: tuple[Point, Point]
+    stiffness_npm: Triple
+    damping_nspm: Triple
+
+
 class VehicleFile(Part):
     """A whole vehicle file; profiles that it names by a relative path lie beside it."""
 
@@ -101,6 +123,8 @@ class VehicleFile(Part):
     suspension: tuple[SuspensionEntry, ...] = ()
     rotation: tuple[RotationEntry, ...] = ()
     tabled: tuple[TabledEntry, ...] = ()
+    rod: tuple[RodEntry, ...] = ()
+    trailing_arm: tuple[TrailingArmEntry, ...] = ()
     creep: CreepLaw = CreepLaw()
     linear_contact: LinearContact | None = None
     gyroscopic: bool = True
@@ -119,7 +143,7 @@ class VehicleFile(Part):
             )
         asked = [
             (f"{kind}[{i}].between", name)
-            for kind in ("suspension", "rotation", "tabled")
+            for kind in ("suspension", "rotation", "tabled", "rod", "trailing_arm")
             for i, entry in enumerate(getattr(self, kind))
             for name in entry.between
         ]
@@ -165,9 +189,39 @@ class VehicleFile(Part):
                     value=entry.points,
                     limit="first column rising, second not falling",
                 )
+        self._check_rods()
         # Each says itself what it cannot read.
         wheel_profile(self.wheel_profile, self._folder)
         rail_profile(self.rail_profile, self._folder)
+
+    def _check_rods(self) -> None:
+        for i, rod in enumerate(self.rod):
+            for first, second in rod.ends_m:
+                if first == second:
+                    raise InputError(
+                        "a rod without length has no direction",
+                        field=f"rod[{i}].ends_m",
+                        value=(first, second),
+                        remedy="set its ends apart, or take a [[suspension]] with stiffness along one axis",
+                    )
+        axles = {axle.name: axle for axle in self.axle}
+        for i, arm in enumerate(self.trailing_arm):
+            axle = axles.get(arm.between[0])
+            if axle is None:
+                raise InputError(
+                    "a trailing arm leads from an axle to a frame",
+                    field=f"trailing_arm[{i}].between",
+                    value=arm.between,
+                    limit="first one of " + ", ".join(axles),
+                )
+            left, right = arm.bushings_m
+            if right != (left[0], -left[1], left[2]) or left[1] <= 0.0 or left[0] == axle.x_m:
+                raise InputError(
+                    "not the bushings of a left and a right arm",
+                    field=f"trailing_arm[{i}].bushings_m",
+                    value=arm.bushings_m,
+                    limit=f"[x, y, z] and [x, -y, z], y > 0, x other than the axle's {axle.x_m:g}",
+                )
 
     def _check_wheels(self) -> None:
         """Wheels must stand on the rails, all alike: one contact table serves them."""
@@ -195,6 +249,9 @@ class VehicleFile(Part):
         """Every body must hang together with the guide's body by springs."""
         held = {self.guide.body}
         pairs = [set(entry.between) for entry in self.suspension if any(entry.stiffness_npm)]
+        pairs += [set(entry.between) for entry in self.rod] + [
+            set(entry.between) for entry in self.trailing_arm
+        ]
         for _ in names:
             held = held.union(*(pair for pair in pairs if pair & held))
         for i, name in enumerate(names):
@@ -236,10 +293,9 @@ class VehicleFile(Part):
                 )
         return wheels, spins
 
-    def model(self, name: str) -> VehicleModel:
-        """Build the vehicle that the file describes."""
+    def _axles(self) -> list[Body]:
+        """The axles' bodies."""
         bodies: list[Body] = []
-        wheels, spins = self._wheels()
         for axle in self.axle:
             # The wheels ride on the bridge at the tape circles: their mass and transverse inertia count.
             carried = 2.0 * (axle.wheel_mass_kg * axle.wheel_y_m[0] ** 2 + axle.wheel_transverse_inertia_kgm2)
@@ -252,7 +308,10 @@ class VehicleFile(Part):
                     position_m=(axle.x_m, 0.0, axle.wheel_radius_m),
                 )
             )
-        bodies += self.body
+        return bodies
+
+    def _springs(self) -> tuple[list[Suspension], list[SeriesDamper]]:
+        """Springs with the dampers beside them, and the dampers on mounts that give way."""
         springs: list[Suspension] = []
         series: list[SeriesDamper] = []
         for entry in self.suspension:
@@ -271,6 +330,12 @@ class VehicleFile(Part):
                     for k in range(3)
                     if elastic[k] > 0.0
                 ]
+        return springs, series
+
+    def model(self, name: str) -> VehicleModel:
+        """Build the vehicle that the file describes."""
+        wheels, spins = self._wheels()
+        springs, series = self._springs()
         traction = self.traction
         if traction is not None:
             driven, braked = (_shares(traction, kind, wheels) for kind in ("driven", "braked"))
@@ -280,7 +345,7 @@ class VehicleFile(Part):
             title=self.title,
             source=self.source,
             synthetic=self.synthetic,
-            bodies=tuple(bodies),
+            bodies=(*self._axles(), *self.body),
             suspensions=tuple(springs),
             wheels=tuple(wheels),
             spin_inertia_kgm2=spins,
@@ -312,8 +377,38 @@ class VehicleFile(Part):
                 for entry in self.tabled
                 for ends in _ends(entry)
             ),
+            rods=self._rods(),
+            arms=self._arms(),
             gyroscopic=self.gyroscopic,
             traction=traction,
+        )
+
+    def _arms(self) -> tuple[TrailingArms, ...]:
+        return tuple(
+            TrailingArms(
+                name=entry.name,
+                axle=entry.between[0],
+                frame=entry.between[1],
+                bushings_m=entry.bushings_m,
+                stiffness_npm=entry.stiffness_npm,
+                damping_nspm=entry.damping_nspm,
+            )
+            for entry in self.trailing_arm
+        )
+
+    def _rods(self) -> tuple[Rod, ...]:
+        return tuple(
+            Rod(
+                name=entry.name if len(entry.ends_m) == 1 else f"{entry.name} {i}",
+                inner=entry.between[0],
+                outer=entry.between[1],
+                inner_position_m=first,
+                outer_position_m=second,
+                stiffness_npm=entry.stiffness_npm,
+                damping_nspm=entry.damping_nspm,
+            )
+            for entry in self.rod
+            for i, (first, second) in enumerate(entry.ends_m, start=1)
         )
 
 

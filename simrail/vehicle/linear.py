@@ -41,6 +41,8 @@ _MIDDLE_M = 256.0
 _STEPS = {"place": 1e-6, "turn": 1e-6, "velocity": 1e-5, "rate": 1e-5, "spin": 1e-5, "inner": 1e-7}
 """Difference steps (m, rad, m/s, rad/s): small against a contact patch's penetration (0.1 mm) and the
 creepage that saturates it (3e-3), large against rounding."""
+_PITCH = 4
+"""Number of the turn about y among the six motions of a body."""
 _FULL_SIZE_RADIUS_M = 0.25
 """No full-size wheel is smaller. A smaller one is a scale vehicle's: of like build, its contact gives way by
 the 5/3rd power of its size, and places step by less."""
@@ -215,16 +217,19 @@ class RunningVehicle:
     def held(self, matrix: FloatArray) -> tuple[FloatArray, tuple[int, ...]]:
         """What is left of a state matrix when the wheelsets are held: the vehicle on its springs.
 
+        The rails hold an axle in all but pitch: its body (bridge, axle boxes) turns in the bearings of its
+        wheels, and does so as the frame above it bounces on trailing arms.
+
         Returns
         -------
         matrix : ndarray
-            Rows and columns of the bodies above the axles and of the inner states of suspensions.
-        bodies : tuple of int
-            Their numbers.
+            Rows and columns of the free motions and of the inner states of suspensions.
+        motions : tuple of int
+            The free motions: number of the body times 6, plus that of the motion (x, y, z, roll, pitch, yaw).
         """
         axles = set(self.data.axles["body"])
-        free = tuple(i for i in range(self.bodies) if i not in axles)
-        first = np.concatenate([np.arange(6 * i, 6 * i + 6) for i in free]) if free else np.zeros(0, int)
+        free = tuple(6 * i + k for i in range(self.bodies) for k in range(6) if i not in axles or k == _PITCH)
+        first = np.array(free, dtype=int)
         creep = 12 * self.bodies + len(self.data.spins) + 4 * len(self.model.wheels)
         states = np.concatenate([first, 6 * self.bodies + first, np.arange(creep, self.size)]).astype(int)
         return matrix[np.ix_(states, states)], free

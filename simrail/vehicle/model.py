@@ -80,6 +80,55 @@ class Rotation:
 
 
 @dataclass(frozen=True)
+class Rod:
+    """A bar with a ball joint at each end: a spring and damper along the line between two points.
+
+    It has no mass and turns freely. Its force is along the line as the bodies stand at the moment, so it is
+    right at any rotation.
+    """
+
+    name: str
+    inner: str
+    outer: str
+    inner_position_m: Point
+    outer_position_m: Point
+    stiffness_npm: Positive
+    damping_nspm: NotNegative
+
+    @property
+    def length_m(self) -> float:
+        """Distance of its ends as the vehicle stands nominally."""
+        return float(np.linalg.norm(np.subtract(self.outer_position_m, self.inner_position_m)))
+
+
+@dataclass(frozen=True)
+class TrailingArms:
+    """The left and the right trailing arm of an axle: each turns by itself about the axle's own line.
+
+    An arm is rigid and has no mass; its far end hangs in a bushing of the frame. It follows the axle in roll
+    and yaw. What swings it up or down at one end only meets no resistance; both together turn the
+    axle's body, which stands for the axle boxes. The springs that carry the frame stand on the boxes, over
+    the axle's line. Equations: `simrail.vehicle.engines.suspension_forces.arm_force`.
+
+    Attributes
+    ----------
+    name, axle, frame : str
+        Name, body of the axle, body that holds the bushings.
+    bushings_m : (Point, Point)
+        Centres of the left and the right bushing.
+    stiffness_npm, damping_nspm : Triple
+        Of each bushing: along the arm, lateral, and across the arm in its plane.
+    """
+
+    name: str
+    axle: str
+    frame: str
+    bushings_m: tuple[Point, Point]
+    stiffness_npm: Triple
+    damping_nspm: Triple
+
+
+@dataclass(frozen=True)
 class Tabled:
     """A force that is an odd tabled law of a deflection (bump stop) or of its rate (damper).
 
@@ -232,6 +281,10 @@ class VehicleModel:
         Springs and dampers of rotations.
     tabled : tuple of Tabled
         Bump stops and nonlinear dampers.
+    rods : tuple of Rod
+        Bars between two points.
+    arms : tuple of TrailingArms
+        Trailing arms, one entry for both of an axle.
     gyroscopic : bool
         Whether the spinning wheels resist being turned.
     traction : Traction or None
@@ -251,6 +304,8 @@ class VehicleModel:
     series: tuple[SeriesDamper, ...] = ()
     rotations: tuple[Rotation, ...] = ()
     tabled: tuple[Tabled, ...] = ()
+    rods: tuple[Rod, ...] = ()
+    arms: tuple[TrailingArms, ...] = ()
     gyroscopic: bool = True
     traction: Traction | None = None
 
@@ -270,6 +325,11 @@ class VehicleModel:
         return list(dict.fromkeys(wheel.axle for wheel in self.wheels))
 
     @property
+    def has_wheelsets(self) -> bool:
+        """Whether both wheels of some axle turn as one: only then there is conicity, and hunting by it."""
+        return len(self.spin_inertia_kgm2) < len(self.wheels)
+
+    @property
     def reach_m(self) -> tuple[float, float]:
         """Smallest and largest x of an axle: how far the vehicle reaches from its reference point."""
         x = [body.position_m[0] for body in self.bodies if body.name in self.axle_names]
@@ -285,7 +345,12 @@ class VehicleModel:
 
     def wheel_load_n(self, gravity_mps2: float) -> FloatArray:
         """Static vertical load (w,) of each wheel."""
-        return self._statics[len(self.suspensions) : -1] * gravity_mps2
+        first = len(self.suspensions)
+        return self._statics[first : first + len(self.wheels)] * gravity_mps2
+
+    def rod_tension_n(self, gravity_mps2: float) -> FloatArray:
+        """Force (r,) that each rod carries at rest on level track, + in tension."""
+        return self._statics[len(self.suspensions) + len(self.wheels) : -1] * gravity_mps2
 
     def guide_load_n(self, gravity_mps2: float) -> float:
         """Weight that the guide carries at rest, N."""
@@ -293,17 +358,18 @@ class VehicleModel:
 
     @cached_property
     def _statics(self) -> FloatArray:
-        """Vertical forces of springs, wheels and guide per unit of gravity: every body balances.
+        """Forces of springs, wheels, rods and guide per unit of gravity: every body balances.
 
         Vertical force, roll moment and pitch moment of each body balance; where that leaves a choice
         (several springs side by side), springs share in proportion to their stiffness, which is what
-        equal deflections do. The guide may take the pitch moment of its own body, and its roll moment
-        and weight if it has the stiffness.
+        equal deflections do. Springs and wheels bear vertically, rods along their lines, unless these are
+        level. The guide may take the pitch moment of its own body, and its roll moment and weight if it
+        has the stiffness.
         """
         springs, wheels = len(self.suspensions), len(self.wheels)
-        balance = np.zeros((3 * len(self.bodies), springs + wheels + 1))
+        balance = np.zeros((3 * len(self.bodies), springs + wheels + len(self.rods) + 1))
         weight = np.zeros(3 * len(self.bodies))
-        scale = np.ones(springs + wheels + 1)
+        scale = np.ones(balance.shape[1])
         for i, body in enumerate(self.bodies):
             weight[3 * i] = body.mass_kg
         for j, spring in enumerate(self.suspensions):
@@ -316,13 +382,18 @@ class VehicleModel:
             i = self.body_names.index(wheel.axle)
             scale[j] = 1e6  # a wheel is far stiffer than a spring
             balance[3 * i : 3 * i + 2, j] = 1.0, self.wheel_rail.tape_circle_half_m * wheel.side
+        for j, rod in enumerate(self.rods, start=springs + wheels):
+            scale[j] = np.sqrt(rod.stiffness_npm)
+            for i, wrench in self._pulls(rod):
+                balance[3 * i : 3 * i + 3, j] = wrench[[2, 3, 4]]
         held = 3 * self.body_names.index(self.guide.body)
         scale[-1] = np.sqrt(self.guide.vertical_stiffness_npm)
         balance[held, -1] = 1.0
         forces = scale * np.linalg.lstsq(balance * scale, weight, rcond=1e-12)[0]
         # A spring without vertical stiffness may not be what carries a body.
         stiff = np.array(
-            [spring.stiffness_npm[2] > 0.0 for spring in self.suspensions] + [True] * (wheels + 1)
+            [spring.stiffness_npm[2] > 0.0 for spring in self.suspensions]
+            + [True] * (wheels + len(self.rods) + 1)
         )
         short = weight - balance @ np.where(stiff, forces, 0.0)
         short[held + 2] = 0.0
@@ -337,4 +408,36 @@ class VehicleModel:
                 field=name,
                 remedy="give it a suspension with vertical stiffness on both sides",
             )
+        self._check_thrust(forces[springs + wheels : -1], 1e-6 * np.sum(weight))
         return forces
+
+    def _pulls(self, rod: Rod) -> list[tuple[int, FloatArray]]:
+        """Body and wrench (6,) on it of a rod's unit tension, for both ends; none for a level rod."""
+        way = np.subtract(rod.outer_position_m, rod.inner_position_m)
+        if abs(way[2]) < 1e-9 * rod.length_m:
+            return []
+        found = []
+        for name, place, sign in (
+            (rod.inner, rod.inner_position_m, 1.0),
+            (rod.outer, rod.outer_position_m, -1.0),
+        ):
+            i = self.body_names.index(name)
+            force = sign * way / rod.length_m
+            arm = np.subtract(place, self.bodies[i].position_m)
+            found.append((i, np.concatenate([force, np.cross(arm, force)])))
+        return found
+
+    def _check_thrust(self, tension: FloatArray, limit: float) -> None:
+        """Refuse rods that bear weight and thrust a body aside: it would not stand where it is said to."""
+        thrust = np.zeros((len(self.bodies), 3))
+        for rod, force in zip(self.rods, tension, strict=True):
+            for i, wrench in self._pulls(rod):
+                thrust[i] += force * wrench[[0, 1, 5]]
+        if np.max(np.abs(thrust), initial=0.0) > limit:
+            i = int(np.argmax(np.max(np.abs(thrust), axis=1)))
+            raise InputError(
+                "cannot rest: rods that carry its weight push it aside",
+                file=f"vehicle {self.name}",
+                field=self.bodies[i].name,
+                remedy="lay rods level, or in pairs whose level thrusts balance",
+            )

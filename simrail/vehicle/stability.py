@@ -62,7 +62,7 @@ class Mode:
 
 
 def modes_of(
-    matrix: FloatArray, vehicle: RunningVehicle, *, bodies: Sequence[int] | None = None
+    matrix: FloatArray, vehicle: RunningVehicle, *, motions: Sequence[int] | None = None
 ) -> list[Mode]:
     """Oscillatory modes of a state matrix, by rising natural frequency.
 
@@ -72,34 +72,32 @@ def modes_of(
         `RunningVehicle.linearised`, or `RunningVehicle.held` of it.
     vehicle : RunningVehicle
         Whose.
-    bodies : sequence of int, optional
-        Bodies whose motions the matrix holds; all of them if not given.
+    motions : sequence of int, optional
+        Motions that the matrix holds, numbered as by `RunningVehicle.held`; all of them if not given.
     """
-    of = list(range(vehicle.bodies) if bodies is None else bodies)
+    of = np.arange(6 * vehicle.bodies) if motions is None else np.array(motions, dtype=int)
     values, vectors = np.linalg.eig(matrix)
-    n = 6 * len(of)
-    weight = np.array(
-        [[vehicle.model.bodies[i].mass_kg] * 3 + [*vehicle.model.bodies[i].inertia_kgm2] for i in of]
-    )
+    n = len(of)
+    weight = np.array([[body.mass_kg] * 3 + [*body.inertia_kgm2] for body in vehicle.model.bodies]).ravel()[
+        of
+    ]
+    names = [(vehicle.model.bodies[k // 6].name, DIRECTIONS[k % 6]) for k in of]
     modes = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag > 2.0 * np.pi * 1e-3:
-            energy = weight.ravel() * np.abs(vector[n : 2 * n]) ** 2
+            energy = weight * np.abs(vector[n : 2 * n]) ** 2
             energy /= max(energy.sum(), 1e-300)
-            shares = {
-                (vehicle.model.bodies[of[k // 6]].name, DIRECTIONS[k % 6]): float(energy[k]) for k in range(n)
-            }
-            modes.append(Mode(complex(value), shares))
+            modes.append(Mode(complex(value), dict(zip(names, energy.tolist(), strict=True))))
     return sorted(modes, key=lambda mode: mode.natural_frequency_hz)
 
 
 def standstill_modes(vehicle: RunningVehicle) -> list[Mode]:
-    """Modes of the vehicle on its springs, its wheelsets held.
+    """Modes of the vehicle on its springs, its wheelsets held but in pitch.
 
     They do not depend on the speed: only wheels know how fast they roll.
     """
-    matrix, bodies = vehicle.held(vehicle.linearised(1.0))
-    return modes_of(matrix, vehicle, bodies=bodies)
+    matrix, motions = vehicle.held(vehicle.linearised(1.0))
+    return modes_of(matrix, vehicle, motions=motions)
 
 
 @dataclass(frozen=True)
@@ -184,6 +182,8 @@ def first_crossing(
     eigenvalues: Callable[[float], ComplexArray],
     speeds_mps: FloatArray,
     known: Sequence[ComplexArray] | None = None,
+    *,
+    accuracy_mps: float = 1e-7,
 ) -> CriticalSpeed:
     """Critical speed of anything whose eigenvalues (1/s) are known as a function of the speed.
 
@@ -205,7 +205,7 @@ def first_crossing(
         return max(growth_1ps(eigenvalues(v)), -1e3)
 
     low, high = float(speeds_mps[i - 1]), float(speeds_mps[i])
-    speed_mps = low if growth(low) >= 0.0 else float(brentq(growth, low, high, xtol=1e-7, rtol=1e-9))
+    speed_mps = low if growth(low) >= 0.0 else float(brentq(growth, low, high, xtol=accuracy_mps, rtol=1e-9))
     return CriticalSpeed(speed_mps, _fastest_growing_hz(eigenvalues(speed_mps)), searched)
 
 

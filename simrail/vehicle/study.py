@@ -50,7 +50,8 @@ class Conicity:
         Where the contact lies on the left and right wheel (from the tape circle, outward), and the
         tangent of the contact angle there; of the patch that carries more.
     amplitude_m, equivalent : ndarray (k,)
-        Amplitudes, and the equivalent conicity there; NaN where nothing steers back.
+        Amplitudes, and the equivalent conicity there; NaN where nothing steers back. Empty for wheels that
+        turn independently: a difference of their radii steers nothing.
     scale : float
         Wheel radius over that of a full-scale wheel (1 for a full-scale vehicle); amplitudes scale with it.
     """
@@ -64,8 +65,13 @@ class Conicity:
     scale: float
 
     @property
+    def steers(self) -> bool:
+        """Whether there is an equivalent conicity."""
+        return self.equivalent.size > 0
+
+    @property
     def at_3_mm(self) -> float:
-        """Equivalent conicity at 3 mm (times the scale of a scale vehicle)."""
+        """Equivalent conicity at 3 mm (times the scale of a scale vehicle), where there is one."""
         return float(np.interp(AMPLITUDE_M * self.scale, self.amplitude_m, self.equivalent))
 
 
@@ -89,8 +95,8 @@ class VehicleStudy:
         That speed.
     locus : RootLocus
         Over the speeds searched.
-    critical : CriticalSpeed
-        Where hunting begins.
+    critical : CriticalSpeed or None
+        Where hunting begins; None if all wheels turn independently, so that no wheelset can hunt.
     """
 
     model: VehicleModel
@@ -100,7 +106,7 @@ class VehicleStudy:
     running: list[Mode]
     running_mps: float
     locus: RootLocus
-    critical: CriticalSpeed
+    critical: CriticalSpeed | None
 
 
 def study_vehicle(
@@ -136,7 +142,7 @@ def study_vehicle(
     speeds = np.linspace(min(SLOWEST_MPS, 0.5 * top_mps), top_mps, SPEEDS)
     locus = root_locus(vehicle, speeds, progress=lambda done, n: say("root locus", done / n))
     say("critical speed", 0.0)
-    critical = critical_speed(vehicle, locus)
+    critical = critical_speed(vehicle, locus) if model.has_wheelsets else None
     running = modes_of(vehicle.linearised(running_mps), vehicle)
     return VehicleStudy(
         model=model,
@@ -169,7 +175,7 @@ def contact_over_shift(model: VehicleModel, *, gravity_mps2: float, say: Progres
             patch = _loaded_patch(table, side, float(at), float(rest.z_m[i]), float(rest.roll_rad[i]))
             abscissa[i, k], slope[i, k] = patch["abscissa_m"], patch["slope"]
     amplitude = np.linspace(0.5e-3, 7e-3, 14) * scale
-    amplitude = amplitude[amplitude <= y[-1]]
+    amplitude = amplitude[amplitude <= y[-1]] if model.has_wheelsets else amplitude[:0]
     values = []
     for i, a in enumerate(amplitude):
         values.append(conicity(table, float(a)))

@@ -28,6 +28,21 @@ WHEEL_FAULTS: dict[str, tuple[str, str, list[str]]] = {
         'engine = "kinematic"',
         ["ride[0].drive", "no forces", "compiled or exudyn"],
     ),
+    "forces at a rate that is none of the truth's": (
+        'engine = "compiled"',
+        'engine = "compiled"\ncontact_rate_hz = 300.0',
+        ["contact_rate_hz", "300.0", "truth_rate_hz = 1000 Hz divided by a whole number", "333.333333333"],
+    ),
+    "forces more often than the truth": (
+        'engine = "compiled"',
+        'engine = "compiled"\ncontact_rate_hz = 500.0\ntruth_rate_hz = 250.0',
+        ["contact_rate_hz", "500.0", "truth_rate_hz = 250 Hz", "try 250"],
+    ),
+    "forces at a negative rate": (
+        'engine = "compiled"',
+        'engine = "compiled"\ncontact_rate_hz = -1.0',
+        ["contact_rate_hz", "-1.0", ">= 0"],
+    ),
     "a condition that is none": (
         'condition = "leaves"',
         'condition = "snow"',
@@ -74,6 +89,12 @@ def test_fault_of_wheels_and_rails(fault: str, place: Path, message_of: Callable
     for part in ("mine.toml", *parts):
         assert part in text, text
     assert sorted(place.rglob("*")) == before
+
+
+def test_forces_of_a_body_that_follows_the_rails(message_of: Callable[[list[str]], str]) -> None:
+    text = message_of(["check", "quick_kinematic", "--set", "contact_rate_hz=100.0"])
+    for part in ("contact_rate_hz", "100.0", "no forces to keep", "compiled or exudyn"):
+        assert part in text, text
 
 
 def test_leaves_under_a_kinematic_ride(place: Path, message_of: Callable[[list[str]], str]) -> None:

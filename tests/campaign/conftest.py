@@ -14,7 +14,13 @@ from simrail.campaign.campaign import run_campaign
 from simrail.core.toml_files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario
 
-SHORT = ["ride.end_m=150.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "imu.grade='lord_3dm_gx4_25'"]
+SHORT = [
+    "ride.end_m=150.0",
+    "ride.rest_s=1.0",
+    "ride.final_rest_s=1.0",
+    "imu.grade='lord_3dm_gx4_25'",
+    "score.windows=['whole', 'moving']",
+]
 
 NOTING = """
 import os

@@ -89,7 +89,7 @@ def test_a_campaign_on_a_cluster_with_a_worker_killed_midway(
     """The estimator comes from a file, which the workers get from the campaign."""
     cluster.add_worker()
     cluster.add_worker()
-    scenario = load_scenario(noting_file, overrides=["monte_carlo.sensor_draws=10"])
+    scenario = load_scenario(noting_file, overrides=["monte_carlo.sensor_draws=6"])
     whole = run_campaign(scenario, workers=1)
     notes.file.unlink()
 

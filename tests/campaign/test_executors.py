@@ -51,9 +51,7 @@ def alone(module_rides: None, short: Callable[..., Scenario]) -> CampaignResult:
     return run_campaign(short(*AXES), workers=1, batch_cells=1)
 
 
-@pytest.mark.parametrize(
-    ("workers", "batch_cells"), [(1, 3), (2, 2), pytest.param(4, None, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("workers", "batch_cells"), [(1, 3), pytest.param(4, None, marks=pytest.mark.slow)])
 def test_workers_and_batches_change_no_bit(
     workers: int,
     batch_cells: int | None,
@@ -62,6 +60,10 @@ def test_workers_and_batches_change_no_bit(
     assert_same: Same,
 ) -> None:
     found = run_campaign(short(*AXES), workers=workers, batch_cells=batch_cells)
+    assert_same_result(alone, found, assert_same)
+
+
+def assert_same_result(alone: CampaignResult, found: CampaignResult, assert_same: Same) -> None:
     assert_same(alone.scores, found.scores)
     pd.testing.assert_frame_equal(alone.cells, found.cells)
     assert found.failures == [] and len(found.rides) == 4
@@ -99,8 +101,11 @@ def test_one_cell_alone_has_the_bits_that_it_has_among_others(
     assert list(found.cells["cell"]) == [7]
 
 
-def test_each_ride_is_simulated_once_whoever_runs_it(rides: Path, short: Callable[..., Scenario]) -> None:
-    found = run_campaign(short(*AXES[:2]), workers=2, batch_cells=1)
+def test_two_workers_simulate_each_ride_once_and_change_no_bit(
+    alone: CampaignResult, rides: Path, short: Callable[..., Scenario], assert_same: Same
+) -> None:
+    found = run_campaign(short(*AXES), workers=2, batch_cells=2)
+    assert_same_result(alone, found, assert_same)
     assert [ride["from_cache"] for ride in found.rides] == [False] * 4
     assert len(list(rides.glob("[!.]*"))) == 4
 
@@ -179,8 +184,12 @@ class Killer:
 """
 
 
-def test_a_cell_that_kills_its_worker_fails_and_its_fellows_do_not(tmp_path: Path, noting_file: Path) -> None:
+def test_a_cell_that_kills_its_worker_fails_and_its_fellows_do_not(
+    tmp_path: Path, noting_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each try costs two new processes: two tries are enough to see it."""
     (tmp_path / "noting.py").write_text(KILLER.replace("Killer", "Noting"))
+    monkeypatch.setattr(campaign, "_MOST_TRIES", 2)
     settings = ["ride.speed_kmh=50", "monte_carlo.sensor_draws=3"]
     found = run_campaign(load_scenario(noting_file, overrides=settings), workers=2, batch_cells=2)
     failed = {failure.cell for failure in found.failures}

@@ -15,9 +15,9 @@ import pandas as pd
 import pytest
 
 from simrail.campaign.cell import record_cell
-from simrail.campaign.export import TRUTH_STEM, export
+from simrail.campaign.export import CONTACT_FOLDER, TRUTH_STEM, export
 from simrail.cli.main import BAD_INPUT, DONE, call
-from simrail.core.columns import ENCODER, IMU, MOTION, ODOMETRY, ODOMETRY_SD
+from simrail.core.columns import CONTACT, ENCODER, IMU, MOTION, ODOMETRY, ODOMETRY_SD
 from simrail.core.toml_files import shipped
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.recording import Recording
@@ -216,3 +216,26 @@ def test_interrupted_export_leaves_nothing(here: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("simrail.campaign.export.write_parts", stop)
     assert call(["export", "quick_kinematic", *SETTINGS, "--out", "x"]) == 130
     assert not list(here.iterdir())
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_forces_are_written_for_each_wheel(here: Path, form: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a ride kept, number by number; and refused with the remedy where nothing is kept."""
+    settings = [*SETTINGS, "--set", "engine=compiled", "--set", "imu.grade=ideal"]
+    asked = ["export", "quick_kinematic", *settings, "--format", form, "--contact", "--out"]
+    assert call([*asked, "none"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "keeps no forces" in said and "--set contact_rate_hz=200.0" in said
+    assert not (here / "none").exists()
+    assert call([*asked, "out", "--set", "contact_rate_hz=50.0"]) == DONE
+    overrides = [*QUICK, "engine=compiled", "contact_rate_hz=50.0"]
+    scenario = load_scenario("quick_kinematic", overrides=overrides)
+    truth = simulate(Parts(scenario).ride(next(cells(scenario))))
+    (folder,) = (path / CONTACT_FOLDER for path in (here / "out").iterdir() if path.is_dir())
+    assert names_in(folder) == {f"{wheel}.{form}" for wheel in truth.wheel_names}
+    for wheel in truth.wheel_names:
+        file = folder / f"{wheel}.{form}"
+        frame = pd.read_csv(file) if form == "csv" else pd.read_parquet(file)
+        frame = frame.set_index("time_s") if "time_s" in frame.columns else frame
+        assert list(frame.columns) == list(CONTACT)
+        np.testing.assert_array_equal(frame.to_numpy(), truth.contact(wheel).to_numpy())

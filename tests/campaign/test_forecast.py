@@ -25,6 +25,7 @@ SETTINGS = [
     "monte_carlo.sensor_draws=3",
     "score.windows=['whole', 'curve', 'curve:*']",
     "ride.rest_s=2.0",
+    "ride.end_m=420.0",
 ]
 
 

@@ -145,16 +145,16 @@ def test_an_imu_with_draws_of_its_own_is_not_waited_for(short: Short) -> None:
 
 
 def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
-    """Optional stopping costs a little: measured on 400 campaigns of skewed scores (Rayleigh).
+    """Optional stopping costs a little: measured on 200 campaigns of skewed scores (Rayleigh).
 
-    Chance moves a share of 400 by 0.011 (sd) at 0.95. Below 0.90 the rule could not be recommended.
+    Chance moves a share of 200 by 0.015 (sd) at 0.95. Below 0.90 the rule could not be recommended.
     """
     truth, spread = np.sqrt(np.pi / 2.0), np.sqrt(2.0 - np.pi / 2.0)
     chance = np.random.default_rng(4)
     stages = rule(short("monte_carlo.sensor_draws=80", stop(1.0, least=10))).stages
     assert stages == (10, 15, 23, 35, 53, 80)
     covered = stopped_early = 0
-    for _ in range(400):
+    for _ in range(200):
         values = chance.rayleigh(1.0, 80)
         for draws in stages:
             found = interval(values[:draws])
@@ -162,8 +162,8 @@ def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
                 break
         covered += found.low <= truth <= found.high
         stopped_early += draws < 80
-    assert stopped_early > 390
-    assert 0.90 < covered / 400 < 0.98
+    assert stopped_early > 195
+    assert 0.90 < covered / 200 < 0.98
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +200,7 @@ def rows_of(found: CampaignResult, draws: int) -> pd.DataFrame:
 
 @pytest.mark.parametrize(
     ("workers", "batch_cells"),
-    [(1, 1), (2, 3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 5), (2, None)))],
+    [(2, 3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 1), (1, 5), (2, None)))],
 )
 def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
     workers: int,

@@ -123,7 +123,12 @@ def scores(*, bands: dict[str, str], rails: bool = True) -> tuple[pd.DataFrame, 
 def shown(scenario: Scenario, table: pd.DataFrame, cells: pd.DataFrame, *, width: int = WIDEST) -> list[str]:
     """Lines that the command line prints."""
     campaign = SimpleNamespace(
-        scores=table, cells=cells, stopped=None, plan=SimpleNamespace(warnings=[]), failures=[]
+        scores=table,
+        cells=cells,
+        stopped=None,
+        plan=SimpleNamespace(warnings=[]),
+        warnings=[],
+        failures=[],
     )
     manifest = {"wall_s": {"total": 1.0}, "real_time_factor": None}
     results = SimpleNamespace(campaign=campaign, scenario=scenario, manifest=manifest, folder=Path("there"))

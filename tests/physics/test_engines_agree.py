@@ -137,6 +137,16 @@ def test_a_scale_vehicle_in_its_curve():
     assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
 
 
+@pytest.mark.parametrize("vehicle", ["metro_car_gz18", "irw_car"])
+def test_on_arms_and_on_rods(vehicle):
+    """1e-6 m/s2 rms (1e-6 rad/s2) from rest on irregular rails: GZ18's trailing arms, the IRW car's rods."""
+    profile = SpeedProfile(100.0, 140.0, 10.0, **BRISK | {"acceleration_mps2": 6.0, "jerk_mps3": 30.0})
+    compiled, exudyn = both(vehicle, "level_straight", profile, duration_s=3.0)
+    assert rms(exudyn.acceleration) > 0.05
+    assert rms(compiled.acceleration - exudyn.acceleration) < 1e-6
+    assert rms(compiled.angular_acceleration - exudyn.angular_acceleration) < 1e-6
+
+
 def test_with_fastsim():
     """1e-6 m/s2 rms into the curve, creep forces by FASTSIM, which is another ride than by the default."""
     profile, ride = SpeedProfile(180.0, 260.0, 12.0, **BRISK), ("metro_irw_bogie", "smooth_curve")

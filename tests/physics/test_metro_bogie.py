@@ -18,7 +18,8 @@ from simrail.sensors.imu import sample_imu
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
-from simrail.vehicle.engines.engine import DerailedError, Setup
+from simrail.vehicle.engines.derailment import DerailedError
+from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.engines.exudyn_engine import ExudynEngine
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile

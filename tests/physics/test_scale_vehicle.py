@@ -10,7 +10,8 @@ from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
-from simrail.vehicle.engines.engine import DerailedError, Setup
+from simrail.vehicle.engines.derailment import DerailedError
+from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.engines.step_limit import contact_resonance
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.linear import running_vehicle

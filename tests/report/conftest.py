@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, Recording
+from simrail.report.pages import page
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.scoring.score import reference_of, score, score_odometry
 from simrail.scoring.table import concat_scores, labelled
@@ -171,6 +172,15 @@ def example() -> Callable[..., CellResult]:
 def tables() -> Callable[..., tuple[pd.DataFrame, pd.DataFrame]]:
     """See `tables_of`."""
     return tables_of
+
+
+@pytest.fixture(scope="module")
+def no_pictures_of_rides() -> Iterator[None]:
+    """Pages without the sections on single rides and tracks, whose pictures take half of their time."""
+    with pytest.MonkeyPatch.context() as patch:
+        pictures = (page.ride_sections, page._tracks)
+        patch.setattr(page, "SECTIONS", tuple(make for make in page.SECTIONS if make not in pictures))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,8 @@ from short_line import SHORT_LINE
 from simrail.campaign.stored_results import read_results
 from simrail.cli.main import BAD_INPUT, DONE, call
 
+pytestmark = pytest.mark.usefixtures("no_pictures_of_rides")
+
 TEXT = (
     SHORT_LINE
     + """
@@ -35,7 +37,7 @@ MODEL = TEXT.replace("[3.0, 70.0]", "[1.0, 7.0]").replace('"go"', '"out"').repla
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def ran(tmp_path_factory: pytest.TempPathFactory, no_pictures_of_rides: None) -> Path:
     """A folder with the results of both sizes, the first beside the second."""
     here = tmp_path_factory.mktemp("beside")
     with pytest.MonkeyPatch.context() as patch:

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simrail.core.columns import CONTACT
+from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.ride import cache as ride_cache
 from simrail.ride import ride as ride_module
@@ -45,6 +47,7 @@ def all_arrays(truth):
         yield from (body.position, body.velocity, body.acceleration, body.angles, body.rate)
         yield body.angular_acceleration
     yield from truth.wheel_angles.values()
+    yield from truth.contacts.values()
 
 
 def assert_same(one, other):
@@ -72,6 +75,7 @@ def test_simulated_once_then_found(ride, monkeypatch):
         {"irregularity": Irregularity("erri_b176_high", (3.0, 100.0), 20.0)},
         {"profile": SpeedProfile(30.0, 90.0, 11.0, rest_s=1.0, final_rest_s=0.5)},
         {"drive": "wheels"},
+        {"contact_rate_hz": 100.0},
         {"conditions": (RailCondition(40.0, 60.0, 0.2),)},
     ],
     ids=lambda change: next(iter(change)),
@@ -182,3 +186,65 @@ def test_wheels_over_leaves_are_late_and_the_truth_knows_where(ride):
     np.testing.assert_allclose(truth.reference_position_m, there, rtol=0.0, atol=1e-3)
     assert truth.manifest["drive"] == "wheels"
     assert truth.manifest["conditions"][0]["start_m"] == 20.0
+
+
+BRISK = SpeedProfile(30.0, 60.0, 10.0, rest_s=0.3, final_rest_s=0.2, acceleration_mps2=3.0, jerk_mps3=20.0)
+
+
+@pytest.fixture
+def driven(ride):
+    return replace(ride, engine="compiled", profile=BRISK, contact_rate_hz=1000.0)
+
+
+def test_contact_is_kept_at_the_rate_that_is_asked_for(driven, tmp_path):
+    """Every n-th row of what is kept at the output rate, bit by bit, over the segments of the engine, too."""
+    whole = simulate(driven)
+    assert len(whole.time_s) > 5000  # a segment of the engine
+    for rate_hz, every in ((250.0, 4), (1000.0 / 7.0, 7)):
+        some = simulate(replace(driven, contact_rate_hz=rate_hz))
+        for wheel in whole.wheel_names:
+            expected, kept = whole.contact(wheel).iloc[::every], some.contact(wheel)
+            assert kept.equals(expected) and list(kept.columns) == list(CONTACT)
+    save_truth(some, tmp_path / "copy")
+    copy = load_truth(tmp_path / "copy")
+    assert_same(copy, some)
+    assert copy.contact("rear.left").equals(some.contact("rear.left"))
+
+
+def test_the_motion_does_not_depend_on_what_is_kept(driven):
+    kept, bare = simulate(driven), simulate(replace(driven, contact_rate_hz=0.0))
+    assert kept.manifest["contact"] == bare.manifest["contact"]
+    assert not bare.contacts
+    assert_same(replace(kept, contacts={}), bare)
+
+
+def test_wheels_of_the_contact_are_where_they_are(driven):
+    """A wheel's place is that of its axle, as its motion says it."""
+    truth = simulate(driven)
+    for axle in ("front", "rear"):
+        mount = Mount("centre", axle, (0.0, 0.0, truth.bodies[axle].height_m))
+        there = truth.motion(mount)["position_m"].to_numpy()
+        for side in ("left", "right"):
+            place = truth.contact(f"{axle}.{side}")["position_m"].to_numpy()
+            np.testing.assert_allclose(place, there, rtol=0.0, atol=1e-6)
+    assert truth.contact("leading.left").equals(truth.contact("front.left"))
+    static = driven.vehicle.wheel_load_n(9.81)
+    for wheel, load_n in zip(truth.wheel_names, static, strict=True):
+        assert truth.contact(wheel)["wheel_load_n"].mean() == pytest.approx(load_n, rel=0.03)
+
+
+def test_extremes_of_a_ride_are_those_of_its_rows(driven):
+    truth = simulate(driven)
+    load = np.column_stack([truth.contact(wheel)["wheel_load_n"] for wheel in truth.wheel_names])
+    said = truth.manifest["contact"]
+    assert said["greatest_q_n"]["value"] == load.max()
+    assert said["smallest_q_over_q0"]["value"] == (load / driven.vehicle.wheel_load_n(9.81)).min()
+    assert truth.manifest["warnings"] == []
+
+
+def test_contact_that_was_not_kept_is_said_with_the_remedy(ride):
+    truth = simulate(ride)
+    with pytest.raises(InputError, match=r"contact_rate_hz: this ride kept no forces.*set contact_rate_hz"):
+        truth.contact("front.left")
+    with pytest.raises(InputError, match=r"no such wheel; found 'third'; limit: front.left"):
+        truth.contact("third")

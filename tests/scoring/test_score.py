@@ -458,10 +458,12 @@ def test_columns_and_vocabulary_are_those_of_the_design() -> None:
     assert ", ".join(SCORE_COLUMNS) == written
     quantities = (
         "roll pitch yaw lateral vertical position speed acceleration_x acceleration_y alignment "
-        "vertical_profile cross_level gauge twist yaw_debiased distance_relative gyro_bias accel_bias"
+        "vertical_profile cross_level gauge twist yaw_debiased distance_relative gyro_bias accel_bias "
+        "derailment_quotient sum_y sum_y_relative guiding_force wheel_load wheel_unloading comfort_nmv "
+        "sperling_lateral sperling_vertical lateral_growth"
     )
     assert " ".join(QUANTITY_UNITS) == quantities
-    assert " ".join(METRICS) == "rms mean sd p95 max final nees nis coverage95 us_per_sample"
+    assert " ".join(METRICS) == "rms mean sd p95 p9985 max final nees nis coverage95 us_per_sample"
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ from simrail.track.spectra import SPECTRA
 
 STEP = 0.125
 REAL = [name for name in SPECTRA if name != "none"]
+GAUSSIAN = [name for name in REAL if SPECTRA[name].gauge_limits_m is None]
+LIMITED = [name for name in REAL if name not in GAUSSIAN]
 D1 = Irregularity("erri_b176_low", (3.0, 25.0), fade_m=0.0)
 
 
@@ -40,7 +42,7 @@ def test_it_is_the_sum_that_it_says_it_is() -> None:
     assert np.abs(drawn[knots % drawn.size] - expected).max() < 1e-12 * np.sqrt(drawn.size)
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", GAUSSIAN)
 @pytest.mark.parametrize("band", [(3.0, 25.0), (25.0, 70.0), (70.0, 150.0)])
 def test_band_rms_of_a_whole_period(name: str, band: tuple[float, float]) -> None:
     # All harmonics are there once: only the two ends of the band are uncertain by one harmonic.
@@ -52,7 +54,7 @@ def test_band_rms_of_a_whole_period(name: str, band: tuple[float, float]) -> Non
         assert abs(drawn.mean()) < 1e-15
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", GAUSSIAN)
 def test_band_rms_of_20_km_within_statistics(name: str) -> None:
     n, band = int(20_000 / STEP), (3.0, 25.0)
     for seed, column in itertools.product(range(3), IRREGULARITY):
@@ -65,7 +67,7 @@ def test_band_rms_of_20_km_within_statistics(name: str) -> None:
 
 
 @pytest.mark.parametrize("column", IRREGULARITY)
-@pytest.mark.parametrize("name", ["erri_b176_low", "erri_b176_high", "fra_4", "fra_6"])
+@pytest.mark.parametrize("name", ["erri_b176_low", "erri_b176_high", "fra_4_formula", "fra_6_formula"])
 def test_psd_of_20_km_within_ten_percent(name: str, column: str) -> None:
     # Octave by octave from 3 to 25 m; the narrowest one holds 900 independent waves: 10 % are 3 sd.
     drawn = realise(Irregularity(name, (1.5, 100.0)), column, seed=1, step_m=STEP)[: int(20_000 / STEP)]
@@ -114,6 +116,60 @@ def test_scale_scales() -> None:
     assert np.abs(double - 2.0 * single).max() < 1e-17
 
 
+@pytest.mark.parametrize("column", IRREGULARITY)
+def test_each_irregularity_has_a_scale_of_its_own(column: str) -> None:
+    own = {f"{column.removesuffix('_m')}_scale": 3.0}
+    scaled = realise_all(Irregularity("erri_b176_low", (3.0, 25.0), scale=0.5, **own), seed=4, step_m=STEP)
+    plain = realise_all(D1, seed=4, step_m=STEP)
+    for i, name in enumerate(IRREGULARITY):
+        factor = 1.5 if name == column else 0.5
+        assert np.abs(scaled[:, i] - factor * plain[:, i]).max() < 1e-16
+
+
+def gauge(name: str, **scales: float) -> np.ndarray:
+    return realise(Irregularity(name, (1.5, 100.0), **scales), "gauge_m", seed=1, step_m=STEP)
+
+
+# 49 CFR 213.53 (b): feet and inches by class; class 6 keeps what class 5 keeps.
+FEET_INCHES = {1: (4, 10), 2: (4, 9.75), 3: (4, 9.75), 4: (4, 9.5), 5: (4, 9.5), 6: (4, 9.5)}
+
+
+@pytest.mark.parametrize("number", FEET_INCHES)
+@pytest.mark.parametrize("scale", [0.3, 1.0, 5.0])
+def test_gauge_of_an_fra_class_is_within_its_safety_limits(number: int, scale: float) -> None:
+    feet, inches = FEET_INCHES[number]
+    millimetres = 1435.0 + 1e3 * gauge(f"fra_{number}", gauge_scale=scale)
+    assert millimetres.min() > 1422.4 and millimetres.max() < 25.4 * (12.0 * feet + inches)
+
+
+def test_gauge_of_the_published_form_is_far_outside() -> None:
+    for number in FEET_INCHES:
+        drawn = gauge(f"fra_{number}_formula")
+        # 65 km of a Gaussian process: some 4.3 sd at its greatest.
+        variance = SPECTRA[f"fra_{number}"].densities["gauge_m"].variance((1.5, 100.0))
+        assert -drawn.min() == pytest.approx(4.3 * np.sqrt(variance), rel=0.1)
+    assert gauge("fra_1_formula").min() < -0.04
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_gauge_within_limits_is_the_published_form_bent_into_them(name: str) -> None:
+    low, high = SPECTRA[name].gauge_limits_m or (np.nan, np.nan)
+    free, bent = gauge(f"{name}_formula"), gauge(name)
+    half = (high - low) / 2.0
+    expected = (high + low) / 2.0 + half * (1.0 - 2.0 / (np.exp(2.0 * free / half) + 1.0))
+    assert np.abs(bent - expected).max() < 1e-15
+    # A factor up to 1 counts afterwards, the rest of it before: 0 is a gauge without any deviation.
+    assert np.abs(gauge(name, scale=0.4, gauge_scale=0.5) - 0.2 * bent).max() < 1e-17
+    assert not gauge(name, gauge_scale=0.0).any()
+    assert gauge(name, gauge_scale=3.0).std() > 1.2 * bent.std()
+    # The other three are as published.
+    limited, formula = (
+        realise_all(Irregularity(which, (1.5, 100.0)), seed=1, step_m=STEP)
+        for which in (name, f"{name}_formula")
+    )
+    assert np.array_equal(limited[:, :3], formula[:, :3])
+
+
 def test_fade_is_a_quintic_at_both_ends() -> None:
     s = np.linspace(-10.0, 210.0, 22001)
     factor = fade(s, 0.0, end_m=200.0, length_m=40.0)
@@ -138,6 +194,8 @@ def test_fade_is_a_quintic_at_both_ends() -> None:
         ({"wavelengths_m": (3.0, float("nan"))}, "wavelengths_m"),
         ({"fade_m": -1.0}, "fade_m"),
         ({"scale": float("inf")}, "scale"),
+        ({"gauge_scale": -0.1}, "gauge_scale"),
+        ({"alignment_scale": float("nan")}, "alignment_scale"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(options: dict[str, object], field: str) -> None:

@@ -18,7 +18,8 @@ from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
-from simrail.vehicle.engines.engine import DerailedError, Setup
+from simrail.vehicle.engines.derailment import DerailedError
+from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.engines.stepper import BODY
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
@@ -227,7 +228,7 @@ def test_derailment_is_said_at_once():
     with pytest.raises(DerailedError, match=r"axle front left the rail at s = [\d.]+ m") as said:
         for _ in engine.run(8.0, segment_s=60.0):
             pass
-    place = laid.design.frame(np.array([float(str(said.value).split()[-2])])).position[0]
+    place = laid.design.frame(np.array([said.value.derailment.place_m])).position[0]
     assert np.linalg.norm(engine.state[:2] - place[:2]) < 0.2
 
 

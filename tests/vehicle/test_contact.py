@@ -244,5 +244,5 @@ def test_beyond_the_flange_it_is_derailed_and_still_finite(kernel):
         flag, _, _ = kernel.call(contact, side=side, y=side * 11.5e-3, z=10.67e-3 + 0.001, V=10.0)
         assert flag == 0
         # The wheel that falls inward off its rail.
-        flag, _, _ = kernel.call(contact, side=side, y=side * -25e-3)
+        flag, _, _ = kernel.call(contact, side=side, y=side * -55e-3)
         assert flag == -1

@@ -61,6 +61,15 @@ def test_slope_of_the_penetration_is_the_contact_angle(patch, first, last, limit
     assert np.abs(column(contact, patch, "penetration", u) - soft.penetration).max() < limit_um * 1e-6
 
 
+def test_the_tread_goes_on_where_the_gauge_is_wide():
+    # One wheel climbs its rail while the other is off by that and by all of 49 CFR 213.53, 38.2 mm.
+    contact = table()
+    assert contact.const["first_shift_m"] <= -(contact.const["derailed_shift_m"] + 0.0382)
+    # There S1002 is the cone of 1:15, and lies where the canted crown of the rail (R300) has that slope.
+    u = np.linspace(-44e-3, -42e-3, 9)
+    assert column(contact, 0, "penetration", u, 1) == pytest.approx(1.0 / 15.0, abs=1e-4)
+
+
 def full_pair(**changes):
     depth = wheel_depth(s1002())
     head = incline(rail_60e1(), 1.0 / 40.0, gauge_depth_m=0.014)

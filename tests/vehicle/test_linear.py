@@ -28,7 +28,7 @@ from simrail.vehicle.stability import (
     root_locus,
     standstill_modes,
 )
-from simrail.vehicle.study import SLOWEST_MPS, SPEEDS
+from simrail.vehicle.study import SLOWEST_MPS, SPEEDS, contact_over_shift
 
 M, IZ, R0, B, F11, F22 = 1500.0, 1000.0, 0.45, 0.75, 1e7, 1e7
 """Reference wheelset A of FACTS 1.2."""
@@ -168,8 +168,12 @@ def on_springs(*, height=1.2, wheels="fixed", guide=NO_GUIDE):
 
 
 def test_body_on_springs_has_the_frequencies_of_the_closed_form():
-    """All six, to 1e-3 (gravity tilts and the springs' sag add less), and the damping of bounce."""
-    found = standstill_modes(running_vehicle(on_springs()))
+    """All six, to 1e-3 (gravity tilts and the springs' sag add less), and the damping of bounce.
+
+    Nothing but its inertia holds the axle in pitch: here that is a mountain's.
+    """
+    heavy = replace(AXLE, inertia_kgm2=(AXLE.inertia_kgm2[0], 1e9, AXLE.inertia_kgm2[2]))
+    found = standstill_modes(running_vehicle(replace(on_springs(), bodies=(heavy, BODY))))
     stiffness = {
         "longitudinal": (4 * KX + NO_GUIDE.stiffness_npm) / BODY.mass_kg,
         "lateral": 4 * KY / BODY.mass_kg,
@@ -318,3 +322,34 @@ def test_exudyns_own_linearised_system_has_the_same_eigenvalues(bogie):
     ours = ours[ours.imag > 0.01]
     error = np.array([np.abs(theirs - value).min() / np.abs(value) for value in ours])
     assert len(ours) >= 28 and error.max() < 3e-4 and np.median(error) < 1e-6
+
+
+def test_frames_bounce_on_their_springs_though_their_boxes_hang_on_arms():
+    """GZ18: sqrt((4 k_z + 2 k_air)/m), 4.0 Hz, with the boxes' inertia, which pitch as their arms swing."""
+    vehicle = running_vehicle(load(VehicleFile, "vehicle", "metro_car_gz18").model("metro_car_gz18"))
+    found = standstill_modes(vehicle)
+    bounces = [m for m in found if m.shares["frame_front", "bounce"] + m.shares["frame_rear", "bounce"] > 0.8]
+    assert len(bounces) == 2
+    for mode in bounces:
+        # Both frames together or against each other; the body stands still to 1 %.
+        mass = 8900.0 + 2.0 * 60.0 / 0.48**2
+        expected = np.sqrt((4 * 1.4e6 + 2 * 230e3) / mass) / (2.0 * np.pi)
+        assert mode.natural_frequency_hz == pytest.approx(expected, rel=0.01)
+    pitch = [m for m in found if sum(m.shares[a, "pitch"] for a in vehicle.model.axle_names) > 0.9]
+    # An axle's boxes on the bushings of both its arms; the frame, which recoils, makes it some 5 % more.
+    expected = np.sqrt(2.0 * 17e6 * (0.48**2 + 0.0135**2) / 60.0) / (2.0 * np.pi)
+    assert len(pitch) == 4
+    for mode in pitch:
+        assert expected < mode.natural_frequency_hz < 1.06 * expected
+
+
+def test_conicity_belongs_to_wheels_that_turn_together():
+    """S1002 on 60E1: some 0.18 at 3 mm under load (FACTS 4.1: 0.18 rigid); none of independent wheels."""
+    wagon, bogie = (
+        contact_over_shift(
+            load(VehicleFile, "vehicle", name).model(name), gravity_mps2=9.81, say=lambda _what, _share: None
+        )
+        for name in ("two_axle_wagon", "metro_irw_bogie")
+    )
+    assert wagon.steers and wagon.at_3_mm == pytest.approx(0.18, abs=0.01)
+    assert not bogie.steers and bogie.amplitude_m.size == 0

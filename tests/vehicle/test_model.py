@@ -15,9 +15,9 @@ from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
 from simrail.vehicle.engines.force_data import memory_of, pack, states_of
 from simrail.vehicle.engines.forces import forces
-from simrail.vehicle.engines.records import LAW, POSE, ROTATION, SERIES, SPRING, STOP, WRENCH
+from simrail.vehicle.engines.records import LAW, LINK, POSE, ROTATION, SERIES, SPRING, STOP, WRENCH
 from simrail.vehicle.engines.suspension_forces import (
-    rotation_forces,
+    link_forces,
     series_forces,
     spring_forces,
     stop_forces,
@@ -51,6 +51,11 @@ def still():
     return pose
 
 
+def rotational(stiffness, damping):
+    """A rotational spring and damper between the two bodies."""
+    return np.array([(ROTATION, 0, 1, NOWHERE, NOWHERE, stiffness, damping, 0.0)], LINK)
+
+
 def data_of(name):
     model = load(VehicleFile, "vehicle", name).model(name)
     track = load(TrackFile, "track", "level_straight").design("level_straight")
@@ -61,6 +66,7 @@ def data_of(name):
 ARMS = (0.3, -0.2, 0.5), (-0.4, 0.1, 0.7)
 ENDS = (0, 1, *ARMS)
 AT_CENTRES = (0, 1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+NOWHERE = np.zeros((2, 3))
 PIECES = np.array([(0.0, (0.0, 5e3, 0.0, 0.0)), (0.1, (0.0, 0.0, 1e3, 50.0))], LAW)
 ELEMENTS = {
     "series": lambda pose, w: series_forces(
@@ -68,9 +74,7 @@ ELEMENTS = {
     ),
     "stop": lambda pose, w: stop_forces(np.array([(*ENDS, 2, 0, 0, 2)], STOP), PIECES, pose, w),
     "rate law": lambda pose, w: stop_forces(np.array([(*ENDS, 0, 1, 0, 2)], STOP), PIECES, pose, w),
-    "rotation": lambda pose, w: rotation_forces(
-        np.array([(0, 1, (1e3, 2e3, 3e3), (10.0, 20.0, 30.0))], ROTATION), pose, w
-    ),
+    "rotation": lambda pose, w: link_forces(rotational((1e3, 2e3, 3e3), (10.0, 20.0, 30.0)), pose, w),
 }
 
 
@@ -129,7 +133,7 @@ def test_anti_roll_bar_is_a_moment_by_angle():
     """940 kN m/rad and 10 mrad give 9.4 kN m about X, and nothing else."""
     pose, wrenches = still(), two(WRENCH)
     pose["rotation"][1] = Turn.from_rotvec([0.010, 0.0, 0.0]).as_matrix()
-    rotation_forces(np.array([(0, 1, (940e3, 0.0, 0.0), (0.0, 0.0, 0.0))], ROTATION), pose, wrenches)
+    link_forces(rotational((940e3, 0.0, 0.0), (0.0, 0.0, 0.0)), pose, wrenches)
     wrench = flat(wrenches)
     np.testing.assert_allclose(wrench[0], [0, 0, 0, 9400.0, 0, 0], rtol=2e-5, atol=1e-9)
     np.testing.assert_allclose(wrench[1], -wrench[0])

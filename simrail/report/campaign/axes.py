@@ -39,6 +39,14 @@ class CampaignAxis:
         """Its title without a unit."""
         return self.title.partition(",")[0]
 
+    def word_of(self, value: object) -> str:
+        """Words for one of its values; a ride that has no value on an axis of another ride has NaN."""
+        return next(
+            word
+            for known, word in zip(self.values, self.words, strict=True)
+            if known == value or (_is_none(known) and _is_none(value))
+        )
+
 
 def is_campaign(scenario: Scenario) -> bool:
     """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
@@ -117,7 +125,14 @@ def _title(name: str) -> str:
     return _TITLES.get(name) or (f"{words}, {unit}" if unit else words)
 
 
+def _is_none(value: object) -> bool:
+    """Whether a cell has no value here: NaN, which alone differs from itself, or None."""
+    return value is None or value != value
+
+
 def _words(value: object) -> str:
+    if _is_none(value):
+        return "-"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"{value:g}"
     text = str(value)

@@ -174,7 +174,7 @@ def _worst(
         {
             "method": style.name,
             "rms_roll_deg": float(record["value"]),
-            **{axis.title: axis.words[axis.values.index(record[axis.column])] for axis in axes},
+            **{axis.title: axis.word_of(record[axis.column]) for axis in axes},
             "track_draw": int(record["track_draw"]),
             "sensor_draw": int(record["sensor_draw"]),
             "cell": int(record["cell"]),

@@ -108,7 +108,7 @@ def locus_figure(study: VehicleStudy) -> str:
         damping = np.where(counts, -values.real / np.maximum(np.abs(values), 1e-9), np.inf).min(axis=1)
         below.plot(speed, 100.0 * damping, color=_LEFT, lw=1.6)
         below.axhline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))
-        if study.critical.speed_mps is not None:
+        if study.critical is not None and study.critical.speed_mps is not None:
             below.axvline(3.6 * study.critical.speed_mps, color=_RIGHT, lw=1.1)
         most = max(1.15 * 100.0 * float(damping.max()), 1.0)
         below.set(xlim=(0.0, float(speed[-1])), ylim=(None, most))

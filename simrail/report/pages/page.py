@@ -21,9 +21,11 @@ from simrail.report.papers import SECTIONS as PAPERS
 from simrail.report.tables.geometry import geometry_table, overview_table
 from simrail.report.tables.pivot import Case, map_words
 from simrail.report.tables.provenance import facts, parts
+from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.running_safety import DERAILMENT_LIMIT, TRACK_SHIFT_FACTOR
 from simrail.scoring.table import LEFT_OPEN, NO_SAMPLES, OK
 from simrail.track.design import TrackDesign
 
@@ -117,6 +119,25 @@ def _rails(data: PageData) -> list[Section]:
     return [_section("rails", "Rails", rails=table)] if table is not None else []
 
 
+def _running(data: PageData) -> list[Section]:
+    """What the ride itself was like."""
+    spec = data.scenario.spec
+    safety = spec.running_safety
+    limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
+    table = running_table(data.cases, derailment_limit=limit)
+    if table is None:
+        return []
+    factor = 1.0 if safety is None else TRACK_SHIFT_FACTOR[safety.vehicle]
+    shown = {
+        "running": table,
+        "safety": safety,
+        "factor": factor,
+        "comfort": spec.ride_comfort is not None,
+        "kicks": decay_words(data.cases),
+    }
+    return [_section("running", "Running safety and comfort", **shown)]
+
+
 def _scores(data: PageData) -> list[Section]:
     shown = [_case(data, case) for case in data.cases[:MOST_TABLES]]
     left_out = max(len(data.cases) - MOST_TABLES, 0)
@@ -126,13 +147,12 @@ def _scores(data: PageData) -> list[Section]:
 def _case(data: PageData, case: Case) -> dict[str, Any]:
     """The tables of one case."""
     labels = case.labels
-    axes = {name: value for name, value in labels.items() if "." in name and not name.startswith("imu.grade")}
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
     title.append(map_words(labels["map"]))
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     return {
-        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in axes.items())]),
+        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in case.axes.items())]),
         "draws": (words if draws > 1 else "one draw") + f" over {tracks} draws of the track" * (tracks > 1),
         "truth": error_table(case, data.attitude_styles, reference="truth"),
         "design": error_table(case, data.attitude_styles, reference="design"),
@@ -170,6 +190,7 @@ SECTIONS: tuple[Callable[[PageData], list[Section]], ...] = (
     ride_sections,
     _tracks,
     _rails,
+    _running,
     _scores,
     _odometry,
     _words,

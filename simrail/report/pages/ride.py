@@ -8,6 +8,7 @@ import numpy as np
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
 from simrail.report.figures.attitude import attitude_figure, error_figure
+from simrail.report.figures.contact import contact_figure
 from simrail.report.figures.geometry import bands_figure, has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.figures.ride import direction_of, imu_figure, odometry_figure, speed_figure
 from simrail.report.figures.score import curves_figure, rms_figure
@@ -92,6 +93,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "attitude": attitude_figure(example, first or drawn, what=f"Attitude, {name}") if drawn else "",
         "comparisons": comparisons,
         "errors": error_figure(example, drawn) if drawn else "",
+        "contact": contact_figure(example) if example.contacts else "",
         "odometry": "" if example.recording.odometry is None else odometry_figure(example),
         "geometry": geometry,
         "left_out": len(left_out),

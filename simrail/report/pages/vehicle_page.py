@@ -50,7 +50,7 @@ def _tiles(study: VehicleStudy) -> list[tuple[str, str, str]]:
     if slowest:
         mode = slowest[0]
         tiles.insert(2, ("lowest frequency", f"{mode.natural_frequency_hz:.2f} Hz", mode.words(most=1)))
-    if study.conicity:
+    if study.conicity and study.conicity.steers:
         contact = study.conicity
         note = f"equivalent, at {3.0 * contact.scale:.2g} mm"
         tiles.insert(2, ("conicity", f"{contact.at_3_mm:.3f}", note))
@@ -82,6 +82,6 @@ def _contact(model: VehicleModel, contact: Conicity) -> dict[str, Any]:
     return {
         "pair": pair_figure(model, contact),
         "shift": shift_figure(contact),
-        "conicity": conicity_figure(contact),
+        "conicity": conicity_figure(contact) if contact.steers else None,
         "rows": rows,
     }

@@ -49,6 +49,15 @@ class Case:
     table: pd.DataFrame
     scores: dict[tuple[str, str, str, str, str, str], Mean]
 
+    @property
+    def axes(self) -> dict[str, str]:
+        """Values of the scenario's lists by dotted name; the IMU's grade is left out, ``imu`` has it.
+
+        A ride has no value of a list that stands in another ride only.
+        """
+        named = ((name, value) for name, value in self.labels.items() if "." in name)
+        return {n: value for n, value in named if not n.startswith("imu.grade") and value != "nan"}
+
     def get(
         self,
         estimator: str,

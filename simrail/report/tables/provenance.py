@@ -11,6 +11,7 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.scenario.scenario import Scenario
+from simrail.scenario.tables import IrregularityPart
 from simrail.track.rail_condition import FRICTION
 from simrail.vehicle.file import VehicleFile
 
@@ -28,11 +29,8 @@ def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult
     """Every part that the campaign used, with its source."""
     tracks = {example.recording.track.name: example.recording.track for example in examples}
     result = [Part("track", name, _word(track.synthetic), track.source) for name, track in tracks.items()]
-    irregularity = scenario.spec.irregularity
-    if irregularity is not None:
-        shortest, longest = irregularity.wavelengths_m
-        source = f"random draw from the spectrum, wavelengths {shortest:g} to {longest:g} m"
-        result.append(Part("irregularity", str(irregularity.spectrum), "synthetic", source))
+    if scenario.spec.irregularity is not None:
+        result += _irregularities(scenario.spec.irregularity)
     for at in scenario.spec.rail_condition:
         if at.condition is None:
             source = "friction as the scenario says"
@@ -54,6 +52,24 @@ def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult
             assumed = f" Assumed: {imu.assumed}" if imu.assumed else ""
             result.append(Part("IMU", name, "simulated", f"{imu.title} ({imu.source}).{assumed}"))
     return list(dict.fromkeys(result))
+
+
+def _irregularities(part: IrregularityPart) -> list[Part]:
+    """What makes the rails deviate from the design: a spectrum, a file, defects."""
+    result = []
+    if part.spectrum != "none" or not (part.measured or part.defect):
+        shortest, longest = part.wavelengths_m
+        source = f"random draw from the spectrum, wavelengths {shortest:g} to {longest:g} m"
+        result.append(Part("irregularity", str(part.spectrum), "synthetic", source))
+    if part.measured is not None:
+        columns = ", ".join(name for name in part.measured.columns if name != "position")
+        result.append(Part("measured rails", part.measured.file, "from a file", columns.replace("_", " ")))
+    for at in part.defect:
+        shape = f"{at.form} of {at.size_mm:g} mm over {at.length_m:g} m at {at.at_m:g} m"
+        result.append(
+            Part("defect", shape, "synthetic", f"as the scenario says; {at.rails} rails, {at.direction}")
+        )
+    return result
 
 
 def _word(is_synthetic: bool) -> str:

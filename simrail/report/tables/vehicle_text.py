@@ -20,8 +20,10 @@ def amount(value: float) -> str:
     return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
-def critical_words(critical: CriticalSpeed) -> str:
-    """The critical speed in words."""
+def critical_words(critical: CriticalSpeed | None) -> str:
+    """The critical speed in words; what a bracket holds is a remark."""
+    if critical is None:
+        return "not given (the wheels turn independently: without conicity no wheelset hunts)"
     low, high = (3.6 * v for v in critical.searched_mps)
     if critical.speed_mps is None:
         return f"none below {high:.0f} km/h"
@@ -67,7 +69,7 @@ def print_study(console: Console, study: VehicleStudy) -> None:
     )
     console.print(f"in all {amount(mass)} kg; static wheel loads, kN: {loads}", highlight=False)
 
-    modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held", words=2)
+    modes = _table("natural frequency\nHz", "damping\n%", "what moves, wheelsets held but in pitch", words=2)
     for mode in listed(study.standstill):
         words = mode.words().replace(" %", "%")  # or a line may begin with the sign
         modes.add_row(f"{mode.natural_frequency_hz:.3f}", f"{100 * mode.damping:.1f}", words)
@@ -83,14 +85,19 @@ def _contact_lines(study: VehicleStudy) -> list[str]:
     if contact is None:
         return ["contact: prescribed and linear"]
     size = "" if pair.profile_scale == 1.0 else f" at {_ratio(pair.profile_scale)}"
+    lines = [
+        f"wheel {Path(pair.wheel_profile).name} on rail {Path(pair.rail_profile).name}{size}, "
+        f"gauge {1e3 * pair.gauge_m:g} mm, inclination {_ratio(pair.rail_inclination)}, under static load"
+    ]
+    if not contact.steers:
+        return [*lines, "equivalent conicity: not given (the wheels turn independently)"]
     at_amplitudes = ", ".join(
         f"{1e3 * amplitude:.2g} mm {value:.3f}"
         for amplitude, value in zip(contact.amplitude_m, contact.equivalent, strict=True)
         if abs(amplitude / contact.scale - 1e-3 * round(1e3 * amplitude / contact.scale)) < 1e-6
     )
     return [
-        f"wheel {Path(pair.wheel_profile).name} on rail {Path(pair.rail_profile).name}{size}, "
-        f"gauge {1e3 * pair.gauge_m:g} mm, inclination {_ratio(pair.rail_inclination)}, under static load",
+        *lines,
         f"equivalent conicity at {3.0 * contact.scale:.2g} mm: [bold]{contact.at_3_mm:.3f}[/bold]; over the "
         f"amplitude: {at_amplitudes}",
     ]

@@ -73,8 +73,8 @@ class WheelForce(NamedTuple):
     Attributes
     ----------
     flag : int
-        0 no contact, 1 tread, 2 flange, 3 both, -1 derailed: beyond the table's range, forces no
-        longer mean anything.
+        0 no contact, 1 tread, 2 flange, 3 both, -1 derailed: beyond the table's range, or lifted by more than
+        the flange is high; forces no longer mean anything.
     fx, fy, fz : float
         Force on the wheel in the track frame, N.
     mx, my, mz : float
@@ -94,6 +94,26 @@ class WheelForce(NamedTuple):
     mz: float
     normal: float
     penetration: float
+
+
+CONTACT = np.dtype(
+    [
+        ("wanted", "i8"),
+        ("flag", "i8"),
+        *((name, "f8") for name in ("position_m", "load_n", "guiding_n", "normal_n", "shift_m", "lift_m")),
+        *((name, "f8") for name in ("creep_x_n", "creep_y_n", "creepage_x", "creepage_y", "spin_1pm")),
+        *((name, "f8") for name in ("rail_m", "angle_rad", "carried_n")),
+    ],
+    align=True,
+)
+"""What is told of the contact of one wheel, where ``wanted`` is not 0.
+
+Of the wheel, in any case: the flag, vertical and lateral force in the track frame (Q and Y) and normal force,
+as in `WheelForce`; place s of its axle; how far it stands outward of its place on the rail, and how high its
+tape circle over the head. Of both patches together: creep forces along and
+across in the contact's plane. Of the patch that carries more: creepages, spin creepage, abscissa on the
+rail from the middle of its head outward, contact angle, and ``carried_n``, its normal force.
+"""
 
 
 class Touch(NamedTuple):
@@ -176,6 +196,27 @@ def rolling(V: float, spin_speed: float) -> float:
     return V * V * V / (V * V * V * V + spin_speed * spin_speed * spin_speed * spin_speed)
 
 
+@njit_inner
+def clear(told: Any) -> None:
+    """Forget a `CONTACT`: no patch carries anything."""
+    told.creep_x_n = told.creep_y_n = told.creepage_x = told.creepage_y = told.spin_1pm = 0.0
+    told.rail_m = told.angle_rad = told.carried_n = 0.0
+
+
+@njit_inner
+def tell_patch(
+    told: Any, normal: float, along: float, across: float, xi_x: float, xi_y: float, spin: float
+) -> bool:
+    """Add a patch to a `CONTACT`: normal force, creep forces, creepages; whether it carries the most."""
+    told.creep_x_n += along
+    told.creep_y_n += across
+    heavier: bool = normal > told.carried_n
+    if heavier:
+        told.carried_n = normal
+        told.creepage_x, told.creepage_y, told.spin_1pm = xi_x, xi_y, spin
+    return heavier
+
+
 @njit_borrowed
 def wheel_force(
     patches: npt.NDArray[np.void],
@@ -185,6 +226,7 @@ def wheel_force(
     rail: RailHere,
     zeta: FloatArray,
     zeta_dot: FloatArray,
+    told: Any = None,
 ) -> WheelForce:
     """Force and moment of a rail on a wheel, and the rates of its four creep states.
 
@@ -199,6 +241,8 @@ def wheel_force(
     zeta, zeta_dot : ndarray, shape (4,)
         Creep states (tread longitudinal, lateral; flange longitudinal, lateral), and their rates
         (written).
+    told : record, optional
+        A `CONTACT`; shift and lift are written, and its part on the patches if it is wanted.
 
     Returns
     -------
@@ -316,6 +360,14 @@ def wheel_force(
         my -= side * sd * M
         mz += cd * M
         normal += N
-    if u < const.first_shift_m or u > const.derailed_shift_m:
+        if told is not None and told.wanted:
+            rolled = abs(per_speed)
+            if tell_patch(told, N, T1, T2, slip_x * rolled, v_2 * rolled, spin_slip * per_speed):
+                told.rail_m = s + u + const.rail_offset_m
+                told.angle_rad = np.arctan(t)
+    lift = height + side * phi * half
+    if u < const.first_shift_m or u > const.derailed_shift_m or lift > const.flange_height_m:
         flag = -1
+    if told is not None:
+        told.shift_m, told.lift_m = u, lift
     return WheelForce(flag, fx, fy, fz, mx, my, mz, normal, deepest)

@@ -8,7 +8,7 @@ angle, the axle's roll in the creepages. Creep forces build up over the same rel
 from typing import Any
 
 from simrail.core.jit import FloatArray, njit_borrowed
-from simrail.vehicle.contact.contact import Motion, RailHere, WheelForce, rolling
+from simrail.vehicle.contact.contact import Motion, RailHere, WheelForce, rolling, tell_patch
 
 
 @njit_borrowed
@@ -21,6 +21,7 @@ def linear_wheel_force(
     rail: RailHere,
     zeta: FloatArray,
     zeta_dot: FloatArray,
+    told: Any = None,
 ) -> WheelForce:
     """Force and moment of a rail on a wheel, and the rates of its creep states.
 
@@ -33,6 +34,8 @@ def linear_wheel_force(
     length = const.relaxation_length_m + const.relaxation_time_s * speed
     shift = motion.y - rail.y
     Y = side * const.tape_circle_half_m
+    if told is not None:
+        told.shift_m, told.lift_m = side * shift, motion.z + Y * motion.phi - rail.z
     zeta_dot[2] = zeta_dot[3] = 0.0
     # Normal force: the static load and a linear spring and damper.
     pen = rail.z - motion.z - Y * motion.phi
@@ -60,5 +63,8 @@ def linear_wheel_force(
     # The larger rolling radius moves the point where the longitudinal force drives the wheel.
     my -= side * linear.conicity * shift * T1
     mz = -Y * T1 + M - linear.gravitational_yaw_stiffness * motion.psi
+    if told is not None and told.wanted:
+        rolled = abs(per_speed)
+        tell_patch(told, N, T1, fy, slip_x * rolled, slip_y * rolled, spin_slip * per_speed)
     flag = -1 if abs(shift) > const.derailed_shift_m else 1
     return WheelForce(flag, T1, fy, N, Y * N + r0 * fy, my, mz, N, pen)

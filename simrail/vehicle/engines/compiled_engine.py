@@ -11,16 +11,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from simrail.core.jit import FloatArray
+from simrail.vehicle.contact.contact import CONTACT
+from simrail.vehicle.engines.derailment import refuse_derailed
 from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
-    refuse_derailed,
     start_memory,
     start_poses,
     stretches,
 )
 from simrail.vehicle.engines.force_data import states_of
-from simrail.vehicle.engines.records import POSE, WRENCH
+from simrail.vehicle.engines.records import POSE, WRENCH, RecordArray
 from simrail.vehicle.engines.stepper import BODY, march
 
 
@@ -46,8 +47,9 @@ class CompiledEngine:
         for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
             body[:3] = position
             body[3:7] = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+        self._contacts = np.zeros((0, len(self.data.wheels)), CONTACT)
         # Compiled now, so that no clock of a ride counts it.
-        self._march(0, np.zeros((0, len(self.state))))
+        self._march(0, np.zeros((0, len(self.state))), self._contacts)
 
     def run(self, duration_s: float, *, segment_s: float = 5.0) -> Iterator[Segment]:
         """Simulate from rest; yields the output segment by segment (also the way to see progress).
@@ -55,7 +57,7 @@ class CompiledEngine:
         Raises
         ------
         DerailedError
-            If a wheel leaves the rail beyond its flange tip.
+            If a wheel leaves its rail.
         """
         for time_s, rows, slopes in stretches(
             self.setup,
@@ -65,6 +67,7 @@ class CompiledEngine:
             segment_s=segment_s,
         ):
             bodies = self._bodies(rows)
+            told, self._contacts = np.split(self._contacts, [len(time_s)])
             turn = Rotation.from_quat(bodies[:, :, 3:7].reshape(-1, 4), scalar_first=True).as_matrix()
             yield Segment(
                 time_s=time_s,
@@ -76,21 +79,30 @@ class CompiledEngine:
                 angular_acceleration=slopes[:, :, 3:],
                 spin_rad=rows[:, self._turned : self._turned + len(self.data.spins)],
                 states=rows[:, self._first_state :],
+                contacts=told,
             )
 
     def _bodies(self, states: FloatArray) -> FloatArray:
         """The bodies' part of states (..., n), as (..., b, 13)."""
         return states[..., : self._turned].reshape(*states.shape[:-1], -1, BODY)
 
-    def _march(self, first: int, rows: FloatArray) -> int:
-        return march(first, self.setup.step_s, self.state, rows, *self._scratch, self.memory, self.data)
+    def _march(self, first: int, rows: FloatArray, contacts: RecordArray) -> int:
+        setup, scratch = self.setup, self._scratch
+        return march(
+            first, setup.step_s, self.state, rows, *scratch, self.memory, self.data, setup.every, contacts
+        )
 
     def _solve(self, first: int, last: int) -> FloatArray:
         """Integrate from the present state; the state (steps + 1, n) at every step."""
         rows = np.empty((last - first + 1, len(self.state)))
         rows[0] = self.state
-        made = self._march(first, rows[1:])
-        refuse_derailed(self.memory, self.setup.model)
+        every = self.setup.every
+        output = range(-(-max(first, 0) // every) * every, last, every)
+        told = np.zeros((len(output), len(self.data.wheels)), CONTACT)
+        made = self._march(first, rows[1:], told)
+        self._contacts = np.concatenate([self._contacts, told])
+        reached = self._contacts[self._contacts["wanted"].any(axis=1)]
+        refuse_derailed(self.memory, self.setup, lambda _time_s: reached)
         if made < last - first or not np.isfinite(self.state).all():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

@@ -21,15 +21,12 @@ from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.track.laid_track import LaidTrack
 from simrail.vehicle.contact.contact_tables import rest_drops_m
 from simrail.vehicle.engines.force_data import ForceData, Memory, memory_of, pack
+from simrail.vehicle.engines.records import RecordArray
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
 _DIFFERENCE = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
 _REACH = len(_DIFFERENCE)
-
-
-class DerailedError(RuntimeError):
-    """A wheel climbed beyond its flange tip: the ride ends there."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +62,11 @@ class Setup:
     settle_s: float = 4.0
     drive: Literal["guide", "wheels"] = "guide"
 
+    @property
+    def every(self) -> int:
+        """Steps from one output row to the next."""
+        return round(1.0 / (self.rate_hz * self.step_s))
+
     def pack(self) -> ForceData:
         """The arrays that the force kernel takes; see `simrail.vehicle.engines.force_data.pack`."""
         return pack(self.model, self.track, self.profile, gravity_mps2=self.gravity_mps2, drive=self.drive)
@@ -88,6 +90,8 @@ class Segment:
         Angle that each spin has turned about its axle, absolute.
     states : ndarray (n, k)
         First-order states, the four creep states of every wheel at first.
+    contacts : ndarray of records (n, w)
+        `simrail.vehicle.contact.contact.CONTACT` of each wheel.
     """
 
     time_s: FloatArray
@@ -99,6 +103,7 @@ class Segment:
     angular_acceleration: FloatArray
     spin_rad: FloatArray
     states: FloatArray
+    contacts: RecordArray
 
     def body(self, index: int) -> FloatArray:
         """Motion (n, 18) of one body: the columns of `simrail.ride.truth_files.BODY_ARRAYS`."""
@@ -146,13 +151,6 @@ def start_memory(setup: Setup) -> Memory:
     return memory
 
 
-def refuse_derailed(memory: Memory, model: VehicleModel) -> None:
-    """Raise `DerailedError` if a wheel has left its rail."""
-    for axle, memo in zip(model.axle_names, memory.axle_memos, strict=True):
-        if memo["derailed"]:
-            raise DerailedError(f"derailed: axle {axle} left the rail at s = {memo['derailed_s_m']:.1f} m")
-
-
 def stretches(
     setup: Setup,
     solve: Callable[[int, int], FloatArray],
@@ -185,8 +183,7 @@ def stretches(
     slopes : ndarray (n, b, 6)
         Derivatives of the rates.
     """
-    step_s = setup.step_s
-    every = round(1.0 / (setup.rate_hz * step_s))
+    step_s, every = setup.step_s, setup.every
     total = round(duration_s / step_s)
     per_segment = max(every, round(segment_s / step_s) // every * every)
     # Steps at hand, from `first` on; differences reach 3 steps, so rows lag behind the solution, and a few

@@ -30,16 +30,18 @@ from exudyn.itemInterface import (
 from scipy.spatial.transform import Rotation
 
 from simrail.core.jit import FloatArray
+from simrail.vehicle.contact.contact import CONTACT
+from simrail.vehicle.engines.derailment import refuse_derailed
 from simrail.vehicle.engines.engine import (
     Segment,
     Setup,
-    refuse_derailed,
     start_memory,
     start_poses,
     stretches,
 )
-from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces
+from simrail.vehicle.engines.exudyn_forces import HALF_TURN, Arguments, generalized_forces, tell_contacts
 from simrail.vehicle.engines.force_data import states_of
+from simrail.vehicle.engines.records import RecordArray
 
 _NOTHING = [0.0]
 
@@ -61,6 +63,8 @@ class ExudynEngine:
         self.size = 6 * len(model.bodies) + len(data.spins) + self._states
         self.memory = start_memory(setup)
         self._arguments = Arguments(self.size, data, self.memory)
+        # What is told of the contact is evaluated apart, so that it leaves no trace in the ride.
+        self._telling = Arguments(self.size, data, start_memory(setup))
         # Compiled now, so that no clock of a ride counts it.
         compiled = generalized_forces.compile  # type: ignore[attr-defined]
         compiled((numba.float64, numba.typeof(self._arguments.places)))
@@ -72,7 +76,7 @@ class ExudynEngine:
         Raises
         ------
         DerailedError
-            If a wheel leaves the rail beyond its flange tip.
+            If a wheel leaves its rail.
         """
         bodies, spins = len(self.setup.model.bodies), len(self._spins)
         for time_s, rows, slopes in stretches(
@@ -95,7 +99,21 @@ class ExudynEngine:
                 angular_acceleration=slopes[:, :, 3:] * HALF_TURN,
                 spin_rad=rows[:, 0, 6 * bodies : 6 * bodies + spins],
                 states=rows[:, 1, 6 * bodies + spins :],
+                contacts=self._contacts(time_s, rows),
             )
+
+    def _contacts(self, time_s: FloatArray, rows: FloatArray) -> RecordArray:
+        """What the force kernel tells of the contact (n, w) at output rows."""
+        at = self._telling
+        told = np.zeros((len(rows), len(at.contacts)), CONTACT)
+        tell_contacts(time_s, np.ascontiguousarray(rows), at.state, at.contacts, at.places, told)
+        return told
+
+    def _until(self, time_s: float, first: int) -> RecordArray:
+        """What the force kernel tells of the contact (n, w) at output rows from a step until a time."""
+        step_s, every = self.setup.step_s, self.setup.every
+        steps = np.arange(-(-max(first, 0) // every) * every, int(time_s / step_s) + 1, every)
+        return self._contacts(np.multiply(steps, step_s), self._rows[steps - first])
 
     def _build(self) -> None:
         model = self.setup.model
@@ -186,7 +204,7 @@ class ExudynEngine:
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
         )
-        refuse_derailed(self.memory, self.setup.model)
+        refuse_derailed(self.memory, self.setup, lambda time_s: self._until(time_s, first))
         if not solved or np.isnan(self._rows).any():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

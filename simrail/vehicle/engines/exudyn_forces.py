@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
+from simrail.vehicle.contact.contact import CONTACT
 from simrail.vehicle.contact.contact_geometry import CONST, PATCH
 from simrail.vehicle.engines import records
 from simrail.vehicle.engines.force_data import ForceData, Memory
@@ -100,10 +101,12 @@ class Arguments:
     state : ndarray (3 n,)
         Coordinates, rates and, as the output, generalised forces, each n = 6 b + p + the number of
         first-order states long.
+    contacts : ndarray of records (w,)
+        Those of the memory.
     """
 
     def __init__(self, size: int, data: ForceData, memory: Memory) -> None:
-        self.state = np.zeros(3 * size)
+        self.state, self.contacts = np.zeros(3 * size), memory.contacts
         bodies = len(data.bodies)
         parts = [self.state, *data, *memory, np.zeros(bodies, records.POSE), np.zeros(bodies, records.WRENCH)]
         self._parts = [np.ascontiguousarray(part) for part in parts]
@@ -122,7 +125,7 @@ def generalized_forces(t: float, places: RecordArray) -> None:
         records_at(at.bodies[0], (at.bodies[1],), records.BODY),
         records_at(at.springs[0], (at.springs[1],), records.SPRING),
         records_at(at.series[0], (at.series[1],), records.SERIES),
-        records_at(at.rotations[0], (at.rotations[1],), records.ROTATION),
+        records_at(at.links[0], (at.links[1],), records.LINK),
         records_at(at.stops[0], (at.stops[1],), records.STOP),
         records_at(at.laws[0], (at.laws[1],), records.LAW),
         records_at(at.wheels[0], (at.wheels[1],), records.WHEEL),
@@ -140,6 +143,7 @@ def generalized_forces(t: float, places: RecordArray) -> None:
         records_at(at.guide_memo[0], (1,), records.GUIDE_MEMO),
         records_at(at.axle_memos[0], (at.axle_memos[1],), records.AXLE_MEMO),
         records_at(at.frame[0], (1,), records.FRAME),
+        records_at(at.contacts[0], (at.contacts[1],), CONTACT),
     )
     pose = records_at(at.pose[0], (at.pose[1],), records.POSE)
     wrench = records_at(at.wrench[0], (at.wrench[1],), records.WRENCH)
@@ -151,3 +155,37 @@ def generalized_forces(t: float, places: RecordArray) -> None:
     states = spins + data.spins.shape[0]
     forces(t, pose, v[spins:states], v[states:], data, wrench, out[spins:states], out[states:], memory)
     loads_of(pose, wrench, out)
+
+
+@njit_borrowed
+def tell_contacts(
+    time_s: FloatArray,
+    rows: FloatArray,
+    state: FloatArray,
+    told: RecordArray,
+    places: RecordArray,
+    out: RecordArray,
+) -> None:
+    """Contact of each wheel at rows of Exudyn's coordinates and rates.
+
+    Parameters
+    ----------
+    time_s : ndarray (n,)
+        Times.
+    rows : ndarray (n, 2, k)
+        Coordinates and rates.
+    state, told, places : ndarray
+        `Arguments.state`, its memory's ``contacts``, and `Arguments.places`.
+    out : ndarray of records (n, w), output
+        `simrail.vehicle.contact.contact.CONTACT`.
+    """
+    size = rows.shape[2]
+    for w in range(told.shape[0]):
+        told[w].wanted = 1
+    for i in range(rows.shape[0]):
+        for k in range(size):
+            state[k] = rows[i, 0, k]
+            state[size + k] = rows[i, 1, k]
+        generalized_forces(time_s[i], places)
+        for w in range(told.shape[0]):
+            out[i, w] = told[w]

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.track.laid_track import LaidTrack
+from simrail.vehicle.contact.contact import CONTACT
 from simrail.vehicle.contact.contact_geometry import CONST
 from simrail.vehicle.contact.contact_tables import contacts_of, rest_drops_m
 from simrail.vehicle.engines import records
@@ -29,8 +30,8 @@ class ForceData(NamedTuple):
 
     Attributes
     ----------
-    bodies, springs, series, rotations, stops, laws, wheels, spins, axles, drive : ndarray of records
-        Of each, `BODY`, `SPRING`, `SERIES`, `ROTATION`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
+    bodies, springs, series, links, stops, laws, wheels, spins, axles, drive : ndarray of records
+        Of each, `BODY`, `SPRING`, `SERIES`, `LINK`, `STOP`, `LAW`, `WHEEL`, `SPIN`, `AXLE`, `DRIVE`.
     guide, traction, options : ndarray of records (1,)
         `GUIDE`, `TRACTION`, `OPTIONS`.
     track : ndarray of records
@@ -42,7 +43,7 @@ class ForceData(NamedTuple):
     bodies: RecordArray
     springs: RecordArray
     series: RecordArray
-    rotations: RecordArray
+    links: RecordArray
     stops: RecordArray
     laws: RecordArray
     wheels: RecordArray
@@ -66,17 +67,24 @@ class Memory(NamedTuple):
         `GUIDE_MEMO` and, for each axle, `AXLE_MEMO`.
     frame : ndarray of records (1,)
         `FRAME`, overwritten at every look at the track.
+    contacts : ndarray of records (w,)
+        `simrail.vehicle.contact.contact.CONTACT` of each wheel: forces and penetration of the last call,
+        the rest of the last call in which they were wanted.
     """
 
     guide_memo: RecordArray
     axle_memos: RecordArray
     frame: RecordArray
+    contacts: RecordArray
 
 
 def memory_of(axles: int) -> Memory:
-    """A `Memory` of nothing."""
+    """A `Memory` of nothing; each axle has two wheels."""
     return Memory(
-        np.zeros(1, records.GUIDE_MEMO), np.zeros(axles, records.AXLE_MEMO), np.zeros(1, records.FRAME)
+        np.zeros(1, records.GUIDE_MEMO),
+        np.zeros(axles, records.AXLE_MEMO),
+        np.zeros(1, records.FRAME),
+        np.zeros(2 * axles, CONTACT),
     )
 
 
@@ -120,13 +128,7 @@ def pack(
             [(*_ends(model, e), e.axis, e.stiffness_npm, e.damping_nspm) for e in model.series],
             records.SERIES,
         ),
-        rotations=np.array(
-            [
-                (index(e.inner), index(e.outer), e.stiffness_nmprad, e.damping_nmsprad)
-                for e in model.rotations
-            ],
-            records.ROTATION,
-        ),
+        links=_links(model, gravity_mps2),
         stops=stops,
         laws=laws,
         wheels=np.array(wheels, records.WHEEL),
@@ -136,10 +138,16 @@ def pack(
         traction=traction,
         options=_options(model, track, gravity_mps2),
         drive=np.array([(start, cubic) for start, cubic in zip(times, cubics, strict=False)], records.DRIVE),
-        track=track.table.reshape(len(track.table), -1).view(records.TRACK)[:, 0],
+        track=_writable(track.table).reshape(len(track.table), -1).view(records.TRACK)[:, 0],
         patches=np.stack([table.patches for table in contacts.tables]),
         const=np.array([table.const for table in contacts.tables], CONST),
     )
+
+
+def _writable(table: FloatArray) -> FloatArray:
+    """The array that a read-only view is of: kernels, which write into neither, would be compiled for both."""
+    base = table.base
+    return base if isinstance(base, np.ndarray) and base.shape == table.shape else table
 
 
 def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
@@ -150,6 +158,31 @@ def _springs(model: VehicleModel, gravity_mps2: float) -> RecordArray:
         sag = force / spring.stiffness_npm[2] if spring.stiffness_npm[2] > 0.0 else 0.0
         springs[i] = (*_ends(model, spring), spring.stiffness_npm, spring.damping_nspm, sag)
     return springs
+
+
+def _links(model: VehicleModel, gravity_mps2: float) -> RecordArray:
+    """Springs of rotations, rods and trailing arms. A rod that carries weight is strained by it at rest."""
+    index, nowhere = model.body_names.index, np.zeros((2, 3))
+    rows: list[tuple[Any, ...]] = [
+        (
+            *(records.ROTATION, index(e.inner), index(e.outer), nowhere, nowhere),
+            *(e.stiffness_nmprad, e.damping_nmsprad, 0.0),
+        )
+        for e in model.rotations
+    ]
+    for rod, tension in zip(model.rods, model.rod_tension_n(gravity_mps2), strict=True):
+        inner, outer = (
+            (np.subtract(place, model.body(body).position_m), np.zeros(3))
+            for body, place in ((rod.inner, rod.inner_position_m), (rod.outer, rod.outer_position_m))
+        )
+        factors = (rod.stiffness_npm, 0.0, 0.0), (rod.damping_nspm, 0.0, 0.0)
+        length_m = rod.length_m - tension / rod.stiffness_npm
+        rows.append((records.ROD, index(rod.inner), index(rod.outer), inner, outer, *factors, length_m))
+    for pair in model.arms:
+        ends = [np.subtract(pair.bushings_m, model.body(b).position_m) for b in (pair.axle, pair.frame)]
+        factors = pair.stiffness_npm, pair.damping_nspm
+        rows.append((records.ARMS, index(pair.axle), index(pair.frame), *ends, *factors, 0.0))
+    return np.array(rows, records.LINK)
 
 
 def _guide(model: VehicleModel, gravity_mps2: float) -> RecordArray:

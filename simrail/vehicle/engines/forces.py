@@ -8,14 +8,14 @@ integrated here. The constants are `simrail.vehicle.engines.force_data.ForceData
 import numpy as np
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
-from simrail.vehicle.contact.contact import Motion, RailHere, wheel_force
+from simrail.vehicle.contact.contact import Motion, RailHere, clear, wheel_force
 from simrail.vehicle.contact.linear_contact import linear_wheel_force
 from simrail.vehicle.engines.force_data import ForceData, Memory
 from simrail.vehicle.engines.lookup import find_on_track
 from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
 from simrail.vehicle.engines.suspension_forces import (
     guide_force,
-    rotation_forces,
+    link_forces,
     series_forces,
     spring_forces,
     stop_forces,
@@ -36,10 +36,12 @@ def axle_forces(
     zeta_rate: FloatArray,
     memo: Record,
     frame: Record,
+    contacts: RecordArray,
 ) -> None:
     """Add the contact forces of one axle's two wheels, and their gyroscopic moment.
 
     ``memo`` is an `simrail.vehicle.engines.records.AXLE_MEMO`; its s is where the search for s starts.
+    What is told of the two wheels goes into ``contacts`` (w,).
     """
     options, wheels = data.options[0], data.wheels
     b, w, first = pose[axle.body], wrench[axle.body], axle.first_wheel
@@ -72,13 +74,21 @@ def axle_forces(
         creep = zeta[4 * (first + n) : 4 * (first + n) + 4]
         creep_rate = zeta_rate[4 * (first + n) : 4 * (first + n) + 4]
         side = float(wheel.side)
+        told = contacts[first + n]
+        if told.wanted:
+            clear(told)
         if options.linear_contact:
-            contact = linear_wheel_force(options, const, wheel.load_n, side, motion, rail, creep, creep_rate)
+            contact = linear_wheel_force(
+                options, const, wheel.load_n, side, motion, rail, creep, creep_rate, told
+            )
         else:
-            contact = wheel_force(data.patches[wheel.table], const, side, motion, rail, creep, creep_rate)
+            contact = wheel_force(
+                data.patches[wheel.table], const, side, motion, rail, creep, creep_rate, told
+            )
         # Before 0 the vehicle is still being set down on its rails: where it then stands counts.
         if contact.flag < 0 and memo.derailed == 0 and t >= 0.0:
-            memo.derailed, memo.derailed_s_m = 1, s
+            memo.derailed, memo.derailed_time_s, memo.derailed_s_m = n + 1, t, s
+            memo.speed_mps, memo.shift_m, memo.lift_m = speed, told.shift_m, told.lift_m
         gx, gy, gz = rotated(frame.rotation, contact.fx, contact.fy, contact.fz)
         mx, my, mz = rotated(frame.rotation, contact.mx, contact.my, contact.mz)
         # The bearing passes everything on to the axle but the moment about its own axis.
@@ -90,10 +100,8 @@ def axle_forces(
         w.mx += mx - about * ex - h * (b.wy * ez - b.wz * ey)
         w.my += my - about * ey - h * (b.wz * ex - b.wx * ez)
         w.mz += mz - about * ez - h * (b.wx * ey - b.wy * ex)
-        if n == 0:
-            memo.load_left_n = contact.fz
-        else:
-            memo.load_right_n = contact.fz
+        told.flag, told.position_m = contact.flag, s
+        told.load_n, told.guiding_n, told.normal_n = contact.fz, contact.fy, contact.normal
 
 
 @njit_borrowed
@@ -132,6 +140,7 @@ def forces(
     memory : Memory
         What is remembered from call to call.
     """
+    contacts = memory.contacts
     options, traction, frame, memo = data.options[0], data.traction[0], memory.frame[0], memory.guide_memo[0]
     for k in range(torque.shape[0]):
         torque[k] = 0.0
@@ -143,7 +152,7 @@ def forces(
     brakes = creep + data.series.shape[0]
     spring_forces(data.springs, pose, wrench)
     series_forces(data.series, pose, zeta[creep:brakes], wrench, zeta_rate[creep:brakes])
-    rotation_forces(data.rotations, pose, wrench)
+    link_forces(data.links, pose, wrench)
     stop_forces(data.stops, data.laws, pose, wrench)
     wheels_drive = traction.wheels_drive > 0
     behind, wanted, speed = guide_force(
@@ -155,6 +164,7 @@ def forces(
             efforts, traction, data.spins, pose, spin, zeta[brakes:], wrench, torque, zeta_rate[brakes:]
         )
     for a in range(data.axles.shape[0]):
+        memo = memory.axle_memos[a]
         axle_forces(
-            t, data.axles[a], spin, zeta, data, pose, wrench, torque, zeta_rate, memory.axle_memos[a], frame
+            t, data.axles[a], spin, zeta, data, pose, wrench, torque, zeta_rate, memo, frame, contacts
         )

@@ -63,8 +63,21 @@ BODY = _record("mass_kg", inertia=_VECTOR)
 SPRING = _record("sag_m", **_ENDS, stiffness=_VECTOR, damping=_VECTOR)
 """``sag_m``: deflection at rest along z."""
 SERIES = _record("stiffness damping", **_ENDS, axis=_INDEX)
-ROTATION = _record("", inner=_INDEX, outer=_INDEX, stiffness=_VECTOR, damping=_VECTOR)
-"""A spring and damper of the rotation between two bodies."""
+ROTATION, ROD, ARMS = 0, 1, 2
+"""Kinds of `LINK`."""
+LINK = _record(
+    "length_m",
+    kind=_INDEX,
+    inner=_INDEX,
+    outer=_INDEX,
+    inner_arm=("f8", (2, 3)),
+    outer_arm=("f8", (2, 3)),
+    stiffness=_VECTOR,
+    damping=_VECTOR,
+)
+"""A spring and damper of the rotation between two bodies; or a rod, with its length without force; or both
+trailing arms of an axle (inner) on a frame (outer). In one array, since every further one that a kernel takes
+costs it a per cent. A rod has its places and factors first of their fields, a rotation has no places."""
 STOP = _record("", **_ENDS, axis=_INDEX, over_rate=_INDEX, first=_INDEX, pieces=_INDEX)
 """An element with a tabled law: the pieces from ``first`` on, over its deflection or its rate."""
 LAW = np.dtype([("start", "f8"), ("cubic", "f8", (4,))], align=True)
@@ -95,8 +108,9 @@ DRIVE = np.dtype([("start_s", "f8"), ("cubic", "f8", (4,))], align=True)
 """A piece of the speed profile: s(t) from its start on."""
 GUIDE_MEMO = _record("s_m", piece=_INDEX)
 """What the kernel remembers from call to call: the piece of the profile and the s of the guide's body."""
-AXLE_MEMO = _record("s_m derailed_s_m load_left_n load_right_n", derailed=_INDEX)
-"""The same of an axle: its s, whether and where it derailed, vertical wheel loads of the last call."""
+AXLE_MEMO = _record("s_m derailed_time_s derailed_s_m speed_mps shift_m lift_m", derailed=_INDEX)
+"""The same of an axle: its s; and where a wheel derailed (1 its first, 2 its second), when, where, how fast,
+and its shift and lift (`simrail.vehicle.contact.contact.CONTACT`)."""
 
 
 class Relative(NamedTuple):

@@ -79,6 +79,13 @@ def normalise(state: RecordArray) -> None:
         body.q3 /= length
 
 
+@njit_inner
+def want(contacts: RecordArray, wanted: bool) -> None:
+    """Say whether the next evaluation of the forces shall tell of the contact of each wheel."""
+    for w in range(contacts.shape[0]):
+        contacts[w].wanted = wanted
+
+
 @njit_borrowed
 def march(
     first: int,
@@ -90,6 +97,8 @@ def march(
     wrench: RecordArray,
     memory: Memory,
     data: ForceData,
+    every: int,
+    contacts: RecordArray,
 ) -> int:
     """Integrate one step per row.
 
@@ -111,6 +120,10 @@ def march(
         Of `simrail.vehicle.engines.forces.forces`.
     data : ForceData
         The constants.
+    every : int
+        The contact is told at each step from 0 on whose number this divides.
+    contacts : ndarray of records (k, w), output
+        `simrail.vehicle.contact.contact.CONTACT` of each wheel at the beginning of these steps.
 
     Returns
     -------
@@ -128,15 +141,23 @@ def march(
     torque, zeta_rate = slope[spin_at:zeta_at], slope[zeta_at:]
     for k in range(n):
         stage[k] = state[k]
+    seen = 0
     for row in range(rows.shape[0]):
         start = (first + row) * step_s
+        tells = first + row >= 0 and (first + row) % every == 0
         for part in range(4):
             # Stages at 0, 1/2, 1/2, 1 of the step, with weights 1, 2, 2, 1 sixths.
             t = start + step_s * (0.0 if part == 0 else (1.0 if part == 3 else 0.5))
             ahead = step_s * (0.5 if part < 2 else 1.0)
             weight = step_s / (6.0 if part == 0 or part == 3 else 3.0)
             pose_of(bodies_stage, pose)
+            # The first stage is the step's beginning itself: nothing is evaluated for the contact alone.
+            want(memory.contacts, tells and part == 0)
             forces(t, pose, spin, zeta, data, wrench, torque, zeta_rate, memory)
+            if tells and part == 0:
+                for w in range(contacts.shape[1]):
+                    contacts[seen, w] = memory.contacts[w]
+                seen += 1
             body_rates(bodies_stage, data.bodies, pose, wrench, bodies_slope)
             for k in range(np_):
                 slope[turned + k] = spin[k]

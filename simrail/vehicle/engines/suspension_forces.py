@@ -1,24 +1,39 @@
 """Forces of suspension elements and of the guide, compiled: what `simrail.vehicle.engines.forces` adds up.
 
-Every element acts between an *inner* and an *outer* body, along or about the axes of the inner one, and
-pushes each at that body's own attachment point. With A the rotation of the inner body and u the way from
-its attachment point to the outer body's, an element sees the deflection A^T u and the rate A^T u'. The
-records are those of `simrail.vehicle.engines.records`.
+Most elements act between an *inner* and an *outer* body, along or about the axes of the inner one. With A
+the rotation of the inner body, w its rate, p the way from its centre of gravity to the attachment point on
+the outer body and r to its own, an element sees the deflection d = A^T p - r and the rate
+d' = A^T (p' - w x p). What follows from the energy of d alone is that the force acts on both bodies at the
+outer point: pushed each at its own point, the couple of force and deflection would be in no balance, and a
+car body that leans out on its springs would not load the outer wheels. Rods pull along their own line, and
+trailing arms turn about their axle's. The records are those of
+`simrail.vehicle.engines.records`.
 """
 
 from typing import NamedTuple
 
+import numpy as np
+
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.contact.cubic import value
 from simrail.vehicle.engines.lookup import driven, find_on_track, place_in, track_at
-from simrail.vehicle.engines.records import Record, RecordArray, push, relative, rotated, rotated_back
+from simrail.vehicle.engines.records import (
+    ROD,
+    ROTATION,
+    Record,
+    RecordArray,
+    push,
+    relative,
+    rotated,
+    rotated_back,
+)
 
 
 class Between(NamedTuple):
-    """The two attachment points of an element.
+    """Where an element acts, and what it feels.
 
-    Arms from the centres of gravity, global axes (inner ``ax, ay, az``, outer ``bx, by, bz``), m; deflection
-    (m) and its rate (m/s) in the inner body's axes.
+    Arms from the centres of gravity (inner ``ax, ay, az``, outer ``bx, by, bz``) to the attachment point on
+    the outer body, global axes, m; deflection (m) and its rate (m/s) in the axes of the inner body.
     """
 
     ax: float
@@ -37,15 +52,16 @@ class Between(NamedTuple):
 
 @njit_inner
 def between(inner_arm: FloatArray, outer_arm: FloatArray, a: Record, b: Record) -> Between:
-    """Attachment points of an element, from its arms on the bodies and the poses of these."""
-    ax, ay, az = rotated(a.rotation, inner_arm[0], inner_arm[1], inner_arm[2])
+    """An element from its arms on the bodies, in their axes, and the poses of these."""
     bx, by, bz = rotated(b.rotation, outer_arm[0], outer_arm[1], outer_arm[2])
+    ax, ay, az = b.x + bx - a.x, b.y + by - a.y, b.z + bz - a.z
     # A point of a body moves with v + w x r.
     ex = b.vx + b.wy * bz - b.wz * by - a.vx - a.wy * az + a.wz * ay
     ey = b.vy + b.wz * bx - b.wx * bz - a.vy - a.wz * ax + a.wx * az
     ez = b.vz + b.wx * by - b.wy * bx - a.vz - a.wx * ay + a.wy * ax
-    x, y, z = rotated_back(a.rotation, b.x + bx - a.x - ax, b.y + by - a.y - ay, b.z + bz - a.z - az)
+    x, y, z = rotated_back(a.rotation, ax, ay, az)
     x_rate, y_rate, z_rate = rotated_back(a.rotation, ex, ey, ez)
+    x, y, z = x - inner_arm[0], y - inner_arm[1], z - inner_arm[2]
     return Between(ax, ay, az, bx, by, bz, x, y, z, x_rate, y_rate, z_rate)
 
 
@@ -128,29 +144,135 @@ def stop_forces(stops: RecordArray, laws: RecordArray, pose: RecordArray, wrench
         pull_along(p, stop.axis, a, wrench[stop.inner], wrench[stop.outer], force)
 
 
-@njit_borrowed
-def rotation_forces(rotations: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
-    """Add rotational springs and dampers, of the small rotation of the outer body in the inner body's axes.
+@njit_inner
+def rotation_force(spring: Record, a: Record, b: Record, wa: Record, wb: Record) -> None:
+    """Add a rotational spring and damper, of the small rotation of the outer body in the inner body's axes.
 
     The rotation is the antisymmetric part of A^T B.
     """
-    for m in range(rotations.shape[0]):
-        spring = rotations[m]
-        a, b, wa, wb = pose[spring.inner], pose[spring.outer], wrench[spring.inner], wrench[spring.outer]
-        A, B = a.rotation, b.rotation
-        for k in range(3):
-            q, u = (k + 1) % 3, (k + 2) % 3
-            angle = 0.0
-            for n in range(3):
-                angle += 0.5 * (A[n, u] * B[n, q] - A[n, q] * B[n, u])
-            rate = A[0, k] * (b.wx - a.wx) + A[1, k] * (b.wy - a.wy) + A[2, k] * (b.wz - a.wz)
-            moment = spring.stiffness[k] * angle + spring.damping[k] * rate
-            wa.mx += A[0, k] * moment
-            wa.my += A[1, k] * moment
-            wa.mz += A[2, k] * moment
-            wb.mx -= A[0, k] * moment
-            wb.my -= A[1, k] * moment
-            wb.mz -= A[2, k] * moment
+    A, B = a.rotation, b.rotation
+    for k in range(3):
+        q, u = (k + 1) % 3, (k + 2) % 3
+        angle = 0.0
+        for n in range(3):
+            angle += 0.5 * (A[n, u] * B[n, q] - A[n, q] * B[n, u])
+        rate = A[0, k] * (b.wx - a.wx) + A[1, k] * (b.wy - a.wy) + A[2, k] * (b.wz - a.wz)
+        moment = spring.stiffness[k] * angle + spring.damping[k] * rate
+        wa.mx += A[0, k] * moment
+        wa.my += A[1, k] * moment
+        wa.mz += A[2, k] * moment
+        wb.mx -= A[0, k] * moment
+        wb.my -= A[1, k] * moment
+        wb.mz -= A[2, k] * moment
+
+
+class Seen(NamedTuple):
+    """The end of a trailing arm as its axle sees it, in the axes of the axle's body.
+
+    Attributes
+    ----------
+    x, y, z, x_rate, y_rate, z_rate : float
+        Way from the axle's centre to the bushing on the frame, and its rate in these turning axes.
+    ux, uy, uz : float
+        The same way in global axes.
+    length, length_rate : float
+        Distance of the bushing from the axle's own line.
+    turn, turn_rate : float
+        Angle by which the arm has turned about that line from its place at rest.
+    """
+
+    x: float
+    y: float
+    z: float
+    x_rate: float
+    y_rate: float
+    z_rate: float
+    ux: float
+    uy: float
+    uz: float
+    length: float
+    length_rate: float
+    turn: float
+    turn_rate: float
+
+
+@njit_inner
+def rod_force(rod: Record, a: Record, b: Record, wa: Record, wb: Record) -> None:
+    """Add a rod: a spring and damper along the line between two points, F = k (L - L0) + c L'."""
+    p = between(rod.inner_arm[0], rod.outer_arm[0], a, b)
+    length = np.sqrt(p.x * p.x + p.y * p.y + p.z * p.z)
+    x, y, z = p.x / length, p.y / length, p.z / length
+    rate = x * p.x_rate + y * p.y_rate + z * p.z_rate
+    force = rod.stiffness[0] * (length - rod.length_m) + rod.damping[0] * rate
+    pull(p, a, wa, wb, force * x, force * y, force * z)
+
+
+@njit_inner
+def seen(axle_arm: FloatArray, frame_arm: FloatArray, a: Record, b: Record) -> Seen:
+    """One trailing arm between the axle's body (pose ``a``) and the frame (pose ``b``)."""
+    bx, by, bz = rotated(b.rotation, frame_arm[0], frame_arm[1], frame_arm[2])
+    ux, uy, uz = b.x + bx - a.x, b.y + by - a.y, b.z + bz - a.z
+    # A point of the frame moves with v + w x r, the axle's axes turn with w.
+    ex = b.vx + b.wy * bz - b.wz * by - a.vx - a.wy * uz + a.wz * uy
+    ey = b.vy + b.wz * bx - b.wx * bz - a.vy - a.wz * ux + a.wx * uz
+    ez = b.vz + b.wx * by - b.wy * bx - a.vz - a.wx * uy + a.wy * ux
+    x, y, z = rotated_back(a.rotation, ux, uy, uz)
+    x_rate, y_rate, z_rate = rotated_back(a.rotation, ex, ey, ez)
+    length = np.sqrt(x * x + z * z)
+    length_rate = (x * x_rate + z * z_rate) / length
+    turn = np.arctan2(axle_arm[2] * x - axle_arm[0] * z, axle_arm[0] * x + axle_arm[2] * z)
+    turn_rate = (z * x_rate - x * z_rate) / (length * length)
+    return Seen(x, y, z, x_rate, y_rate, z_rate, ux, uy, uz, length, length_rate, turn, turn_rate)
+
+
+@njit_inner
+def arm_force(pair: Record, a: Record, b: Record, wa: Record, wb: Record) -> None:
+    """Add trailing arms: the left and the right one of an axle turn about its line one by one.
+
+    In the axle's axes an arm of the length r0 at rest, its bushing at a distance r from the axle's line and
+    turned by the angle t about it, feels
+
+        along   k_x (r - r0) + c_x r'            towards the bushing
+        lateral k_y (y - y0) + c_y y'
+        across  r0^2 (k_z T + c_z T') / r        with T the mean turn of both arms
+
+    The force acts at the bushing, on both bodies. An arm without mass bears no moment about the line that it
+    turns on, so no force across it comes of its own turn; the mean of both is that of the axle boxes, which
+    the axle's body stands for, and their moment holds that body. The potential is
+    ``sum (k_x (r - r0)^2 + k_y (y - y0)^2)/2 + k_z r0^2 T^2``.
+    """
+    left = seen(pair.inner_arm[0], pair.outer_arm[0], a, b)
+    right = seen(pair.inner_arm[1], pair.outer_arm[1], a, b)
+    k, c = pair.stiffness, pair.damping
+    turning = k[2] * 0.5 * (left.turn + right.turn) + c[2] * 0.5 * (left.turn_rate + right.turn_rate)
+    for n in range(2):
+        at = left if n == 0 else right
+        rest, arm = pair.inner_arm[n], pair.outer_arm[n]
+        square = rest[0] * rest[0] + rest[2] * rest[2]
+        # Over the length, so that the way to the bushing gives the direction.
+        along_arm = (k[0] * (at.length - np.sqrt(square)) + c[0] * at.length_rate) / at.length
+        across = square * turning / (at.length * at.length)
+        side = k[1] * (at.y - rest[1]) + c[1] * at.y_rate
+        gx, gy, gz = rotated(
+            a.rotation, along_arm * at.x + across * at.z, side, along_arm * at.z - across * at.x
+        )
+        bx, by, bz = rotated(b.rotation, arm[0], arm[1], arm[2])
+        push(wa, at.ux, at.uy, at.uz, gx, gy, gz)
+        push(wb, bx, by, bz, -gx, -gy, -gz)
+
+
+@njit_borrowed
+def link_forces(links: RecordArray, pose: RecordArray, wrench: RecordArray) -> None:
+    """Add rotational springs, rods and trailing arms."""
+    for m in range(links.shape[0]):
+        link = links[m]
+        a, b, wa, wb = pose[link.inner], pose[link.outer], wrench[link.inner], wrench[link.outer]
+        if link.kind == ROTATION:
+            rotation_force(link, a, b, wa, wb)
+        elif link.kind == ROD:
+            rod_force(link, a, b, wa, wb)
+        else:
+            arm_force(link, a, b, wa, wb)
 
 
 @njit_inner

@@ -20,6 +20,7 @@ from simrail.estimators.odometry.kernel import (
     UPDATES,
     WAY,
     YAW,
+    Line,
     LineModel,
     S,
     Steps,
@@ -27,9 +28,11 @@ from simrail.estimators.odometry.kernel import (
     curve_matched,
     line_at,
     predict,
+    room_to_work,
 )
 
 from simrail.campaign.cell import record_cell
+from simrail.campaign.worker import RememberedTruth
 from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
@@ -58,7 +61,7 @@ BIAS_RADPS = np.radians(0.05)
 @lru_cache
 def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> Truth:
     """The metro bogie on the line, irregular rails, compiled engine."""
-    return simulate(
+    ride = simulate(
         Ride(
             name="odometry",
             track=LINE,
@@ -69,6 +72,7 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> T
             engine="compiled",
         )
     )
+    return RememberedTruth.of(ride)
 
 
 @lru_cache(maxsize=8)
@@ -280,14 +284,13 @@ def test_transition_is_the_derivative_of_the_step():
     grid = np.array([0.0, 0.25])
     table = np.zeros((200, 4))
     table[:, 3] = 1e-4 * np.arange(200)  # a vertical curve
-    here = np.array([-0.4, -0.004, 0.05, 0.01, 0.0])
+    here = Line(-0.4, -0.004, 0.05, 0.01, 0.0)
     signal = np.array([0.01, -0.06, 0.9])
     model = LineModel(*[1e-6] * len(LineModel._fields))
     model = model._replace(pulse_m=1.8e-3, tread_length_m=40.0, sway_length_m=4.0, gate=7.0, still_s=0.5)
 
     def step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        x, f, lean = x.copy(), np.zeros((STATES, STATES)), np.zeros(5)
-        line_at(grid, table, x[S] - x[LEAD], lean)
+        x, f, lean = x.copy(), np.zeros((STATES, STATES)), line_at(grid, table, x[S] - x[LEAD])
         nothing = np.zeros((STATES, STATES))
         predict(x, nothing, f, nothing.copy(), here, lean, signal, 0.02, model, 9.81, 0.9)
         return x, f
@@ -309,7 +312,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     first = 2300
     imu = recording.imu.to_numpy()[: (first + steps) * 5].reshape(-1, 5, 6).mean(axis=1)[first:]
     counts = recording.encoder["pulse_count"].to_numpy(dtype=float)
-    time = recording.imu.index.to_numpy()[4::5][first : first + steps]
+    time = recording.imu.index.to_numpy()[4::5][first : first + steps].copy()
     read = np.searchsorted(recording.encoder.index.to_numpy(), time, side="right") - 1
     sheet = recording.encoder_sheet
     pulse = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
@@ -325,7 +328,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     past = room_for_history(steps, n, UPDATES)
     curve_matched(
         0.02, imu[:, 1:4].copy(), counts[read], method._model(recording, pulse), 9.81,
-        grid, table, x, p, out, past,
+        grid, table, x, p, out, room_to_work(), past,
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
     fixed_interval(past, smoothed, covariance)

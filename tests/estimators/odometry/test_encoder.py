@@ -135,7 +135,7 @@ def test_predict_and_update_are_the_textbook_filter():
     oracle.x = rng.standard_normal((3, 1))
     x, p = oracle.x[:, 0].copy(), oracle.P.copy()
     row, gain, work = np.array([1.0, 0.0, 0.0]), np.zeros(3), np.zeros(3)
-    answer = np.empty((1, 6))
+    answer = np.empty(6)
     for _ in range(50):
         dt, intensity, z, r = (
             rng.uniform(0.001, 0.1),
@@ -146,9 +146,9 @@ def test_predict_and_update_are_the_textbook_filter():
         oracle.F = np.array([[1.0, dt, 0.5 * dt**2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
         oracle.Q = Q_continuous_white_noise(3, dt, intensity)
         oracle.predict()
-        ahead(x, p, dt, intensity, answer, 0)
+        ahead(x, p, dt, intensity, answer)
         predict(x, p, dt, intensity)
-        np.testing.assert_allclose(answer[0], [*x, *np.diag(p)], rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(answer, [*x, *np.diag(p)], rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(x, oracle.x[:, 0], rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(p, oracle.P, rtol=1e-9, atol=1e-12)
         oracle.update(z, R=r)

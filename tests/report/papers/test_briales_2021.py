@@ -256,7 +256,7 @@ def test_figures_that_need_more_rides_are_left_out() -> None:
     assert all(svg.startswith("<svg") for svg in drawings)
 
 
-def test_the_section_stands_on_the_page(tmp_path: Path) -> None:
+def test_the_section_stands_on_the_page(tmp_path: Path, no_pictures_of_rides: None) -> None:
     scenario, result = campaign(FAST)
     write_report(
         tmp_path / "report.html",
