@@ -166,7 +166,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
             check()
             for name in tally.estimators:
                 tally.fail(cell, name, error)
-        if cell.sensor_draw == 0:  # sensors change nothing of the ride itself
+        if cell.sensor_draw == cell.map_draw == 0:  # neither changes anything of the ride itself
             try:
                 _score_ride(cell, truth, parts, tally)
             except Exception as error:
