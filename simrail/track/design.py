@@ -282,8 +282,9 @@ class TrackDesign:
         if isinstance(data["vertical_radius_m"], list):
             values["vertical_radius_m"] = tuple(data["vertical_radius_m"])
         if data.get("deviation") is not None:
-            columns = data["deviation"].items()
-            values["deviation"] = Deviation(**{k: tuple(v) if isinstance(v, list) else v for k, v in columns})
+            beside = data["deviation"]
+            rows = tuple(beside["cant_m"]), tuple(beside["height_m"])
+            values["deviation"] = Deviation(beside["from_m"], beside["step_m"], *rows)
         return cls(**values)
 
     def on_track(self, s: npt.ArrayLike) -> FloatArray:
