@@ -159,12 +159,15 @@ def test_klingel_wavelength(conicity):
 
 
 def test_cant_deficiency_loads_the_outer_wheels():
-    """By the quasi-static balance of moments about the track's centre: asked 2 %, here 0.2 %.
+    """By the quasi-static balance of moments about the track's centre: asked 2 %, here 0.25 %.
 
-    Conical wheels, whose contact points stay where they are on the rails; the cone of 1:40 meets the top
-    of a rail inclined by as much, at the tape circle.
+    Conical wheels, whose contact points stay where they are on the rails to a tenth of a millimetre, which
+    is a quarter of a percent; the cone of 1:40 meets the top of a rail inclined alike, at the tape circle.
+    The curve is so wide that no flange touches: one that does takes 66 N m of 10 kN m at R8000. That is what
+    the couple of springs pushed each at its own point lacked there, so that test and fault agreed; here the
+    couple is 0.6 %.
     """
-    radius, cant_mm, speed, at = 8000.0, 10.0, 70.0, 900.0
+    radius, cant_mm, speed, at = 24000.0, 0.0, 70.0, 900.0
     model = vehicle("two_axle_wagon")
     model = replace(model, wheel_rail=replace(model.wheel_rail, wheel_profile="cone_1_40"))
     track = curve(radius, cant_mm, 1000.0)
@@ -187,8 +190,9 @@ def test_cant_deficiency_loads_the_outer_wheels():
     # The wheels' spin, carried round the curve, leans on the outer rail as well.
     moment += sum(model.spin_inertia_kgm2.values()) * speed / 0.46 * speed / radius
     loads = wheel_loads_n(engine)
-    assert outward == pytest.approx(0.547, abs=1e-3)
-    assert np.sum(loads[1::2] - loads[0::2]) * 0.75 == pytest.approx(moment, rel=2e-3)
+    assert outward == pytest.approx(0.204, abs=1e-3)
+    assert np.all(engine.memory.contacts["flag"] == 1)
+    assert np.sum(loads[1::2] - loads[0::2]) * 0.75 == pytest.approx(moment, rel=4e-3)
 
 
 @pytest.mark.parametrize("radius", [300.0, 1000.0])

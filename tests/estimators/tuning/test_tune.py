@@ -306,7 +306,7 @@ def test_kom_does_better_on_sensors_that_it_has_not_seen(
     ride = piece(metro_recording(70.0, 1, "axle", 0), first, count)
     smoother = TrajectorySmoother()
     settings = {"box": (1e-8, 1e4), "constrained": (), "position_m2": 3e-3, "band": BANDS["D0"]}
-    tuning = tune([ride], settings=settings, references=[rails_of(ride)], evaluations=160)
+    tuning = tune([ride], settings=settings, references=[rails_of(ride)], evaluations=320)
     assert tuning.search is not None and tuning.search.method == "kom"
     by_hand = replace(Hyperparameters(), lateral_position_m2=3e-3, vertical_position_m2=3e-3)
     for draw in (0, 1, 2):
