@@ -166,7 +166,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
             check()
             for name in tally.estimators:
                 tally.fail(cell, name, error)
-        if cell.sensor_draw == 0:  # sensors change nothing of the ride itself
+        if cell.sensor_draw == cell.map_draw == 0:  # neither changes anything of the ride itself
             try:
                 _score_ride(cell, truth, parts, tally)
             except Exception as error:
@@ -203,6 +203,8 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         draw=cell.sensor_draw,
         earth_rate=resolved.earth_rate,
         temperature=resolved.temperature,
+        track_map=resolved.track_map,
+        map_errors=resolved.map_errors,
     )
     if resolved.odometry is None:
         return recording
@@ -246,6 +248,7 @@ def _labels(cell: Cell) -> dict[str, object]:
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
+        "map": cell.map_label,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
     }
@@ -256,6 +259,7 @@ def cell_record(cell: Cell) -> dict[str, object]:
     record: dict[str, object] = _labels(cell) | {
         "case": cell.case,
         "sample": cell.sample,
+        "map_draw": cell.map_draw,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
         "speed_kmh": cell.ride.speed_kmh or 0.0,
@@ -283,7 +287,7 @@ def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> _Recor
     with tally.timed("measure"):
         recording = record_cell(cell, truth, parts)
     with tally.timed("score"):
-        reference = reference_of(truth_at_imu(truth, recording), recording)
+        reference = reference_of(truth, recording)
         if recording.odometry is not None:
             figures = score_odometry(recording, reference, **_wanted(cell))
             tally.add(cell, f"odometry:{recording.odometry_source}", figures)

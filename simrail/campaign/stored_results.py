@@ -70,6 +70,9 @@ def read_results(folder: Path, *, field: str, remedy: str) -> StoredResults:
     except (OSError, ValueError) as error:
         problem = "there are no finished results there"
         raise InputError(problem, field=field, value=str(folder), remedy=remedy) from error
+    if "map" not in scores:
+        # Written before trains had maps of their own: each knew the line as it was laid.
+        scores["map"], cells["map"] = "exact", "exact"
     for what, names, needed in (
         ("manifest", manifest, ("scenario", "settings", "seed", "scenario_text")),
         ("score table", scores, SCORE_COLUMNS),

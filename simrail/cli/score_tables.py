@@ -19,7 +19,7 @@ from simrail.report.tables.geometry import (
     waves_words,
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Case, Mean, cases
+from simrail.report.tables.pivot import Case, Mean, cases, map_words
 from simrail.report.tables.running import decay_words, running_words
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
@@ -112,7 +112,7 @@ def _case(
     draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
     title = Text(
         f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
-        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}",
+        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}, {map_words(first['map'])}",
         style="bold",
     )
     wanted = rows["metric"].isin(("rms", "sd", "us_per_sample")) | (rows["estimator"] == RIDE)

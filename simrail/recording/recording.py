@@ -19,6 +19,7 @@ import pandas as pd
 
 from simrail.core.errors import InputError
 from simrail.track.design import TrackDesign
+from simrail.track.map_errors import UNSTATED, MapErrors
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,9 @@ class Recording:
         (x, y, z) of the IMU in its body when it stands centred on level track: x forward from the
         body's reference point, y left of the track centre, z above the rail plane.
     track : TrackDesign
-        The design track.
+        The map of the line that the train carries: its design, with the errors of a survey.
+    map_errors : MapErrors
+        How wrong that map may be; wide where nobody has said.
     encoder : pandas.DataFrame, optional
         Indexed by ``time_s``, column ``pulse_count``, and ``edge_time_s`` if the logger times edges.
     encoder_sheet : EncoderSheet, optional
@@ -238,6 +241,7 @@ class Recording:
     rail_sensor_sheet: RailSensorSheet | None = None
     odometer: pd.DataFrame | None = None
     odometer_sheet: OdometerSheet | None = None
+    map_errors: MapErrors = UNSTATED
 
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""

@@ -37,6 +37,7 @@ from simrail.track.design import TrackDesign
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import LaidTrack
+from simrail.track.map_errors import EXACT, MapErrors, draw_map
 from simrail.track.quality import Limits
 from simrail.track.rail_condition import FRICTION, RailCondition
 from simrail.vehicle.contact.profile_files import profiles_digest
@@ -73,6 +74,10 @@ class ResolvedCell:
         Rotation of the Earth; None for an Earth at rest.
     temperature : Temperature, optional
         Temperature of the IMU; None for that of its calibration.
+    track_map : TrackDesign, optional
+        The map that the train carries; None for an exact one.
+    map_errors : MapErrors
+        How wrong it may be.
     odometry : Estimator, optional
         The odometry that is run on the recording; None where there is none to be run.
     bands : tuple of Band
@@ -88,6 +93,8 @@ class ResolvedCell:
     rail_sensor: RailSensorSpec | None
     earth_rate: EarthRate | None
     temperature: Temperature | None
+    track_map: TrackDesign | None
+    map_errors: MapErrors
     odometry: Estimator | None
     bands: tuple[Band, ...]
 
@@ -133,7 +140,7 @@ class Parts:
             If a file that it names is missing or faulty, or a sensor cannot be as its words say.
         """
         # All but the draw of the sensors is in the case, the sample and the draw of the track.
-        key = (cell.case, cell.sample, cell.track_draw)
+        key = (cell.case, cell.sample, cell.track_draw, cell.map_draw)
         if key not in self._resolved:
             if len(self._resolved) >= _MOST_RESOLVED:
                 self._resolved.clear()
@@ -157,6 +164,8 @@ class Parts:
             earth_rate=None
             if earth is None
             else EarthRate(radians(earth.latitude_deg), radians(earth.x_axis_deg)),
+            track_map=self.track_map(cell),
+            map_errors=EXACT if spec.map is None else spec.map.errors(),
             odometry=self.odometry(cell),
             temperature=None
             if temperature is None
@@ -209,6 +218,20 @@ class Parts:
     def track(self, cell: Cell) -> TrackDesign:
         """Design track of a cell."""
         return self._noun("track", TrackFile, cell.spec.track, "track", TrackFile.design)
+
+    def track_map(self, cell: Cell) -> TrackDesign | None:
+        """The map that the train of a cell carries; None for an exact one."""
+        part = cell.spec.map
+        if part is None or part.exact:
+            return None
+        with blame(self.scenario.file, "map"):
+            return draw_map(
+                self.track(cell),
+                part.errors(),
+                seed=cell.map_seed,
+                draw=cell.map_draw,
+                defects=part.defects(),
+            )
 
     def vehicle(self, cell: Cell) -> VehicleModel:
         """Vehicle of a cell."""

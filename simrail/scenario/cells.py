@@ -16,16 +16,18 @@ the same scores alone, among others, or in another order.
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from math import prod
 from typing import Any
 
-from simrail.scenario.axes import axes_of, drawn, expand
+from simrail.scenario.axes import axes_of, drawn, each, expand
 from simrail.scenario.distributions import Value, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
+from simrail.scoring.table import DRAWN_MAP, EXACT_MAP
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
-SENSING = ("odometry", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
+SENSING = ("odometry", "map", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Cell:
         Its ride and its IMU.
     ride_index, imu_index : int
         Where they stand in the scenario, for messages.
-    sample, track_draw, sensor_draw : int
+    sample, track_draw, map_draw, sensor_draw : int
         Sample of the distributions, and draws within it, from 0.
     settings : dict
         Values of the scenario's lists and distributions by dotted name, e.g.
@@ -64,6 +66,7 @@ class Cell:
     imu_index: int
     sample: int
     track_draw: int
+    map_draw: int
     sensor_draw: int
     settings: dict[str, Value]
 
@@ -76,6 +79,16 @@ class Cell:
     def sensor_seed(self) -> int:
         """Root seed of the sensors: rides over the same draws are paired, draws share nothing."""
         return derived_seed(self.spec.seed, *self._sample_name, "sensors_of_track_draw", self.track_draw)
+
+    @property
+    def map_seed(self) -> int:
+        """Root seed of the map: each track draw has maps of its own, the same for all rides over it."""
+        return derived_seed(self.spec.seed, *self._sample_name, "map_of_track_draw", self.track_draw)
+
+    @property
+    def map_label(self) -> str:
+        """What tables call the map."""
+        return EXACT_MAP if self.spec.map is None or self.spec.map.exact else DRAWN_MAP
 
     @property
     def _sample_name(self) -> tuple[str | int, ...]:
@@ -123,12 +136,15 @@ def cells(scenario: Scenario) -> Iterator[Cell]:
     for world in _worlds(scenario.spec):
         for track_draw in range(scenario.spec.monte_carlo.track_draws):
             for sensing in _sensings(scenario.spec, world):
-                for sensor_draw in range(sensor_draws(scenario.spec, sensing.imu)):
+                for map_draw, sensor_draw in product(
+                    range(map_draws(sensing.spec)), range(sensor_draws(scenario.spec, sensing.imu))
+                ):
                     yield replace(
                         sensing,
                         number=number,
                         ride_number=ride_number,
                         track_draw=track_draw,
+                        map_draw=map_draw,
                         sensor_draw=sensor_draw,
                     )
                     number += 1
@@ -144,7 +160,7 @@ def first_cells(scenario: Scenario) -> Iterator[Cell]:
         before = 0
         for sensing in _sensings(spec, world):
             yield replace(sensing, number=number + before, ride_number=w * draws)
-            before += sensor_draws(spec, sensing.imu)
+            before += map_draws(sensing.spec) * sensor_draws(spec, sensing.imu)
         number += before * draws
 
 
@@ -201,6 +217,7 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
             imu_index=i,
             sample=world.sample,
             track_draw=0,
+            map_draw=0,
             sensor_draw=0,
             settings=settings | of_estimators,
         )
@@ -209,6 +226,11 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
 def sensor_draws(spec: ScenarioFile, imu: ImuPart) -> int:
     """Number of sensor draws of an IMU."""
     return min(spec.monte_carlo.sensor_draws, imu.sensor_draws or spec.monte_carlo.sensor_draws)
+
+
+def map_draws(spec: ScenarioFile) -> int:
+    """Number of draws of the map, of a setting of the sensors; an exact one has no errors to be drawn."""
+    return 1 if spec.map is None or spec.map.exact else spec.monte_carlo.map_draws
 
 
 def _sensing_count(spec: ScenarioFile) -> int:
@@ -220,9 +242,11 @@ def count(scenario: Scenario) -> tuple[int, int]:
     spec = scenario.spec
     worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * sample_count(spec)
     rides = worlds * spec.monte_carlo.track_draws
-    return rides, rides * _size(spec, SENSING) * sum(
-        _size(part) * sensor_draws(spec, part) for part in spec.imu
-    )
+    maps = _size(spec, SENSING)
+    if spec.map is not None:
+        exact = each(spec.map.exact)
+        maps = maps // len(exact) * sum(1 if one else spec.monte_carlo.map_draws for one in exact)
+    return rides, rides * maps * sum(_size(part) * sensor_draws(spec, part) for part in spec.imu)
 
 
 def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:

@@ -44,6 +44,7 @@ class ScenarioFile(Part):
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
     odometry: Listed[str] = ""
     irregularity: tables.IrregularityPart | None = None
+    map: tables.MapPart | None = None
     rail_condition: tuple[tables.RailConditionPart, ...] = ()
     ride: Annotated[list[tables.RidePart], Field(min_length=1)]
     imu: Annotated[list[tables.ImuPart], Field(min_length=1)]

@@ -16,6 +16,8 @@ from simrail.scenario.axes import Listed, each
 from simrail.scenario.measured_file import MeasuredPart
 from simrail.track.defects import Defect
 from simrail.track.irregularity import Irregularity
+from simrail.track.map_errors import EXACT, MapDefect, MapErrors
+from simrail.track.map_file import map_errors_of
 from simrail.track.measured import MeasuredRails
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
@@ -201,6 +203,56 @@ class ImuPart(Part):
         return NOISE in self.name or NOISE in str(self.grade)
 
 
+class MapDefectPart(Part):
+    """``[[map.defect]]``: one fault of the map that the train does not know of.
+
+    ``at_m`` lies in the transition or the curve that is wrong, or in the middle of what has settled.
+    """
+
+    kind: Literal["missing_transition", "straightened_transition", "coarse_curve", "settled"]
+    at_m: float
+    chord_m: Annotated[float, Field(ge=1.0, le=200.0)] = 20.0
+    depth_mm: Annotated[float, Field(ge=-500.0, le=500.0)] = 20.0
+    length_m: Annotated[float, Field(ge=20.0, le=1000.0)] = 60.0
+
+
+class MapPart(Part):
+    """``[map]``: how the map that the train carries differs from what was laid. Without it, not at all.
+
+    Standard deviations by kind, and single defects. ``exact = true`` is an ablation: a map without errors,
+    and a train that knows it to be so.
+    """
+
+    exact: Listed[bool] = False
+    cant_sd_mm: Listed[Annotated[float, Field(ge=0.0, le=100.0)]] = 3.0
+    cant_along_sd_mm: Listed[Annotated[float, Field(ge=0.0, le=100.0)]] = 1.0
+    cant_along_length_m: Listed[Annotated[float, Field(ge=20.0, le=10000.0)]] = 100.0
+    radius_sd_percent: Listed[Annotated[float, Field(ge=0.0, le=20.0)]] = 1.0
+    place_sd_m: Listed[Annotated[float, Field(ge=0.0, le=50.0)]] = 0.5
+    gradient_sd_permil: Listed[Annotated[float, Field(ge=0.0, le=20.0)]] = 0.2
+    chainage_scale_sd_percent: Listed[Annotated[float, Field(ge=0.0, le=5.0)]] = 0.0
+    chainage_offset_sd_m: Listed[Annotated[float, Field(ge=0.0, le=200.0)]] = 0.0
+    defect: tuple[MapDefectPart, ...] = ()
+
+    def errors(self) -> MapErrors:
+        """The sizes in SI."""
+        return EXACT if self.exact else map_errors_of(self, EXACT)
+
+    def defects(self) -> tuple[MapDefect, ...]:
+        """The single defects in SI; none of an exact map."""
+        if self.exact:
+            return ()
+        return tuple(
+            MapDefect(
+                part.kind,
+                part.at_m,
+                part.chord_m if part.kind == "coarse_curve" else 1e-3 * part.depth_mm,
+                part.length_m,
+            )
+            for part in self.defect
+        )
+
+
 class EarthPart(Part):
     """``[earth]``: the Earth turns. Without it, it is at rest.
 
@@ -236,13 +288,15 @@ class MonteCarloPart(Part):
     """``[monte_carlo]``: how often chance is asked.
 
     Each of the ``samples`` draws a value from every distribution of the scenario, jointly by ``method``,
-    and has draws of its own: ``track_draws`` lay the rails anew, and each ride over them is recorded with
-    ``sensor_draws`` draws of the sensors. Without a distribution there is one sample.
+    and has draws of its own: ``track_draws`` lay the rails anew, each ride over them is made with
+    ``map_draws`` draws of the map, and recorded with ``sensor_draws`` draws of the sensors.
+    Without a distribution there is one sample.
     """
 
     samples: Draws = 1
     method: Literal["latin_hypercube", "sobol"] = "latin_hypercube"
     track_draws: Draws = 1
+    map_draws: Draws = 1
     sensor_draws: Draws = 1
 
     @model_validator(mode="after")

@@ -49,9 +49,9 @@ def score_geometry(
     estimate : Estimate
         Its `geometry`, by its `geometry_draws` if it has some, and nothing else, is scored.
     rails : LaidTrack
-        The rails that the ride was run on.
+        The rails that the ride was run on; their design defines the windows.
     recording : Recording
-        Its design track defines the windows.
+        What the estimator saw.
     bands : sequence of Band
         Bands to score in, beside ``full``.
     twist_base_m : float
@@ -76,8 +76,9 @@ def score_geometry(
     require(geometry, IRREGULARITY, what="geometry")
     position = geometry.index.to_numpy(dtype=np.float64)
     step = _step_of(position)
-    track = recording.track
-    chosen = chosen_windows(windows_of(track, position, np.ones(len(position))), windows)
+    if estimate.mount != recording.mount:
+        raise InputError("the estimate speaks of another mount", value=estimate.mount, limit=recording.mount)
+    chosen = chosen_windows(windows_of(rails.design, position, np.ones(len(position))), windows)
     chosen = {name: at for name, at in chosen.items() if name not in ("standstill", "moving")}
     keep = [name for name in chosen_metrics(metrics) if name not in _NO_PLACE_METRICS]
     for band in bands:

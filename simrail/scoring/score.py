@@ -82,8 +82,10 @@ def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference
     truth : Truth or pandas.DataFrame
         The truth, or its motion at the IMU times as `truth_at_imu` gives it.
     recording : Recording
-        The recording; its design track defines the windows.
+        The recording. The design that was laid defines the windows and the design angles; with a frame,
+        which does not know it, the recording's map does.
     """
+    track = recording.track if isinstance(truth, pd.DataFrame) else truth.track
     motion = truth if isinstance(truth, pd.DataFrame) else truth_at_imu(truth, recording)
     require(motion, (*ATTITUDE, *ODOMETRY), what="truth")
     if len(motion) != len(recording.imu):
@@ -91,10 +93,10 @@ def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference
     if not np.isfinite(motion[[n for n in MOTION if n in motion.columns]].to_numpy()).all():
         raise InputError("the truth holds a value that is not finite", field="truth")
     position = motion["position_m"].to_numpy()
-    frame = recording.track.frame(position)
+    frame = track.frame(position)
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
     time = recording.imu.index.to_numpy(dtype=np.float64)
-    windows = windows_of(recording.track, position, motion["speed_mps"].to_numpy(), time_s=time)
+    windows = windows_of(track, position, motion["speed_mps"].to_numpy(), time_s=time)
     return Reference(motion, design, windows)
 
 

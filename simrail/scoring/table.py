@@ -37,6 +37,7 @@ LABEL_COLUMNS = (
     "mount",
     "imu",
     "odometry",
+    "map",
     "tuning",
     "track_draw",
     "sensor_draw",
@@ -90,6 +91,8 @@ BANDS = (FULL, *_STANDARD_BANDS)
 REFERENCES = ("truth", "design")
 WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "p9985", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
+EXACT_MAP, DRAWN_MAP = "exact", "drawn"
+"""What the train knows of the line: all of it, an ablation, or a map with errors."""
 OK = "ok"
 NO_SAMPLES = "no samples"
 """Status of a figure over a window that the ride does not have."""

@@ -20,7 +20,9 @@ from simrail.sensors.imu import EarthRate, arrived, sample_imu
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 from simrail.sensors.rail_sensor import RailSensorSpec, sample_rails
+from simrail.track.design import TrackDesign
 from simrail.track.laid_track import LaidTrack
+from simrail.track.map_errors import EXACT, MapErrors
 
 
 def measure(
@@ -38,6 +40,8 @@ def measure(
     draw: int,
     earth_rate: EarthRate | None = None,
     temperature: Temperature | None = None,
+    track_map: TrackDesign | None = None,
+    map_errors: MapErrors = EXACT,
 ) -> Recording:
     """Record a ride.
 
@@ -69,6 +73,11 @@ def measure(
         Rotation of the Earth; None for an Earth at rest.
     temperature : Temperature, optional
         Temperature of the IMU over the ride; None for that of its calibration.
+    track_map : TrackDesign, optional
+        The map that the train carries (`simrail.track.map_errors.draw_map`); None for an exact one, which is
+        the design that was laid.
+    map_errors : MapErrors
+        How wrong that map may be, as the train knows it.
 
     Returns
     -------
@@ -131,7 +140,8 @@ def measure(
         mount=mount.name,
         mount_body=mount.body,
         mount_position_m=mount.position_m,
-        track=truth.track,
+        track=track_map or truth.track,
+        map_errors=map_errors,
         encoder=counts,
         encoder_sheet=sheet,
         start_position_m=start_m,

@@ -23,6 +23,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
 from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
+from simrail.track.deviation import Deviation
 from simrail.track.elements import (
     CURVE,
     RAIL_BASE_M,
@@ -136,6 +137,8 @@ class TrackDesign:
         Global x, y, z at `start_m`.
     start_yaw_rad : float
         Yaw at `start_m`.
+    deviation : Deviation, optional
+        Cant and height that are added to those of the elements and gradients.
     """
 
     name: str
@@ -150,6 +153,7 @@ class TrackDesign:
     synthetic: bool = False
     start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_yaw_rad: float = 0.0
+    deviation: Deviation | None = None
 
     @property
     def length_m(self) -> float:
@@ -184,6 +188,8 @@ class TrackDesign:
             )
         check_elements(self.elements, rail_base_m=self.rail_base_m)
         check_gradients(self.gradients, end_m=self.end_m)
+        if self.deviation is not None:
+            self.deviation.check()
         x, y, z = self.start_position_m
         plan = build_plan(self.elements, self.start_m, position_m=(x, y), yaw_rad=self.start_yaw_rad)
         cant = build_cant(self.elements, self.start_m, ramp=self.cant_ramp)
@@ -223,8 +229,13 @@ class TrackDesign:
         shape = self._shape
         x, y = shape.plan.xy(s)
         yaw, yaw1, yaw2 = shape.plan.state(s)
-        u, u1, u2 = (cant(s) / self.rail_base_m for cant in shape.cant)
-        z, z1, z2, z3 = (height(s) for height in shape.height)
+        cants = [cant(s) for cant in shape.cant]
+        heights = [height(s) for height in shape.height]
+        if self.deviation is not None:
+            cants = [a + b for a, b in zip(cants, self.deviation.cant(s, derivatives=2), strict=True)]
+            heights = [a + b for a, b in zip(heights, self.deviation.height(s, derivatives=3), strict=True)]
+        u, u1, u2 = (cant / self.rail_base_m for cant in cants)
+        z, z1, z2, z3 = heights
         # roll = asin(u), pitch = -atan(z1), and their derivatives
         level = 1.0 / np.sqrt(1.0 - u * u)
         roll, roll1, roll2 = np.arcsin(u), u1 * level, u2 * level + u * u1 * u1 * level**3
@@ -270,6 +281,10 @@ class TrackDesign:
         values["start_position_m"] = tuple(data["start_position_m"])
         if isinstance(data["vertical_radius_m"], list):
             values["vertical_radius_m"] = tuple(data["vertical_radius_m"])
+        if data.get("deviation") is not None:
+            beside = data["deviation"]
+            rows = tuple(beside["cant_m"]), tuple(beside["height_m"])
+            values["deviation"] = Deviation(beside["from_m"], beside["step_m"], *rows)
         return cls(**values)
 
     def on_track(self, s: npt.ArrayLike) -> FloatArray:

@@ -21,6 +21,7 @@ from simrail.track.design import (
     TrackDesign,
     Transition,
 )
+from simrail.track.deviation import Deviation
 
 Length = Annotated[float, Field(gt=0.0)]
 
@@ -79,6 +80,23 @@ class GradientPart(Part):
         return Gradient(self.from_m, self.permil / 1000.0)
 
 
+class DeviationPart(Part):
+    """``[deviation]``: cant and height beside those of segments and gradients, at equal steps along the line.
+
+    A map that was surveyed has one; a drawing has none. See `simrail.track.deviation`.
+    """
+
+    from_m: float
+    step_m: Length
+    cant_mm: tuple[float, ...]
+    height_mm: tuple[float, ...]
+
+    def deviation(self) -> Deviation:
+        """The deviation that it describes."""
+        cant, height = (tuple(value / 1000.0 for value in row) for row in (self.cant_mm, self.height_mm))
+        return Deviation(self.from_m, self.step_m, cant, height)
+
+
 class TrackFile(Part):
     """A track file.
 
@@ -101,6 +119,8 @@ class TrackFile(Part):
         gauge.
     segment, gradient : tuple
         The plan and the gradients, in the order of s.
+    deviation : DeviationPart, optional
+        What is added to them.
     """
 
     title: str
@@ -118,6 +138,7 @@ class TrackFile(Part):
     )
     segment: tuple[SegmentPart, ...] = Field(min_length=1)
     gradient: tuple[GradientPart, ...] = ()
+    deviation: DeviationPart | None = None
 
     @model_validator(mode="after")
     def _makes_a_line(self) -> Self:
@@ -137,6 +158,7 @@ class TrackFile(Part):
             elements=tuple(part.element() for part in self.segment),
             gradients=tuple(part.gradient() for part in self.gradient),
             rail_base_m=self.rail_base_mm / 1000.0,
+            deviation=None if self.deviation is None else self.deviation.deviation(),
             **{field: getattr(self, field) for field in _SHARED},
         )
 
@@ -178,7 +200,16 @@ def track_text(design: TrackDesign) -> str:
         {"from_m": gradient.from_m, "permil": _thousandths(gradient.slope, f"gradient[{i}].permil")}
         for i, gradient in enumerate(design.gradients)
     ]
-    return toml_text({**head, "segment": segments, **({"gradient": gradients} if gradients else {})})
+    tables: dict[str, object] = {"segment": segments, **({"gradient": gradients} if gradients else {})}
+    if design.deviation is not None:
+        beside = design.deviation
+        tables["deviation"] = {
+            "from_m": beside.from_m,
+            "step_m": beside.step_m,
+            "cant_mm": [_thousandths(value, "deviation.cant_mm") for value in beside.cant_m],
+            "height_mm": [_thousandths(value, "deviation.height_mm") for value in beside.height_m],
+        }
+    return toml_text({**head, **tables})
 
 
 def _thousandths(value: float, field: str) -> float:

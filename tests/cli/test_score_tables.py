@@ -82,6 +82,7 @@ def scores(*, bands: dict[str, str], rails: bool = True) -> tuple[pd.DataFrame, 
         "mount": "body",
         "imu": "lord_3dm_gx4_25",
         "odometry": "encoder",
+        "map": "exact",
         "tuning": "default",
         "track_draw": 0,
     }

@@ -128,6 +128,7 @@ def example_ride(*, backward: bool = False, rate: float = 50.0, name: str = "go"
         "mount": "axle",
         "imu": "lord_3dm_gx4_25",
         "odometry": "encoder",
+        "map": "exact",
     }
     return CellResult(cell, recording, motion, estimates)
 

@@ -116,7 +116,7 @@ def campaign(
     cells["sample"] = 0
     cells["speed_kmh"] = cells["ride.speed_kmh"]
     cells["direction"] = np.where(cells["ride.reverse"], "backward", "forward")
-    fixed = {"ride": "out", "vehicle": "none", "mount": "axle", "odometry": "encoder"}
+    fixed = {"ride": "out", "vehicle": "none", "mount": "axle", "odometry": "encoder", "map": "exact"}
     for name, value in (fixed | {"track": "test_line", "engine": "kinematic"}).items():
         cells[name] = value
     n, rows = len(cells), len(methods) * len(FIGURES)
@@ -139,7 +139,17 @@ def campaign(
         name: pd.Categorical(cells[name].repeat(rows))
         if name not in INTEGER_COLUMNS
         else cells[name].repeat(rows).to_numpy()
-        for name in ("cell", "ride", "vehicle", "mount", "imu", "odometry", "track_draw", "sensor_draw")
+        for name in (
+            "cell",
+            "ride",
+            "vehicle",
+            "mount",
+            "imu",
+            "odometry",
+            "map",
+            "track_draw",
+            "sensor_draw",
+        )
     }
     units = {"nees": "1", "coverage95": "1", "us_per_sample": "us"}
     columns = repeated | {

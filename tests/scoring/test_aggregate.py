@@ -17,6 +17,7 @@ LABELS: dict[str, object] = {
     "mount": "axle",
     "imu": "ideal",
     "odometry": "encoder",
+    "map": "exact",
     "tuning": "default",
 }
 

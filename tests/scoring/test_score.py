@@ -364,6 +364,7 @@ def test_an_estimate_of_other_times_or_another_mount_is_refused() -> None:
 class FakeTruth:
     def __init__(self, motion: pd.DataFrame) -> None:
         self.kept, self.asked = motion, None
+        self.track = PiecewiseTrack()
 
     def motion(self, mount: Any) -> pd.DataFrame:
         self.asked = mount
@@ -434,6 +435,7 @@ LABELS: dict[str, object] = {
     "mount": "axle",
     "imu": "ideal",
     "odometry": "encoder",
+    "map": "exact",
     "tuning": "recommended",
     "track_draw": 0,
     "sensor_draw": 0,
@@ -450,8 +452,8 @@ def figures(**words: object) -> pd.DataFrame:
 
 def test_columns_and_vocabulary_are_those_of_the_design() -> None:
     written = (
-        "cell, scenario, ride, vehicle, mount, imu, odometry, tuning, track_draw, sensor_draw, estimator, "
-        "quantity, band, reference, window, metric, value, unit, n_samples, status"
+        "cell, scenario, ride, vehicle, mount, imu, odometry, map, tuning, track_draw, sensor_draw, "
+        "estimator, quantity, band, reference, window, metric, value, unit, n_samples, status"
     )
     assert ", ".join(SCORE_COLUMNS) == written
     quantities = (

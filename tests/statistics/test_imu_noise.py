@@ -220,7 +220,7 @@ def test_white_noise_alone_has_no_random_walk():
         (10.0, "accel"),
         (100.0, "gyro"),
         (100.0, "accel"),
-        (1000.0, "gyro"),
+        pytest.param(1000.0, "gyro", marks=pytest.mark.slow),
         pytest.param(1000.0, "accel", marks=pytest.mark.slow),
     ],
 )

@@ -44,7 +44,7 @@ STEPS = {
     "0.25 m": np.arange(-5.0, 620.0, 0.25),
     "0.3 m": np.arange(-5.0, 620.0, 0.3),
     "0.1 m": np.arange(-5.0, 620.0, 0.1),
-    "2 mm": np.arange(0.0, 600.001, 0.002),
+    "5 mm": np.arange(0.0, 600.001, 0.005),
     "uneven": np.sort(np.arange(-5.0, 620.0, 0.25) + GENERATOR.uniform(-0.06, 0.06, 2500)),
 }
 

@@ -26,6 +26,7 @@ from simrail.recording.signals import (
     RAIL_SIGNAL,
     Signal,
 )
+from simrail.track.map_file import MapErrorsPart
 
 
 class ImuSignalPart(VectorPart):
@@ -234,6 +235,8 @@ class RideFile(Part):
         Local gravity.
     longest_gap_s : float
         Longest gap in a signal that is bridged by a straight line.
+    map : MapErrorsPart, optional
+        How wrong the track file may be; taken to be wide without it.
     imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
         Its signals. Without an odometry it is made from encoder or odometer
         (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
@@ -244,6 +247,7 @@ class RideFile(Part):
     start_position_m: float
     gravity_mps2: Annotated[float, Field(ge=9.7, le=9.9)] = 9.81
     longest_gap_s: Annotated[float, Field(gt=0.0, le=10.0)] = LONGEST_GAP_S
+    map: MapErrorsPart = MapErrorsPart()
     imu: ImuSignalPart
     encoder: EncoderSignalPart | None = None
     magnetometer: MagnetometerSignalPart | None = None

@@ -97,6 +97,7 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
         mount_body=spec.imu.body,
         mount_position_m=spec.imu.position_m,
         track=track,
+        map_errors=spec.map.errors(),
         encoder=None,
         encoder_sheet=None,
         start_position_m=spec.start_position_m,

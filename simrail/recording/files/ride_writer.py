@@ -19,6 +19,7 @@ from simrail.recording.files.ride_reader import RIDE_FILE
 from simrail.recording.recording import Recording
 from simrail.recording.signals import SIGNALS
 from simrail.track.file import track_text
+from simrail.track.map_file import map_table
 
 Format = Literal["csv", "parquet"]
 
@@ -94,6 +95,7 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         "track": f"./{TRACK_FILE}",
         "start_position_m": recording.start_position_m,
         "gravity_mps2": recording.gravity_mps2,
+        "map": map_table(recording.map_errors),
     }
     (folder / TRACK_FILE).write_text(track_text(recording.track), encoding="utf-8")
     (folder / RIDE_FILE).write_text(toml_text({**head, **tables}), encoding="utf-8")

@@ -15,7 +15,7 @@ from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, FULL
 _FIRST = ("speed_kmh", "direction", "imu", "irregularity.scale", "irregularity.spectrum", "vehicle")
 """Columns of the table of cells that come first, and that stand for others which say the same."""
 
-_LAST = ("mount", "odometry", "track", "engine", "ride")
+_LAST = ("mount", "odometry", "map", "track", "engine", "ride")
 _TITLES = {
     "speed_kmh": "speed, km/h",
     "direction": "direction",
@@ -57,7 +57,7 @@ def is_campaign(scenario: Scenario) -> bool:
 
 def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     """The axes along which the cells differ, each told once, the usual ones first."""
-    named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry"))
+    named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry", "map"))
     varying = [n for n in named if n in cells and n != "case" and len(cells[n].unique()) > 1]
     others = [name for name in varying if name not in (*_FIRST, *_LAST)]
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]

@@ -19,7 +19,7 @@ from simrail.report.pages.ride import ride_sections
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers import SECTIONS as PAPERS
 from simrail.report.tables.geometry import geometry_table, overview_table
-from simrail.report.tables.pivot import Case
+from simrail.report.tables.pivot import Case, map_words
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
@@ -148,6 +148,7 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
     """The tables of one case."""
     labels = case.labels
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
+    title.append(map_words(labels["map"]))
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     return {

@@ -10,9 +10,14 @@ from typing import NamedTuple
 import pandas as pd
 
 from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
-from simrail.scoring.table import CURVE_PREFIX, FULL, SCORE_COLUMNS
+from simrail.scoring.table import CURVE_PREFIX, EXACT_MAP, FULL, SCORE_COLUMNS
 
-CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry")
+CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry", "map")
+
+
+def map_words(known: str) -> str:
+    """What the train knows of the line, for titles."""
+    return "an exact map (ablation)" if known == EXACT_MAP else "a map with errors"
 
 
 class Mean(NamedTuple):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, Mean
+from simrail.report.tables.pivot import Case, Mean, map_words
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def odometry_table(all_cases: Sequence[Case]) -> Table:
             ]
             label = (
                 f"{case.labels['ride']} \u00b7 {case.labels['mount']} ({case.labels['imu']}) \u00b7 "
-                f"{name.removeprefix('odometry:')}"
+                f"{name.removeprefix('odometry:')} \u00b7 {map_words(case.labels['map'])}"
             )
             key = (label, *(cell.text for cell in cells))
             if key not in seen:

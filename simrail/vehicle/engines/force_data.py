@@ -145,7 +145,7 @@ def pack(
 
 
 def _writable(table: FloatArray) -> FloatArray:
-    """The array that a read-only view is of: kernels, which write into neither, would be compiled for both."""
+    """The array that a read-only view is of: kernels would be compiled for both, and write into neither."""
     base = table.base
     return base if isinstance(base, np.ndarray) and base.shape == table.shape else table
 

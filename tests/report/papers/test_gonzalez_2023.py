@@ -321,7 +321,14 @@ def case(change: Change | None = None, **labels: str) -> Case:
             "failed": [0, 0, 0],
         }
     )
-    said = {"ride": "go", "vehicle": "v", "mount": "axle", "imu": "real", "odometry": "curve_smoothed"}
+    said = {
+        "ride": "go",
+        "vehicle": "v",
+        "mount": "axle",
+        "imu": "real",
+        "odometry": "curve_smoothed",
+        "map": "exact",
+    }
     return Case({**said, **labels}, table, found)
 
 
@@ -387,7 +394,7 @@ def test_sentences_lay_error_baseline_and_its_causes_side_by_side() -> None:
 def test_the_overview_has_a_row_per_case_and_marks_a_loss() -> None:
     table = overview_table([case(), case({("ours", "alignment", "D1"): 4.0}, odometry="truth")], STYLES)
     assert table is not None and len(table.rows) == 2
-    assert "ablation" in table.rows[1].label and "ablation" not in table.rows[0].label
+    assert "truth, an ablation" in table.rows[1].label and "truth" not in table.rows[0].label
     assert [cell.mark for cell in table.rows[1].cells] == ["", "", "", "", "worse", ""]
     assert overview_table([replace(case(), scores={})], STYLES) is None
 

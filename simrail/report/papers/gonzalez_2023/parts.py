@@ -99,7 +99,7 @@ def rows_of(all_cases: Sequence[Case], ran: Sequence[Method], *, band: str) -> R
     plain = [case for case in real if not _is_noisy(case)]
     for case in [*plain, *all_cases]:
         if any(case.get(name, "cross_level", "sd").draws for name in names.values()):
-            same = ("ride", "odometry", "vehicle")
+            same = ("ride", "odometry", "map", "vehicle")
             noisy = (c for c in real if _is_noisy(c) and all(c.labels[k] == case.labels[k] for k in same))
             return Rows(case, next(noisy, None), names, band)
     return None

@@ -1,0 +1,67 @@
+"""The accuracy of a map as a person writes it: ``[map]`` of a ride file, in mm, percent and permil.
+
+What a scenario says of its maps has the same keys (`simrail.scenario.tables.MapPart`), where each may be a
+list or a distribution.
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from simrail.core.toml_files import Part
+from simrail.track.map_errors import EXACT, UNSTATED, MapErrors
+
+_UNITS = {
+    "cant_sd_mm": ("cant_sd_m", 1e-3),
+    "cant_along_sd_mm": ("cant_along_sd_m", 1e-3),
+    "cant_along_length_m": ("cant_along_length_m", 1.0),
+    "radius_sd_percent": ("radius_relative_sd", 1e-2),
+    "place_sd_m": ("place_sd_m", 1.0),
+    "gradient_sd_permil": ("gradient_sd", 1e-3),
+    "chainage_scale_sd_percent": ("chainage_scale_sd", 1e-2),
+    "chainage_offset_sd_m": ("chainage_offset_sd_m", 1.0),
+}
+"""Key of a file -> field of `MapErrors`, and the unit of the key in that of the field."""
+
+
+class MapErrorsPart(Part):
+    """``[map]``: how wrong the map may be; what is left out is taken to be wide.
+
+    Attributes
+    ----------
+    exact : bool
+        True for a map without errors; then nothing else may be said.
+    cant_sd_mm, cant_along_sd_mm, ... : float
+        As in `MapErrors`.
+    """
+
+    exact: bool = False
+    cant_sd_mm: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
+    cant_along_sd_mm: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
+    cant_along_length_m: Annotated[float, Field(ge=20.0, le=10000.0)] | None = None
+    radius_sd_percent: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
+    place_sd_m: Annotated[float, Field(ge=0.0, le=50.0)] | None = None
+    gradient_sd_permil: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
+    chainage_scale_sd_percent: Annotated[float, Field(ge=0.0, le=5.0)] | None = None
+    chainage_offset_sd_m: Annotated[float, Field(ge=0.0, le=200.0)] | None = None
+
+    def errors(self) -> MapErrors:
+        """The sizes in SI."""
+        return map_errors_of(self, EXACT if self.exact else UNSTATED)
+
+
+def map_errors_of(part: Part, unsaid: MapErrors) -> MapErrors:
+    """Sizes in SI of a table that has these keys; where it says nothing, those of ``unsaid``."""
+    said = {key: getattr(part, key) for key in _UNITS}
+    values = {
+        field: (getattr(unsaid, field) if said[key] is None else unit * said[key])
+        for key, (field, unit) in _UNITS.items()
+    }
+    return MapErrors(**values)
+
+
+def map_table(errors: MapErrors) -> dict[str, object]:
+    """The table that says these sizes: what `MapErrorsPart` reads back, to rounding."""
+    if errors == EXACT:
+        return {"exact": True}
+    return {key: float(f"{getattr(errors, field) / unit:.12g}") for key, (field, unit) in _UNITS.items()}
