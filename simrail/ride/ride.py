@@ -196,14 +196,21 @@ def simulate(
 
 
 def _with_hunting(derailment: Derailment, ride: Ride) -> Derailment:
-    """A derailment that nothing of the rails explains, with hunting as its cause where the vehicle hunts."""
-    if derailment.from_the_track:
+    """A derailment that the rails do not explain, with hunting as its cause where the vehicle does hunt.
+
+    It does if the axle has swung from side to side above the critical speed: a vehicle that is too fast for a
+    curve leans on one rail.
+    """
+    if derailment.from_the_track or not derailment.swung:
         return derailment
     model = on_gauge(ride.vehicle, mean_widening_m(rails_of(ride), ride.profile))
     critical = critical_below(model, abs(derailment.speed_mps), gravity_mps2=ride.gravity_mps2)
     if critical is None:
         return derailment
-    cause = f"hunting, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
+    # Wheels that all turn apart do not hunt; what grows is another swing.
+    apart = len(model.spin_inertia_kgm2) == len(model.wheels)
+    swing = "unstable running" if apart else "hunting"
+    cause = f"{swing}, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
     return replace(derailment, cause=cause)
 
 

@@ -47,7 +47,8 @@ class CompiledEngine:
         for body, (position, rotation) in zip(self._bodies(self.state), poses, strict=True):
             body[:3] = position
             body[3:7] = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
-        self._contacts = np.zeros((0, len(self.data.wheels)), CONTACT)
+        # Contacts of rows that are still to be put out, and of the last ones that were.
+        self._contacts = self._earlier = np.zeros((0, len(self.data.wheels)), CONTACT)
         # Compiled now, so that no clock of a ride counts it.
         self._march(0, np.zeros((0, len(self.state))), self._contacts)
 
@@ -68,6 +69,7 @@ class CompiledEngine:
         ):
             bodies = self._bodies(rows)
             told, self._contacts = np.split(self._contacts, [len(time_s)])
+            self._earlier = told
             turn = Rotation.from_quat(bodies[:, :, 3:7].reshape(-1, 4), scalar_first=True).as_matrix()
             yield Segment(
                 time_s=time_s,
@@ -102,7 +104,7 @@ class CompiledEngine:
         made = self._march(first, rows[1:], told)
         self._contacts = np.concatenate([self._contacts, told])
         reached = self._contacts[self._contacts["wanted"].any(axis=1)]
-        refuse_derailed(self.memory, self.setup, lambda _time_s: reached)
+        refuse_derailed(self.memory, self.setup, lambda _time_s: np.concatenate([self._earlier, reached]))
         if made < last - first or not np.isfinite(self.state).all():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

@@ -68,6 +68,8 @@ class ExudynEngine:
         # Compiled now, so that no clock of a ride counts it.
         compiled = generalized_forces.compile  # type: ignore[attr-defined]
         compiled((numba.float64, numba.typeof(self._arguments.places)))
+        # Coordinates and rates at every step of the present stretch, and of the one before it.
+        self._rows = self._earlier = np.zeros((0, 2, self.size))
         self._build()
 
     def run(self, duration_s: float, *, segment_s: float = 10.0) -> Iterator[Segment]:
@@ -110,10 +112,15 @@ class ExudynEngine:
         return told
 
     def _until(self, time_s: float, first: int) -> RecordArray:
-        """What the force kernel tells of the contact (n, w) at output rows from a step until a time."""
+        """What the force kernel tells of the contact (n, w) at output rows until a time.
+
+        ``first`` is the first step of the present stretch; the one before it is told, too.
+        """
         step_s, every = self.setup.step_s, self.setup.every
+        rows = np.concatenate([self._earlier[:-1], self._rows])
+        first -= max(len(self._earlier) - 1, 0)
         steps = np.arange(-(-max(first, 0) // every) * every, int(time_s / step_s) + 1, every)
-        return self._contacts(np.multiply(steps, step_s), self._rows[steps - first])
+        return self._contacts(np.multiply(steps, step_s), rows[steps - first])
 
     def _build(self) -> None:
         model = self.setup.model
@@ -199,7 +206,7 @@ class ExudynEngine:
         integration.startTime = first * self.setup.step_s + self.setup.settle_s
         integration.endTime = last * self.setup.step_s + self.setup.settle_s
         integration.numberOfSteps = last - first
-        self._rows = np.full((last - first + 1, 2, self.size), np.nan)
+        self._earlier, self._rows = self._rows, np.full((last - first + 1, 2, self.size), np.nan)
         self._rows_start_s = integration.startTime
         solved = self.mbs.SolveDynamic(
             self._settings, solverType=exu.DynamicSolverType.RK44, updateInitialValues=True, showHints=False
