@@ -79,6 +79,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     started.close()
 
 
+@pytest.mark.slow
 def test_a_campaign_on_a_cluster_with_a_worker_killed_midway(
     cluster: Cluster,
     noting_file: Path,

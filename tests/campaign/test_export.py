@@ -194,6 +194,7 @@ def test_nothing_is_exported_of_a_faulty_scenario_or_into_a_full_place(
     assert not list((here / "x").iterdir())
 
 
+@pytest.mark.slow
 def test_killed_export_leaves_no_folder_and_can_be_repeated(here: Path) -> None:
     command = [sys.executable, "-m", "simrail", "export", "quick_kinematic", "--out", "x"]
     environment = {**os.environ, "SIMRAIL_RIDES": str(here / "rides")}

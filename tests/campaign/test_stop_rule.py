@@ -200,7 +200,7 @@ def rows_of(found: CampaignResult, draws: int) -> pd.DataFrame:
 
 @pytest.mark.parametrize(
     ("workers", "batch_cells"),
-    [(2, 3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 1), (1, 5), (2, None)))],
+    [(1, 5), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 1), (2, 3), (2, None)))],
 )
 def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
     workers: int,

@@ -62,6 +62,7 @@ def test_makes_the_file_that_the_scenario_names(place: Path, capsys: pytest.Capt
     assert sorted(entry.name for entry in place.iterdir()) == ["mine.toml", "mine_cml.toml"]
 
 
+@pytest.mark.slow
 def test_interrupted_it_goes_on(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,6 +196,7 @@ def test_what_a_strangers_tunable_does_not_offer_is_refused_in_one_line(
     assert {entry.name for entry in place.iterdir()} == {"mine.py", "mine.toml"}
 
 
+@pytest.mark.slow
 def test_fits_on_several_draws_of_new_tracks_first(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

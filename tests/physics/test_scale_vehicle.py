@@ -42,6 +42,7 @@ def worst_rms(values):
     return float(np.sqrt(np.mean(values**2, axis=0)).max())
 
 
+@pytest.mark.slow
 def test_halving_the_step_converges(model, laid):
     """At 1 m/s into the curve: by less than 5e-4 m/s2 rms at the advised step, less with each halving.
 

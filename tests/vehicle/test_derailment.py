@@ -382,6 +382,7 @@ def test_a_wheelset_that_hunts_is_said_to(tmp_path, monkeypatch):
     assert critical < found.speed_mps < 1.31 * critical
 
 
+@pytest.mark.slow
 def test_a_wagon_climbs_in_a_sharp_curve_at_friction_1():
     """R100, uncanted, 18 km/h, mu = 1: above Nadal's limit of 0.47 no longer needs much; dry rails hold it.
 
@@ -404,7 +405,7 @@ def test_a_wagon_climbs_in_a_sharp_curve_at_friction_1():
     assert sum(len(segment.time_s) for segment in CompiledEngine(dry).run(12.0)) == 12001
 
 
-@pytest.mark.parametrize("engine", [CompiledEngine, ExudynEngine])
+@pytest.mark.parametrize("engine", [CompiledEngine, pytest.param(ExudynEngine, marks=pytest.mark.slow)])
 def test_what_went_before_counts_however_a_ride_is_cut(engine):
     """An engine runs in stretches; one that ends just before the derailment leaves nothing out."""
     setup = Setup(model_of("metro_irw_bogie"), with_defect(**DEFECTS["too narrow"]), PROFILE, settle_s=1.0)

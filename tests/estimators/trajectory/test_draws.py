@@ -293,6 +293,7 @@ def test_the_interval_in_a_band_holds_95_of_100(slow: bool) -> None:
     assert (low <= inside).all() and (inside <= high).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scale", "slow"), [(1.4, False), *(pytest.param(by, True, marks=pytest.mark.slow) for by in (0.7, 1.4))]
 )

@@ -356,6 +356,7 @@ def test_a_bad_hyperparameter_is_named(value: Any) -> None:
         Hyperparameters(gyro_y_rad2ps2=value)
 
 
+@pytest.mark.slow
 def test_steady_for_hours() -> None:
     """Rounding does not add up: after 6 h at 10 Hz the covariances are those of the first hour.
 

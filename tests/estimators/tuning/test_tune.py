@@ -294,6 +294,7 @@ def rails_of(recording: Recording) -> pd.DataFrame:
     return laid.irregularities(np.arange(place.min() + 5.0, place.max() - 5.0, 0.25))
 
 
+@pytest.mark.slow
 def test_kom_does_better_on_sensors_that_it_has_not_seen(
     metro_recording: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
 ) -> None:
