@@ -208,8 +208,7 @@ def _with_hunting(derailment: Derailment, ride: Ride) -> Derailment:
     if critical is None:
         return derailment
     # Wheels that all turn apart do not hunt; what grows is another swing.
-    apart = len(model.spin_inertia_kgm2) == len(model.wheels)
-    swing = "unstable running" if apart else "hunting"
+    swing = "hunting" if model.has_wheelsets else "unstable running"
     cause = f"{swing}, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
     return replace(derailment, cause=cause)
 

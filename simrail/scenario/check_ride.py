@@ -275,8 +275,7 @@ def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
         return []
     cone = conicity_of(model, gravity_mps2=ride.gravity_mps2)
     # Wheels that all turn apart have no conicity to hunt by; what grows is another swing.
-    apart = len(ride.vehicle.spin_inertia_kgm2) == len(ride.vehicle.wheels)
-    does = "runs unstably" if apart else "hunts"
+    does = "hunts" if ride.vehicle.has_wheelsets else "runs unstably"
     on = "" if cone is None else f" with equivalent conicity {cone:.2f} at 3 mm,"
     gauge_mm = 1e3 * model.wheel_rail.gauge_m
     return [

@@ -17,7 +17,16 @@ from simrail.scenario.measured_file import MeasuredPart
 from simrail.track.defects import Defect
 from simrail.track.irregularity import Irregularity
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors
-from simrail.track.map_file import map_errors_of
+from simrail.track.map_file import (
+    CantSd,
+    CorrelationLength,
+    GradientSd,
+    OffsetSd,
+    PlaceSd,
+    RadiusSd,
+    ScaleSd,
+    map_errors_of,
+)
 from simrail.track.measured import MeasuredRails
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
@@ -224,14 +233,14 @@ class MapPart(Part):
     """
 
     exact: Listed[bool] = False
-    cant_sd_mm: Listed[Annotated[float, Field(ge=0.0, le=100.0)]] = 3.0
-    cant_along_sd_mm: Listed[Annotated[float, Field(ge=0.0, le=100.0)]] = 1.0
-    cant_along_length_m: Listed[Annotated[float, Field(ge=20.0, le=10000.0)]] = 100.0
-    radius_sd_percent: Listed[Annotated[float, Field(ge=0.0, le=20.0)]] = 1.0
-    place_sd_m: Listed[Annotated[float, Field(ge=0.0, le=50.0)]] = 0.5
-    gradient_sd_permil: Listed[Annotated[float, Field(ge=0.0, le=20.0)]] = 0.2
-    chainage_scale_sd_percent: Listed[Annotated[float, Field(ge=0.0, le=5.0)]] = 0.0
-    chainage_offset_sd_m: Listed[Annotated[float, Field(ge=0.0, le=200.0)]] = 0.0
+    cant_sd_mm: Listed[CantSd] = 3.0
+    cant_along_sd_mm: Listed[CantSd] = 1.0
+    cant_along_length_m: Listed[CorrelationLength] = 100.0
+    radius_sd_percent: Listed[RadiusSd] = 1.0
+    place_sd_m: Listed[PlaceSd] = 0.5
+    gradient_sd_permil: Listed[GradientSd] = 0.2
+    chainage_scale_sd_percent: Listed[ScaleSd] = 0.0
+    chainage_offset_sd_m: Listed[OffsetSd] = 0.0
     defect: tuple[MapDefectPart, ...] = ()
 
     def errors(self) -> MapErrors:

@@ -8,7 +8,8 @@ The quantities of EN 14363 (and UIC 518, from which it grew) from arrays of forc
   dQ/Q0 = (Q0 - Q)/Q0.
 
 Of each the greatest value, and the percentile that EN 14363 evaluates, 99.85 % (on either side where the
-quantity has two). Limits: Nadal's in closed form, the 0.8 that EN 14363 sets, and Prud'homme's.
+quantity has two). Limits: the 0.8 that EN 14363 sets, and Prud'homme's; Nadal's
+is `simrail.vehicle.engines.derailment.nadal_limit`.
 
 Sources. Quantities, filters (20 Hz), windows (2 m every 0.5 m) and percentiles (0.15 and 99.85 %): the table
 of EN 14363 and UIC 518 at gensys.se/course/UIC518_tests.html. (Y/Q)_2m <= 0.8: railwaynews.net on UIC 518.
@@ -49,20 +50,6 @@ LEAST_RATE_HZ = 100.0
 
 _CARRIES = 0.01
 """Below this share of its static load a wheel carries nothing: its quotient Y/Q is 0/0, and counts as 0."""
-
-
-def nadal_limit(contact_angle_rad: float, friction: float) -> float:
-    """Y/Q above which a flange can climb: (tan a - mu) / (1 + mu tan a) (Nadal 1896).
-
-    Parameters
-    ----------
-    contact_angle_rad : float
-        Steepest angle of the flange, a.
-    friction : float
-        Coefficient of friction, mu.
-    """
-    tangent = np.tan(contact_angle_rad)
-    return float((tangent - friction) / (1.0 + friction * tangent))
 
 
 def prudhomme_limit_n(axle_load_n: float, *, factor: float = 1.0) -> float:

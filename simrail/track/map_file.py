@@ -11,6 +11,14 @@ from pydantic import Field
 from simrail.core.toml_files import Part
 from simrail.track.map_errors import EXACT, UNSTATED, MapErrors
 
+CantSd = Annotated[float, Field(ge=0.0, le=100.0)]
+CorrelationLength = Annotated[float, Field(ge=20.0, le=10000.0)]
+RadiusSd = Annotated[float, Field(ge=0.0, le=20.0)]
+PlaceSd = Annotated[float, Field(ge=0.0, le=50.0)]
+GradientSd = Annotated[float, Field(ge=0.0, le=20.0)]
+ScaleSd = Annotated[float, Field(ge=0.0, le=5.0)]
+OffsetSd = Annotated[float, Field(ge=0.0, le=200.0)]
+
 _UNITS = {
     "cant_sd_mm": ("cant_sd_m", 1e-3),
     "cant_along_sd_mm": ("cant_along_sd_m", 1e-3),
@@ -36,14 +44,14 @@ class MapErrorsPart(Part):
     """
 
     exact: bool = False
-    cant_sd_mm: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
-    cant_along_sd_mm: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
-    cant_along_length_m: Annotated[float, Field(ge=20.0, le=10000.0)] | None = None
-    radius_sd_percent: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
-    place_sd_m: Annotated[float, Field(ge=0.0, le=50.0)] | None = None
-    gradient_sd_permil: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
-    chainage_scale_sd_percent: Annotated[float, Field(ge=0.0, le=5.0)] | None = None
-    chainage_offset_sd_m: Annotated[float, Field(ge=0.0, le=200.0)] | None = None
+    cant_sd_mm: CantSd | None = None
+    cant_along_sd_mm: CantSd | None = None
+    cant_along_length_m: CorrelationLength | None = None
+    radius_sd_percent: RadiusSd | None = None
+    place_sd_m: PlaceSd | None = None
+    gradient_sd_permil: GradientSd | None = None
+    chainage_scale_sd_percent: ScaleSd | None = None
+    chainage_offset_sd_m: OffsetSd | None = None
 
     def errors(self) -> MapErrors:
         """The sizes in SI."""

@@ -85,8 +85,7 @@ def critical_below(model: VehicleModel, top_mps: float, *, gravity_mps2: float =
 
 def conicity_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> float | None:
     """Equivalent conicity at 3 mm; None where the wheels turn apart or the contact is prescribed."""
-    together = len(model.spin_inertia_kgm2) < len(model.wheels)
-    if not together or model.wheel_rail.linear is not None:
+    if not model.has_wheelsets or model.wheel_rail.linear is not None:
         return None
     value = conicity(contacts_of(model, gravity_mps2=gravity_mps2).tables[0], AMPLITUDE_M)
     return value if np.isfinite(value) else None

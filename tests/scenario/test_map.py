@@ -11,6 +11,7 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells, count, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, read_scenario
+from simrail.track.map_errors import MapErrors
 
 TEXT = """
 title = "map"
@@ -115,3 +116,8 @@ def test_a_map_that_cannot_be_is_one_message(table: str, words: str) -> None:
     with pytest.raises(InputError, match=words) as raised:
         judge_scenario(scenario(table))
     assert "\n" not in str(raised.value)
+
+
+def test_the_defaults_of_a_scenario_are_those_of_the_sizes() -> None:
+    spec = scenario("[map]").spec
+    assert spec.map is not None and spec.map.errors() == MapErrors()

@@ -10,13 +10,13 @@ from simrail.scoring.running_safety import (
     estimated_maximum,
     greatest_percentile,
     low_pass,
-    nadal_limit,
     prudhomme_limit_n,
     safety_series,
     section_percentiles,
     sliding_mean,
     travelled,
 )
+from simrail.vehicle.engines.derailment import nadal_limit
 
 RATE_HZ = 1000.0
 

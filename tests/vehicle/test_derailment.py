@@ -24,7 +24,7 @@ from simrail.vehicle.engines.derailment import (
     DerailedError,
     Derailment,
     flange_angle,
-    nadal,
+    nadal_limit,
     outward_ratio,
     refuse_derailed,
 )
@@ -124,8 +124,8 @@ def test_a_line_says_all_of_it_and_survives_another_process():
 
 def test_nadal_and_the_sign_of_y_over_q():
     """70 degrees, mu = 0.3: (2.7475 - 0.3)/(1 + 0.8242) = 1.3416; no limit at the angle of friction."""
-    assert nadal(np.deg2rad(70.0), 0.3) == pytest.approx(1.3416, abs=1e-4)
-    assert nadal(np.arctan(0.3), 0.3) == pytest.approx(0.0, abs=1e-15)
+    assert nadal_limit(np.deg2rad(70.0), 0.3) == pytest.approx(1.3416, abs=1e-4)
+    assert nadal_limit(np.arctan(0.3), 0.3) == pytest.approx(0.0, abs=1e-15)
     load, guiding = np.array([40e3, 40e3, 0.0]), np.array([-8e3, 8e3, 1e3])
     np.testing.assert_allclose(outward_ratio(guiding, load, 1), [0.2, -0.2, 0.0], atol=1e-15)
     np.testing.assert_allclose(outward_ratio(guiding, load, -1), [-0.2, 0.2, 0.0], atol=1e-15)

@@ -229,7 +229,7 @@ def _motion_cause(setup: Setup, number: int, memo: Record, told: RecordArray) ->
     side = "friction_left" if wheel.side > 0 else "friction_right"
     factor = setup.track.channels(float(memo["derailed_s_m"]))[CHANNELS.index(side)]
     angle, friction = flange_angle(table), float(table.const["friction"]) * float(factor)
-    limit = f"{nadal(angle, friction):.2f} ({np.rad2deg(angle):.0f} degrees, friction {friction:.2f})"
+    limit = f"{nadal_limit(angle, friction):.2f} ({np.rad2deg(angle):.0f} degrees, friction {friction:.2f})"
     if len(climb) < THROWN_S * setup.rate_hz:
         blow = f"within {1e3 * len(climb) / setup.rate_hz:.0f} ms"
         return f"a blow from the side threw the wheel up its flange {blow}; Nadal's limit of Y/Q is {limit}"
@@ -311,10 +311,18 @@ def flange_angle(table: ContactTable) -> float:
     return float(np.arctan(np.max(cubic[deeper, np.arange(cubic.shape[1]), 2])))
 
 
-def nadal(angle_rad: float, friction: float) -> float:
-    """Nadal's limit of Y/Q for a flange angle: (tan(angle) - mu)/(1 + mu tan(angle)) (Nadal 1896)."""
-    slope = float(np.tan(angle_rad))
-    return (slope - friction) / (1.0 + friction * slope)
+def nadal_limit(contact_angle_rad: float, friction: float) -> float:
+    """Y/Q above which a flange can climb: (tan a - mu) / (1 + mu tan a) (Nadal 1896).
+
+    Parameters
+    ----------
+    contact_angle_rad : float
+        Steepest angle of the flange, a.
+    friction : float
+        Coefficient of friction, mu.
+    """
+    tangent = np.tan(contact_angle_rad)
+    return float((tangent - friction) / (1.0 + friction * tangent))
 
 
 def _last_metres(told: RecordArray) -> RecordArray:

@@ -30,10 +30,11 @@ from simrail.vehicle.engines.records import (
 
 
 class Between(NamedTuple):
-    """Where an element acts, and what it feels.
+    """Where an element acts, and how it lies there.
 
     Arms from the centres of gravity (inner ``ax, ay, az``, outer ``bx, by, bz``) to the attachment point on
-    the outer body, global axes, m; deflection (m) and its rate (m/s) in the axes of the inner body.
+    the outer body, global axes, m; a way (m) and its rate (m/s) in the axes of the inner body: that from the
+    inner body's centre of gravity to this point, or the deflection.
     """
 
     ax: float
@@ -51,18 +52,25 @@ class Between(NamedTuple):
 
 
 @njit_inner
-def between(inner_arm: FloatArray, outer_arm: FloatArray, a: Record, b: Record) -> Between:
-    """An element from its arms on the bodies, in their axes, and the poses of these."""
+def way_to(outer_arm: FloatArray, a: Record, b: Record) -> Between:
+    """Way A^T p to the attachment point on the outer body (arm in its axes), from the poses of both."""
     bx, by, bz = rotated(b.rotation, outer_arm[0], outer_arm[1], outer_arm[2])
     ax, ay, az = b.x + bx - a.x, b.y + by - a.y, b.z + bz - a.z
-    # A point of a body moves with v + w x r.
+    # A point of a body moves with v + w x r, and the inner body's axes turn with w.
     ex = b.vx + b.wy * bz - b.wz * by - a.vx - a.wy * az + a.wz * ay
     ey = b.vy + b.wz * bx - b.wx * bz - a.vy - a.wz * ax + a.wx * az
     ez = b.vz + b.wx * by - b.wy * bx - a.vz - a.wx * ay + a.wy * ax
     x, y, z = rotated_back(a.rotation, ax, ay, az)
     x_rate, y_rate, z_rate = rotated_back(a.rotation, ex, ey, ez)
-    x, y, z = x - inner_arm[0], y - inner_arm[1], z - inner_arm[2]
     return Between(ax, ay, az, bx, by, bz, x, y, z, x_rate, y_rate, z_rate)
+
+
+@njit_inner
+def between(inner_arm: FloatArray, outer_arm: FloatArray, a: Record, b: Record) -> Between:
+    """Deflection A^T p - r of an element, from its arms on the bodies, in their axes, and their poses."""
+    p = way_to(outer_arm, a, b)
+    x, y, z = p.x - inner_arm[0], p.y - inner_arm[1], p.z - inner_arm[2]
+    return Between(p.ax, p.ay, p.az, p.bx, p.by, p.bz, x, y, z, p.x_rate, p.y_rate, p.z_rate)
 
 
 @njit_inner
@@ -166,30 +174,20 @@ def rotation_force(spring: Record, a: Record, b: Record, wa: Record, wb: Record)
         wb.mz -= A[2, k] * moment
 
 
-class Seen(NamedTuple):
-    """The end of a trailing arm as its axle sees it, in the axes of the axle's body.
+class Arm(NamedTuple):
+    """A trailing arm as its axle sees it.
 
     Attributes
     ----------
-    x, y, z, x_rate, y_rate, z_rate : float
-        Way from the axle's centre to the bushing on the frame, and its rate in these turning axes.
-    ux, uy, uz : float
-        The same way in global axes.
+    way : Between
+        From the axle's centre to the bushing on the frame.
     length, length_rate : float
         Distance of the bushing from the axle's own line.
     turn, turn_rate : float
         Angle by which the arm has turned about that line from its place at rest.
     """
 
-    x: float
-    y: float
-    z: float
-    x_rate: float
-    y_rate: float
-    z_rate: float
-    ux: float
-    uy: float
-    uz: float
+    way: Between
     length: float
     length_rate: float
     turn: float
@@ -208,21 +206,14 @@ def rod_force(rod: Record, a: Record, b: Record, wa: Record, wb: Record) -> None
 
 
 @njit_inner
-def seen(axle_arm: FloatArray, frame_arm: FloatArray, a: Record, b: Record) -> Seen:
+def arm_of(axle_arm: FloatArray, frame_arm: FloatArray, a: Record, b: Record) -> Arm:
     """One trailing arm between the axle's body (pose ``a``) and the frame (pose ``b``)."""
-    bx, by, bz = rotated(b.rotation, frame_arm[0], frame_arm[1], frame_arm[2])
-    ux, uy, uz = b.x + bx - a.x, b.y + by - a.y, b.z + bz - a.z
-    # A point of the frame moves with v + w x r, the axle's axes turn with w.
-    ex = b.vx + b.wy * bz - b.wz * by - a.vx - a.wy * uz + a.wz * uy
-    ey = b.vy + b.wz * bx - b.wx * bz - a.vy - a.wz * ux + a.wx * uz
-    ez = b.vz + b.wx * by - b.wy * bx - a.vz - a.wx * uy + a.wy * ux
-    x, y, z = rotated_back(a.rotation, ux, uy, uz)
-    x_rate, y_rate, z_rate = rotated_back(a.rotation, ex, ey, ez)
-    length = np.sqrt(x * x + z * z)
-    length_rate = (x * x_rate + z * z_rate) / length
-    turn = np.arctan2(axle_arm[2] * x - axle_arm[0] * z, axle_arm[0] * x + axle_arm[2] * z)
-    turn_rate = (z * x_rate - x * z_rate) / (length * length)
-    return Seen(x, y, z, x_rate, y_rate, z_rate, ux, uy, uz, length, length_rate, turn, turn_rate)
+    p = way_to(frame_arm, a, b)
+    length = np.sqrt(p.x * p.x + p.z * p.z)
+    length_rate = (p.x * p.x_rate + p.z * p.z_rate) / length
+    turn = np.arctan2(axle_arm[2] * p.x - axle_arm[0] * p.z, axle_arm[0] * p.x + axle_arm[2] * p.z)
+    turn_rate = (p.z * p.x_rate - p.x * p.z_rate) / (length * length)
+    return Arm(p, length, length_rate, turn, turn_rate)
 
 
 @njit_inner
@@ -241,24 +232,19 @@ def arm_force(pair: Record, a: Record, b: Record, wa: Record, wb: Record) -> Non
     the axle's body stands for, and their moment holds that body. The potential is
     ``sum (k_x (r - r0)^2 + k_y (y - y0)^2)/2 + k_z r0^2 T^2``.
     """
-    left = seen(pair.inner_arm[0], pair.outer_arm[0], a, b)
-    right = seen(pair.inner_arm[1], pair.outer_arm[1], a, b)
+    left = arm_of(pair.inner_arm[0], pair.outer_arm[0], a, b)
+    right = arm_of(pair.inner_arm[1], pair.outer_arm[1], a, b)
     k, c = pair.stiffness, pair.damping
     turning = k[2] * 0.5 * (left.turn + right.turn) + c[2] * 0.5 * (left.turn_rate + right.turn_rate)
     for n in range(2):
-        at = left if n == 0 else right
-        rest, arm = pair.inner_arm[n], pair.outer_arm[n]
+        arm, rest = left if n == 0 else right, pair.inner_arm[n]
+        p = arm.way
         square = rest[0] * rest[0] + rest[2] * rest[2]
         # Over the length, so that the way to the bushing gives the direction.
-        along_arm = (k[0] * (at.length - np.sqrt(square)) + c[0] * at.length_rate) / at.length
-        across = square * turning / (at.length * at.length)
-        side = k[1] * (at.y - rest[1]) + c[1] * at.y_rate
-        gx, gy, gz = rotated(
-            a.rotation, along_arm * at.x + across * at.z, side, along_arm * at.z - across * at.x
-        )
-        bx, by, bz = rotated(b.rotation, arm[0], arm[1], arm[2])
-        push(wa, at.ux, at.uy, at.uz, gx, gy, gz)
-        push(wb, bx, by, bz, -gx, -gy, -gz)
+        along_arm = (k[0] * (arm.length - np.sqrt(square)) + c[0] * arm.length_rate) / arm.length
+        across = square * turning / (arm.length * arm.length)
+        side = k[1] * (p.y - rest[1]) + c[1] * p.y_rate
+        pull(p, a, wa, wb, along_arm * p.x + across * p.z, side, along_arm * p.z - across * p.x)
 
 
 @njit_borrowed
