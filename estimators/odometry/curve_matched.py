@@ -45,8 +45,21 @@ from scipy import signal
 from simrail.estimators.kalman import fixed_interval, room_for_history
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.kernel import (
+    BEND,
+    DRIFT,
+    EVEN,
+    LAG,
+    LEAD,
+    ODD,
+    PUSH,
+    SCALE,
+    SQUAT,
     STATES,
+    SWAY,
+    TREAD,
+    TURN,
     UPDATES,
+    WAY,
     YAW,
     BoolArray,
     LineModel,
@@ -56,15 +69,15 @@ from simrail.estimators.odometry.kernel import (
     curve_matched,
     room_to_work,
 )
+from simrail.estimators.odometry.line_table import line_at, line_table
+from simrail.recording.sheets.vehicle_sheet import Chord
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
-from simrail.track.design import TrackDesign
 
-_PLACES_PER_M = 4.0
 _STILL_S = 0.5
 
 RATE_HZ = 50.0
@@ -78,6 +91,10 @@ HOLD_S = 2.0
 
 ACCELERATION_SD_MPS2 = 0.03
 """Of that acceleration: what the body's pitching leaves in it."""
+
+UNKNOWN_CHORD_SD_M = 3.0
+"""Of the place whose heading a body has, where no drawing says what it rests on: half a bogie centre distance
+is 3 to 10 m, and an IMU is seldom at its end."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -188,8 +205,10 @@ class CurveMatchedOdometry:
         read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
         counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
         pulse = wheel.pulse_m
-        grid, table = line_table(recording.track)
-        x, p = self._start(recording, pulse)
+        chord = chord_of(recording)
+        grid, table = line_table(recording.track, chord=chord, mount_x_m=recording.mount_position_m[0])
+        x, p = self._start(recording, pulse, chord)
+        x[YAW] = line_at(grid, table, x[S]).heading
         states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
         steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
@@ -246,50 +265,49 @@ class CurveMatchedOdometry:
             # Of a Markov process that wanders by its bias instability within some 300 s.
             "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
             "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
+            "bend_sd": recording.map_errors.radius_relative_sd,
+            "shift_sd_m": recording.map_errors.place_sd_m,
         }
         return LineModel(**(own | sheets))
 
-    def _start(self, recording: Recording, pulse: float) -> tuple[FloatArray, FloatArray]:
+    def _start(
+        self, recording: Recording, pulse: float, chord: Chord | None
+    ) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand."""
-        sheet = recording.imu_sheet
+        sheet, errors = recording.imu_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        x[YAW] = float(recording.track.frame(np.array([x[S]])).yaw_rad[0])
-        sd = np.array(
-            [
-                self.start_sd_m,
-                STILL_SD_MPS,
-                pulse / math.sqrt(12.0),
-                self.radius_sd,
-                self.tread_sd,
-                self.turn_sd_m,
-                math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2),
-                self.squat_sd,
-                self.lead_sd_m,
-                5e-3,
-                sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5,
-                self.sway_sd_rad,
-                self.lag_sd_m,
-            ]
-        )
+        chord_sd = UNKNOWN_CHORD_SD_M if chord is None else chord.sd_m / math.sqrt(2.0)
+        sd = np.zeros(STATES)
+        sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
+        sd[V] = STILL_SD_MPS
+        sd[WAY] = pulse / math.sqrt(12.0)
+        sd[SCALE] = self.radius_sd
+        sd[TREAD] = self.tread_sd
+        sd[TURN] = self.turn_sd_m
+        sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
+        sd[SQUAT] = self.squat_sd
+        sd[LEAD] = math.hypot(self.lead_sd_m, chord_sd)
+        sd[YAW] = 5e-3
+        sd[DRIFT] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
+        sd[SWAY] = self.sway_sd_rad
+        sd[LAG] = math.hypot(self.lag_sd_m, chord_sd)
+        sd[BEND] = errors.radius_relative_sd
+        sd[EVEN] = sd[ODD] = errors.place_sd_m
         return x, np.diag(sd**2)
 
+    def _chainage_sd(self, recording: Recording, place_m: FloatArray) -> FloatArray:
+        """How far the map's chainage may be from the line's at places (n,): what no curve can tell apart."""
+        errors = recording.map_errors
+        return np.hypot(
+            errors.chainage_offset_sd_m, errors.chainage_scale_sd * (place_m - recording.track.start_m)
+        )
 
-def line_table(track: TrackDesign) -> tuple[FloatArray, FloatArray]:
-    """The design as the kernel takes it.
 
-    Returns
-    -------
-    grid : ndarray (2,)
-        First place (m), places per metre.
-    table : ndarray (m, 4)
-        Heading, its slope, roll, pitch at every place.
-    """
-    count = math.ceil((track.end_m - track.start_m) * _PLACES_PER_M) + 1
-    places = np.minimum(track.start_m + np.arange(count) / _PLACES_PER_M, track.end_m)
-    frame = track.frame(places)
-    table = np.column_stack([frame.yaw_rad, frame.rates[:, 2], frame.roll_rad, frame.pitch_rad])
-    return np.array([track.start_m, _PLACES_PER_M]), np.ascontiguousarray(table)
+def chord_of(recording: Recording) -> Chord | None:
+    """The chord along which the body of the mount points, if the train has a drawing."""
+    sheet = recording.vehicle_sheet
+    return None if sheet is None else sheet.chord(recording.mount_body)
 
 
 def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
+from simrail.estimators.odometry.line_table import Line, line_at
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 
 BoolArray = npt.NDArray[np.bool_]
 
-STATES = 13
-S, V, WAY, SCALE, TREAD, TURN, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG = range(STATES)
+STATES = 16
+S, V, WAY, SCALE, TREAD, TURN, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG, BEND, EVEN, ODD = range(STATES)
 
 UPDATES = 3
 WHEEL, HEADING, REST = range(UPDATES)
@@ -63,6 +64,8 @@ class LineModel(NamedTuple):
         Random walk of `push`; white noise, drift and relative scale error of the gyro.
     sway_sd_rad, sway_length_m, lag_walk_m, heading_sd_rad : float
         Markov process `sway` in distance; random walk of `lag` (m2 per m); white part of the heading.
+    bend_sd, shift_sd_m : float
+        How wrong the map is: relative error of a curve's curvature, and of the place of a joint.
     """
 
     pulse_m: float
@@ -81,6 +84,8 @@ class LineModel(NamedTuple):
     sway_length_m: float
     lag_walk_m: float
     heading_sd_rad: float
+    bend_sd: float
+    shift_sd_m: float
 
 
 class Steps(NamedTuple):
@@ -90,7 +95,7 @@ class Steps(NamedTuple):
     ----------
     time_s : ndarray (n,)
         Ends of the steps; given.
-    states, covariance : ndarray (n, 13), (n, 13, 13)
+    states, covariance : ndarray (n, 16), (n, 16, 16)
         See `simrail.estimators.odometry.curve_matched`.
     acceleration : ndarray (n,)
         Along the track, over the step; it shakes with the body.
@@ -111,11 +116,11 @@ class Scratch(NamedTuple):
 
     Attributes
     ----------
-    f, work : ndarray (13, 13)
+    f, work : ndarray (16, 16)
         F, and what `simrail.estimators.kalman.congruence` needs.
-    rows : ndarray (3, 13)
+    rows : ndarray (3, 16)
         h of each update.
-    gain, v : ndarray (13,)
+    gain, v : ndarray (16,)
         What `simrail.estimators.kalman.update` writes.
     """
 
@@ -132,29 +137,36 @@ def room_to_work() -> Scratch:
     return Scratch(*(np.zeros(shape) for shape in ((n, n), (n, n), (m, n), n, n)))
 
 
-class Line(NamedTuple):
-    """The design at one place: heading, its slope, roll, pitch, the slope of the pitch; rad, and per m."""
+@njit_borrowed
+def forget(x: FloatArray, p: FloatArray, f: FloatArray, state: int, sd: float) -> None:
+    """Put a constant of the map that is behind in place of one that is ahead: known only to `sd`.
 
-    heading: float
-    curvature: float
-    roll: float
-    pitch: float
-    pitch_slope: float
+    It is a prediction with a zero in F, so that the smoother knows of it too.
+    """
+    for i in range(x.shape[0]):
+        p[i, state] = p[state, i] = f[state, i] = 0.0
+    p[state, state] = sd * sd
+    x[state] = 0.0
 
 
 @njit_borrowed
-def line_at(grid: FloatArray, table: FloatArray, s: float) -> Line:
-    """Design at s."""
-    at = min(max((s - grid[0]) * grid[1], 0.0), table.shape[0] - 1.000001)
-    i = int(at)
-    x, a, b = at - i, table[i], table[i + 1]
-    return Line(
-        a[0] + x * (b[0] - a[0]),
-        a[1] + x * (b[1] - a[1]),
-        a[2] + x * (b[2] - a[2]),
-        a[3] + x * (b[3] - a[3]),
-        (b[3] - a[3]) * grid[1],
-    )
+def map_ahead(
+    x: FloatArray, p: FloatArray, f: FloatArray, before: Line, here: Line, model: LineModel
+) -> None:
+    """Errors of curve and joints, where the train comes from the one to the next.
+
+    Element i lies between joints i and i + 1. A train that comes from the element below keeps joint i, which
+    was ahead and now is behind, and meets i + 1; one from above keeps i + 1. The states differ by parity.
+    """
+    if here.curve != before.curve:
+        forget(x, p, f, BEND, model.bend_sd)
+    step = here.element - before.element
+    if step != 0.0:
+        odd_below = here.element % 2.0 == 1.0
+        if step > 0.0 or abs(step) > 1.0:
+            forget(x, p, f, EVEN if odd_below else ODD, model.shift_sd_m)
+        if step < 0.0 or abs(step) > 1.0:
+            forget(x, p, f, ODD if odd_below else EVEN, model.shift_sd_m)
 
 
 @njit_borrowed
@@ -190,6 +202,9 @@ def predict(
     run = abs(way)
     rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here.curvature
     wears, sways = np.exp(-run / model.tread_length_m), np.exp(-run / model.sway_length_m)
+    # The map has a curvature that is not there (`simrail.estimators.odometry.line_table`): the heading counts
+    # from the map's, so it loses what the track turns beyond the map.
+    astray = here.ramp_even * x[EVEN] + here.ramp_odd * x[ODD] - here.bend * x[BEND]
     # F, the derivative of all that follows by the state.
     for i in range(n):
         for j in range(n):
@@ -208,12 +223,14 @@ def predict(
     f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * here.curvature
     f[TREAD, TREAD], f[SWAY, SWAY] = wears, sways
     f[YAW, DRIFT] = -dt
+    f[YAW, BEND], f[YAW, EVEN], f[YAW, ODD] = -way * here.bend, way * here.ramp_even, way * here.ramp_odd
+    f[YAW, V] = dt * astray
     # The state itself.
     x[S] += way
     x[V] += dt * acceleration
     x[WAY] += rolls * way
     x[TREAD] *= wears
-    x[YAW] += dt * (turn - x[DRIFT])
+    x[YAW] += dt * (turn - x[DRIFT]) + way * astray
     x[SWAY] *= sways
 
     congruence(f, p, work)
@@ -292,9 +309,9 @@ def curve_matched(
         Noise.
     gravity : float
         m/s2.
-    grid, table : ndarray (2,), (m, 4)
-        First place and places per metre of the design's table: heading, its slope, roll, pitch.
-    x, p : ndarray (13,), (13, 13)
+    grid, table : ndarray (2,), (m, 9)
+        The map (`simrail.estimators.odometry.line_table`).
+    x, p : ndarray (16,), (16, 16)
         State and covariance at the start; replaced by the last ones.
     steps : Steps, output
         Of n rows.
@@ -309,12 +326,15 @@ def curve_matched(
     h[HEADING, SWAY] = -1.0
     direction = idle = moving = agreed = wheel_speed = steady = 0.0
     resting, slipping = True, False
+    before = line_at(grid, table, x[S])
     for k in range(signals.shape[0]):
         here, lean = line_at(grid, table, x[S]), line_at(grid, table, x[S] - x[LEAD])
         steady += dt / STEADY_S * (signals[k, 2] - x[PUSH] - steady)
         steps.acceleration[k], rolls = predict(
             x, p, f, work, here, lean, signals[k], dt, model, gravity, steady
         )
+        map_ahead(x, p, f, before, here, model)
+        before = here
 
         # The wheel: where it stands, and since when it rests or rolls.
         change = count[k] - count[k - 1] if k > 0 else 0.0
@@ -356,7 +376,7 @@ def curve_matched(
             elif m == HEADING:
                 # That of the design where the body points, and its sway about that.
                 line = line_at(grid, table, x[S] - direction * x[LAG])
-                h[HEADING, S], h[HEADING, LAG] = -line.curvature, direction * line.curvature
+                h[HEADING, S], h[HEADING, LAG] = -line.bend, direction * line.bend
                 error, variance = line.heading - x[YAW] + x[SWAY], model.heading_sd_rad**2
                 wanted = True
             else:

@@ -1,0 +1,171 @@
+"""The map as the curve-matched odometry takes it: a table over places, and what its errors do there.
+
+A body does not point where the track under its sensor points, but along the chord between the places that
+it rests on (`simrail.recording.sheets.vehicle_sheet.Chord`): its heading is the mean of the track's heading
+over the chord, and that of a body on two bogies over the wheelbases at its ends too,
+
+    heading(s) = [H(s+a+b) + H(s+a-b) - H(s-a+b) - H(s-a-b)] / (4 a),   H the integral of the track's yaw
+
+with s the middle of the chord, a half its length and b half a wheelbase: the chord's ends are at the middles
+of their own chords, y(s +- a) = [y(s +- a + b) + y(s +- a - b)]/2, for small angles between track and body.
+
+Where the map has a curve of curvature k, there lies one of (1 + bend) k; a joint of two elements that the map
+has at j lies at j + shift. To first order the curvature that lies there is
+
+    k(s) (1 + bend) - k'(s) shift(s),   shift(s) = (1 - u) shift_j + u shift_(j+1) from joint j to j+1
+
+which is exact for a linear transition of which both ends are moved. The table has k' (1 - u) and k' u by the
+parity of the joint, so that each joint keeps its place in the state while it matters.
+"""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from simrail.recording.sheets.vehicle_sheet import Chord
+
+from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.track.alignment import element_starts
+from simrail.track.design import Curve, Straight, TrackDesign
+
+PLACES_PER_M = 4.0
+
+
+class Line(NamedTuple):
+    """The map at one place.
+
+    Attributes
+    ----------
+    heading, bend : float
+        Of a body on its chord, rad, and the slope of that, 1/m.
+    ramp_even, ramp_odd : float
+        Slope of its curvature, by the parity of the joint whose shift it goes with, 1/m2.
+    roll : float
+        rad.
+    pitch, pitch_slope : float
+        Of a body on its chord, rad, and the slope of that, 1/m.
+    curvature : float
+        Of the track, 1/m.
+    element, curve : float
+        Numbers of the element, and of the stretch that has one curve's error.
+    """
+
+    heading: float
+    bend: float
+    ramp_even: float
+    ramp_odd: float
+    roll: float
+    pitch: float
+    pitch_slope: float
+    curvature: float
+    element: float
+    curve: float
+
+
+@njit_borrowed
+def line_at(grid: FloatArray, table: FloatArray, s: float) -> Line:
+    """The map at s."""
+    at = min(max((s - grid[0]) * grid[1], 0.0), table.shape[0] - 1.000001)
+    i = int(at)
+    x, a, b = at - i, table[i], table[i + 1]
+    return Line(
+        a[0] + x * (b[0] - a[0]),
+        a[1] + x * (b[1] - a[1]),
+        a[2] + x * (b[2] - a[2]),
+        a[3] + x * (b[3] - a[3]),
+        a[4] + x * (b[4] - a[4]),
+        a[5] + x * (b[5] - a[5]),
+        (b[5] - a[5]) * grid[1],
+        a[6] + x * (b[6] - a[6]),
+        a[7],
+        a[8],
+    )
+
+
+def line_table(
+    track: TrackDesign, *, chord: Chord | None = None, mount_x_m: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """The map under a body on its chord, over the place of a mount on that body.
+
+    Parameters
+    ----------
+    track : TrackDesign
+        The map.
+    chord : Chord, optional
+        What the body points along; without one it points where the track does.
+    mount_x_m : float
+        Place of the mount along the body, in the chord's coordinates.
+
+    Returns
+    -------
+    grid : ndarray (2,)
+        First place (m), places per metre.
+    table : ndarray (m, 9)
+        `Line` at every place, but for the slope of the pitch.
+    """
+    count = math.ceil((track.end_m - track.start_m) * PLACES_PER_M) + 1
+    places = np.minimum(track.start_m + np.arange(count) / PLACES_PER_M, track.end_m)
+    frame = track.frame(places)
+    centre, half, wheelbase = (
+        (0.0, 0.0, 0.0)
+        if chord is None
+        else (chord.centre_m - mount_x_m, chord.half_m, chord.half_wheelbase_m)
+    )
+    reach = abs(centre) + half + wheelbase + 1.0
+    fine = np.arange(track.start_m - reach, track.end_m + reach, 1.0 / PLACES_PER_M)
+    under = track.frame_extended(fine)
+    curvature = under.rates[:, 2]
+    ramps = _ramps(track, fine, curvature)
+    columns = [under.yaw_rad, curvature, *ramps]
+    heading, bend, even, odd, pitch = (
+        _along_chord(fine, column, places + centre, half, wheelbase) for column in (*columns, under.pitch_rad)
+    )
+    element = track.segment(np.clip(places + centre, track.start_m, track.end_m))
+    curve = np.searchsorted(_curve_ends(track), places + centre, side="right")
+    rows = [heading, bend, even, odd, frame.roll_rad, pitch, frame.rates[:, 2], element, curve]
+    return np.array([track.start_m, PLACES_PER_M]), np.ascontiguousarray(
+        np.column_stack(rows), dtype=np.float64
+    )
+
+
+def _along_chord(
+    places: FloatArray, values: FloatArray, middle: FloatArray, half: float, wheelbase: float
+) -> FloatArray:
+    """Mean of values over chords about the places ``middle``, as the module says it."""
+    if half == 0.0:
+        return np.interp(middle, places, values)
+    steps = 0.5 * np.diff(places) * (values[1:] + values[:-1])
+    integral = np.concatenate([[0.0], np.cumsum(steps)])
+    ends = [
+        np.interp(middle + side * half + offset, places, integral)
+        for side in (1.0, -1.0)
+        for offset in (wheelbase, -wheelbase)
+    ]
+    mean: FloatArray = (ends[0] + ends[1] - ends[2] - ends[3]) / (4.0 * half)
+    return mean
+
+
+def _ramps(track: TrackDesign, places: FloatArray, curvature: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Slope of the curvature times the weight of the joint of even, and of odd number; (n,) each."""
+    starts = element_starts(track.elements, track.start_m)
+    element = np.clip(np.searchsorted(starts, places, side="right") - 1, 0, len(track.elements) - 1)
+    share = np.clip((places - starts[element]) / np.diff(starts)[element], 0.0, 1.0)
+    slope = np.gradient(curvature, places)
+    begins_even = element % 2 == 0
+    even = np.where(begins_even, 1.0 - share, share)
+    return slope * even, slope * (1.0 - even)
+
+
+def _curve_ends(track: TrackDesign) -> FloatArray:
+    """Places that part curves: the middle of the longest straight between two, or of what there is."""
+    starts = element_starts(track.elements, track.start_m)
+    curves = [i for i, element in enumerate(track.elements) if isinstance(element, Curve)]
+    ends = []
+    for before, after in pairwise(curves):
+        between = range(before + 1, after)
+        straights = [i for i in between if isinstance(track.elements[i], Straight)]
+        widest = max(straights, key=lambda i: float(starts[i + 1] - starts[i]), default=None)
+        first, last = (before + 1, after) if widest is None else (widest, widest + 1)
+        ends.append(0.5 * float(starts[first] + starts[last]))
+    return np.array(ends)
