@@ -205,6 +205,7 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         temperature=resolved.temperature,
         track_map=resolved.track_map,
         map_errors=resolved.map_errors,
+        vehicle_sheet=resolved.vehicle_sheet,
     )
     if resolved.odometry is None:
         return recording

@@ -1,11 +1,11 @@
 """What the logger on the train saw, and what the train may know: the wall before the truth.
 
 A `Recording` holds the signals (IMU, encoder, magnetometer) and the knowledge that a real train has: the
-design track, the nominal wheel radius, the IMU's data sheet, where it is mounted. Where the train is, nobody
-records: an odometry estimator concludes it, and its odometry frame is handed on to those estimators that
-need one (`simrail.estimation.choose_odometry`). A recording never holds a true value, except in an odometry
-frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read into the same
-class, so the same estimators run on them.
+design track, the nominal wheel radius, the IMU's data sheet, where it is mounted, the drawing of the vehicle.
+Where the train is, nobody records: an odometry estimator concludes it, and its odometry frame is handed on to
+those estimators that need one (`simrail.estimation.choose_odometry`). A recording never holds a true value,
+except in an odometry frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read
+into the same class, so the same estimators run on them.
 
 This module neither simulates nor estimates.
 """
@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import pandas as pd
 
 from simrail.core.errors import InputError
+from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.track.design import TrackDesign
 from simrail.track.map_errors import UNSTATED, MapErrors
 
@@ -219,6 +220,8 @@ class Recording:
         Indexed by ``time_s``, column ``speed_mps``, negative towards smaller s: what an odometer shows.
     odometer_sheet : OdometerSheet, optional
         Its data sheet.
+    vehicle_sheet : VehicleSheet, optional
+        The vehicle's drawing, and how far the train may be from it; None where nothing is known of it.
     """
 
     name: str
@@ -242,6 +245,7 @@ class Recording:
     odometer: pd.DataFrame | None = None
     odometer_sheet: OdometerSheet | None = None
     map_errors: MapErrors = UNSTATED
+    vehicle_sheet: VehicleSheet | None = None
 
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""

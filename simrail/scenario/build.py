@@ -19,6 +19,7 @@ from simrail.core.toml_files import Part, blame, load
 from simrail.estimation.estimate import Estimator
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuFile
+from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.ride.ride import Ride, rails_of
 from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
@@ -27,6 +28,7 @@ from simrail.scenario.distributions import distributions_of
 from simrail.scenario.measured_file import read_measured
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
+from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
@@ -97,6 +99,11 @@ class ResolvedCell:
     map_errors: MapErrors
     odometry: Estimator | None
     bands: tuple[Band, ...]
+
+    @property
+    def vehicle_sheet(self) -> VehicleSheet:
+        """The vehicle's drawing, as the train knows it."""
+        return drawing(self.ride.vehicle, each_by_itself=self.ride.engine == "kinematic")
 
 
 class Parts:

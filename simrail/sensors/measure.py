@@ -14,6 +14,7 @@ from simrail.core.errors import InputError
 from simrail.core.resample import resample
 from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
 from simrail.recording.sheets.grades import ImuGrade, imu_sheet
+from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.imu import EarthRate, arrived, sample_imu
@@ -42,6 +43,7 @@ def measure(
     temperature: Temperature | None = None,
     track_map: TrackDesign | None = None,
     map_errors: MapErrors = EXACT,
+    vehicle_sheet: VehicleSheet | None = None,
 ) -> Recording:
     """Record a ride.
 
@@ -78,6 +80,8 @@ def measure(
         the design that was laid.
     map_errors : MapErrors
         How wrong that map may be, as the train knows it.
+    vehicle_sheet : VehicleSheet, optional
+        The vehicle's drawing (`simrail.sensors.drawing`); None where the train has none.
 
     Returns
     -------
@@ -142,6 +146,7 @@ def measure(
         mount_position_m=mount.position_m,
         track=track_map or truth.track,
         map_errors=map_errors,
+        vehicle_sheet=vehicle_sheet,
         encoder=counts,
         encoder_sheet=sheet,
         start_position_m=start_m,

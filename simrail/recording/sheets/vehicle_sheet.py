@@ -1,0 +1,159 @@
+"""What a train's owner knows of its vehicle from a drawing: what rests on what, and where.
+
+A `VehicleSheet` lists the bodies of a vehicle, axles and bogie frames among them, with the places where each
+rests on those below it. From these it says which chord of the track a body points along
+(`VehicleSheet.chord`): on a curved line a car body does not point along the track where an IMU sits, but from
+one of its pivots to the other. It holds what a drawing has, and how far the train itself may be from it.
+"""
+
+from dataclasses import dataclass
+
+PLACE_SD_M = 0.02
+"""Standard deviation of a place along the vehicle where nobody has said it; synthetic."""
+
+STIFFNESS_RELATIVE_SD = 0.2
+"""Relative standard deviation of primary stiffness and damping where nobody has said it; synthetic."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """Where a body rests on another.
+
+    Attributes
+    ----------
+    on : str
+        Name of the body or axle below it.
+    x_m : float
+        Place along the upper body, in its own coordinates: forward from its reference point, as in
+        `Recording.mount_position_m`. Of a bogie, its pivot.
+    """
+
+    on: str
+    x_m: float
+
+
+@dataclass(frozen=True)
+class SheetBody:
+    """A car body, a bogie frame or an axle.
+
+    Attributes
+    ----------
+    name : str
+        Its name, e.g. that of `Recording.mount_body`.
+    x_m : float
+        Where its reference point is along the vehicle; forward, from any point that all bodies share.
+    supports : tuple of Support
+        What it rests on; empty for what runs on the rails by itself: an axle, or a carrier that a test rig
+        guides along them.
+    ends_m : tuple of float, optional
+        Its rear and its front end, in its own coordinates; None where the drawing does not say.
+    primary_stiffness_npm, primary_damping_nspm : float, optional
+        Of an axle: vertical stiffness and damping of its suspension, both sides together; None where the
+        drawing does not say.
+    """
+
+    name: str
+    x_m: float = 0.0
+    supports: tuple[Support, ...] = ()
+    ends_m: tuple[float, float] | None = None
+    primary_stiffness_npm: float | None = None
+    primary_damping_nspm: float | None = None
+
+
+@dataclass(frozen=True)
+class Chord:
+    """The chord of the track that a body points along.
+
+    With y(x) the lateral offset of the track from any straight line, x along it from the body's reference
+    point, the body's heading against that line is (y_front - y_rear) / (2 half_m). y_front is the mean of y at
+    centre_m + half_m - half_wheelbase_m and at centre_m + half_m + half_wheelbase_m, since both axles of a
+    bogie hold its pivot; y_rear likewise. A chord with half_m = 0 is the tangent at centre_m.
+
+    Attributes
+    ----------
+    centre_m : float
+        Middle between its ends, in the body's own coordinates.
+    half_m : float
+        Half its length; 0 for a body that points along the track where it is.
+    half_wheelbase_m : float
+        Half the wheelbase of the bogies under its ends; 0 where its ends are on axles or on other bodies.
+    sd_m : float
+        Standard deviation of the place of each end along the body, independent of the other's.
+    """
+
+    centre_m: float
+    half_m: float
+    half_wheelbase_m: float
+    sd_m: float
+
+
+@dataclass(frozen=True)
+class VehicleSheet:
+    """The drawing of a vehicle.
+
+    Attributes
+    ----------
+    bodies : tuple of SheetBody
+        Each stands after those that it rests on: axles first.
+    place_sd_m : float
+        Standard deviation of each place along the vehicle (`Support.x_m`), independent of the others; the
+        default is synthetic.
+    stiffness_relative_sd : float
+        Relative standard deviation of each primary stiffness and damping; the default is synthetic.
+    """
+
+    bodies: tuple[SheetBody, ...]
+    place_sd_m: float = PLACE_SD_M
+    stiffness_relative_sd: float = STIFFNESS_RELATIVE_SD
+
+    def body(self, name: str) -> SheetBody | None:
+        """The body of a name; None if it is not on the drawing."""
+        return next((body for body in self.bodies if body.name == name), None)
+
+    def chord(self, body: str) -> Chord | None:
+        """The chord that a body points along, in its own coordinates; None if it is not on the drawing.
+
+        * A body on two or more supports: from its rearmost to its foremost one.
+        * A body on one support only: the chord of what it rests on, which turns it.
+        * What runs on the rails by itself and has, alone, a body of several supports over it (an axle in
+          a bogie frame, or under a two-axle wagon): the chord of that body, which guides it.
+        * Any other axle: the tangent at its own place.
+        """
+        here = self.body(body)
+        if here is None:
+            return None
+        if len(here.supports) == 1:
+            below = self.body(here.supports[0].on)
+            chord = None if below is None else self.chord(below.name)
+            return None if below is None or chord is None else _seen_from(here, below, chord)
+        if here.supports:
+            return self._from_support_to_support(here)
+        over = [entry for entry in self.bodies if any(support.on == body for support in entry.supports)]
+        if len(over) == 1 and len(over[0].supports) > 1:
+            return _seen_from(here, over[0], self._from_support_to_support(over[0]))
+        return Chord(0.0, 0.0, 0.0, self.place_sd_m)
+
+    def _from_support_to_support(self, body: SheetBody) -> Chord:
+        """Chord of a body on two or more supports."""
+        rear, *_, front = sorted(body.supports, key=lambda support: support.x_m)
+        return Chord(
+            centre_m=0.5 * (rear.x_m + front.x_m),
+            half_m=0.5 * (front.x_m - rear.x_m),
+            half_wheelbase_m=0.5 * (self._half_wheelbase_m(rear.on) + self._half_wheelbase_m(front.on)),
+            sd_m=self.place_sd_m,
+        )
+
+    def _half_wheelbase_m(self, name: str) -> float:
+        """Half the wheelbase of a bogie; 0 for an axle, and for a body that rests on bogies itself."""
+        here = self.body(name)
+        below = () if here is None else tuple(self.body(support.on) for support in here.supports)
+        if here is None or len(below) < 2 or any(axle is None or axle.supports for axle in below):
+            return 0.0
+        places = [support.x_m for support in here.supports]
+        return 0.5 * (max(places) - min(places))
+
+
+def _seen_from(body: SheetBody, other: SheetBody, chord: Chord) -> Chord:
+    """The chord of another body, in the coordinates of this one."""
+    centre = other.x_m + chord.centre_m - body.x_m
+    return Chord(centre, chord.half_m, chord.half_wheelbase_m, chord.sd_m)

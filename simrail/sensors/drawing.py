@@ -1,0 +1,127 @@
+"""The drawing of a simulated vehicle: what its owner would know, from the model that is simulated.
+
+Places are the true ones. How far a real train may be from its drawing stands beside them in the
+`VehicleSheet`, as synthetic figures (smaller by its scale on a scale vehicle), and an estimator takes them as
+uncertain.
+"""
+
+from collections import defaultdict
+from typing import NamedTuple
+
+import numpy as np
+
+from simrail.recording.sheets.vehicle_sheet import PLACE_SD_M, SheetBody, Support, VehicleSheet
+from simrail.vehicle.model import VehicleModel
+
+LEAST_SHARE = 1e-6
+"""Share of the vehicle's weight below which two bodies do not carry each other."""
+
+
+class _Bearing(NamedTuple):
+    """A spring or a rod that can bear weight.
+
+    ``load_n`` is the vertical force on the outer body, upward, at rest in unit gravity; ``x_m`` are its
+    places on the inner and on the outer body, along the vehicle.
+    """
+
+    inner: str
+    outer: str
+    x_m: tuple[float, float]
+    load_n: float
+    stiffness_npm: float
+    damping_nspm: float
+
+
+def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSheet:
+    """The drawing of a vehicle.
+
+    Parameters
+    ----------
+    vehicle : VehicleModel
+        The vehicle.
+    each_by_itself : bool
+        True for rides of the kinematic engine, where every body follows the rails at its own place and rests
+        on nothing.
+
+    Returns
+    -------
+    VehicleSheet
+        Which body rests on which follows from the static forces of springs and of rods that are not level.
+        The place is the mean of theirs, weighted by vertical stiffness: springs at four corners bear at the
+        pivot in the middle between them. Primary stiffness and damping are the sums of these elements'
+        vertical ones, dampers on elastic mounts as if these were rigid; tabled laws (dry friction, bump
+        stops) are left out, and so are trailing arms, which carry no weight.
+
+    Raises
+    ------
+    InputError
+        If the vehicle cannot rest.
+    """
+    place_sd = PLACE_SD_M * vehicle.wheel_rail.profile_scale
+    at = {body.name: body.position_m[0] for body in vehicle.bodies}
+    if each_by_itself:
+        return VehicleSheet(tuple(SheetBody(name, x) for name, x in at.items()), place_sd)
+    between: dict[tuple[str, str], list[_Bearing]] = defaultdict(list)
+    for bearing in _bearings(vehicle):
+        between[bearing.inner, bearing.outer].append(bearing)
+    least = LEAST_SHARE * sum(body.mass_kg for body in vehicle.bodies)
+    supports: dict[str, list[Support]] = {name: [] for name in at}
+    primary: dict[str, tuple[float, float]] = {}
+    for (inner, outer), bearings in between.items():
+        load = sum(bearing.load_n for bearing in bearings)
+        if abs(load) <= least:
+            continue
+        upper, lower = (outer, inner) if load > 0.0 else (inner, outer)
+        place = np.average(
+            [bearing.x_m[upper == outer] for bearing in bearings],
+            weights=[bearing.stiffness_npm for bearing in bearings],
+        )
+        supports[upper].append(Support(lower, round(float(place) - at[upper], 9)))
+        if lower in vehicle.axle_names:
+            primary[lower] = (
+                primary.get(lower, (0.0, 0.0))[0] + sum(bearing.stiffness_npm for bearing in bearings),
+                primary.get(lower, (0.0, 0.0))[1] + sum(bearing.damping_nspm for bearing in bearings),
+            )
+    bodies = {
+        name: SheetBody(name, x, tuple(supports[name]), None, *primary.get(name, (None, None)))
+        for name, x in at.items()
+    }
+    return VehicleSheet(tuple(bodies[name] for name in _from_the_rails_up(supports)), place_sd)
+
+
+def _bearings(vehicle: VehicleModel) -> list[_Bearing]:
+    """Springs and rods with vertical stiffness."""
+    found = []
+    mounted = {
+        (damper.name, damper.inner, damper.outer): damper.damping_nspm
+        for damper in vehicle.series
+        if damper.axis == 2
+    }
+    for spring, load in zip(vehicle.suspensions, vehicle.preload_n(1.0), strict=True):
+        x = spring.position_m[0]
+        damping = spring.damping_nspm[2] + mounted.get((spring.name, spring.inner, spring.outer), 0.0)
+        found.append(_Bearing(spring.inner, spring.outer, (x, x), load, spring.stiffness_npm[2], damping))
+    for rod, tension in zip(vehicle.rods, vehicle.rod_tension_n(1.0), strict=True):
+        first, second = rod.inner_position_m, rod.outer_position_m
+        steepness = (second[2] - first[2]) / rod.length_m
+        found.append(
+            _Bearing(
+                rod.inner,
+                rod.outer,
+                (first[0], second[0]),
+                -tension * steepness,
+                rod.stiffness_npm * steepness**2,
+                rod.damping_nspm * steepness**2,
+            )
+        )
+    return [bearing for bearing in found if bearing.stiffness_npm > 0.0]
+
+
+def _from_the_rails_up(supports: dict[str, list[Support]]) -> list[str]:
+    """Names of the bodies, each after those that it rests on."""
+    placed: list[str] = []
+    while len(placed) < len(supports):
+        open_ones = [name for name in supports if name not in placed]
+        ready = [name for name in open_ones if all(s.on in placed for s in supports[name])]
+        placed += ready or open_ones[:1]
+    return placed
