@@ -11,10 +11,10 @@ The idea of matching the measured with the design curvature is that of Escalona,
 The accelerometer drives the model, the wheel and the line correct it. States, in this order:
 
     s, V        position and speed along the track
-    way         way that the wheel should show, d(way) = (1 + scale + tread + turn k3) ds
+    way         way that the wheel should show, d(way) = (1 + scale + tread + left or right) ds
     scale       relative error of the nominal wheel radius (constant)
     tread       wandering of the rolling radius: the wheel runs off its tape circle (Markov in distance)
-    turn        m, how the way depends on curvature: the wheel's own path, and its taper in curves
+    left, right how the way changes in a curve to the left or right: the wheel's own path, and its flange
     push        m/s2, offset of the accelerometer along X (random walk)
     squat       relative: a body that pitches under traction and braking feels more than there is
     lead        m, the slope that the body has is the design's this far behind
@@ -37,7 +37,8 @@ encoder alone (`simrail.estimators.odometry.encoder`).
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -50,14 +51,15 @@ from simrail.estimators.odometry.kernel import (
     EVEN,
     LAG,
     LEAD,
+    LEFT,
     ODD,
     PUSH,
+    RIGHT,
     SCALE,
     SQUAT,
     STATES,
     SWAY,
     TREAD,
-    TURN,
     UPDATES,
     WAY,
     YAW,
@@ -70,13 +72,13 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
-from simrail.recording.sheets.vehicle_sheet import Chord
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
-from simrail.core.jit import FloatArray
+from simrail.core.jit import FloatArray, IntArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
+from simrail.recording.sheets.vehicle_sheet import Chord
 
 _STILL_S = 0.5
 
@@ -90,11 +92,46 @@ HOLD_S = 2.0
 """After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
 
 ACCELERATION_SD_MPS2 = 0.03
-"""Of that acceleration: what the body's pitching leaves in it."""
+"""Of that acceleration: what the body's pitching leaves in it. What it shakes beside that is measured."""
 
-UNKNOWN_CHORD_SD_M = 3.0
-"""Of the place whose heading a body has, where no drawing says what it rests on: half a bogie centre distance
-is 3 to 10 m, and an IMU is seldom at its end."""
+POWER_S = 5.0
+"""So long is averaged over what it shakes: it changes with the speed."""
+
+
+class YawInTrack(NamedTuple):
+    """How a body points against the chord of the track that it is on.
+
+    Attributes
+    ----------
+    lag_m, lag_sd_m, lag_walk_m : float
+        The track that it points along lies this far behind, in the direction of travel; its standard
+        deviation between vehicles, and its random walk from curve to curve, m2 per m.
+    sway_sd_rad, sway_length_m : float
+        What it does beside that: standard deviation, and over what distance it changes.
+    """
+
+    lag_m: float
+    lag_sd_m: float
+    lag_walk_m: float
+    sway_sd_rad: float
+    sway_length_m: float
+
+
+AXLE = YawInTrack(0.8, 0.5, 5e-5, 4e-4, 2.0)
+FRAME = YawInTrack(0.8, 0.25, 5e-5, 4e-4, 2.0)
+"""An axle, and what lies on axles. In a curve the leading wheelset runs at the outer rail and the trailing
+one does not: some mm over a wheelbase of 2 m. An axle steers against the frame besides."""
+
+ON_BOGIES = YawInTrack(0.0, 0.1, 2e-6, 2.5e-4, 6.5)
+"""A body on two bogies: what they do is the same at both ends, and 15 m apart."""
+
+OTHER_BODY = YawInTrack(0.0, 1.2, 5e-5, 2.5e-3, 9.0)
+"""A body on one bogie, or between other bodies: its suspension turns with it."""
+
+UNKNOWN_BODY = YawInTrack(0.0, 3.0, 5e-5, 1e-3, 4.0)
+"""No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
+
+The sizes of all five are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -110,13 +147,12 @@ class CurveMatchedOdometry:
         False: a causal filter. True: the fixed-interval smoother, for use after the ride.
     start_sd_m : float
         How well the start is known.
-    radius_sd : float
-        Relative standard deviation of the nominal wheel radius.
     tread_sd, tread_length_m : float
         Relative standard deviation of the rolling radius about its mean, and over what distance it
         changes: 0.1 to 0.35 % are the taper's share on 5 mm of lateral play.
-    turn_sd_m : float
-        Standard deviation of `turn`: half the distance of the wheels, 0.75 m, and some taper.
+    flange_sd : float
+        Standard deviation of `left` and `right`. In a curve a wheel rolls on its flange root, some 4 mm
+        further out than at its tape circle, or not: 1.5 % of a wheel of 0.29 m, 0.9 % of one of 0.46 m.
     wheel_walk_m : float
         Random walk of the wheel's way against the track, m2 per m: creep.
     force_m2ps3 : float
@@ -126,10 +162,8 @@ class CurveMatchedOdometry:
     squat_sd, unsteady_s05 : float
         Of `squat`: a body that pitches by 1 deg at 1 m/s2 has 0.17. And how unsteady that is:
         what it feels, times `unsteady_s05`, is the density, per sqrt(Hz), of what disturbs it.
-    lag_sd_m, lag_walk_m, lead_sd_m : float
-        Of lag and lead, and the random walk of lag, m2 per m.
-    sway_sd_rad, sway_length_m : float
-        Yaw of the body in the track, and over what distance it changes.
+    lead_sd_m : float
+        Of lead.
     heading_sd_rad : float
         White part of that.
     gate : float
@@ -138,21 +172,16 @@ class CurveMatchedOdometry:
 
     smoothed: bool = False
     start_sd_m: float = 0.05
-    radius_sd: float = 0.01
-    tread_sd: float = 0.001
-    tread_length_m: float = 40.0
-    turn_sd_m: float = 1.0
+    tread_sd: float = 0.0015
+    tread_length_m: float = 25.0
+    flange_sd: float = 0.008
     wheel_walk_m: float = 2e-6
     force_m2ps3: float = 3e-5
     push_sd_mps2: float = 0.05
     push_walk_m2ps5: float = 1e-6
     squat_sd: float = 0.1
     unsteady_s05: float = 0.03
-    lag_sd_m: float = 1.0
-    lag_walk_m: float = 1e-6
     lead_sd_m: float = 1.0
-    sway_sd_rad: float = 5e-4
-    sway_length_m: float = 4.0
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
 
@@ -198,21 +227,26 @@ class CurveMatchedOdometry:
         block = max(1, round(sheet.rate_hz / RATE_HZ))
         time = recording.imu.index.to_numpy(dtype=np.float64)
         n = len(time) // block
-        names = [GYRO[1], GYRO[2], ACCEL[0]]
+        names = [GYRO[1], GYRO[2], ACCEL[0], ACCEL[1]]
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
-        signals = signals.reshape(n, block, 3).mean(axis=1)
+        signals = signals.reshape(n, block, 4).mean(axis=1)
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
         read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
         counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
         pulse = wheel.pulse_m
         chord = chord_of(recording)
-        grid, table = line_table(recording.track, chord=chord, mount_x_m=recording.mount_position_m[0])
+        grid, table = line_table(
+            recording.track,
+            chord=chord,
+            mount_x_m=recording.mount_position_m[0],
+            wheel_ahead_m=wheel_ahead(recording),
+        )
         x, p = self._start(recording, pulse, chord)
         x[YAW] = line_at(grid, table, x[S]).heading
         states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
         steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
-        model = self._model(recording, pulse)
+        model = self._model(recording, pulse, yaw_in_track(recording, chord))
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
         curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
         if past is not None:
@@ -222,10 +256,15 @@ class CurveMatchedOdometry:
     def _at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
         """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
-        values = np.column_stack([steps.states[:, [S, V]], _calm(steps, smoothed=self.smoothed)])
+        calm = _calm(steps, smoothed=self.smoothed)
+        shaking = _power(
+            _unsteady(recording, len(calm)) + (steps.acceleration - calm) ** 2, both_ways=self.smoothed
+        )
+        values = np.column_stack([steps.states[:, [S, V]], calm])
         values[steps.resting, 1:] = 0.0
         sd = np.sqrt(np.diagonal(steps.covariance, axis1=1, axis2=2)[:, [S, V]])
-        lines = np.column_stack([values, sd, np.full(len(sd), ACCELERATION_SD_MPS2)])
+        sd[:, 0] = np.hypot(sd[:, 0], self._chainage_sd(recording, values[:, 0]))
+        lines = np.column_stack([values, sd, np.sqrt(ACCELERATION_SD_MPS2**2 + shaking)])
         # Until the filter's first step: standing at the start.
         start = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, STILL_SD_MPS, ACCELERATION_SD_MPS2]
         lines, times = np.vstack([start, lines]), np.concatenate([[-np.inf], steps.time_s])
@@ -236,24 +275,31 @@ class CurveMatchedOdometry:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = lines[last]
             rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
-            values[rolls, 2::3] = self._wheel_acceleration(recording)[rolls]
+            values[rolls, 2::3] = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)[
+                rolls
+            ]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
         return pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
 
-    def _wheel_acceleration(self, recording: Recording) -> FloatArray:
+    def _wheel_acceleration(
+        self, recording: Recording, times: FloatArray, calm: FloatArray, shaking: FloatArray, last: IntArray
+    ) -> FloatArray:
         """The wheel's own acceleration and its sd (n, 2), for where it rolls.
 
         An attitude filter takes the acceleration off the accelerometer. Made from that same accelerometer
-        it would take the body's own pitch away as well.
+        it would take the body's own pitch away as well. What parts the two is the wheel's error, which is
+        mostly its rolling radius that changes, and is measured so.
         """
-        assert recording.encoder_sheet is not None
-        sheet = replace(recording.encoder_sheet, radius_relative_sd=self.radius_sd)
-        wheel = EncoderOdometry().estimate(replace(recording, encoder_sheet=sheet)).states
-        return wheel[["acceleration_mps2", "acceleration_sd_mps2"]].to_numpy()
+        wheel = EncoderOdometry().estimate(recording).states
+        read = np.searchsorted(wheel.index.to_numpy(), times + 1e-9, side="right") - 1
+        own = wheel["acceleration_mps2"].to_numpy()
+        off = _power((own[read] - calm) ** 2, both_ways=False)
+        sd = np.sqrt(wheel["acceleration_sd_mps2"].to_numpy() ** 2 + np.append(off + shaking, 0.0)[last - 1])
+        return np.column_stack([own, sd])
 
-    def _model(self, recording: Recording, pulse: float) -> LineModel:
+    def _model(self, recording: Recording, pulse: float, yaw: YawInTrack) -> LineModel:
         """Noise and constants: those of the method under their own names, with what the data sheet adds."""
         sheet = recording.imu_sheet
         own = {name: value for name, value in vars(self).items() if name in LineModel._fields}
@@ -265,6 +311,9 @@ class CurveMatchedOdometry:
             # Of a Markov process that wanders by its bias instability within some 300 s.
             "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
             "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
+            "sway_sd_rad": yaw.sway_sd_rad,
+            "sway_length_m": yaw.sway_length_m,
+            "lag_walk_m": yaw.lag_walk_m,
             "bend_sd": recording.map_errors.radius_relative_sd,
             "shift_sd_m": recording.map_errors.place_sd_m,
         }
@@ -274,24 +323,27 @@ class CurveMatchedOdometry:
         self, recording: Recording, pulse: float, chord: Chord | None
     ) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand."""
+        assert recording.encoder_sheet is not None
         sheet, errors = recording.imu_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        chord_sd = UNKNOWN_CHORD_SD_M if chord is None else chord.sd_m / math.sqrt(2.0)
+        yaw = yaw_in_track(recording, chord)
+        x[LAG] = yaw.lag_m
+        chord_sd = 0.0 if chord is None else chord.sd_m / math.sqrt(2.0)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
         sd[V] = STILL_SD_MPS
         sd[WAY] = pulse / math.sqrt(12.0)
-        sd[SCALE] = self.radius_sd
+        sd[SCALE] = recording.encoder_sheet.radius_relative_sd
         sd[TREAD] = self.tread_sd
-        sd[TURN] = self.turn_sd_m
+        sd[LEFT] = sd[RIGHT] = self.flange_sd
         sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
         sd[SQUAT] = self.squat_sd
-        sd[LEAD] = math.hypot(self.lead_sd_m, chord_sd)
+        sd[LEAD] = self.lead_sd_m if chord is not None else UNKNOWN_BODY.lag_sd_m
         sd[YAW] = 5e-3
         sd[DRIFT] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
-        sd[SWAY] = self.sway_sd_rad
-        sd[LAG] = math.hypot(self.lag_sd_m, chord_sd)
+        sd[SWAY] = yaw.sway_sd_rad
+        sd[LAG] = math.hypot(yaw.lag_sd_m, chord_sd)
         sd[BEND] = errors.radius_relative_sd
         sd[EVEN] = sd[ODD] = errors.place_sd_m
         return x, np.diag(sd**2)
@@ -310,6 +362,31 @@ def chord_of(recording: Recording) -> Chord | None:
     return None if sheet is None else sheet.chord(recording.mount_body)
 
 
+def yaw_in_track(recording: Recording, chord: Chord | None) -> YawInTrack:
+    """What is known of the yaw of the mount's body in the track."""
+    if recording.vehicle_sheet is None or chord is None:
+        return UNKNOWN_BODY
+    if chord.half_wheelbase_m > 0.0:
+        return ON_BOGIES
+    rests_on = {body.name: body.supports for body in recording.vehicle_sheet.bodies}
+    supports = rests_on[recording.mount_body]
+    if not supports:
+        return AXLE
+    return FRAME if all(not rests_on[support.on] for support in supports) else OTHER_BODY
+
+
+def wheel_ahead(recording: Recording) -> float:
+    """How far ahead of the mount the encoder's wheel is along the vehicle, m; 0 where no drawing says it."""
+    sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
+    if sheet is None or wheel is None:
+        return 0.0
+    at = {body.name: body.x_m for body in sheet.bodies}
+    axle = wheel.wheel.rpartition(".")[0]
+    if axle not in at or recording.mount_body not in at:
+        return 0.0
+    return at[axle] - at[recording.mount_body] - recording.mount_position_m[0]
+
+
 def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:
     """Acceleration without what the body shakes, (n,): the train's own changes slowly."""
     if smoothed:
@@ -323,6 +400,24 @@ def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:
         [(1.0 - keep) ** 2], [1.0, -2.0 * keep, keep * keep], steps.acceleration
     )
     return passed
+
+
+def _unsteady(recording: Recording, steps: int) -> FloatArray:
+    """Variance of the accelerometer along X within each step less its white noise, (steps,), (m/s2)^2."""
+    sheet = recording.imu_sheet
+    block = max(1, round(sheet.rate_hz / RATE_HZ))
+    force = recording.imu[ACCEL[0]].to_numpy(dtype=np.float64)[: steps * block].reshape(steps, block)
+    within: FloatArray = force.var(axis=1) - sheet.accel_noise_mpsqrts**2 * sheet.rate_hz
+    return within
+
+
+def _power(squares: FloatArray, *, both_ways: bool) -> FloatArray:
+    """Mean of squares (n,) over the last `POWER_S`, or over as long before and after; not negative."""
+    keep = math.exp(-1.0 / (POWER_S * RATE_HZ))
+    passed: FloatArray = signal.lfilter([1.0 - keep], [1.0, -keep], squares)
+    if both_ways:
+        passed = signal.lfilter([1.0 - keep], [1.0, -keep], passed[::-1])[::-1]
+    return np.maximum(passed, 0.0)
 
 
 def _held(flags: BoolArray, hold_s: float) -> BoolArray:

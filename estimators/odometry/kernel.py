@@ -15,8 +15,10 @@ from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 
 BoolArray = npt.NDArray[np.bool_]
 
-STATES = 16
-S, V, WAY, SCALE, TREAD, TURN, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG, BEND, EVEN, ODD = range(STATES)
+STATES = 17
+S, V, WAY, SCALE, TREAD, LEFT, RIGHT, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG, BEND, EVEN, ODD = range(
+    STATES
+)
 
 UPDATES = 3
 WHEEL, HEADING, REST = range(UPDATES)
@@ -43,6 +45,10 @@ REST_VARIANCE = 1e-8
 
 NARROWEST = 0.1
 """Least width, in pulses, of the interval in which an edge that was just passed says the wheel is."""
+
+SATURATION_RADIUS_M = 1000.0
+"""A wheelset runs the further out the sharper the curve, up to its flange: free wheels are there at a radius
+of 800 m, conventional wheelsets at 500 to 300 m; chosen so that both are nearly so."""
 
 SCALE_FACTOR_S = 10.0
 """s: a gyro's error of scale is taken for white over so long; a curve lasts as long at line speed."""
@@ -95,7 +101,7 @@ class Steps(NamedTuple):
     ----------
     time_s : ndarray (n,)
         Ends of the steps; given.
-    states, covariance : ndarray (n, 16), (n, 16, 16)
+    states, covariance : ndarray (n, 17), (n, 17, 17)
         See `simrail.estimators.odometry.curve_matched`.
     acceleration : ndarray (n,)
         Along the track, over the step; it shakes with the body.
@@ -116,11 +122,11 @@ class Scratch(NamedTuple):
 
     Attributes
     ----------
-    f, work : ndarray (16, 16)
+    f, work : ndarray (17, 17)
         F, and what `simrail.estimators.kalman.congruence` needs.
-    rows : ndarray (3, 16)
+    rows : ndarray (3, 17)
         h of each update.
-    gain, v : ndarray (16,)
+    gain, v : ndarray (17,)
         What `simrail.estimators.kalman.update` writes.
     """
 
@@ -178,6 +184,7 @@ def predict(
     here: Line,
     lean: Line,
     signal: FloatArray,
+    force: float,
     dt: float,
     model: LineModel,
     gravity: float,
@@ -186,21 +193,24 @@ def predict(
     """One step of the model, in place: x, P and F.
 
     ``here`` is the design at x[S], ``lean`` that at x[S] - x[LEAD], ``signal`` the mean rates about Y and
-    Z and the mean force along X, ``steady`` the effort without its vibration. Returns the acceleration,
-    and the way that the wheel shows per metre.
+    Z, ``force`` the mean force along the track, ``steady`` the effort without its vibration. Returns the
+    acceleration, and the way that the wheel shows per metre.
     """
     n = x.shape[0]
     # Heading rate of a body in the design's cant and slope; the effort less what squat and slope feign.
     turn = (signal[0] * np.sin(here.roll) + signal[1] * np.cos(here.roll)) / np.cos(here.pitch)
     level = np.cos(lean.pitch)
     share = 1.0 / (1.0 + x[SQUAT])
-    effort = (signal[2] - x[PUSH]) * share
+    effort = (force - x[PUSH]) * share
     acceleration = level * (effort + gravity * np.sin(lean.pitch))
     # Way of the train, and of its wheel (`rolls` per metre); what is Markov in distance forgets.
     half = 0.5 * dt * dt
     way = dt * x[V] + half * acceleration
     run = abs(way)
-    rolls = 1.0 + x[SCALE] + x[TREAD] + x[TURN] * here.curvature
+    bent = SATURATION_RADIUS_M * here.curvature
+    flank = bent / np.sqrt(1.0 + bent * bent)
+    left, right = max(flank, 0.0), max(-flank, 0.0)
+    rolls = 1.0 + x[SCALE] + x[TREAD] + left * x[LEFT] + right * x[RIGHT]
     wears, sways = np.exp(-run / model.tread_length_m), np.exp(-run / model.sway_length_m)
     # The map has a curvature that is not there (`simrail.estimators.odometry.line_table`): the heading counts
     # from the map's, so it loses what the track turns beyond the map.
@@ -220,7 +230,7 @@ def predict(
         f[S, place] += half * slope
         f[WAY, place] += rolls * half * slope
     f[S, V], f[WAY, V] = dt, rolls * dt
-    f[WAY, SCALE], f[WAY, TREAD], f[WAY, TURN] = way, way, way * here.curvature
+    f[WAY, SCALE], f[WAY, TREAD], f[WAY, LEFT], f[WAY, RIGHT] = way, way, way * left, way * right
     f[TREAD, TREAD], f[SWAY, SWAY] = wears, sways
     f[YAW, DRIFT] = -dt
     f[YAW, BEND], f[YAW, EVEN], f[YAW, ODD] = -way * here.bend, way * here.ramp_even, way * here.ramp_odd
@@ -300,18 +310,18 @@ def curve_matched(
     ----------
     dt : float
         Step, s.
-    signals : ndarray (n, 3)
-        Mean angular rates about Y and Z (rad/s) and mean specific force along X (m/s2) over the step that
-        ends here, body axes.
+    signals : ndarray (n, 4)
+        Mean angular rates about Y and Z (rad/s) and mean specific forces along X and Y (m/s2) over the step
+        that ends here, body axes.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
     model : LineModel
         Noise.
     gravity : float
         m/s2.
-    grid, table : ndarray (2,), (m, 9)
+    grid, table : ndarray (2,), (m, 10)
         The map (`simrail.estimators.odometry.line_table`).
-    x, p : ndarray (16,), (16, 16)
+    x, p : ndarray (17,), (17, 17)
         State and covariance at the start; replaced by the last ones.
     steps : Steps, output
         Of n rows.
@@ -329,9 +339,11 @@ def curve_matched(
     before = line_at(grid, table, x[S])
     for k in range(signals.shape[0]):
         here, lean = line_at(grid, table, x[S]), line_at(grid, table, x[S] - x[LEAD])
-        steady += dt / STEADY_S * (signals[k, 2] - x[PUSH] - steady)
+        # A body askew of the track under the mount feels a share of what pushes it around the curve.
+        force = signals[k, 2] * np.cos(here.askew) - signals[k, 3] * np.sin(here.askew)
+        steady += dt / STEADY_S * (force - x[PUSH] - steady)
         steps.acceleration[k], rolls = predict(
-            x, p, f, work, here, lean, signals[k], dt, model, gravity, steady
+            x, p, f, work, here, lean, signals[k], force, dt, model, gravity, steady
         )
         map_ahead(x, p, f, before, here, model)
         before = here

@@ -23,9 +23,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from simrail.recording.sheets.vehicle_sheet import Chord
 
 from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.recording.sheets.vehicle_sheet import Chord
 from simrail.track.alignment import element_starts
 from simrail.track.design import Curve, Straight, TrackDesign
 
@@ -46,7 +46,9 @@ class Line(NamedTuple):
     pitch, pitch_slope : float
         Of a body on its chord, rad, and the slope of that, 1/m.
     curvature : float
-        Of the track, 1/m.
+        Of the track under the encoder's wheel, 1/m.
+    askew : float
+        Heading of the body on its chord less that of the track under the mount, rad.
     element, curve : float
         Numbers of the element, and of the stretch that has one curve's error.
     """
@@ -59,6 +61,7 @@ class Line(NamedTuple):
     pitch: float
     pitch_slope: float
     curvature: float
+    askew: float
     element: float
     curve: float
 
@@ -78,13 +81,14 @@ def line_at(grid: FloatArray, table: FloatArray, s: float) -> Line:
         a[5] + x * (b[5] - a[5]),
         (b[5] - a[5]) * grid[1],
         a[6] + x * (b[6] - a[6]),
-        a[7],
+        a[7] + x * (b[7] - a[7]),
         a[8],
+        a[9],
     )
 
 
 def line_table(
-    track: TrackDesign, *, chord: Chord | None = None, mount_x_m: float = 0.0
+    track: TrackDesign, *, chord: Chord | None = None, mount_x_m: float = 0.0, wheel_ahead_m: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
     """The map under a body on its chord, over the place of a mount on that body.
 
@@ -96,12 +100,14 @@ def line_table(
         What the body points along; without one it points where the track does.
     mount_x_m : float
         Place of the mount along the body, in the chord's coordinates.
+    wheel_ahead_m : float
+        How far ahead of the mount the encoder's wheel is.
 
     Returns
     -------
     grid : ndarray (2,)
         First place (m), places per metre.
-    table : ndarray (m, 9)
+    table : ndarray (m, 10)
         `Line` at every place, but for the slope of the pitch.
     """
     count = math.ceil((track.end_m - track.start_m) * PLACES_PER_M) + 1
@@ -112,7 +118,7 @@ def line_table(
         if chord is None
         else (chord.centre_m - mount_x_m, chord.half_m, chord.half_wheelbase_m)
     )
-    reach = abs(centre) + half + wheelbase + 1.0
+    reach = abs(centre) + half + wheelbase + abs(wheel_ahead_m) + 1.0
     fine = np.arange(track.start_m - reach, track.end_m + reach, 1.0 / PLACES_PER_M)
     under = track.frame_extended(fine)
     curvature = under.rates[:, 2]
@@ -123,7 +129,9 @@ def line_table(
     )
     element = track.segment(np.clip(places + centre, track.start_m, track.end_m))
     curve = np.searchsorted(_curve_ends(track), places + centre, side="right")
-    rows = [heading, bend, even, odd, frame.roll_rad, pitch, frame.rates[:, 2], element, curve]
+    at_wheel = np.interp(places + wheel_ahead_m, fine, curvature)
+    askew = heading - frame.yaw_rad
+    rows = [heading, bend, even, odd, frame.roll_rad, pitch, at_wheel, askew, element, curve]
     return np.array([track.start_m, PLACES_PER_M]), np.ascontiguousarray(
         np.column_stack(rows), dtype=np.float64
     )
