@@ -125,7 +125,7 @@ one does not: some mm over a wheelbase of 2 m. An axle steers against the frame 
 ON_BOGIES = YawInTrack(0.0, 0.1, 2e-6, 2.5e-4, 6.5)
 """A body on two bogies: what they do is the same at both ends, and 15 m apart."""
 
-OTHER_BODY = YawInTrack(0.0, 1.2, 5e-5, 2.5e-3, 9.0)
+OTHER_BODY = YawInTrack(0.0, 1.2, 5e-5, 5e-3, 10.0)
 """A body on one bogie, or between other bodies: its suspension turns with it."""
 
 UNKNOWN_BODY = YawInTrack(0.0, 3.0, 5e-5, 1e-3, 4.0)

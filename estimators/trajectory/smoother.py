@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from simrail.estimators.odometry.continuous import with_continuous_odometry
 from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
 from simrail.estimators.trajectory.kernel import (
     PACKED,
@@ -251,7 +252,12 @@ class TrajectorySmoother:
         return estimate, trace.errors
 
     def trace(self, recording: Recording) -> Trajectory:
-        """All twelve states with their covariances, the innovations, and the log-likelihood."""
+        """All twelve states with their covariances, the innovations, and the log-likelihood.
+
+        An odometry that corrects its place is made continuous first
+        (`simrail.estimators.odometry.continuous`).
+        """
+        recording = with_continuous_odometry(recording, causal=not self.smoothed)
         around = None
         for _ in range(self.passes - 1):
             model = self.model(recording, around=around)

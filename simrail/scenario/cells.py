@@ -203,6 +203,8 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
     )
     of_estimators = {name: value for name, value in world.values.items() if name.startswith("estimator.")}
     for k, (sensing_settings, sensing, i, imu_settings, imu) in enumerate(listed):
+        if not imu.is_on(world.spec.vehicle):
+            continue
         sensing_drawn, concrete = drawn(sensing, world.values, fields=SENSING)
         imu_drawn, mounted = drawn(imu, world.values, prefix=f"imu.{imu.name}.", shown="imu.")
         settings = world.settings | sensing_settings | sensing_drawn | imu_settings | imu_drawn
@@ -246,7 +248,10 @@ def count(scenario: Scenario) -> tuple[int, int]:
     if spec.map is not None:
         exact = each(spec.map.exact)
         maps = maps // len(exact) * sum(1 if one else spec.monte_carlo.map_draws for one in exact)
-    return rides, rides * maps * sum(_size(part) * sensor_draws(spec, part) for part in spec.imu)
+    vehicles = each(spec.vehicle)
+    on = [(part, sum(part.is_on(str(vehicle)) for vehicle in vehicles)) for part in spec.imu]
+    recorded = sum(n * _size(part) * sensor_draws(spec, part) for part, n in on)
+    return rides, rides * maps * recorded // len(vehicles)
 
 
 def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:

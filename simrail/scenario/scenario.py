@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
 from simrail.scenario import tables
@@ -79,11 +79,25 @@ class ScenarioFile(Part):
     @field_validator("ride", "imu", "estimator")
     @classmethod
     def _unique_names(cls, value: list[Any]) -> list[Any]:
-        names = [part.name for part in value]
-        for name in names:
-            if names.count(name) > 1:
+        names = [(part.name, getattr(part, "vehicle", None)) for part in value]
+        for name, vehicle in names:
+            if names.count((name, vehicle)) > 1 or (vehicle and (name, None) in names):
                 raise ValueError(f"two of them are named {name!r}; give each a name of its own")
         return value
+
+    @model_validator(mode="after")
+    def _every_vehicle_has_an_imu(self) -> "ScenarioFile":
+        vehicles = [str(vehicle) for vehicle in each(self.vehicle)]
+        for i, part in enumerate(self.imu):
+            if part.vehicle is not None and part.vehicle not in vehicles:
+                raise ValueError(
+                    f"imu[{i}].vehicle is none of the scenario's: found {part.vehicle!r}; "
+                    f"limit: one of {', '.join(vehicles)}"
+                )
+        for vehicle in vehicles:
+            if not any(part.is_on(vehicle) for part in self.imu):
+                raise ValueError(f"no imu is on vehicle {vehicle!r}; add an [[imu]] with vehicle = {vehicle!r}")
+        return self
 
 
 @dataclass(frozen=True)

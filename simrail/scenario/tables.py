@@ -194,17 +194,23 @@ class ImuPart(Part):
     """``[[imu]]``: an IMU of some grade, mounted on a body of the vehicle.
 
     ``sensor_draws`` limits the draws of this IMU below those of ``[monte_carlo]``: an ideal one has no
-    errors to be drawn, so that one or two draws (of the encoder) say all.
+    errors to be drawn, so that one or two draws (of the encoder) say all. ``vehicle`` names the one that it is
+    on, where a scenario has several whose bodies have other names.
     """
 
     name: Name
     grade: Listed[str]
+    vehicle: str | None = None
     body: Listed[str]
     position_m: tuple[OnBoard, OnBoard, OnBoard]
     roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
     pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
     yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
     sensor_draws: Draws | None = None
+
+    def is_on(self, vehicle: str) -> bool:
+        """Whether it is on a vehicle."""
+        return self.vehicle in (None, vehicle)
 
     @property
     def noise_added(self) -> bool:
