@@ -1,7 +1,7 @@
 """The drawing of a vehicle as a person writes it: ``[vehicle_sheet]`` of a ride file, in SI.
 
-For the body that carries the IMU a few places suffice (``pivots_m``, ``axles_m`` or ``other_axle_m``). A whole
-vehicle has a ``[[vehicle_sheet.body]]`` for each axle, frame and body, which is what simrail writes.
+For the body that carries the IMU a few places suffice (``pivots_m``, ``axles_m`` or ``other_axle_m``). A
+whole vehicle has a ``[[vehicle_sheet.body]]`` for each axle, frame and body, which is what simrail writes.
 """
 
 from dataclasses import replace
@@ -206,7 +206,7 @@ class VehicleSheetPart(Part):
     def sheet(self, mount_body: str) -> VehicleSheet:
         """The drawing; ``mount_body`` is the body that carries the IMU.
 
-        What the file gives no name is called after it: ``"body.bogie_rear"``, ``"body.bogie_rear.axle_front"``.
+        What the file does not name is called after it, e.g. ``"body.bogie_rear.axle_front"``.
         """
         bodies = tuple(part.body() for part in self.body) or self._bodies(mount_body)
         return VehicleSheet(bodies, self.place_sd_m, self.stiffness_relative_sd)
