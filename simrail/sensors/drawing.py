@@ -21,7 +21,7 @@ ABREAST_M = 1e-3
 
 
 class _Bearing(NamedTuple):
-    """A spring or a rod that can bear weight.
+    """A spring, damper or rod between two bodies, as it acts vertically.
 
     By body: ``x_m``, where it holds it, along the vehicle; ``load_n``, the vertical force on it, upward, at
     rest in unit gravity.
@@ -91,26 +91,22 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
 
 
 def _bearings(vehicle: VehicleModel) -> list[_Bearing]:
-    """Springs and rods with vertical stiffness."""
+    """Springs, dampers and rods, as they act vertically."""
     found = []
-    mounted = {
-        (damper.name, damper.inner, damper.outer): damper.damping_nspm
-        for damper in vehicle.series
-        if damper.axis == 2
-    }
-    for spring, load_n in zip(vehicle.suspensions, vehicle.preload_n(1.0), strict=True):
-        x = spring.position_m[0]
-        damping = spring.damping_nspm[2] + mounted.get((spring.name, spring.inner, spring.outer), 0.0)
-        load = {spring.inner: -float(load_n), spring.outer: float(load_n)}
-        place = {spring.inner: x, spring.outer: x}
-        found.append(_Bearing(place, load, spring.stiffness_npm[2], damping))
+    for spring, force in zip(vehicle.suspensions, vehicle.preload_n(1.0), strict=True):
+        place = dict.fromkeys((spring.inner, spring.outer), spring.position_m[0])
+        load = {spring.inner: -float(force), spring.outer: float(force)}
+        found.append(_Bearing(place, load, spring.stiffness_npm[2], spring.damping_nspm[2]))
+    for damper in vehicle.series:
+        ends = (damper.inner, damper.outer)
+        place, load = dict.fromkeys(ends, damper.position_m[0]), dict.fromkeys(ends, 0.0)
+        found.append(_Bearing(place, load, 0.0, damper.damping_nspm if damper.axis == 2 else 0.0))
     for rod, tension in zip(vehicle.rods, vehicle.rod_tension_n(1.0), strict=True):
         rise = (rod.outer_position_m[2] - rod.inner_position_m[2]) / rod.length_m
         place = {rod.inner: rod.inner_position_m[0], rod.outer: rod.outer_position_m[0]}
-        pull = float(tension) * rise
-        load = {rod.inner: pull, rod.outer: -pull}
+        load = {rod.inner: float(tension) * rise, rod.outer: -float(tension) * rise}
         found.append(_Bearing(place, load, rod.stiffness_npm * rise**2, rod.damping_nspm * rise**2))
-    return [bearing for bearing in found if bearing.stiffness_npm > 0.0]
+    return found
 
 
 def _between(bearings: list[_Bearing]) -> dict[tuple[str, str], list[_Bearing]]:
