@@ -14,7 +14,7 @@ from simrail.scenario.build import NO_IRREGULARITY
 from simrail.sensors.drawing import drawing
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 from simrail.vehicle.file import VehicleFile
-from simrail.vehicle.model import Body, Rod, Suspension, VehicleModel
+from simrail.vehicle.model import Body, Rod, SeriesDamper, Suspension, VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
 
@@ -141,7 +141,8 @@ def test_a_damper_beside_the_spring_counts() -> None:
     """As an entry of its own, without stiffness."""
     model = model_of("two_axle_wagon")
     beside = Suspension("damper", "front", "body", (3.0, 0.0, 0.46), (0.0, 0.0, 0.0), (0.0, 0.0, 7e3))
-    sheet = drawing(replace(model, suspensions=(*model.suspensions, beside)))
+    lateral = SeriesDamper("lateral", "front", "body", (3.0, 0.0, 0.46), 1, 1e6, 5e4)  # and one that does not
+    sheet = drawing(replace(model, suspensions=(*model.suspensions, beside), series=(lateral,)))
     assert sheet.body("front").primary_damping_nspm == 17e3
     assert sheet.body("front").primary_stiffness_npm == 2e6
     assert sheet.body("body").supports == (Support("front", 3.0), Support("rear", -3.0))

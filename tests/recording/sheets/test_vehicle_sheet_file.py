@@ -53,6 +53,10 @@ def test_a_few_places_give_the_chord_of_the_mount(text: str, chord: tuple[float,
     axles = [body for body in sheet.bodies if not body.supports]
     assert {(axle.primary_stiffness_npm, axle.primary_damping_nspm) for axle in axles} == {(2.4e6, 16e3)}
     assert sheet.body("body").primary_stiffness_npm == (2.4e6 if "other" in text else None)
+    places = {body.name: body.x_m for body in sheet.bodies}
+    assert all(
+        places[name] > places[name.replace("front", "rear")] for name in places if name.endswith("front")
+    )
     names = [body.name for body in sheet.bodies]
     assert len(set(names)) == len(names)
     assert read(toml_text(vehicle_sheet_table(sheet))) == sheet
