@@ -59,6 +59,8 @@ def check_plausible(recording: Recording) -> None:
     _check_turning(recording)
     if recording.odometry is not None:
         _check_motion(recording, recording.odometry)
+    else:
+        _check_on_track(recording, recording.start_position_m, field="start_position_m")
 
 
 def _check_gravity(recording: Recording) -> None:
@@ -128,14 +130,7 @@ def _check_motion(recording: Recording, odometry: pd.DataFrame) -> None:
     track = recording.track
     position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
     for place in (position.min(), position.max()):
-        if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:
-            raise InputError(
-                f"the ride leaves track {track.name!r}",
-                field="odometry.position_m",
-                value=round(float(place), 2),
-                limit=f"{track.start_m:g} to {track.end_m:g} m",
-                remedy="mend start_position_m or the direction (reverse = true), or lengthen the track",
-            )
+        _check_on_track(recording, float(place), field="odometry.position_m")
     seconds = max(1, round(recording.imu_sheet.rate_hz))
     frame = track.frame_extended(_means(position, seconds))
     bend = frame.rates[:, 2] * _means(speed, seconds)
@@ -148,6 +143,18 @@ def _check_motion(recording: Recording, odometry: pd.DataFrame) -> None:
     if np.ptp(position) > LEAST_WAY_M and np.var(along) > max(2.0 * noise, LEAST_VARIANCE_M2PS4):
         x, y = (_slope(_means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
         _judge_push(x, y)
+
+
+def _check_on_track(recording: Recording, place: float, *, field: str) -> None:
+    track = recording.track
+    if not track.start_m - BEYOND_TRACK_M <= place <= track.end_m + BEYOND_TRACK_M:
+        raise InputError(
+            f"the ride leaves track {track.name!r}",
+            field=field,
+            value=round(place, 2),
+            limit=f"{track.start_m:g} to {track.end_m:g} m",
+            remedy="mend start_position_m or the direction (reverse = true), or lengthen the track",
+        )
 
 
 def _judge_turn(recording: Recording, line: tuple[float, float]) -> None:

@@ -16,18 +16,19 @@ from simrail.vehicle.model import VehicleModel
 LEAST_SHARE = 1e-6
 """Share of the vehicle's weight below which two bodies do not carry each other."""
 
+ABREAST_M = 1e-3
+"""Distance along the vehicle up to which two bodies carry a third one side by side."""
+
 
 class _Bearing(NamedTuple):
-    """A spring or a rod that can bear weight.
+    """A spring, damper or rod between two bodies, as it acts vertically.
 
-    ``load_n`` is the vertical force on the outer body, upward, at rest in unit gravity; ``x_m`` are its
-    places on the inner and on the outer body, along the vehicle.
+    By body: ``x_m``, where it holds it, along the vehicle; ``load_n``, the vertical force on it, upward, at
+    rest in unit gravity.
     """
 
-    inner: str
-    outer: str
-    x_m: tuple[float, float]
-    load_n: float
+    x_m: dict[str, float]
+    load_n: dict[str, float]
     stiffness_npm: float
     damping_nspm: float
 
@@ -61,22 +62,22 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
     at = {body.name: body.position_m[0] for body in vehicle.bodies}
     if each_by_itself:
         return VehicleSheet(tuple(SheetBody(name, x) for name, x in at.items()), place_sd)
-    between: dict[tuple[str, str], list[_Bearing]] = defaultdict(list)
-    for bearing in _bearings(vehicle):
-        between[bearing.inner, bearing.outer].append(bearing)
     least = LEAST_SHARE * sum(body.mass_kg for body in vehicle.bodies)
     supports: dict[str, list[Support]] = {name: [] for name in at}
     primary: dict[str, tuple[float, float]] = {}
-    for (inner, outer), bearings in between.items():
-        load = sum(bearing.load_n for bearing in bearings)
+    for (first, second), bearings in _between(_bearings(vehicle)).items():
+        load = sum(bearing.load_n[second] for bearing in bearings)
         if abs(load) <= least:
             continue
-        upper, lower = (outer, inner) if load > 0.0 else (inner, outer)
+        upper, lower = (second, first) if load > 0.0 else (first, second)
         place = np.average(
-            [bearing.x_m[upper == outer] for bearing in bearings],
+            [bearing.x_m[upper] for bearing in bearings],
             weights=[bearing.stiffness_npm for bearing in bearings],
         )
-        supports[upper].append(Support(lower, round(float(place) - at[upper], 9)))
+        # What bears abreast of another support adds nothing to the drawing.
+        x = round(float(place) - at[upper], 9)
+        if all(abs(x - other.x_m) > ABREAST_M for other in supports[upper]):
+            supports[upper].append(Support(lower, x))
         if lower in vehicle.axle_names:
             primary[lower] = (
                 primary.get(lower, (0.0, 0.0))[0] + sum(bearing.stiffness_npm for bearing in bearings),
@@ -90,31 +91,31 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
 
 
 def _bearings(vehicle: VehicleModel) -> list[_Bearing]:
-    """Springs and rods with vertical stiffness."""
+    """Springs, dampers and rods, as they act vertically."""
     found = []
-    mounted = {
-        (damper.name, damper.inner, damper.outer): damper.damping_nspm
-        for damper in vehicle.series
-        if damper.axis == 2
-    }
-    for spring, load in zip(vehicle.suspensions, vehicle.preload_n(1.0), strict=True):
-        x = spring.position_m[0]
-        damping = spring.damping_nspm[2] + mounted.get((spring.name, spring.inner, spring.outer), 0.0)
-        found.append(_Bearing(spring.inner, spring.outer, (x, x), load, spring.stiffness_npm[2], damping))
+    for spring, force in zip(vehicle.suspensions, vehicle.preload_n(1.0), strict=True):
+        place = dict.fromkeys((spring.inner, spring.outer), spring.position_m[0])
+        load = {spring.inner: -float(force), spring.outer: float(force)}
+        found.append(_Bearing(place, load, spring.stiffness_npm[2], spring.damping_nspm[2]))
+    for damper in vehicle.series:
+        ends = (damper.inner, damper.outer)
+        place, load = dict.fromkeys(ends, damper.position_m[0]), dict.fromkeys(ends, 0.0)
+        found.append(_Bearing(place, load, 0.0, damper.damping_nspm if damper.axis == 2 else 0.0))
     for rod, tension in zip(vehicle.rods, vehicle.rod_tension_n(1.0), strict=True):
-        first, second = rod.inner_position_m, rod.outer_position_m
-        steepness = (second[2] - first[2]) / rod.length_m
-        found.append(
-            _Bearing(
-                rod.inner,
-                rod.outer,
-                (first[0], second[0]),
-                -tension * steepness,
-                rod.stiffness_npm * steepness**2,
-                rod.damping_nspm * steepness**2,
-            )
-        )
-    return [bearing for bearing in found if bearing.stiffness_npm > 0.0]
+        rise = (rod.outer_position_m[2] - rod.inner_position_m[2]) / rod.length_m
+        place = {rod.inner: rod.inner_position_m[0], rod.outer: rod.outer_position_m[0]}
+        load = {rod.inner: float(tension) * rise, rod.outer: -float(tension) * rise}
+        found.append(_Bearing(place, load, rod.stiffness_npm * rise**2, rod.damping_nspm * rise**2))
+    return found
+
+
+def _between(bearings: list[_Bearing]) -> dict[tuple[str, str], list[_Bearing]]:
+    """Bearings by the two bodies that they connect."""
+    pairs: dict[tuple[str, str], list[_Bearing]] = defaultdict(list)
+    for bearing in bearings:
+        first, second = sorted(bearing.x_m)
+        pairs[first, second].append(bearing)
+    return pairs
 
 
 def _from_the_rails_up(supports: dict[str, list[Support]]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,6 +17,8 @@ from simrail.cli.templates import ride_template
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.files.ride_writer import write_ride
+from simrail.recording.sheets.vehicle_sheet import Chord
+from simrail.track.map_errors import UNSTATED
 
 TOML, DATA = "ride.toml", "ride.csv"
 
@@ -93,6 +96,17 @@ def repeat(frame: pd.DataFrame) -> None:
 
 def late(frame: pd.DataFrame) -> None:
     frame.loc[2000:, "t_ms"] += 5000.0
+
+
+def known(table: str) -> Callable[[Path], None]:
+    """Say something of line or vehicle."""
+    return text(("\n[imu]\n", f"\n{table}\n[imu]\n"))
+
+
+def without_odometry(folder: Path) -> None:
+    path = folder / TOML
+    said = path.read_text().split("[encoder]")[0]
+    path.write_text(said.replace("start_position_m = 110.0", "start_position_m = 900.0"))
 
 
 GYROS, ACCELS = ("wx", "wy", "wz"), ("ax", "ay", "az")
@@ -203,6 +217,45 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
         ["track", "smoth_curve", "smooth_curve"],
     ),
     "off_the_track": (text(("start_position_m = 110.0", "start_position_m = 900.0")), ["odometry", "track"]),
+    "off_the_track_without_odometry": (
+        without_odometry,
+        ["start_position_m", "900", "leaves track 'smooth_curve'", "0 to 600 m"],
+    ),
+    "negative_map_sd": (known("[map]\ncant_sd_mm = -3.0"), [TOML, "map.cant_sd_mm", "-3", ">= 0", "unit"]),
+    "map_sd_is_nan": (known("[map]\nplace_sd_m = nan"), [TOML, "map.place_sd_m", "not a finite number"]),
+    "map_sd_in_m": (known("[map]\nradius_sd_percent = 300.0"), ["map.radius_sd_percent", "300", "<= 20"]),
+    "map_typo": (known("[map]\ncant_sd = 3.0"), ["map.cant_sd", "did you mean cant_sd_mm"]),
+    "exact_map_that_errs": (
+        known("[map]\nexact = true\ncant_sd_mm = 3.0"),
+        [TOML, "map.cant_sd_mm", "exact map has no errors", "remove it"],
+    ),
+    "pivot_outside_the_body": (
+        known("[vehicle_sheet]\npivots_m = [9.5, -9.5]\nbody_ends_m = [-9.0, 12.0]"),
+        [TOML, "vehicle_sheet.pivots_m", "outside the body", "-9.5", "-9 to 12 m", "reference point"],
+    ),
+    "pivots_in_mm": (
+        known("[vehicle_sheet]\npivots_m = [9500.0, -9500.0]"),
+        [TOML, "vehicle_sheet.pivots_m[0]", "9500", "<= 40", "unit"],
+    ),
+    "negative_sheet_sd": (
+        known("[vehicle_sheet]\nother_axle_m = -1.8\nplace_sd_m = -0.1"),
+        [TOML, "vehicle_sheet.place_sd_m", "-0.1", ">= 0"],
+    ),
+    "sheet_of_no_body": (
+        known('[[vehicle_sheet.body]]\nname = "frunt"\nx_m = 0.0'),
+        [TOML, "imu.body", "not on the drawing", "'front'", "one of frunt"],
+    ),
+    "imu_outside_its_body": (
+        text(
+            ("\n[imu]\n", "\n[vehicle_sheet]\nother_axle_m = -1.8\nbody_ends_m = [-0.5, 0.5]\n[imu]\n"),
+            ("position_m = [0.0, 0.0, 0.6]", "position_m = [0.9, 0.0, 0.6]"),
+        ),
+        [TOML, "imu.position_m[0]", "outside its body", "0.9", "-0.5 to 0.5 m"],
+    ),
+    "vehicle_sheet_typo": (
+        known("[vehicle_sheet]\npivot_m = [9.5, -9.5]"),
+        ["vehicle_sheet.pivot_m", "unknown key", "did you mean pivots_m"],
+    ),
     "no_sheet": (text(('grade = "lord_3dm_gx4_25"', "")), ["imu.grade", "data sheet", "imu.datasheet"]),
     "no_grade": (text(('grade = "lord_3dm_gx4_25"', 'grade = "lord"')), ["imu.grade", "lord_3dm_gx4_25"]),
     "no_way": (
@@ -228,6 +281,23 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
 def test_the_template_itself_is_sound(ride: Path) -> None:
     recording = read_ride(ride / TOML)
     assert recording.gaps is not None and recording.gaps["missing"].tolist() == [2, 1]
+
+
+def test_the_template_shows_how_to_say_what_is_known(ride: Path) -> None:
+    """Without the marks of comment its tables are read, at the values that are taken where none are said."""
+    plain = read_ride(ride / TOML)
+    assert plain.vehicle_sheet is None and plain.map_errors == UNSTATED
+    said = (ride / TOML).read_text()
+    begin, end = said.index("# [map]"), said.index("\n[imu]\n")
+    shown = re.sub("^# ?", "", said[begin:end], flags=re.MULTILINE)
+    (ride / TOML).write_text(said[:begin] + shown + said[end:])
+    recording = read_ride(ride / TOML)
+    assert recording.map_errors == replace(UNSTATED, cant_sd_m=0.003)
+    sheet = recording.vehicle_sheet
+    assert sheet is not None and (sheet.place_sd_m, sheet.stiffness_relative_sd) == (0.02, 0.2)
+    assert sheet.chord(recording.mount_body) == Chord(-0.9, 0.9, 0.0, 0.02, 0.9)
+    assert sheet.bodies[0].primary_stiffness_npm == 2.4e6
+    pd.testing.assert_frame_equal(recording.imu, plain.imu, check_exact=True)
 
 
 @pytest.mark.parametrize("fault", FAULTS)

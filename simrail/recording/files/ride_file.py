@@ -16,6 +16,7 @@ from simrail.core.toml_files import Part
 from simrail.recording.files.signal_part import SignalPart, VectorPart
 from simrail.recording.recording import EncoderSheet, ImuSheet, MagnetometerSheet, RailSensorSheet
 from simrail.recording.sheets.imu_file import ImuFile
+from simrail.recording.sheets.vehicle_sheet_file import VehicleSheetPart
 from simrail.recording.signals import (
     ENCODER_SIGNAL,
     GAPS_SIGNAL,
@@ -237,6 +238,8 @@ class RideFile(Part):
         Longest gap in a signal that is bridged by a straight line.
     map : MapErrorsPart, optional
         How wrong the track file may be; taken to be wide without it.
+    vehicle_sheet : VehicleSheetPart, optional
+        What a drawing of the vehicle says; without it nothing is known of pivots and axles.
     imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
         Its signals. Without an odometry it is made from encoder or odometer
         (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
@@ -248,6 +251,7 @@ class RideFile(Part):
     gravity_mps2: Annotated[float, Field(ge=9.7, le=9.9)] = 9.81
     longest_gap_s: Annotated[float, Field(gt=0.0, le=10.0)] = LONGEST_GAP_S
     map: MapErrorsPart = MapErrorsPart()
+    vehicle_sheet: VehicleSheetPart | None = None
     imu: ImuSignalPart
     encoder: EncoderSignalPart | None = None
     magnetometer: MagnetometerSignalPart | None = None
@@ -255,6 +259,44 @@ class RideFile(Part):
     odometer: OdometerPart | None = None
     odometry: OdometrySignalPart | None = None
     gaps: GapsPart | None = None
+
+    @field_validator("map")
+    @classmethod
+    def _exact_or_not(cls, value: MapErrorsPart) -> MapErrorsPart:
+        said = sorted(value.model_fields_set - {"exact"})
+        if value.exact and said:
+            raise InputError(
+                "an exact map has no errors",
+                field=said[0],
+                value=getattr(value, said[0]),
+                remedy="remove it, or exact = true",
+            )
+        return value
+
+    @model_validator(mode="after")
+    def _on_the_drawing(self) -> Self:
+        if self.vehicle_sheet is None:
+            return self
+        sheet = self.vehicle_sheet.sheet(self.imu.body)
+        body = sheet.body(self.imu.body)
+        if body is None:
+            raise InputError(
+                "is not on the drawing of the vehicle",
+                field="imu.body",
+                value=self.imu.body,
+                limit="one of " + ", ".join(entry.name for entry in sheet.bodies),
+                remedy="mend it, or add a [[vehicle_sheet.body]]",
+            )
+        x = self.imu.position_m[0]
+        if body.ends_m is not None and not body.ends_m[0] <= x <= body.ends_m[1]:
+            raise InputError(
+                "the IMU sits outside its body",
+                field="imu.position_m[0]",
+                value=x,
+                limit=f"{body.ends_m[0]:g} to {body.ends_m[1]:g} m, the ends of {body.name!r}",
+                remedy="give it in metres from the body's own reference point",
+            )
+        return self
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

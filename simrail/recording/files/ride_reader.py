@@ -98,6 +98,7 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
         mount_position_m=spec.imu.position_m,
         track=track,
         map_errors=spec.map.errors(),
+        vehicle_sheet=None if spec.vehicle_sheet is None else spec.vehicle_sheet.sheet(spec.imu.body),
         encoder=None,
         encoder_sheet=None,
         start_position_m=spec.start_position_m,

@@ -17,6 +17,7 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import toml_text
 from simrail.recording.files.ride_reader import RIDE_FILE
 from simrail.recording.recording import Recording
+from simrail.recording.sheets.vehicle_sheet_file import vehicle_sheet_table
 from simrail.recording.signals import SIGNALS
 from simrail.track.file import track_text
 from simrail.track.map_file import map_table
@@ -90,13 +91,15 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
     ):
         if sheet is not None:
             tables[table] |= {"sheet": asdict(sheet)}
-    head = {
+    head: dict[str, Any] = {
         "name": recording.name,
         "track": f"./{TRACK_FILE}",
         "start_position_m": recording.start_position_m,
         "gravity_mps2": recording.gravity_mps2,
         "map": map_table(recording.map_errors),
     }
+    if recording.vehicle_sheet is not None:
+        head["vehicle_sheet"] = vehicle_sheet_table(recording.vehicle_sheet)
     (folder / TRACK_FILE).write_text(track_text(recording.track), encoding="utf-8")
     (folder / RIDE_FILE).write_text(toml_text({**head, **tables}), encoding="utf-8")
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simrail.core.errors import InputError
-from simrail.core.toml_files import judge, parse_toml, shipped
+from simrail.core.toml_files import judge, load, parse_toml, shipped
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
@@ -24,6 +24,7 @@ from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.signals import SIGNALS
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
+from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.measure import measure
@@ -32,6 +33,7 @@ from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transit
 from simrail.track.file import TrackFile, track_by_name, track_text
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
+from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
 
@@ -50,6 +52,7 @@ def recording() -> Recording:
         gradients=(Gradient(0.0, 0.005), Gradient(90.0, -0.0123)),
         vertical_radius_m=1500.0,
     )
+    model = load(VehicleFile, "vehicle", "manchester_1").model("coach")
     truth = kinematic_truth(track, SpeedProfile(start_m=0.0, end_m=150.0, speed_mps=8.0, rest_s=2.0))
     recording = measure(
         truth,
@@ -62,6 +65,7 @@ def recording() -> Recording:
         rails=lay(track, Irregularity("erri_b176_low", fade_m=20.0), seed=1),
         seed=1,
         draw=0,
+        vehicle_sheet=drawing(model),
     )
     return with_odometry(recording, "encoder")
 
@@ -162,6 +166,12 @@ def test_whatever_a_track_file_can_say_can_be_written_again():
 def test_every_shipped_track_can_be_written(name):
     design = track_by_name(name)
     assert judge(TrackFile, parse_toml(track_text(design), file="t"), file="t").design("") == design
+
+
+def test_a_ride_without_a_drawing_has_none_when_read(recording, tmp_path):
+    write_ride(replace(recording, vehicle_sheet=None), tmp_path / "ride")
+    assert "vehicle_sheet" not in (tmp_path / "ride" / "ride.toml").read_text()
+    assert read_ride(tmp_path / "ride").vehicle_sheet is None
 
 
 def test_round_trip_without_an_encoder(recording, tmp_path):
