@@ -103,35 +103,40 @@ class YawInTrack(NamedTuple):
 
     Attributes
     ----------
-    lag_m, lag_sd_m, lag_walk_m : float
-        The track that it points along lies this far behind, in the direction of travel; its standard
-        deviation between vehicles, and its random walk from curve to curve, m2 per m.
+    lag_sd_m, lag_walk_m : float
+        The track that it points along lies behind its chord, in the direction of travel, by the chord's
+        `play_m` and something: the standard deviation of that between vehicles, and its random walk from
+        curve to curve, m2 per m.
     sway_sd_rad, sway_length_m : float
         What it does beside that: standard deviation, and over what distance it changes.
     """
 
-    lag_m: float
     lag_sd_m: float
     lag_walk_m: float
     sway_sd_rad: float
     sway_length_m: float
 
 
-AXLE = YawInTrack(0.8, 0.5, 5e-5, 4e-4, 2.0)
-FRAME = YawInTrack(0.8, 0.25, 5e-5, 4e-4, 2.0)
-"""An axle, and what lies on axles. In a curve the leading wheelset runs at the outer rail and the trailing
-one does not: some mm over a wheelbase of 2 m. An axle steers against the frame besides."""
+AXLE = YawInTrack(0.5, 5e-5, 4e-4, 2.0)
+"""It steers against its frame."""
 
-ON_BOGIES = YawInTrack(0.0, 0.1, 2e-6, 2.5e-4, 6.5)
+FRAME = YawInTrack(0.25, 5e-5, 4e-4, 2.0)
+"""And any other body on axles."""
+
+ON_BOGIES = YawInTrack(0.1, 2e-6, 2.5e-4, 6.5)
 """A body on two bogies: what they do is the same at both ends, and 15 m apart."""
 
-OTHER_BODY = YawInTrack(0.0, 1.2, 5e-5, 5e-3, 10.0)
-"""A body on one bogie, or between other bodies: its suspension turns with it."""
+OTHER_BODY = YawInTrack(0.7, 5e-5, 5e-3, 10.0)
+"""A body on one bogie, or between other bodies: its suspension turns with it, and it swings after a
+transition."""
 
-UNKNOWN_BODY = YawInTrack(0.0, 3.0, 5e-5, 1e-3, 4.0)
+UNKNOWN_BODY = YawInTrack(3.0, 5e-5, 1e-3, 4.0)
 """No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
 
 The sizes of all five are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
+
+MOST_LAG_M = 1.0
+"""Of a long wheelbase: the play in the gauge turns it by no more, in the curves that matter."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -328,7 +333,7 @@ class CurveMatchedOdometry:
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
         yaw = yaw_in_track(recording, chord)
-        x[LAG] = yaw.lag_m
+        x[LAG] = 0.0 if chord is None else min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
         chord_sd = 0.0 if chord is None else chord.sd_m / math.sqrt(2.0)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
