@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.odometry.continuous import with_continuous_odometry
+from simrail.estimators.odometry.consistent import with_consistent_acceleration
 from simrail.estimators.trajectory.draws import geometry_draws, state_errors, stream_of
 from simrail.estimators.trajectory.kernel import (
     PACKED,
@@ -254,10 +254,10 @@ class TrajectorySmoother:
     def trace(self, recording: Recording) -> Trajectory:
         """All twelve states with their covariances, the innovations, and the log-likelihood.
 
-        An odometry that corrects its place is made continuous first
-        (`simrail.estimators.odometry.continuous`).
+        An acceleration that is not the slope of the odometry's speed is replaced first
+        (`simrail.estimators.odometry.consistent`).
         """
-        recording = with_continuous_odometry(recording, causal=not self.smoothed)
+        recording = with_consistent_acceleration(recording, causal=not self.smoothed)
         around = None
         for _ in range(self.passes - 1):
             model = self.model(recording, around=around)

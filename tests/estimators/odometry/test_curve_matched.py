@@ -51,15 +51,18 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import load_scenario
 from simrail.scoring.score import truth_at_imu
+from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.measure import measure
 from simrail.track.file import track_by_name
 from simrail.track.irregularity import Irregularity
+from simrail.track.map_errors import MapErrors, draw_map
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
 AXLE = Mount("axle", "front", (0.0, 0.0, 0.6))
 LINE = track_by_name("condequinto_olivar")
+VEHICLE = load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie")
 BIAS_RADPS = np.radians(0.05)
 
 
@@ -72,7 +75,7 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> T
             track=LINE,
             irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 40.0),
             track_seed=1,
-            vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
+            vehicle=VEHICLE,
             profile=SpeedProfile(start_m, end_m, speed_kmh / 3.6, stops=tuple((s, 15.0) for s in stops)),
             engine="compiled",
         )
@@ -87,7 +90,7 @@ def record_fast(ride: int, draw: int) -> Recording:
 
 
 def record(truth: Truth, draw: int, *, slip: tuple[Slip, ...] = ()) -> Recording:
-    """The 3DM-GX4-25 with 0.05 deg/s of bias about Z, and a wheel whose radius is wrong by 1 %."""
+    """The 3DM-GX4-25 with 0.05 deg/s of bias about Z, a wheel wrong by 1 % of its radius, a map that errs."""
     recording = measure(
         truth,
         name="odometry",
@@ -98,6 +101,9 @@ def record(truth: Truth, draw: int, *, slip: tuple[Slip, ...] = ()) -> Recording
         ),
         seed=1,
         draw=draw,
+        track_map=draw_map(LINE, MapErrors(), seed=1, draw=draw),
+        map_errors=MapErrors(),
+        vehicle_sheet=drawing(VEHICLE),
     )
     imu = recording.imu.copy()
     imu[GYRO[2]] += BIAS_RADPS if draw % 4 < 2 else -BIAS_RADPS
@@ -225,7 +231,7 @@ def test_a_stop_in_a_sharp_curve_is_no_change_of_direction():
     )
     before, after = np.searchsorted(position, (495.0, 520.0))
     assert trace.states[before, LAG] == pytest.approx(trace.states[after, LAG], abs=0.3)
-    assert abs(trace.states[before, LAG]) > 0.8
+    assert trace.states[before, LAG] > 0.3  # half a wheelbase, 0.9 m, at most; turned over it is negative
     assert rms(error) < 1.0
 
 
@@ -239,7 +245,8 @@ def test_wheels_that_spin_and_slide_on_leaves():
     motion = truth_at_imu(truth, recording)
     error = (recording.odometry["position_m"] - motion["position_m"]).to_numpy()
     assert np.max(np.abs(error)) < 3.0
-    assert np.mean(np.abs(error) < 1.96 * recording.odometry["position_sd_m"]) > 0.9
+    # One ride, whose errors hang together: within three standard deviations everywhere.
+    assert np.all(np.abs(error) < 3.0 * recording.odometry["position_sd_m"])
     slipping = CurveMatchedOdometry().trace(recording)
     sheet = recording.encoder_sheet
     way = recording.encoder["pulse_count"] * 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
