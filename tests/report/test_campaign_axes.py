@@ -19,3 +19,18 @@ def test_an_axis_of_one_ride_leaves_the_others_without_a_value() -> None:
     )
     (axis,) = [axis for axis in campaign_axes(cells) if axis.column == "ride.speed_kmh"]
     assert [axis.word_of(value) for value in cells["ride.speed_kmh"]] == ["-", "247", "259"]
+
+
+def test_the_speeds_of_one_ride_are_told_once() -> None:
+    """Beside the speed of every ride; a scale of that ride alone, which crosses its speeds, is an axis too."""
+    cells = pd.DataFrame(
+        {
+            "cell": range(6),
+            "case": range(6),
+            "ride": ["dip", "ramp", *4 * ["kick"]],
+            "speed_kmh": [16.0, 241.0, 241.0, 241.0, 259.0, 259.0],
+            "ride.speed_kmh": [np.nan, np.nan, 241.0, 241.0, 259.0, 259.0],
+            "ride.rest_s": [np.nan, np.nan, 2.0, 4.0, 2.0, 4.0],
+        }
+    )
+    assert [axis.column for axis in campaign_axes(cells)] == ["speed_kmh", "ride.rest_s", "ride"]

@@ -63,7 +63,9 @@ def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
     columns: list[str] = []
     for name in ordered:
-        if not any(_follows(cells, name, one) and _follows(cells, one, name) for one in columns):
+        # An axis of one ride is NaN in the rows of all others, where the axis of the whole still has a value.
+        own = cells[cells[name].notna()]
+        if not any(_follows(own, name, one) and _follows(own, one, name) for one in columns):
             columns.append(name)
     return [_axis(cells, name) for name in columns]
 
