@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from simrail.report.words.sentences import axis_name
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
@@ -22,6 +23,7 @@ _TITLES = {
     "imu": "IMU",
     "irregularity.scale": "irregularity, times its spectrum",
     "irregularity.spectrum": "irregularity",
+    EXACT_MAP_AXIS: "exact map",
 }
 
 
@@ -135,7 +137,9 @@ def _is_none(value: object) -> bool:
 def _words(value: object) -> str:
     if _is_none(value):
         return "-"
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    if isinstance(value, (int, float)):
         return f"{value:g}"
     text = str(value)
     return Path(text).stem if text.endswith(".toml") else text

@@ -23,7 +23,7 @@ from simrail.report.tables.pivot import Case, map_words
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
-from simrail.report.words.sentences import axis_words
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.table import LEFT_OPEN, NO_SAMPLES, OK
@@ -148,10 +148,11 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
     labels = case.labels
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
     title.append(map_words(labels["map"]))
+    axes = [axis_words(*axis) for axis in case.axes.items() if axis[0] != EXACT_MAP_AXIS]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     return {
-        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in case.axes.items())]),
+        "title": " \u00b7 ".join([*title, *axes]),
         "draws": (words if draws > 1 else "one draw") + f" over {tracks} draws of the track" * (tracks > 1),
         "truth": error_table(case, data.attitude_styles, reference="truth"),
         "design": error_table(case, data.attitude_styles, reference="design"),

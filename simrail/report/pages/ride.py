@@ -24,6 +24,7 @@ from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import axis_words, recording_facts
 from simrail.scenario.build import goals_mm, limits_of
+from simrail.scoring.table import EXACT_MAP
 from simrail.track.bands import BANDS, Band, why_not
 from simrail.track.quality import Limits
 
@@ -105,6 +106,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "left_out": len(left_out),
         "rides_left_out": 0,
         "asks_of_ride": data.asks_of_ride,
+        "has_exact_map": example.cell.get("map", EXACT_MAP) == EXACT_MAP,
     }
 
 
