@@ -207,5 +207,5 @@ def in_order(data: PageData) -> list[SectionMaker]:
     """The parts of the page; where the ride itself is asked for, its figures before what attitudes err by."""
     if not data.asks_of_ride:
         return list(SECTIONS)
-    places = {_failures: -2, _running: -1, campaign_section: SECTIONS.index(_scores)}
+    places: dict[SectionMaker, int] = {_failures: -2, _running: -1, campaign_section: SECTIONS.index(_scores)}
     return sorted(SECTIONS, key=lambda make: places.get(make, SECTIONS.index(make)))

@@ -71,7 +71,8 @@ class PageData:
     @property
     def asks_of_ride(self) -> bool:
         """Whether the ride itself is what is asked for: it is scored, and no method under test is."""
-        return (self.scores["estimator"] == RIDE).any() and all(style.baseline for style in self.styles)
+        is_scored = bool((self.scores["estimator"] == RIDE).any())
+        return is_scored and all(style.baseline for style in self.styles)
 
     @property
     def derailment_limit(self) -> float:
