@@ -185,7 +185,7 @@ def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
 def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch) -> None:
     real = worker.simulate
 
-    def derail(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
+    def derail(ride, *, progress=None, told=None, warn=True):  # type: ignore[no-untyped-def]
         if ride.profile.speed_mps > 10.0:
             raise RuntimeError("derailed: axle front left the rail at s = 100.0 m")
         return real(ride, progress=progress)
@@ -205,7 +205,7 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
 ) -> None:
     calls = []
 
-    def swallow(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
+    def swallow(ride, *, progress=None, told=None, warn=True):  # type: ignore[no-untyped-def]
         # What a C++ library does with an exception in its callback.
         calls.append(ride.name)
         try:
