@@ -19,7 +19,13 @@ from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.aggregate import aggregate
 from simrail.scoring.table import OK, SCORE_COLUMNS
 
-SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
+SHORT = [
+    "ride.end_m=300.0",
+    "ride.acceleration_mps2=2.0",
+    "ride.jerk_mps3=4.0",
+    "ride.rest_s=2.0",
+    "imu.grade='lord_3dm_gx4_25'",
+]
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
