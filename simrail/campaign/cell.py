@@ -217,7 +217,7 @@ def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: 
     watcher.ride_begins(number, count, cell.ride.name)
     with interruptible() as check:
         try:
-            truth = simulate(parts.ride(cell), progress=watcher.ride_goes)
+            truth = simulate(parts.ride(cell), progress=watcher.ride_goes, warn=False)
         except Exception:
             check()  # an engine in C++ may have made an error of its own of Ctrl-C
             raise

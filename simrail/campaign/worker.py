@@ -109,7 +109,7 @@ class _Worker:
             ride = self.parts.ride(cell)
             cached = is_cached(ride)
             begun = time.perf_counter()
-            truth = simulate(ride, progress=progress, told=notes.append)
+            truth = simulate(ride, progress=progress, told=notes.append, warn=False)
             took = time.perf_counter() - begun
             truth = RememberedTruth.of(truth)
             facts = {key: value for key, value in truth.manifest.items() if key != "versions"}

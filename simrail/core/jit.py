@@ -7,6 +7,7 @@ every source that a kernel can take something from, and of numba's version: a ch
 
 import hashlib
 import multiprocessing
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -45,6 +46,8 @@ def kernel_hash() -> str:
 
 
 _KERNELS = str(cache_folder() / "kernels" / kernel_hash())
+# numba reads its settings anew from the environment whenever a variable of its own has changed there.
+os.environ["NUMBA_CACHE_DIR"] = _KERNELS
 numba.config.CACHE_DIR = _KERNELS  # type: ignore[attr-defined]
 
 

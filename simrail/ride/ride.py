@@ -8,6 +8,7 @@ not among them, so a new sensor draw costs no new simulation.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -15,24 +16,22 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
 from simrail.ride.contact_extremes import ContactExtremes
-from simrail.ride.contact_forces import contact_columns
+from simrail.ride.hunting import hunting_warning, with_hunting
 from simrail.ride.kinematic import kinematic_truth, rail_following
-from simrail.ride.truth import Truth, abeam
-from simrail.ride.truth_files import create_arrays, let_go, load_truth, save_truth, write_header
+from simrail.ride.truth import Truth
+from simrail.ride.truth_files import load_truth, save_truth, write_header
+from simrail.ride.truth_rows import TruthRows
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import LaidTrack, lay
 from simrail.track.rail_condition import RailCondition
 from simrail.vehicle.contact.profile_files import profiles_digest
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
-from simrail.vehicle.engines.derailment import DerailedError, Derailment
-from simrail.vehicle.engines.engine import Segment, Setup
-from simrail.vehicle.hunting import critical_below, mean_widening_m, on_gauge
+from simrail.vehicle.engines.derailment import DerailedError
+from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -52,6 +51,7 @@ _SOURCES = (
         "ride/kinematic.py",
         "ride/truth.py",
         "ride/truth_files.py",
+        "ride/truth_rows.py",
     ),
     *("core/rotation.py", "core/seeds.py", "core/jit.py"),
 )
@@ -149,7 +149,11 @@ def is_cached(ride: Ride) -> bool:
 
 
 def simulate(
-    ride: Ride, *, progress: Progress | None = None, told: Callable[[str], None] | None = None
+    ride: Ride,
+    *,
+    progress: Progress | None = None,
+    told: Callable[[str], None] | None = None,
+    warn: bool = True,
 ) -> Truth:
     """Simulate a ride, or find it in the cache.
 
@@ -161,6 +165,9 @@ def simulate(
         Called now and then with (seconds done, seconds in all, speed).
     told : callable, optional
         Called with one line if a ride in the cache was damaged; it is dropped and simulated again.
+    warn : bool
+        Warn (`UserWarning`) of a speed at which the vehicle hunts. A campaign, whose check has said so, does
+        not say it again.
 
     Returns
     -------
@@ -172,6 +179,8 @@ def simulate(
     simrail.vehicle.engines.derailment.DerailedError
         If a wheel leaves the rail.
     """
+    if warn and ride.engine != "kinematic" and (words := hunting_warning(ride, rails_of(ride))):
+        warnings.warn(f"ride {ride.name} {words}", stacklevel=2)
     key = ride_cache.key_of(ride.describe())
     place = ride_cache.folder() / key
     if place.exists():
@@ -191,26 +200,8 @@ def simulate(
             try:
                 _drive(ride, draft, progress)
             except DerailedError as error:
-                raise DerailedError(_with_hunting(error.derailment, ride)) from error
+                raise DerailedError(with_hunting(error.derailment, ride, rails_of(ride))) from error
     return load_truth(place)
-
-
-def _with_hunting(derailment: Derailment, ride: Ride) -> Derailment:
-    """A derailment that the rails do not explain, with hunting as its cause where the vehicle does hunt.
-
-    It does if the axle has swung from side to side above the critical speed: a vehicle that is too fast for a
-    curve leans on one rail.
-    """
-    if derailment.from_the_track or not derailment.swung:
-        return derailment
-    model = on_gauge(ride.vehicle, mean_widening_m(rails_of(ride), ride.profile))
-    critical = critical_below(model, abs(derailment.speed_mps), gravity_mps2=ride.gravity_mps2)
-    if critical is None:
-        return derailment
-    # Wheels that all turn apart do not hunt; what grows is another swing.
-    swing = "hunting" if model.has_wheelsets else "unstable running"
-    cause = f"{swing}, above the critical speed of {3.6 * critical:.0f} km/h; {derailment.cause}"
-    return replace(derailment, cause=cause)
 
 
 def _follow(ride: Ride) -> Truth:
@@ -254,12 +245,9 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     """Run an engine segment by segment into arrays on disk."""
     started = time.perf_counter()
     model, profile = ride.vehicle, ride.profile
-    duration = np.floor(profile.duration_s * ride.rate_hz) / ride.rate_hz
-    rows = round(duration * ride.rate_hz) + 1
-    laid = rails_of(ride)
     setup = Setup(
         model,
-        laid,
+        rails_of(ride),
         profile,
         step_s=ride.step_s,
         rate_hz=ride.rate_hz,
@@ -267,70 +255,29 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
         drive=ride.drive,
     )
     engine = _engine_of(ride.engine)(setup)
-    bodies, wheels = len(model.bodies), len(model.wheels)
-    every = ride.contact_every
-    arrays = create_arrays(folder, rows, bodies=bodies, wheels=wheels, wheel_states=4, contact_every=every)
-    at = arrays["reference_position_m"]
-    place, led = profile.start_m, model.body_names.index(model.guide.body)
-    spins = list(model.spin_inertia_kgm2)
-    turned = np.zeros(wheels)
-    yaw = np.zeros(bodies)
+    rows = TruthRows(ride, folder)
     extremes = ContactExtremes(model, rate_hz=ride.rate_hz, gravity_mps2=ride.gravity_mps2)
-    done = 0
     ready = time.perf_counter()
-    for segment in engine.run(duration):
-        here = slice(done, done + len(segment.time_s))
-        arrays["time_s"][here] = np.arange(done, here.stop) / ride.rate_hz
-        for b in range(bodies):
-            motion = segment.body(b)
-            # The heading is continuous over the segments, too.
-            motion[:, 11] += 2.0 * np.pi * np.round((yaw[b] - motion[0, 11]) / (2.0 * np.pi))
-            yaw[b] = motion[-1, 11]
-            arrays[f"body_{b}"][here] = motion
-        # Where the wheels drive, the vehicle is where they have brought it.
-        if ride.drive == "wheels":
-            at[here] = _places(ride, place, segment, led)
-            place = float(at[here.stop - 1])
-        else:
-            at[here] = profile.motion(arrays["time_s"][here])[0]
-        for w, wheel in enumerate(model.wheels):
-            axle = arrays[f"body_{model.body_names.index(wheel.axle)}"]
-            spin = spins.index(wheel.spin)
-            begin = max(done - 1, 0)
-            pitch_rate, pitch_acceleration = axle[begin : here.stop, 13], axle[begin : here.stop, 16]
-            box = turned[w] + _integral(pitch_rate, pitch_acceleration, 1.0 / ride.rate_hz)
-            turned[w] = box[-1]
-            arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
-            arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
-            if every:
-                kept = slice(-(-here.start // every), -(-here.stop // every))
-                told = segment.contacts[kept.start * every - here.start :: every, w]
-                arrays[f"contact_{w}"][kept] = contact_columns(told)
-        extremes.add(arrays["time_s"][here], segment.contacts)
-        done = here.stop
-        let_go(arrays)
+    for segment in engine.run(rows.duration_s):
+        extremes.add(rows.add(segment), segment.contacts)
         if progress is not None:
             now = float(segment.time_s[-1])
-            progress(now, float(duration), float(profile.motion(now)[1]))
-    for w in range(wheels):
-        arrays[f"wheel_{w}"][:] -= arrays[f"wheel_{w}"][0]
-        let_go(arrays)
+            progress(now, rows.duration_s, float(profile.motion(now)[1]))
+    rows.finish()
     wall = time.perf_counter() - ready
-    for array in arrays.values():
-        array.flush()  # type: ignore[attr-defined]
     write_header(
         folder,
         track=ride.track,
         bodies={body.name: (body.position_m[0], body.position_m[2]) for body in model.bodies},
         wheels={wheel.name: wheel.radius_m for wheel in model.wheels},
         gravity_mps2=ride.gravity_mps2,
-        contact_every=every or 1,
+        contact_every=ride.contact_every or 1,
         manifest={
             **_facts(ride),
-            "simulated_s": float(duration),
+            "simulated_s": rows.duration_s,
             "wall_s": wall,
             "setup_s": ready - started,
-            "real_time_factor": float(duration) / wall,
+            "real_time_factor": rows.duration_s / wall,
             "contact": extremes.summary(),
             "warnings": extremes.warnings(),
             "versions": ride.describe()["versions"],
@@ -349,18 +296,3 @@ def _facts(ride: Ride) -> dict[str, Any]:
         "step_s": ride.step_s,
         "rate_hz": ride.rate_hz,
     }
-
-
-def _places(ride: Ride, begin: float, segment: Segment, led: int) -> np.ndarray:
-    """Where the vehicle's reference point is, s (n,), from the guide's body; ``begin`` is just before."""
-    model, step = ride.vehicle, 1.0 / ride.rate_hz
-    offset = model.bodies[led].position_m[0]
-    ahead = np.einsum("nk,nk->n", segment.velocity[:, led], segment.rotation[:, led, :, 0])
-    guess = begin + offset + np.cumsum(ahead) * step
-    return abeam(ride.track, guess, segment.position[:, led])[4] - offset
-
-
-def _integral(rate: np.ndarray, slope: np.ndarray, step: float) -> np.ndarray:
-    """Running integral (n,) of samples whose derivative is known: Hermite, fourth order."""
-    pieces = step / 2.0 * (rate[:-1] + rate[1:]) + step**2 / 12.0 * (slope[:-1] - slope[1:])
-    return np.concatenate([[0.0], np.cumsum(pieces)])

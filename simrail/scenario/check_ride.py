@@ -9,6 +9,7 @@ import numpy as np
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
+from simrail.ride.hunting import hunting_warning
 from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
 from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
@@ -17,7 +18,6 @@ from simrail.track.design import TrackDesign
 from simrail.track.laid_track import LaidTrack
 from simrail.track.rail_condition import check_conditions
 from simrail.vehicle.engines.step_limit import ACCURATE, contact_resonance
-from simrail.vehicle.hunting import conicity_of, critical_below, mean_widening_m, on_gauge
 from simrail.vehicle.model import VehicleModel
 
 WARN_LATERAL_MPS2 = 1.0
@@ -265,24 +265,9 @@ def _judge_dynamics(resolved: ResolvedCell) -> list[str]:
 
 def _judge_hunting(resolved: ResolvedCell, laid: LaidTrack) -> list[str]:
     """Warn of a speed above that at which the vehicle begins to hunt on these rails."""
-    ride, words = resolved.ride, resolved.cell.ride
-    if ride.engine == "kinematic":
-        return []
-    fastest = float(np.max(np.abs(ride.profile.motion(np.arange(0.0, ride.profile.duration_s, 0.1))[1])))
-    model = on_gauge(ride.vehicle, mean_widening_m(laid, ride.profile))
-    critical = critical_below(model, fastest, gravity_mps2=ride.gravity_mps2)
-    if critical is None:
-        return []
-    cone = conicity_of(model, gravity_mps2=ride.gravity_mps2)
-    # Wheels that all turn apart have no conicity to hunt by; what grows is another swing.
-    does = "hunts" if ride.vehicle.has_wheelsets else "runs unstably"
-    on = "" if cone is None else f" with equivalent conicity {cone:.2f} at 3 mm,"
-    gauge_mm = 1e3 * model.wheel_rail.gauge_m
-    return [
-        f"ride[{resolved.cell.ride_index}] ({words.name}) reaches {3.6 * fastest:.0f} km/h: "
-        f"{ride.vehicle.name} {does} above {3.6 * critical:.0f} km/h on these rails,{on} "
-        f"gauge {gauge_mm:.0f} mm; what grows there ends at the flanges only"
-    ]
+    warning = hunting_warning(resolved.ride, laid)
+    cell = resolved.cell
+    return [f"ride[{cell.ride_index}] ({cell.ride.name}) {warning}"] if warning else []
 
 
 def _judge_wheels(resolved: ResolvedCell) -> None:

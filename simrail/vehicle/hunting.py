@@ -9,7 +9,7 @@ import hashlib
 import json
 from contextlib import suppress
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,44 @@ SHARES = (0.5, 0.75, 1.0)
 ACCURACY_MPS = 0.05
 WORTH_M = 1e-3
 """A gauge that is off by less is that of the vehicle's file."""
+
+
+class Hunting(NamedTuple):
+    """A vehicle that hunts on the rails of a ride.
+
+    Attributes
+    ----------
+    model : VehicleModel
+        The vehicle on their mean gauge.
+    critical_mps : float
+        Speed above which it hunts there.
+    """
+
+    model: VehicleModel
+    critical_mps: float
+
+
+def hunting_on(
+    laid: LaidTrack, model: VehicleModel, profile: SpeedProfile, *, top_mps: float, gravity_mps2: float
+) -> Hunting | None:
+    """Whether a vehicle hunts below a speed on the rails of a ride; None if it does not.
+
+    Parameters
+    ----------
+    laid : LaidTrack
+        The rails.
+    model : VehicleModel
+        The vehicle, on the gauge of its file.
+    profile : SpeedProfile
+        Where it runs: over that way the gauge is averaged.
+    top_mps : float
+        Speed up to which it matters.
+    gravity_mps2 : float
+        Gravity.
+    """
+    here = on_gauge(model, mean_widening_m(laid, profile))
+    critical = critical_below(here, top_mps, gravity_mps2=gravity_mps2)
+    return None if critical is None else Hunting(here, critical)
 
 
 def on_gauge(model: VehicleModel, wider_m: float) -> VehicleModel:

@@ -15,7 +15,9 @@ from simrail.core.toml_files import shipped
 from simrail.scenario.scenario import Scenario, load_scenario
 
 SHORT = [
-    "ride.end_m=150.0",
+    "ride.end_m=70.0",
+    "ride.acceleration_mps2=2.0",
+    "ride.jerk_mps3=4.0",
     "ride.rest_s=1.0",
     "ride.final_rest_s=1.0",
     "imu.grade='lord_3dm_gx4_25'",
@@ -103,7 +105,7 @@ def write_noting(folder: Path) -> Path:
     text = shipped("scenario")["quick_kinematic"].read_text()
     head = text[: text.index("[[estimator]]")]
     for old, new in (
-        ("end_m = 590.0", "end_m = 150.0"),
+        ("end_m = 590.0", "end_m = 70.0\nacceleration_mps2 = 2.0\njerk_mps3 = 4.0"),
         ("rest_s = 10.0", "rest_s = 1.0"),
         ("speed_kmh = 50.0", "speed_kmh = [30.0, 50.0]"),
         ("sensor_draws = 2", "sensor_draws = 4"),

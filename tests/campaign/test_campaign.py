@@ -19,7 +19,13 @@ from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.aggregate import aggregate
 from simrail.scoring.table import OK, SCORE_COLUMNS
 
-SHORT = ["ride.end_m=300.0", "ride.rest_s=2.0", "imu.grade='lord_3dm_gx4_25'"]
+SHORT = [
+    "ride.end_m=300.0",
+    "ride.acceleration_mps2=2.0",
+    "ride.jerk_mps3=4.0",
+    "ride.rest_s=2.0",
+    "imu.grade='lord_3dm_gx4_25'",
+]
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
@@ -185,7 +191,7 @@ def test_failures_are_rows_and_the_others_go_on(tmp_path: Path) -> None:
 def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch) -> None:
     real = worker.simulate
 
-    def derail(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
+    def derail(ride, *, progress=None, told=None, warn=True):  # type: ignore[no-untyped-def]
         if ride.profile.speed_mps > 10.0:
             raise RuntimeError("derailed: axle front left the rail at s = 100.0 m")
         return real(ride, progress=progress)
@@ -205,7 +211,7 @@ def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
 ) -> None:
     calls = []
 
-    def swallow(ride, *, progress=None, told=None):  # type: ignore[no-untyped-def]
+    def swallow(ride, *, progress=None, told=None, warn=True):  # type: ignore[no-untyped-def]
         # What a C++ library does with an exception in its callback.
         calls.append(ride.name)
         try:

@@ -27,7 +27,7 @@ from simrail.scenario.cells import Cell, cells
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.score import score
 
-QUICK = ["ride.end_m=150.0", "ride.rest_s=1.0", "ride.speed_kmh=30.0"]
+QUICK = ["ride.end_m=150.0", "ride.acceleration_mps2=2.0", "ride.rest_s=1.0", "ride.speed_kmh=30.0"]
 SETTINGS = [word for setting in QUICK for word in ("--set", setting)]
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -92,7 +92,7 @@ position_m = [0.5, 0.1, 0.7]
 roll_deg = 3.0
 """
     (here / "two.toml").write_text(text)
-    scenario = load_scenario("two.toml", overrides=[*QUICK[:2], "ride.speed_kmh=[20.0, 30.0]"])
+    scenario = load_scenario("two.toml", overrides=[*QUICK[:-1], "ride.speed_kmh=[20.0, 30.0]"])
     names = export(scenario, here / "out", format="parquet")
     assert len(names) == 6 == len(set(names))
     first = [cell for cell in cells(scenario) if cell.sensor_draw == 0]

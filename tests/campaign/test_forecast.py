@@ -26,6 +26,7 @@ SETTINGS = [
     "score.windows=['whole', 'curve', 'curve:*']",
     "ride.rest_s=2.0",
     "ride.end_m=420.0",
+    "ride.acceleration_mps2=2.0",
 ]
 
 

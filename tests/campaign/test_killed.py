@@ -16,9 +16,11 @@ from typing import Protocol
 import pandas as pd
 import pytest
 
+from simrail import results
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.checkpoint import Checkpoint
-from simrail.cli.main import DONE, INTERRUPTED
+from simrail.campaign.executors import _begin_worker
+from simrail.cli.main import DONE, INTERRUPTED, call
 from simrail.scenario.scenario import load_scenario
 
 WORKERS, BATCH_CELLS = 2, 2
@@ -110,15 +112,66 @@ def wait_while(condition: Callable[[], bool], *, at_most_s: float) -> None:
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize(("kills", "cells"), [(1, 12), pytest.param(50, 600, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
+def test_ended_midway_no_process_outlives_it_and_gone_on_with_it_ends_with_the_same_bits(
+    number: signal.Signals,
+    noting_file: Path,
+    notes: Notes,
+    tmp_path: Path,
+    assert_same: Callable[[pd.DataFrame, pd.DataFrame], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Ctrl-C, which the terminal sends to the main process and to its workers alike; or a kill of the first.
+
+    Once a batch is kept and both workers have begun; this process, not a third one, does the rest.
+    """
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    whole = run_campaign(load_scenario(noting_file))
+    notes.file.unlink()
+    run = ["run", str(noting_file), "--set", "estimator.noting.options.sleep_s=0.5", "--workers"]
+    words = [sys.executable, str(program), str(BATCH_CELLS), *run, str(WORKERS)]
+    process = subprocess.Popen(
+        words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True
+    )
+    folder = tmp_path / "results"
+
+    def begun() -> bool:
+        at_work = {pid for pid, _ in notes if pid != process.pid}
+        return len(at_work) == WORKERS and any(folder.glob(".mine.unfinished-*/[!.]*.parquet"))
+
+    wait_while(lambda: process.poll() is None and not begun(), at_most_s=120.0)
+    assert process.poll() is None
+    (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+    _, said = process.communicate(timeout=60)
+    if number == signal.SIGINT:
+        assert process.returncode == INTERRUPTED
+        assert said.decode().splitlines()[-1].startswith("simrail: interrupted") and b"Traceback" not in said
+    wait_while(lambda: any(alive(pid) for pid, _ in notes), at_most_s=10.0)
+    assert not any(alive(pid) for pid, _ in notes), "a worker outlives the main process"
+    asked = sum(pid != process.pid for pid, _ in notes)
+    (unfinished,) = folder.glob(".mine.unfinished-*")
+    kept = len(Checkpoint(unfinished).cells())
+    assert 0 < kept < len(whole.cells) and asked - kept <= WORKERS * BATCH_CELLS
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(results, "write_report", lambda path, **keywords: path.write_text("<html></html>"))
+    assert call([*run, "1"]) == DONE
+    assert_same(whole.scores, pd.read_parquet(folder / "mine" / "scores.parquet"))
+    assert [path.name for path in folder.iterdir()] == ["mine"]
+    assert "going on with an unfinished run" in (folder / "mine" / "run.log").read_text()
+    # What was kept is not run again; an example of each of the two rides is.
+    assert sum(pid == os.getpid() for pid, _ in notes) == len(whole.cells) - kept + 2
+
+
+@pytest.mark.slow
 def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
-    kills: int,
-    cells: int,
     noting_file: Path,
     notes: Notes,
     tmp_path: Path,
     assert_same: Callable[[pd.DataFrame, pd.DataFrame], None],
 ) -> None:
+    """Fifty times, main processes and workers."""
+    kills, cells = 50, 600
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     settings = ["--set", f"monte_carlo.sensor_draws={cells // 2}"]
@@ -128,8 +181,7 @@ def test_killed_and_gone_on_with_each_time_ends_with_the_same_bits(
     killed, kept = run_with_kills(
         kills, [*words, "--workers", str(WORKERS)], notes, tmp_path, cells=cells, seed=kills
     )
-    # A quick machine may be done before the last of a few kills.
-    assert killed == kills if cells > 100 else 0 < killed <= kills
+    assert killed == kills
     folder = tmp_path / "results"
     assert_same(whole.scores, pd.read_parquet(folder / "mine" / "scores.parquet"))
     assert [path.name for path in folder.iterdir()] == ["mine"]
@@ -172,19 +224,22 @@ def test_killed_with_a_stop_rule_it_stops_where_it_would_have(
     assert "going on with an unfinished run" in (folder / "run.log").read_text()
 
 
-def test_ctrl_c_ends_all_processes_in_one_line(noting_file: Path, notes: Notes, tmp_path: Path) -> None:
-    """The terminal sends it to the main process and to its workers alike."""
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM)
-    slow = ["--set", "estimator.noting.options.sleep_s=0.5", "--workers", str(WORKERS)]
-    words = [sys.executable, str(program), str(BATCH_CELLS), "run", str(noting_file), *slow]
-    process = subprocess.Popen(
-        words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True
-    )
-    wait_while(lambda: process.poll() is None and len({pid for pid, _ in notes}) < WORKERS, at_most_s=120.0)
-    os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert process.returncode == INTERRUPTED
-    assert said.decode().splitlines()[-1].startswith("simrail: interrupted") and b"Traceback" not in said
-    wait_while(lambda: any(alive(pid) for pid, _ in notes), at_most_s=5.0)
-    assert not any(alive(pid) for pid, _ in notes)
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a process that outlives another")
+def test_a_worker_whose_parent_is_gone_ends_itself() -> None:
+    """A kill tells nobody: a worker looks who its parent is. The kill of a whole run is slow."""
+    mine, theirs = os.pipe()
+    parent = os.fork()
+    if parent == 0:
+        if os.fork() == 0:
+            _begin_worker(os.getppid())
+            os.write(theirs, str(os.getpid()).encode())
+            time.sleep(60.0)
+        else:
+            time.sleep(60.0)
+        os._exit(0)
+    worker = int(os.read(mine, 20))
+    assert alive(parent) and alive(worker)
+    os.kill(parent, signal.SIGKILL)
+    os.waitpid(parent, 0)
+    wait_while(lambda: alive(worker), at_most_s=10.0)
+    assert not alive(worker)

@@ -1,10 +1,15 @@
 """A scenario that asks for running safety, comfort and the decay of a kick: scores, page, printed lines."""
 
+import re
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from rich.console import Console
 
 from simrail.cli.score_tables import print_scores
+from simrail.report.pages.page import SECTIONS, in_order
+from simrail.report.pages.section import PageData
 from simrail.report.tables.pivot import cases
 from simrail.report.tables.running import running_table
 from simrail.results import run
@@ -111,6 +116,27 @@ def test_the_page_and_the_printed_lines(results, capsys):
     assert "two_axle_wagon on ride out: the kick decays at all speeds from 20 to 28 km/h" in printed
     unloading = figures(results, ride="out", quantity="wheel_unloading", metric="max", window="whole")
     assert f"{1.0 - unloading['value'].iloc[0]:.3f}" in page
+
+
+def test_the_page_begins_with_the_ride_where_no_method_is_under_test(results):
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    first, *anchors = re.findall(r'<h2 id="([\w-]+)"', page)
+    assert first == "failures"  # what a standing vehicle has not
+    rides = [name for name in anchors if name.startswith("ride-")]
+    assert anchors[0] == "running" and anchors[1 : 1 + len(rides)] == rides
+    assert anchors.index("track") < anchors.index("campaign") < anchors.index("scores")
+    of_ride = page[page.index('<h2 id="ride-out') : page.index('<h2 id="track"')]
+    places = [
+        of_ride.index(words) for words in ("least Q/Q", "True speed over distance", "Attitude over dist")
+    ]
+    assert places == sorted(places)
+    assert "Position error of the odometry" not in page  # it is the true one
+
+
+def test_the_page_of_a_method_under_test_keeps_its_order(results):
+    scenario = SimpleNamespace(scores=results.campaign.scores, styles=[SimpleNamespace(baseline="")])
+    assert not PageData.asks_of_ride.fget(scenario)
+    assert in_order(SimpleNamespace(asks_of_ride=False)) == list(SECTIONS)
 
 
 def test_the_table_of_the_page_holds_y_over_q_against_the_limit_of_the_scenario(results):

@@ -22,7 +22,13 @@ from simrail.core.toml_files import shipped
 from simrail.scoring.table import SCORE_COLUMNS
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
-QUICK = ["--set", "ride.end_m=200.0", "--set", "ride.rest_s=1.0", "--set", "imu.grade='lord_3dm_gx4_25'"]
+SETTINGS = [
+    "ride.end_m=200.0",
+    "ride.acceleration_mps2=2.0",
+    "ride.rest_s=1.0",
+    "imu.grade='lord_3dm_gx4_25'",
+]
+QUICK = [word for setting in SETTINGS for word in ("--set", setting)]
 FILES = {"manifest.json", "scores.parquet", "scores.csv", "cells.parquet", "report.html", "run.log"}
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -250,8 +256,7 @@ def test_estimator_template_is_a_good_estimator(here: Path) -> None:
     module = module_from_spec(spec)
     sys.modules["my_filter"] = module
     spec.loader.exec_module(module)
-    settings = [word for word in QUICK if word != "--set"]
-    example = run_campaign(load_scenario("quick_kinematic", overrides=settings)).examples[0]
+    example = run_campaign(load_scenario("quick_kinematic", overrides=SETTINGS)).examples[0]
     check_estimator(module.MyFilter(), example.recording)
 
 

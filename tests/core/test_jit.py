@@ -1,6 +1,9 @@
 """The cache of compiled kernels holds nothing that an edited source has made old."""
 
 import ast
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,3 +59,31 @@ def test_another_layout_of_a_record_is_another_cache(monkeypatch: pytest.MonkeyP
         monkeypatch.undo()
         jit.source_hash.cache_clear()
     assert jit.kernel_hash() == before
+
+
+LATER = """
+import os, sys
+from simrail.core import jit
+os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"  # any of numba's own
+sys.path.insert(0, sys.argv[1])
+import late_kernel
+late_kernel.twice(3.0)
+"""
+
+
+def test_a_setting_of_numba_after_the_import_leaves_the_cache_where_it_is(tmp_path: Path) -> None:
+    """numba reads its settings anew before it compiles the first kernel; the second is decorated later."""
+    sources = tmp_path / "sources"
+    sources.mkdir()
+    kernels = (
+        "from simrail.core.jit import njit\n\n\n@njit\ndef once(x):\n    return x + 1.0\n\n\nonce(1.0)\n\n\n"
+        "@njit\ndef twice(x):\n    return 2.0 * x\n"
+    )
+    (sources / "late_kernel.py").write_text(kernels)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    environment |= {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", LATER, str(sources)]
+    subprocess.run(command, check=True, env=environment, capture_output=True, timeout=120)
+    assert [path.name for path in sources.rglob("*")] == ["late_kernel.py"]
+    kept = {path.name.partition("-")[0] for path in (tmp_path / "cache").rglob("*.nbi")}
+    assert kept == {"late_kernel.once", "late_kernel.twice"}

@@ -78,7 +78,7 @@ def test_natural_frequencies_with_the_wheelsets_held():
 @pytest.mark.parametrize(
     ("conicity", "kmh", "hz"),
     [
-        (0.10, 299.0, 3.75),
+        pytest.param(0.10, 299.0, 3.75, marks=pytest.mark.slow),
         pytest.param(0.15, 280.0, 4.53, marks=pytest.mark.slow),
         pytest.param(0.20, 261.0, 5.12, marks=pytest.mark.slow),
         (0.30, 227.0, 5.96),

@@ -52,7 +52,7 @@ def rough_ride():
 
 @pytest.fixture(scope="module")
 def smooth_curve_ride():
-    profile = SpeedProfile(100.0, 500.0, 15.0, rest_s=2.0, final_rest_s=1.0, acceleration_mps2=1.0)
+    profile = SpeedProfile(100.0, 400.0, 15.0, rest_s=1.0, final_rest_s=0.5, acceleration_mps2=1.5)
     return simulate(Ride("smooth curve", track("smooth_curve"), SMOOTH, 0, vehicle(), profile))
 
 

@@ -96,7 +96,7 @@ def test_kernel_and_native_rods_agree(laid):
     assert worst_rms(hook[1], native[1]) < 1e-6
 
 
-@pytest.mark.parametrize("fault", ["stiffness_npm", "outer_position_m"])
+@pytest.mark.parametrize("fault", ["stiffness_npm", pytest.param("outer_position_m", marks=pytest.mark.slow)])
 def test_small_faults_of_one_rod_would_be_seen(laid, fault):
     """One of the rods 1e-3 stiffer, or 1 mm aside: beyond the tolerance."""
     model = vehicle("irw_car")

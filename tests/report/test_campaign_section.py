@@ -358,8 +358,17 @@ def page_of(
     return path.read_text(encoding="utf-8")
 
 
-def test_the_page_has_the_section_and_its_tables(made_up: Scenario, small: Scores, tmp_path: Path) -> None:
-    page = page_of(made_up, *small, tmp_path)
+@pytest.fixture(scope="module")
+def small_page(made_up: Scenario, small: Scores, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of `small`, by a command that sets it beside another run."""
+    folder = tmp_path_factory.mktemp("small")
+    manifest = {**MANIFEST, "command": "simrail run made_up.toml --beside results/other"}
+    page_of(made_up, *small, folder, manifest)
+    return folder / "report.html"
+
+
+def test_the_page_has_the_section_and_its_tables(small_page: Path) -> None:
+    page = small_page.read_text(encoding="utf-8")
     for words in (
         'id="campaign"',
         "864 cells over",
@@ -371,23 +380,22 @@ def test_the_page_has_the_section_and_its_tables(made_up: Scenario, small: Score
         CURVES[0].removeprefix("curve:"),
     ):
         assert words in page, words
-    assert {path.suffix for path in (tmp_path / TABLES).iterdir()} == {".csv", ".tex"}
+    assert {path.suffix for path in (small_page.parent / TABLES).iterdir()} == {".csv", ".tex"}
     assert "nan" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL).lower().split()
 
 
-def test_a_cell_is_made_again_without_what_stands_beside(
-    made_up: Scenario, small: Scores, tmp_path: Path
-) -> None:
+def test_a_cell_is_made_again_without_what_stands_beside(small_page: Path) -> None:
     """`simrail run` refuses both together."""
-    manifest = {**MANIFEST, "command": "simrail run made_up.toml --beside results/other"}
-    page = page_of(made_up, *small, tmp_path, manifest)
+    page = small_page.read_text(encoding="utf-8")
     assert "<code>simrail run made_up.toml --cell " in page and "--beside results/other --cell" not in page
     assert "<pre>simrail run made_up.toml --beside results/other</pre>" in page
 
 
-def test_intervals_say_whether_they_are_over_tracks(made_up: Scenario, tmp_path: Path) -> None:
-    for tracks in (2, 1):
-        page = page_of(made_up, *campaign(tracks=tracks, sensors=3), tmp_path)
+def test_intervals_say_whether_they_are_over_tracks(
+    made_up: Scenario, small_page: Path, tmp_path: Path
+) -> None:
+    of_one = page_of(made_up, *campaign(tracks=1, sensors=3), tmp_path)
+    for page, tracks in ((small_page.read_text(encoding="utf-8"), 3), (of_one, 1)):
         assert ("from resampled tracks" in page) is (tracks > 1)
         assert ("with one track only" in page) is (tracks == 1)
 

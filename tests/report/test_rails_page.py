@@ -401,6 +401,10 @@ def test_one_line_stands_for_all_that_are_alike(ran: Ran) -> None:
 def test_beside_rails_few_attitudes_are_drawn_and_the_rest_counted(
     ran: Ran, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    for other in ("rms", "curves", "speed", "imu", "error", "odometry"):
+        monkeypatch.setattr(f"simrail.report.pages.ride.{other}_figure", lambda *_, **__: "")
+    monkeypatch.setattr("simrail.report.pages.ride.geometry_view", lambda *_, **__: "rails")
+
     def drawn() -> tuple[int, bool]:
         shown = ride_data(ran.data, ran.example)
         return shown["left_out"], "camera free" in shown["attitude"]

@@ -6,9 +6,11 @@ import pytest
 from simrail.core.toml_files import load
 from simrail.ride.contact_extremes import ContactExtremes
 from simrail.vehicle.contact.contact import CONTACT
+from simrail.vehicle.engines import derailment
 from simrail.vehicle.file import VehicleFile
 
 RATE_HZ = 1000.0
+FORCES = ("guiding_n", "load_n")
 
 
 @pytest.fixture(scope="module")
@@ -44,18 +46,29 @@ def summary(bogie, time_s, told, pieces=1):
     return extremes.summary(), extremes.warnings()
 
 
-def sliding_means(told, wheel, values):
-    """Means (n,) over the last 2 m of way, row by row, of the polyline through the values; NaN before."""
+def sliding_means(told, wheel, values, ends_m=None):
+    """Means over the 2 m of way before some places of it, by default each row, of the polyline of values."""
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(told["position_m"][:, wheel])))])
-    means = np.full(len(way), np.nan)
-    for i in np.flatnonzero(way >= 2.0):
-        inside = (way > way[i] - 2.0) & (np.arange(len(way)) <= i)
-        x = np.concatenate([[way[i] - 2.0], way[inside]])
-        first = np.flatnonzero(inside)[0]
-        share = (x[0] - way[first - 1]) / (way[first] - way[first - 1])
-        y = np.concatenate([[(1 - share) * values[first - 1] + share * values[first]], values[inside]])
-        means[i] = np.trapezoid(y, x) / 2.0
-    return means
+    if ends_m is None:
+        ends_m = way[way >= 2.0]
+
+    def at(place, after):
+        share = (place - way[after - 1]) / (way[after] - way[after - 1])
+        return (1.0 - share) * values[after - 1] + share * values[after]
+
+    means = []
+    for end in ends_m:
+        first, last = np.searchsorted(way, end - 2.0, side="right"), np.searchsorted(way, end)
+        x = np.concatenate([[end - 2.0], way[first:last], [end]])
+        y = np.concatenate([[at(end - 2.0, first)], values[first:last], [at(end, last)]])
+        means.append(np.trapezoid(y, x) / 2.0)
+    return np.array(means)
+
+
+def every_step(told):
+    """Ends of the windows: each 0.1 m of way, from 2 m on."""
+    way = np.abs(np.diff(told["position_m"][:, 0])).sum()
+    return 0.1 * np.arange(20, int(way / 0.1 + 1e-9) + 1)
 
 
 def test_extremes_of_the_rows_themselves(bogie):
@@ -80,17 +93,55 @@ def test_extremes_of_the_rows_themselves(bogie):
 
 
 def test_sliding_means_over_two_metres(bogie):
-    """At every row, by an integral of its own: rests and the way back included. Rounding and 1 mm of way."""
+    """Every 0.1 m, by an integral of its own: rests and the way back included."""
     time_s, told = ride()
     said, _ = summary(bogie, time_s, told)
-    side = np.array([1.0, -1.0, 1.0, -1.0])
-    quotient = -side * told["guiding_n"] / told["load_n"]
-    best = max(np.nanmax(sliding_means(told, w, quotient[:, w])) for w in range(4))
-    assert said["greatest_y_over_q_2m"]["value"] == pytest.approx(best, rel=1e-4)
-    assert best < 0.97 * quotient.max()
+    side, ends = np.array([1.0, -1.0, 1.0, -1.0]), every_step(told)
+
+    def quotients(wheel, ends_m):
+        outward, load = (sliding_means(told, wheel, told[name][:, wheel], ends_m) for name in FORCES)
+        return -side[wheel] * outward / load
+
+    best = max(quotients(w, ends).max() for w in range(4))
+    assert said["greatest_y_over_q_2m"]["value"] == pytest.approx(best, rel=1e-9)
+    assert best < 0.97 * (-side * told["guiding_n"] / told["load_n"]).max()
     summed = told["guiding_n"].reshape(-1, 2, 2).sum(axis=2)
-    best = max(np.nanmax(np.abs(sliding_means(told, 2 * a, summed[:, a]))) for a in range(2))
-    assert said["greatest_sum_y_2m_n"]["value"] == pytest.approx(best, rel=1e-4)
+    best = max(np.abs(sliding_means(told, 2 * a, summed[:, a], ends)).max() for a in range(2))
+    assert said["greatest_sum_y_2m_n"]["value"] == pytest.approx(best, rel=1e-9)
+    # Between two of them a mean of v is off by (v(s) - v(s - 2 m)) / 2 m times half a step at the most.
+    steepest = np.ptp(summed, axis=0).max() / 2.0
+    at_rows = max(np.abs(sliding_means(told, 2 * a, summed[:, a])).max() for a in range(2))
+    assert best <= at_rows + 0.05 * steepest and at_rows <= best + 0.05 * steepest
+
+
+@pytest.mark.parametrize("in_the_air", [0.0, 0.5])
+def test_y_over_q_is_that_of_a_derailments_message(bogie, in_the_air):
+    """Y over Q, each in the mean: a wheel that rattles presses its rail as one that does not."""
+    place = np.arange(1000) * 0.01
+    told = told_of(place, np.full((1000, 4), 40e3), np.tile([-12e3, 0.0, 0.0, 0.0], (1000, 1)))
+    for name in ("load_n", "guiding_n", "normal_n"):
+        told[name][np.arange(1000) % 10 < 10 * in_the_air, 0] = 0.0
+    said, _ = summary(bogie, np.arange(1000) / RATE_HZ, told)
+    assert said["greatest_y_over_q_2m"]["value"] == pytest.approx(0.3, rel=1e-9)
+    assert derailment._y_over_q(told[:, 0], 1) == pytest.approx(0.3, rel=1e-9)
+
+
+def test_a_wheel_in_the_air_for_two_metres_has_no_quotient(bogie):
+    place = np.arange(1000) * 0.01
+    told = told_of(place, np.zeros((1000, 4)), np.zeros((1000, 4)))
+    said, _ = summary(bogie, np.arange(1000) / RATE_HZ, told)
+    assert "greatest_y_over_q_2m" not in said and said["greatest_sum_y_2m_n"]["value"] == 0.0
+
+
+def test_rows_farther_apart_than_the_means(bogie):
+    """0.37 m from row to row: three or four means in between, of the same polyline."""
+    rng = np.random.default_rng(5)
+    place = np.arange(200) * 0.37
+    told = told_of(place, rng.uniform(30e3, 50e3, (200, 4)), rng.uniform(-9e3, 9e3, (200, 4)))
+    said, _ = summary(bogie, np.arange(200) / RATE_HZ, told)
+    summed = told["guiding_n"].reshape(-1, 2, 2).sum(axis=2)
+    best = max(np.abs(sliding_means(told, 2 * a, summed[:, a], every_step(told))).max() for a in range(2))
+    assert said["greatest_sum_y_2m_n"]["value"] == pytest.approx(best, rel=1e-9)
 
 
 def test_pieces_give_the_same_as_the_whole(bogie):

@@ -1,4 +1,7 @@
-"""A ride above its vehicle's critical speed is warned of before it runs; slower ones are not."""
+"""A ride above its vehicle's critical speed is warned of before it runs; slower ones are not.
+
+The search for that speed, which takes seconds, is that of `tests/vehicle/test_hunting.py`.
+"""
 
 import pytest
 
@@ -22,18 +25,34 @@ def warnings(*settings):
     return judge_scenario(load_scenario("quick_kinematic", overrides=[*FAST, *settings])).warnings
 
 
-def test_a_speed_above_the_critical_one_is_warned_of():
+@pytest.fixture
+def known(monkeypatch):
+    """The critical speed is told, not searched for."""
+
+    def critical_below(model, top_mps, *, gravity_mps2):
+        assert model.name == "two_axle_wagon" and gravity_mps2 == 9.81
+        return 212.0 / 3.6 if top_mps > 212.0 / 3.6 else None
+
+    monkeypatch.setattr("simrail.scenario.check_ride.critical_below", critical_below)
+
+
+@pytest.mark.parametrize("how", ["known", pytest.param("searched", marks=pytest.mark.slow)])
+def test_a_speed_above_the_critical_one_is_warned_of(how, request):
     """212 km/h by the search of `simrail vehicle two_axle_wagon`."""
+    if how == "known":
+        request.getfixturevalue("known")
     (line,) = warnings("ride.speed_kmh=230.0")
     assert line.startswith("ride[0] (out) reaches 230 km/h: two_axle_wagon hunts above 21")
     assert "equivalent conicity 0." in line and "gauge 1435 mm" in line
 
 
+@pytest.mark.usefixtures("known")
 @pytest.mark.parametrize("settings", [["ride.speed_kmh=120.0"], ["ride.speed_kmh=230.0", "engine=kinematic"]])
 def test_nothing_is_said_below_it_or_of_a_body_that_follows_the_rails(settings):
     assert warnings(*settings) == ()
 
 
+@pytest.mark.usefixtures("known")
 def test_what_counts_is_the_speed_that_is_reached():
     """On 360 m it is not the 230 km/h that are asked for."""
     (line,) = warnings("ride.speed_kmh=230.0", "ride.end_m=380.0")

@@ -190,7 +190,7 @@ def test_that_is_exit_code_2_and_nothing_written(tmp_path: Path, capsys: pytest.
 def test_an_odometry_of_ones_own_is_used_by_the_filters(own: Path) -> None:
     """It misses a fifth of the way, and so compensation comes in the wrong places; VQF asks nobody."""
     axis = '["encoder", "./mine.py:Mine"]'
-    result = run_campaign(scenario_of("AttitudeEkf", "Vqf", odometry=axis, folder=own), workers=2)
+    result = run_campaign(scenario_of("AttitudeEkf", "Vqf", odometry=axis, folder=own))
     assert not result.failures
     by_odometry = dict(list(result.scores.groupby("odometry", observed=True)))
     assert set(by_odometry) == {"encoder", "./mine.py:Mine"}

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from simrail.report.words.sentences import axis_name
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
@@ -22,6 +23,7 @@ _TITLES = {
     "imu": "IMU",
     "irregularity.scale": "irregularity, times its spectrum",
     "irregularity.spectrum": "irregularity",
+    EXACT_MAP_AXIS: "exact map",
 }
 
 
@@ -63,7 +65,9 @@ def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
     columns: list[str] = []
     for name in ordered:
-        if not any(_follows(cells, name, one) and _follows(cells, one, name) for one in columns):
+        # An axis of one ride is NaN in the rows of all others, where the axis of the whole still has a value.
+        own = cells[cells[name].notna()]
+        if not any(_follows(own, name, one) and _follows(own, one, name) for one in columns):
             columns.append(name)
     return [_axis(cells, name) for name in columns]
 
@@ -133,7 +137,9 @@ def _is_none(value: object) -> bool:
 def _words(value: object) -> str:
     if _is_none(value):
         return "-"
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    if isinstance(value, (int, float)):
         return f"{value:g}"
     text = str(value)
     return Path(text).stem if text.endswith(".toml") else text

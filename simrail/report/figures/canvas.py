@@ -19,7 +19,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from simrail.core.jit import FloatArray
 from simrail.report.figures.decimate import Bins, Envelope
@@ -224,9 +224,16 @@ def fit_limits(axis: Axes, lines: Sequence[FloatArray], *, top: float = 0.08) ->
 
 
 def log_ticks(axis: Axis) -> None:
-    """Label a logarithmic axis without exponents: at 1, 2 and 5 of each decade, or at 1 of many."""
-    low, high = axis.get_view_interval()
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60.0 * low else (1.0,)))
+    """Label a logarithmic axis without exponents: at 1, 2 and 5 of each decade, or at 1 of many.
+
+    Where fewer than two of these are in sight, at two to four even steps.
+    """
+    low, high = sorted(axis.get_view_interval())
+    subs = (1.0, 2.0, 5.0) if high < 60.0 * low else (1.0,)
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
+    marks = np.outer(decades, subs)
+    few = np.count_nonzero((low <= marks) & (marks <= high)) < 2
+    axis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]) if few else LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
@@ -339,8 +346,8 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     text = out.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
-    # A tenth of a point is 0.13 pixels.
-    text = re.sub(r"(\.\d)\d{3,}", r"\1", text)
+    # A tenth of a point is 0.13 pixels. Only within tags: a label of 0.0001 is no place.
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d)\d{3,}", r"\1", tag.group()), text)
     # Several figures share the page: an id that nothing refers to would only stand there twice.
     used = set(re.findall(r"#([\w-]+)", text))
     text = re.sub(r' id="([\w.-]+)"', lambda m: m.group(0) if m.group(1) in used else "", text)

@@ -10,6 +10,8 @@ from simrail.report.words.sentences import listed
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 
 _KIND_COLOUR = {STRAIGHT: "#98a1af", TRANSITION: "#56B4E9", CURVE: "#D55E00"}
+_ROOM = 0.05
+"""Share of the length of a plan that words need beside each other."""
 _KIND_WORD = {STRAIGHT: "straight", TRANSITION: "transition", CURVE: "curve"}
 
 
@@ -42,12 +44,7 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
             axis.plot(*turned[reach].T, color=_KIND_COLOUR[k], lw=3.0, solid_capstyle="butt", label=word)
             named.add(k)
         _name_curves(axis, track, s, turned)
-        for label, at in stops.items():
-            place = (float(np.interp(at, s, turned[:, 0])), float(np.interp(at, s, turned[:, 1])))
-            axis.plot(*place, marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=5)
-            axis.annotate(
-                label, place, (0, -15), textcoords="offset points", ha="center", fontsize=8.4, color=INK
-            )
+        _mark_stops(axis, {label: _place(at, s, turned) for label, at in stops.items()}, span[0])
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(x=0.03, y=0.22)
         axis.grid(False)
@@ -122,12 +119,31 @@ def _along_the_page(xy: FloatArray) -> FloatArray:
     return turned
 
 
+def _place(at_m: float, s: FloatArray, xy: FloatArray) -> tuple[float, float]:
+    return float(np.interp(at_m, s, xy[:, 0])), float(np.interp(at_m, s, xy[:, 1]))
+
+
+def _mark_stops(axis: Axes, places: dict[str, tuple[float, float]], span_m: float) -> None:
+    """Circles with their words below them, or to the sides of circles that are close together."""
+    left = min(places.values())
+    close = np.ptp([place[0] for place in places.values()]) < _ROOM * span_m
+    for label, place in places.items():
+        axis.plot(*place, marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=5)
+        shift, side = (0, "center") if not close else (-7, "right") if place == left else (7, "left")
+        axis.annotate(
+            label, place, (shift, -15), textcoords="offset points", ha=side, fontsize=8.4, color=INK
+        )
+
+
 def _name_curves(axis: Axes, track: TrackDesign, s: FloatArray, xy: FloatArray) -> None:
-    start = track.start_m
+    """Radius and cant of each curve on its outer side, but of one whose words would lie on another's."""
+    start, named = track.start_m, np.zeros((0, 2))
+    room = _ROOM * np.ptp(xy, axis=0).max()
     for element in track.elements:
-        if isinstance(element, Curve):
-            middle = start + 0.5 * element.length_m
-            i = int(np.clip(np.searchsorted(s, middle), 1, len(s) - 2))
+        middle = start + 0.5 * element.length_m
+        i = int(np.clip(np.searchsorted(s, middle), 1, len(s) - 2))
+        if isinstance(element, Curve) and (np.hypot(*(named - xy[i]).T) > room).all():
+            named = np.vstack([named, xy[i]])
             tangent = xy[i + 1] - xy[i - 1]
             outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
             axis.annotate(

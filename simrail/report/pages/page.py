@@ -23,9 +23,9 @@ from simrail.report.tables.pivot import Case, map_words
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
-from simrail.report.words.sentences import axis_words
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words
 from simrail.scenario.scenario import Scenario
-from simrail.scoring.running_safety import DERAILMENT_LIMIT, TRACK_SHIFT_FACTOR
+from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.table import LEFT_OPEN, NO_SAMPLES, OK
 from simrail.track.design import TrackDesign
 
@@ -56,7 +56,7 @@ def write_report(
         The campaign, see `PageData`.
     """
     data = PageData(scenario, scores, cells, examples, manifest, beside)
-    sections = [section for make in SECTIONS for section in make(data)]
+    sections = [section for make in in_order(data) for section in make(data)]
     spec = scenario.spec.monte_carlo
     text = page_text(
         "pages/page.html.j2",
@@ -123,8 +123,7 @@ def _running(data: PageData) -> list[Section]:
     """What the ride itself was like."""
     spec = data.scenario.spec
     safety = spec.running_safety
-    limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
-    table = running_table(data.cases, derailment_limit=limit)
+    table = running_table(data.cases, derailment_limit=data.derailment_limit)
     if table is None:
         return []
     factor = 1.0 if safety is None else TRACK_SHIFT_FACTOR[safety.vehicle]
@@ -149,10 +148,11 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
     labels = case.labels
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
     title.append(map_words(labels["map"]))
+    axes = [axis_words(*axis) for axis in case.axes.items() if axis[0] != EXACT_MAP_AXIS]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
     return {
-        "title": " \u00b7 ".join([*title, *(axis_words(*axis) for axis in case.axes.items())]),
+        "title": " \u00b7 ".join([*title, *axes]),
         "draws": (words if draws > 1 else "one draw") + f" over {tracks} draws of the track" * (tracks > 1),
         "truth": error_table(case, data.attitude_styles, reference="truth"),
         "design": error_table(case, data.attitude_styles, reference="design"),
@@ -183,7 +183,10 @@ def _again(data: PageData) -> list[Section]:
     return [_section("again", "Make it again", scenario=data.scenario, manifest=data.manifest, facts=lines)]
 
 
-SECTIONS: tuple[Callable[[PageData], list[Section]], ...] = (
+SectionMaker = Callable[[PageData], list[Section]]
+"""Makes sections of a campaign."""
+
+SECTIONS: tuple[SectionMaker, ...] = (
     _failures,
     _paper,
     campaign_section,
@@ -198,3 +201,11 @@ SECTIONS: tuple[Callable[[PageData], list[Section]], ...] = (
     _again,
 )
 """What the page holds, in its order; a function that has nothing to show makes no section."""
+
+
+def in_order(data: PageData) -> list[SectionMaker]:
+    """The parts of the page; where the ride itself is asked for, its figures before what attitudes err by."""
+    if not data.asks_of_ride:
+        return list(SECTIONS)
+    places: dict[SectionMaker, int] = {_failures: -2, _running: -1, campaign_section: SECTIONS.index(_scores)}
+    return sorted(SECTIONS, key=lambda make: places.get(make, SECTIONS.index(make)))

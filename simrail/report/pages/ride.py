@@ -7,6 +7,7 @@ import numpy as np
 
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import IRREGULARITY
+from simrail.estimation.choose_odometry import TRUTH
 from simrail.report.figures.attitude import attitude_figure, error_figure
 from simrail.report.figures.contact import contact_figure
 from simrail.report.figures.geometry import bands_figure, has_rails, rails_figure, stretch_of, stretch_words
@@ -16,12 +17,14 @@ from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.geometry import BAND, JUDGED, indicator_table, is_zero, judged_band, waves_words
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, of_cell
+from simrail.report.tables.running import running_tiles
 from simrail.report.tables.tables import Table
 from simrail.report.tables.tiles import tiles
 from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import axis_words, recording_facts
 from simrail.scenario.build import goals_mm, limits_of
+from simrail.scoring.table import EXACT_MAP
 from simrail.track.bands import BANDS, Band, why_not
 from simrail.track.quality import Limits
 
@@ -75,7 +78,9 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
     of_scores: dict[str, Any] = {"tiles": [], "findings": [], "rms": "", "curves": ""}
     if case:
         of_scores = {
-            "tiles": tiles(case, data.styles, known=data.bands),
+            "tiles": running_tiles(case, derailment_limit=data.derailment_limit)
+            if data.asks_of_ride
+            else tiles(case, data.styles, known=data.bands),
             "findings": [
                 # Where rails are scored, they are what the ride was for.
                 *geometry_findings(case, data.styles, data.cases, goals_mm=goals_mm(spec), known=data.bands),
@@ -94,10 +99,14 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "comparisons": comparisons,
         "errors": error_figure(example, drawn) if drawn else "",
         "contact": contact_figure(example) if example.contacts else "",
-        "odometry": "" if example.recording.odometry is None else odometry_figure(example),
+        "odometry": odometry_figure(example)
+        if example.recording.odometry_source not in (None, TRUTH)
+        else "",
         "geometry": geometry,
         "left_out": len(left_out),
         "rides_left_out": 0,
+        "asks_of_ride": data.asks_of_ride,
+        "has_exact_map": example.cell.get("map", EXACT_MAP) == EXACT_MAP,
     }
 
 

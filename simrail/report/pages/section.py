@@ -16,6 +16,8 @@ from simrail.report.tables.pivot import Case, cases
 from simrail.scenario.build import bands_by_name
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.ride_figures import RIDE
+from simrail.scoring.running_safety import DERAILMENT_LIMIT
 from simrail.track.bands import Band
 
 
@@ -65,6 +67,18 @@ class PageData:
     def attitude_styles(self) -> list[MethodStyle]:
         """How those look that are told apart by their attitude."""
         return attitude_methods(self.styles)
+
+    @property
+    def asks_of_ride(self) -> bool:
+        """Whether the ride itself is what is asked for: it is scored, and no method under test is."""
+        is_scored = bool((self.scores["estimator"] == RIDE).any())
+        return is_scored and all(style.baseline for style in self.styles)
+
+    @property
+    def derailment_limit(self) -> float:
+        """What Y/Q is held against."""
+        safety = self.scenario.spec.running_safety
+        return DERAILMENT_LIMIT if safety is None else safety.derailment_limit
 
     @cached_property
     def bands(self) -> dict[str, Band]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from simrail.report.figures.vehicle import conicity_figure, locus_figure, pair_figure, shift_figure
 from simrail.report.pages.frame import page_text, write_page
+from simrail.report.tables.tables import signed
 from simrail.report.tables.vehicle_text import body_rows, critical_words, listed
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import Mode
@@ -70,12 +71,16 @@ def _contact(model: VehicleModel, contact: Conicity) -> dict[str, Any]:
     rest = contact.rest
     every = max(1, len(rest.y_m) // 30)
     digits = 2 if contact.scale == 1.0 else 3
+
+    def number(value: float, decimals: int) -> str:
+        return signed(f"{value:z.{decimals}f}")  # a zero has no sign
+
     rows = [
         (
-            f"{1e3 * rest.y_m[i]:.{digits}f}",
-            *(f"{1e3 * value:.{digits}f}" for value in contact.abscissa_m[i]),
+            number(1e3 * rest.y_m[i], digits),
+            *(number(1e3 * value, digits) for value in contact.abscissa_m[i]),
             *(f"{np.rad2deg(np.arctan(abs(value))):.2f}" for value in contact.slope[i]),
-            f"{1e3 * (rest.radius_left_m[i] - rest.radius_right_m[i]):.{digits + 1}f}",
+            number(1e3 * (rest.radius_left_m[i] - rest.radius_right_m[i]), digits + 1),
         )
         for i in range(0, len(rest.y_m), every)
     ]

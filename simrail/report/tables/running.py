@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from simrail.report.tables.pivot import Case, Mean
 from simrail.report.tables.tables import Row, Table, mean_cell
+from simrail.report.tables.tiles import Tile
 from simrail.report.words.sentences import axis_words
 from simrail.scoring.kick import decay_limit
 from simrail.scoring.ride_figures import RIDE
@@ -59,6 +60,32 @@ def running_table(all_cases: Sequence[Case], *, derailment_limit: float) -> Tabl
     heads = list(dict.fromkeys(group for group, *_ in columns))
     groups = [(head, sum(group == head for group, *_ in columns)) for head in heads]
     return Table(groups, [head for _, head, *_ in columns], rows) if rows else None
+
+
+def running_tiles(case: Case, *, derailment_limit: float) -> list[Tile]:
+    """The same of a case, as the few numbers that a reader sees first."""
+
+    def of(quantity: str, metric: str, decimals: int = 3) -> str:
+        return f"{ride_mean(case, quantity, metric).value:.{decimals}f}"
+
+    result = []
+    if (unloading := ride_mean(case, "wheel_unloading", "max")).draws:
+        note = (
+            f"\u0394Q/Q\u2080 {of('wheel_unloading', 'rms')} rms; Q at most {of('wheel_load', 'max', 1)} kN"
+        )
+        result.append(Tile("least Q/Q\u2080", f"{1.0 - unloading.value:.3f}", note))
+    if (quotient := ride_mean(case, "derailment_quotient", "max")).draws and quotient.value >= 0.0:
+        share = f"{100.0 * quotient.value / derailment_limit:.0f} % of its limit"
+        result.append(Tile("greatest Y/Q, over 2 m", f"{quotient.value:.3f}", share))
+        share = f"{100.0 * ride_mean(case, 'sum_y_relative', 'max').value:.0f} % of its limit"
+        result.append(Tile("greatest \u03a3Y, over 2 m", f"{of('sum_y', 'max', 1)} kN", share))
+    if ride_mean(case, "comfort_nmv", "p95").draws:
+        wz = f"Wz {of('sperling_lateral', 'rms', 2)} lateral, {of('sperling_vertical', 'rms', 2)} vertical"
+        result.append(Tile("comfort N_MV", of("comfort_nmv", "p95", 2), wz))
+    if (growth := ride_mean(case, "lateral_growth", "mean")).draws:
+        does = "grows" if growth.value > 0.0 else "decays"
+        result.append(Tile(f"the kick {does} by", f"{abs(growth.value):.3f} /s", "as exp(growth t)"))
+    return result
 
 
 def running_words(case: Case, *, derailment_limit: float) -> str:

@@ -70,6 +70,10 @@ UNITS = {
 """Units by the ends of names."""
 
 
+EXACT_MAP_AXIS = "map.exact"
+"""Axis that says whether the train knows the line as it is."""
+
+
 def axis_name(name: str) -> tuple[str, str]:
     """Words and unit of an axis: ``ride.speed_kmh`` is the speed in km/h; a unit of "" for none."""
     *words, last = name.rpartition(".")[2].split("_")
@@ -80,9 +84,20 @@ def axis_name(name: str) -> tuple[str, str]:
 
 def axis_words(name: str, value: object) -> str:
     """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
+    if name == EXACT_MAP_AXIS:
+        return "an exact map" if str(value) == str(True) else "a map with errors"
     words, unit = axis_name(name)
-    shown = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{words} {shown} {unit}".rstrip()
+    return f"{words} {_number_or_text(value)} {unit}".rstrip()
+
+
+def _number_or_text(value: object) -> str:
+    """A number without needless zeros, also if it is written as a text."""
+    if not isinstance(value, (float, str)):
+        return str(value)
+    try:
+        return f"{float(value):g}"
+    except ValueError:
+        return str(value)
 
 
 def recording_facts(recording: Recording) -> list[str]:

@@ -88,6 +88,11 @@ class CompiledEngine:
         """The bodies' part of states (..., n), as (..., b, 13)."""
         return states[..., : self._turned].reshape(*states.shape[:-1], -1, BODY)
 
+    def _until_now(self) -> RecordArray:
+        """Contacts (k, w) at the output rows that were reached, of this stretch and of the one before."""
+        reached = self._contacts[self._contacts["wanted"].any(axis=1)]
+        return np.concatenate([self._earlier, reached])
+
     def _march(self, first: int, rows: FloatArray, contacts: RecordArray) -> int:
         setup, scratch = self.setup, self._scratch
         return march(
@@ -100,11 +105,12 @@ class CompiledEngine:
         rows[0] = self.state
         every = self.setup.every
         output = range(-(-max(first, 0) // every) * every, last, every)
-        told = np.zeros((len(output), len(self.data.wheels)), CONTACT)
-        made = self._march(first, rows[1:], told)
-        self._contacts = np.concatenate([self._contacts, told])
-        reached = self._contacts[self._contacts["wanted"].any(axis=1)]
-        refuse_derailed(self.memory, self.setup, lambda _time_s: np.concatenate([self._earlier, reached]))
+        # Records are slow to copy (some 60 ns each): new ones go behind the few that are still to be put out.
+        left = len(self._contacts)
+        told = np.zeros((left + len(output), len(self.data.wheels)), CONTACT)
+        told[:left], self._contacts = self._contacts, told
+        made = self._march(first, rows[1:], told[left:])
+        refuse_derailed(self.memory, self.setup, lambda _time_s: self._until_now())
         if made < last - first or not np.isfinite(self.state).all():
             begin, end = first * self.setup.step_s, last * self.setup.step_s
             raise RuntimeError(f"the integrator stopped between {begin:g} and {end:g} s")

@@ -3,6 +3,12 @@
 What an engine tells of the contact at its output rate goes through here whether or not it is kept, so it must
 cost next to nothing. What the numbers are called, and what is warned of, is in
 `simrail.ride.contact_extremes`.
+
+Y/Q over 2 m is the mean of Y over the mean of Q there, as in the message of a derailment
+(`simrail.vehicle.engines.derailment`): of forces that are not filtered, the mean of the quotient is that of
+spikes, where a wheel hardly touches, or counts the way in the air as 0. EN 14363 takes the mean of the
+quotient, of forces that are low-passed first; that is what `simrail.scoring.running_safety` does. Where Q is
+steady, both are the same.
 """
 
 from typing import NamedTuple
@@ -13,9 +19,9 @@ from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 from simrail.vehicle.engines.records import Record, RecordArray
 
 WINDOW_M = 2.0
-"""Way of the sliding means, as EN 14363 takes them of Y/Q and of the sum of Y."""
-STEP_M = 1e-3
-"""Way from one mark of a sliding mean to the next, at least: a vehicle at rest makes none."""
+"""Way of the sliding means, as that of (Y/Q)_2m and (sum Y)_2m in EN 14363."""
+STEP_M = 0.1
+"""Way from one sliding mean to the next; EN 14363 takes one every 0.5 m."""
 
 EXTREME = np.dtype([("value", "f8"), ("which", "i8"), ("position_m", "f8"), ("time_s", "f8")], align=True)
 """A value, the number of its wheel or axle, and where and when it occurred."""
@@ -30,22 +36,21 @@ KINDS = (
 )
 """What is gathered, in the order of `Gathered.found`."""
 
-_MARKS = round(WINDOW_M / STEP_M) + 8
-"""Marks that a window and its edges can hold."""
-_VALUES = 3
-"""Values of an axle that have a sliding mean: the sum of Y, and Y/Q of both wheels."""
+_MARKS = round(WINDOW_M / STEP_M)
+"""Steps of a window."""
+_VALUES = 4
+"""Values of an axle that have a sliding mean: Y of its left and its right wheel, and their Q."""
 
 AXLE_WAY = np.dtype(
     [
         *((name, "f8") for name in ("place_m", "way_m")),
         *((name, "f8", (_VALUES,)) for name in ("value", "total")),
-        *((name, "i8") for name in ("begun", "newest", "oldest")),
-        ("mark_m", "f8", (_MARKS,)),
+        ("marks", "i8"),
         ("mark_total", "f8", (_MARKS, _VALUES)),
     ],
     align=True,
 )
-"""Way of an axle, integrals of its values over it, and both at the marks of the last 2 m (a ring)."""
+"""Way of an axle, integrals of its values over it, and these at the marks of the last 2 m (a ring)."""
 
 
 class Gathered(NamedTuple):
@@ -83,48 +88,60 @@ def _note(extreme: Record, value: float, which: int, position_m: float, time_s: 
 
 
 @njit_inner
-def _go(way: Record, place_m: float, sum_y: float, left: float, right: float) -> float:
-    """Take an axle to its next row, by the trapezoidal rule.
+def _note_means(
+    way: Record, axle: int, side: FloatArray, found: RecordArray, place_m: float, t: float
+) -> None:
+    """At a mark: note what the means over the last 2 m, between this mark and that of 2 m before, are.
 
-    Returns
-    -------
-    float
-        Share of the interval between the two oldest marks that lies before the last 2 m; -1 if it is no row
-        for a mean: no mark since the last one, or less than 2 m of way.
+    ``way.mark_total`` still holds the integrals of 2 m before where those of this mark, ``way.total``, will
+    stand.
     """
-    if not way.begun:
-        way.begun, way.place_m = 1, place_m
-        way.value[0], way.value[1], way.value[2] = sum_y, left, right
-    moved = abs(place_m - way.place_m)
-    way.place_m = place_m
-    way.way_m += moved
-    way.total[0] += 0.5 * moved * (way.value[0] + sum_y)
-    way.total[1] += 0.5 * moved * (way.value[1] + left)
-    way.total[2] += 0.5 * moved * (way.value[2] + right)
-    way.value[0], way.value[1], way.value[2] = sum_y, left, right
-    if way.way_m - way.mark_m[way.newest] < STEP_M:
-        return -1.0
-    way.newest = (way.newest + 1) % _MARKS
-    way.mark_m[way.newest] = way.way_m
-    for c in range(_VALUES):
-        way.mark_total[way.newest, c] = way.total[c]
-    begin = way.way_m - WINDOW_M
-    if begin < 0.0:
-        return -1.0
-    after = (way.oldest + 1) % _MARKS
-    while way.mark_m[after] <= begin:
-        way.oldest, after = after, (after + 1) % _MARKS
-    share: float = (begin - way.mark_m[way.oldest]) / (way.mark_m[after] - way.mark_m[way.oldest])
-    return share
+    before, total = way.mark_total[way.marks % _MARKS], way.total
+    y_left, y_right = (total[0] - before[0]) / WINDOW_M, (total[1] - before[1]) / WINDOW_M
+    summed = abs(y_left + y_right)
+    if summed > found[4].value:
+        _note(found[4], summed, axle, place_m, t)
+    for n in range(2):
+        outward = -side[2 * axle + n] * (y_right if n else y_left)
+        carried = (total[2 + n] - before[2 + n]) / WINDOW_M
+        # A wheel that carried nothing over the whole way has no quotient.
+        if carried > 0.0 and outward > found[5].value * carried:
+            _note(found[5], outward / carried, 2 * axle + n, place_m, t)
 
 
 @njit_inner
-def _mean(way: Record, share: float, column: int) -> float:
-    """Mean over the last 2 m of a value; ``share`` of the oldest interval lies before them."""
-    after = (way.oldest + 1) % _MARKS
-    low, high = way.mark_total[way.oldest, column], way.mark_total[after, column]
-    mean: float = (way.total[column] - low - share * (high - low)) / WINDOW_M
-    return mean
+def _go(
+    way: Record, left: Record, right: Record, axle: int, side: FloatArray, found: RecordArray, t: float
+) -> None:
+    """Take an axle to its next row, given the contacts of its wheels; in between its values are linear.
+
+    At every mark on the way, the integrals up to it are those of the polyline itself.
+    """
+    value, total = way.value, way.total
+    if not way.marks:
+        way.marks, way.place_m = 1, left.position_m
+        value[0], value[1], value[2], value[3] = left.guiding_n, right.guiding_n, left.load_n, right.load_n
+    moved = abs(left.position_m - way.place_m)
+    way.place_m = left.position_m
+    rise = (
+        left.guiding_n - value[0], right.guiding_n - value[1], left.load_n - value[2], right.load_n - value[3]
+    )  # fmt: skip
+    # The part of the way to this row from its beginning, or from the last mark on it.
+    done, end_m = 0.0, way.way_m + moved
+    while way.marks * STEP_M <= end_m and moved > 0.0:
+        until = (way.marks * STEP_M - way.way_m) / moved
+        for c in range(_VALUES):
+            total[c] += moved * (until - done) * (value[c] + 0.5 * (done + until) * rise[c])
+        done = until
+        if way.marks >= _MARKS:
+            _note_means(way, axle, side, found, left.position_m, t)
+        for c in range(_VALUES):
+            way.mark_total[way.marks % _MARKS, c] = total[c]
+        way.marks += 1
+    for c in range(_VALUES):
+        total[c] += moved * (1.0 - done) * (value[c] + 0.5 * (done + 1.0) * rise[c])
+    value[0], value[1], value[2], value[3] = left.guiding_n, right.guiding_n, left.load_n, right.load_n
+    way.way_m = end_m
 
 
 @njit_borrowed
@@ -173,19 +190,8 @@ def gather(
         rows[0] += 1.0
         rows[1] += lifted
         for a in range(ways.shape[0]):
-            one, other = told[i, 2 * a], told[i, 2 * a + 1]
-            summed, way = one.guiding_n + other.guiding_n, ways[a]
-            if abs(summed) > found[3].value:
-                _note(found[3], abs(summed), a, one.position_m, t)
-            left = -side[2 * a] * one.guiding_n / one.load_n if one.load_n > 0.0 else 0.0
-            right = -side[2 * a + 1] * other.guiding_n / other.load_n if other.load_n > 0.0 else 0.0
-            share = _go(way, one.position_m, summed, left, right)
-            if share < 0.0:
-                continue
-            mean = abs(_mean(way, share, 0))
-            if mean > found[4].value:
-                _note(found[4], mean, a, one.position_m, t)
-            for n in range(2):
-                mean = _mean(way, share, n + 1)
-                if mean > found[5].value:
-                    _note(found[5], mean, 2 * a + n, one.position_m, t)
+            left, right, way = told[i, 2 * a], told[i, 2 * a + 1], ways[a]
+            summed = abs(left.guiding_n + right.guiding_n)
+            if summed > found[3].value:
+                _note(found[3], summed, a, left.position_m, t)
+            _go(way, left, right, a, side, found, t)

@@ -64,8 +64,15 @@ def noisy(bend: Callable, exactly: Callable) -> Recording:
     return recording
 
 
-@pytest.mark.parametrize("turn", [lambda r: r, time_reversed], ids=["forward", "backward"])
-@pytest.mark.parametrize("compensated", [True, False])
+@pytest.mark.parametrize(
+    ("turn", "compensated"),
+    [
+        pytest.param(time_reversed, True, id="compensated-backward"),
+        pytest.param(lambda r: r, False, id="forward"),
+        pytest.param(lambda r: r, True, marks=pytest.mark.slow, id="compensated-forward"),
+        pytest.param(time_reversed, False, marks=pytest.mark.slow, id="backward"),
+    ],
+)
 def test_equals_a_plain_loop(turn: Callable, compensated: bool, noisy: Recording) -> None:
     recording = turn(noisy)
     force = gravity_force(recording, compensated=compensated)

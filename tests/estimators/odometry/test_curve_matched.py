@@ -133,11 +133,11 @@ def judge_rides(rides: list[tuple[float, float, float]], draws: int) -> None:
     Errors of one ride hang together, so a coverage from a few rides is itself known to a few per cent
     only: 32 rides of four kinds give 0.914 (filter) and 0.951 (smoother), hence 85 to 99.5 % for fewer.
     """
+    recorded = {ride: [record(truth_of(*ride), k) for k in range(draws)] for ride in rides}
     for smoothed, bound in ((False, 1.0), (True, 0.3)):
         squares, inside = [], []
-        for ride in rides:
+        for ride, recordings in recorded.items():
             truth = truth_of(*ride)
-            recordings = [record(truth, k) for k in range(draws)]
             found = [errors(truth, one, CurveMatchedOdometry(smoothed)) for one in recordings]
             squares.append(np.mean([np.mean(error**2) for error, _ in found]))
             inside += [np.mean(np.abs(error) < 1.96 * sd) for error, sd in found]

@@ -1,0 +1,115 @@
+"""Rows of a truth that an engine makes, written segment by segment into arrays on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simrail.core.jit import FloatArray
+from simrail.ride.contact_forces import contact_columns
+from simrail.ride.truth import abeam
+from simrail.ride.truth_files import create_arrays, let_go
+from simrail.vehicle.engines.engine import Segment
+
+if TYPE_CHECKING:
+    from simrail.ride.ride import Ride
+
+
+class TruthRows:
+    """The arrays of one ride, and what goes on from segment to segment.
+
+    Parameters
+    ----------
+    ride : Ride
+        What is driven.
+    folder : Path
+        Where the arrays are made.
+    """
+
+    def __init__(self, ride: Ride, folder: Path) -> None:
+        self._ride, model = ride, ride.vehicle
+        self.duration_s = float(np.floor(ride.profile.duration_s * ride.rate_hz) / ride.rate_hz)
+        self._arrays = create_arrays(
+            folder,
+            round(self.duration_s * ride.rate_hz) + 1,
+            bodies=len(model.bodies),
+            wheels=len(model.wheels),
+            wheel_states=4,
+            contact_every=ride.contact_every,
+        )
+        self._spins = list(model.spin_inertia_kgm2)
+        self._done = 0
+        self._place_m = ride.profile.start_m
+        self._yaw_rad = np.zeros(len(model.bodies))
+        self._turned_rad = np.zeros(len(model.wheels))
+
+    def add(self, segment: Segment) -> FloatArray:
+        """Write the rows of a segment; returns their times (n,)."""
+        arrays = self._arrays
+        here = slice(self._done, self._done + len(segment.time_s))
+        arrays["time_s"][here] = np.arange(here.start, here.stop) / self._ride.rate_hz
+        times = np.array(arrays["time_s"][here])
+        self._add_bodies(segment, here)
+        # Where the wheels drive, the vehicle is where they have brought it.
+        if self._ride.drive == "wheels":
+            places = _places(self._ride, self._place_m, segment)
+            self._place_m = float(places[-1])
+        else:
+            places = self._ride.profile.motion(times)[0]
+        arrays["reference_position_m"][here] = places
+        self._add_wheels(segment, here)
+        self._done = here.stop
+        let_go(arrays)
+        return times
+
+    def finish(self) -> None:
+        """Count the wheels' angles from the first row, and bring everything to disk."""
+        for w in range(len(self._ride.vehicle.wheels)):
+            self._arrays[f"wheel_{w}"][:] -= self._arrays[f"wheel_{w}"][0]
+            let_go(self._arrays)
+        for array in self._arrays.values():
+            array.flush()  # type: ignore[attr-defined]
+
+    def _add_bodies(self, segment: Segment, here: slice) -> None:
+        for b in range(len(self._ride.vehicle.bodies)):
+            motion = segment.body(b)
+            # The heading is continuous over the segments, too.
+            motion[:, 11] += 2.0 * np.pi * np.round((self._yaw_rad[b] - motion[0, 11]) / (2.0 * np.pi))
+            self._yaw_rad[b] = motion[-1, 11]
+            self._arrays[f"body_{b}"][here] = motion
+
+    def _add_wheels(self, segment: Segment, here: slice) -> None:
+        """Angles of the wheels in their axle boxes, which pitch; contact states; contacts that are kept."""
+        arrays, model, every = self._arrays, self._ride.vehicle, self._ride.contact_every
+        begin = max(here.start - 1, 0)
+        for w, wheel in enumerate(model.wheels):
+            axle = arrays[f"body_{model.body_names.index(wheel.axle)}"]
+            pitch_rate, pitch_acceleration = axle[begin : here.stop, 13], axle[begin : here.stop, 16]
+            step_s = 1.0 / self._ride.rate_hz
+            box = self._turned_rad[w] + _integral(pitch_rate, pitch_acceleration, step_s)
+            self._turned_rad[w] = box[-1]
+            spin = self._spins.index(wheel.spin)
+            arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
+            arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
+            if every:
+                kept = slice(-(-here.start // every), -(-here.stop // every))
+                told = segment.contacts[kept.start * every - here.start :: every, w]
+                arrays[f"contact_{w}"][kept] = contact_columns(told)
+
+
+def _places(ride: Ride, begin_m: float, segment: Segment) -> FloatArray:
+    """Where the vehicle's reference point is, s (n,), from the guide's body; ``begin_m`` is just before."""
+    model, step = ride.vehicle, 1.0 / ride.rate_hz
+    led = model.body_names.index(model.guide.body)
+    offset = model.bodies[led].position_m[0]
+    ahead = np.einsum("nk,nk->n", segment.velocity[:, led], segment.rotation[:, led, :, 0])
+    guess = begin_m + offset + np.cumsum(ahead) * step
+    return abeam(ride.track, guess, segment.position[:, led])[4] - offset
+
+
+def _integral(rate: FloatArray, slope: FloatArray, step_s: float) -> FloatArray:
+    """Running integral (n,) of samples whose derivative is known: Hermite, fourth order."""
+    pieces = step_s / 2.0 * (rate[:-1] + rate[1:]) + step_s**2 / 12.0 * (slope[:-1] - slope[1:])
+    return np.concatenate([[0.0], np.cumsum(pieces)])
