@@ -1,9 +1,9 @@
 """An odometry whose acceleration is the slope of its speed, for estimators that work after the ride.
 
-A causal odometry cannot know an acceleration without lag and noise: that of an encoder is late by 0.15 s and
-wrong by 0.1 m/s2 where the rolling radius changes in a curve. A smoother of trajectories takes the difference to
-the accelerometer for a share of the centripetal acceleration, and so for yaw: 0.04 m/s2 below 1 Hz are a degree.
-After the ride the slope of the speed is better. Corrections of the place do no such harm.
+A causal odometry cannot know an acceleration without lag and noise: that of an encoder is late by 0.15 s
+and wrong by 0.1 m/s2 where the rolling radius changes in a curve. A smoother of trajectories takes the
+difference to the accelerometer for a share of the centripetal acceleration, and so for yaw: 0.04 m/s2 below
+1 Hz are a degree. After the ride the slope of the speed is better. Corrections of the place do no such harm.
 """
 
 import math
