@@ -6,8 +6,6 @@ difference to the accelerometer for a share of the centripetal acceleration, and
 1 Hz are a degree. After the ride the slope of the speed is better. Corrections of the place do no such harm.
 """
 
-import math
-
 import numpy as np
 from scipy import signal
 
@@ -22,34 +20,24 @@ AGREES_MPS2 = 0.01
 encoder 0.03."""
 
 
-def with_consistent_acceleration(recording: Recording, *, causal: bool) -> Recording:
-    """The recording with the slope of the speed for an acceleration; itself where that is so already.
+def with_consistent_acceleration(recording: Recording) -> Recording:
+    """The recording with the slope of the speed, without lag, for an acceleration.
 
-    Parameters
-    ----------
-    recording : Recording
-        With an odometry.
-    causal : bool
-        True: from the speed so far, some 0.3 s late. False: without lag.
+    A recording whose odometry has that already is returned as it is.
     """
     odometry, rate = odometry_of(recording), recording.imu_sheet.rate_hz
-    speed = odometry["speed_mps"].to_numpy(dtype=np.float64)
-    off = odometry["acceleration_mps2"].to_numpy(dtype=np.float64) - np.gradient(speed, 1.0 / rate)
-    if np.sqrt(np.mean(_low(off, CALM_HZ, rate) ** 2)) < AGREES_MPS2:
+    slope = np.gradient(odometry["speed_mps"].to_numpy(dtype=np.float64), 1.0 / rate)
+    off = odometry["acceleration_mps2"].to_numpy(dtype=np.float64) - slope
+    if np.sqrt(np.mean(_calm(off, rate) ** 2)) < AGREES_MPS2:
         return recording
-    if causal:
-        # The slope of the speed so far, and two equal lags.
-        slope = np.diff(speed, prepend=speed[0]) * rate
-        keep = math.exp(-2.0 * math.pi * CALM_HZ / rate)
-        calm = signal.lfilter([(1.0 - keep) ** 2], [1.0, -2.0 * keep, keep * keep], slope)
-    else:
-        calm = _low(np.gradient(speed, 1.0 / rate), CALM_HZ, rate)
-    return recording.with_odometry(odometry.assign(acceleration_mps2=calm), recording.odometry_source)
+    return recording.with_odometry(
+        odometry.assign(acceleration_mps2=_calm(slope, rate)), recording.odometry_source
+    )
 
 
-def _low(values: FloatArray, cutoff_hz: float, rate_hz: float) -> FloatArray:
-    """What lies below a frequency, without lag."""
-    sections = signal.butter(2, cutoff_hz, fs=rate_hz, output="sos")
-    padding = min(len(values) - 1, int(3.0 * rate_hz / cutoff_hz))
+def _calm(values: FloatArray, rate_hz: float) -> FloatArray:
+    """What lies below `CALM_HZ`, without lag."""
+    sections = signal.butter(2, CALM_HZ, fs=rate_hz, output="sos")
+    padding = min(len(values) - 1, int(3.0 * rate_hz / CALM_HZ))
     low: FloatArray = signal.sosfiltfilt(sections, values, padlen=padding)
     return low

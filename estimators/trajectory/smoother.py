@@ -254,10 +254,11 @@ class TrajectorySmoother:
     def trace(self, recording: Recording) -> Trajectory:
         """All twelve states with their covariances, the innovations, and the log-likelihood.
 
-        An acceleration that is not the slope of the odometry's speed is replaced first
+        The smoother replaces an acceleration that is not the slope of the odometry's speed
         (`simrail.estimators.odometry.consistent`).
         """
-        recording = with_consistent_acceleration(recording, causal=not self.smoothed)
+        if self.smoothed:
+            recording = with_consistent_acceleration(recording)
         around = None
         for _ in range(self.passes - 1):
             model = self.model(recording, around=around)
