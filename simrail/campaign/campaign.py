@@ -183,7 +183,8 @@ class _Loop:
         waiting: dict[Future[BatchResult], _Batch] = {}
         rides = self._rides(draws)
         while True:
-            while len(waiting) < (1 if self.suspects else self.executor.workers()):
+            # What has killed a worker before runs alone, so that nothing else is lost with it.
+            while len(waiting) < (1 if self._suspected(waiting) else self.executor.workers()):
                 batch = self._next(rides)
                 if batch is None:
                     break
@@ -191,6 +192,10 @@ class _Loop:
             if not waiting:
                 return
             self._collect(waiting)
+
+    def _suspected(self, waiting: dict[Future[BatchResult], _Batch]) -> bool:
+        """Whether a batch over which a worker died is to run, or is under way."""
+        return bool(self.suspects) or any(batch.lost for batch in waiting.values())
 
     def _collect(self, waiting: dict[Future[BatchResult], _Batch]) -> None:
         """Wait until something is done, and take it.

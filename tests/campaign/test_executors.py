@@ -189,6 +189,8 @@ class Noting:
     [
         (1, ["lord_3dm_gx4_25", "ideal"], 1),
         pytest.param(2, ["ideal", "lord_3dm_gx4_25"], 3, marks=pytest.mark.slow),
+        # The last suspect alone too, though nothing else is suspected beside it.
+        pytest.param(2, ["lord_3dm_gx4_25", "ideal"], 3, marks=pytest.mark.slow),
     ],
 )
 def test_a_cell_that_kills_its_worker_fails_and_its_fellows_do_not(
