@@ -96,7 +96,9 @@ class ScenarioFile(Part):
                 )
         for vehicle in vehicles:
             if not any(part.is_on(vehicle) for part in self.imu):
-                raise ValueError(f"no imu is on vehicle {vehicle!r}; add an [[imu]] with vehicle = {vehicle!r}")
+                raise ValueError(
+                    f"no imu is on vehicle {vehicle!r}; add an [[imu]] with vehicle = {vehicle!r}"
+                )
         return self
 
 

@@ -194,8 +194,8 @@ class ImuPart(Part):
     """``[[imu]]``: an IMU of some grade, mounted on a body of the vehicle.
 
     ``sensor_draws`` limits the draws of this IMU below those of ``[monte_carlo]``: an ideal one has no
-    errors to be drawn, so that one or two draws (of the encoder) say all. ``vehicle`` names the one that it is
-    on, where a scenario has several whose bodies have other names.
+    errors to be drawn, so that one or two draws (of the encoder) say all. ``vehicle`` names the one that it
+    is on, where a scenario has several whose bodies have other names.
     """
 
     name: Name
