@@ -19,7 +19,7 @@ from simrail.report.tables.pivot import Case
 MOST_GROUPS = 4
 """Mounts, IMUs and odometries whose comparison is printed; the page has all."""
 
-_SHORT = {"drawn": "errs", "both ways": "both", "all speeds": "all"}
+_SHORT = {"drawn": "errs", "both ways": "both", "all speeds": "all", "forward": "forth", "backward": "back"}
 """Words of a narrow table."""
 
 

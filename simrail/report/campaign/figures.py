@@ -19,7 +19,10 @@ MOST_CURVATURES = 4
 """Rides that are drawn over curvature."""
 
 LONG_WORD = 16
-"""Longer names of values are told in two lines, so that neighbours do not touch."""
+"""Longer names of values are told in two lines, so that neighbours do not touch;"""
+
+MOST_IN_ONE_LINE = 4
+"""of more values than these, names of half that length."""
 
 
 def box_figure(
@@ -66,14 +69,15 @@ def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle],
             # A box without height is seen as a bar.
             panel.plot(ends, [middle, middle], color=style.colour, lw=3.6, solid_capstyle="butt", zorder=2)
             panel.plot(ends, [middle, middle], color="white", lw=1.3, solid_capstyle="butt", zorder=4)
-    canvas.categories(panel, [in_two(word) for word in axis.words])
+    longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
+    canvas.categories(panel, [in_two(word, longest=longest) for word in axis.words])
     panel.set_xlabel(axis.title)
 
 
-def in_two(word: str) -> str:
-    """A long name in two lines, parted at the underscore that is nearest to its middle."""
+def in_two(word: str, *, longest: int = LONG_WORD) -> str:
+    """A name longer than `longest` in two lines, parted at the underscore that is nearest to its middle."""
     places = [i for i, letter in enumerate(word) if letter == "_"]
-    if len(word) <= LONG_WORD or not places:
+    if len(word) <= longest or not places:
         return word
     at = min(places, key=lambda i: abs(i - len(word) // 2)) + 1
     return f"{word[:at]}\n{word[at:]}"

@@ -87,9 +87,11 @@ def odometry_draws(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
     table = figures.reindex(columns=pd.MultiIndex.from_tuples(FIGURES.values()))
     table.columns = pd.Index(FIGURES)
     table = table.dropna(subset="position_rms_m").reset_index()
-    chance = [name for name in ("sample", "track_draw", "map_draw") if name in cells]
-    beside = ["vehicle", "mount", "imu", "map", "speed_kmh", "direction"]
-    table = table.merge(cells[["cell", *beside, *chance]], on="cell", how="left")
+    labels = scores[["cell", "vehicle", "mount", "imu", "map", "track_draw"]].drop_duplicates("cell")
+    labels = labels.astype(dict.fromkeys(("vehicle", "mount", "imu", "map"), str))
+    beside = [name for name in ("sample", "map_draw", "speed_kmh", "direction") if name in cells]
+    table = table.merge(labels, on="cell").merge(cells[["cell", *beside]], on="cell")
+    chance = [name for name in ("sample", "track_draw", "map_draw") if name in table]
     return table.assign(cluster=table.groupby(chance, sort=True).ngroup())
 
 
@@ -101,7 +103,8 @@ def odometry_frames(scores: pd.DataFrame, cells: pd.DataFrame) -> dict[str, pd.D
     dict of str to DataFrame
         Columns that tell the rows apart (those that differ); rms over the recordings (root of their mean
         square, m and m/s), mean of their 95th percentiles; mean coverages with their 95 % intervals
-        (``_low95``, ``_high95``; NaN of one cluster alone); ``recordings``, and ``clusters``, the draws of track and map.
+        (``_low95``, ``_high95``; NaN of one cluster alone); ``recordings``, and ``clusters``, the draws of
+        track and map.
     """
     draws = odometry_draws(scores, cells)
     if draws.empty or not _differ(draws, "mount", "map"):
@@ -122,8 +125,8 @@ def _differing(draws: pd.DataFrame, names: Sequence[str]) -> list[str]:
 
 
 def _differ(draws: pd.DataFrame, *names: str) -> bool:
-    """Whether one of some columns has several values."""
-    return any(len(draws[name].unique()) > 1 for name in names)
+    """Whether one of some columns is there and has several values."""
+    return any(name in draws and len(draws[name].unique()) > 1 for name in names)
 
 
 def _pooled(draws: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
@@ -137,7 +140,7 @@ def _pooled(draws: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
             if column in COVERAGES:
                 mean = interval(own[column], own["cluster"])
                 # Of one draw of track and map alone, nothing says what another would change.
-                known = own["cluster"].nunique() > 1
+                known = _differ(own, "cluster")
                 low, high = np.clip([mean.low, mean.high], 0.0, 1.0) if known else (np.nan, np.nan)
                 row |= {column: mean.value, f"{column}_low95": low, f"{column}_high95": high}
             elif metric == "rms":
