@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from simrail.report.campaign.odometry import OdometryTable, odometry_tables, row_words
+from simrail.report.campaign.odometry import COVERAGES, OdometryTable, odometry_tables, row_words
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, judged_band
 from simrail.report.tables.maps import ATTITUDE, MapCost, attitude_costs, map_groups, rails_costs
 from simrail.report.tables.methods import MethodStyle, attitude_methods
@@ -21,6 +21,15 @@ MOST_GROUPS = 4
 
 _SHORT = {"drawn": "errs", "both ways": "both", "all speeds": "all", "forward": "forth", "backward": "back"}
 """Words of a narrow table."""
+
+_HEADS = {
+    "position_rms_m": "posi-\ntion\nrms, m",
+    "position_p95_m": "\n\np95, m",
+    "speed_rms_mps": "speed\nrms,\nm/s",
+    "position_coverage": "position\ninside\n95 %, %",
+    "speed_coverage": "speed\ninside\n95 %, %",
+}
+"""Heads of the columns, by their names in the frames."""
 
 
 def print_map_costs(console: Console, all_cases: Sequence[Case], styles: Sequence[MethodStyle]) -> None:
@@ -61,9 +70,9 @@ def _comparison(
     return table
 
 
-def print_odometries(console: Console, frames: Mapping[str, pd.DataFrame]) -> None:
+def print_odometries(console: Console, frames: Mapping[str, pd.DataFrame], *, by_class: bool = True) -> None:
     """Print the errors of each odometry, and what its 95 % intervals hold: over all rides, and by class."""
-    tables = odometry_tables(frames)
+    tables = odometry_tables(frames if by_class else {n: f for n, f in frames.items() if n == "odometry"})
     for one in tables:
         console.print(Text(f"Odometry {one.odometry}, {one.what}", style="bold"))
         console.print(_odometry(one))
@@ -83,9 +92,9 @@ def _odometry(one: OdometryTable) -> Table:
     table = _table(*(heads.get(name, name) for name in one.names))
     for column in table.columns:
         column.no_wrap = True
-    for head in ("posi-\ntion\nrms, m", "\n\np95, m", "speed\nrms,\nm/s"):
-        table.add_column(head, justify="right", no_wrap=True)
-    for head in ("position\ninside\n95 %, %", "speed\ninside\n95 %, %", "re-\ncord-\nings"):
+    # A scenario says which metrics it keeps.
+    kept = [name for name in _HEADS if one.rows[name].notna().any()]
+    for head in (*(_HEADS[name] for name in kept), "re-\ncord-\nings"):
         table.add_column(head, justify="right", no_wrap=True)
     former: list[str] = []
     for row in one.rows.to_dict("records"):
@@ -94,10 +103,9 @@ def _odometry(one: OdometryTable) -> Table:
         same = next((i for i, (a, b) in enumerate(zip(words, former, strict=False)) if a != b), 0)
         shown = ["" if i < same else word for i, word in enumerate(words)]
         former = words
-        figures = [_number(row[name]) for name in ("position_rms_m", "position_p95_m", "speed_rms_mps")]
-        inside = [_inside(row, name) for name in ("position_coverage", "speed_coverage")]
+        figures = [_inside(row, name) if name in COVERAGES else _number(row[name]) for name in kept]
         dim = "dim" if row["map"] == "exact" else None
-        table.add_row(*shown, *figures, *inside, str(row["recordings"]), style=dim)
+        table.add_row(*shown, *figures, str(row["recordings"]), style=dim)
     return table
 
 

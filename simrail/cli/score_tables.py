@@ -64,7 +64,8 @@ def print_scores(console: Console, results: Results) -> None:
     odometries = odometry_frames(scores, cells)
     # Of odometries alone their own table says all; what an exact map would change stands in one as well.
     shown = without_ablation(cells)
-    shown = shown[:0] if odometries and all(style.baseline for style in styles) else shown
+    alone = bool(odometries) and all(style.baseline for style in styles)
+    shown = shown[:0] if alone else shown
     for number, (_, members) in enumerate(shown.groupby("case", sort=True)):
         if number == MOST_GROUPS:
             console.print(f"... and {shown['case'].nunique() - number} more cases: see scores.csv")
@@ -73,7 +74,7 @@ def print_scores(console: Console, results: Results) -> None:
         console.print(_case(console, rows, members, styles, bands, limit))
     if len(shown):
         print_map_costs(console, cases(scores, cells) if has_both_maps(cells) else [], styles)
-    print_odometries(console, odometries)
+    print_odometries(console, odometries, by_class=alone)
     kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
     for sentence in decay_words(cases(kicks, cells)):
         console.print(Text(sentence), soft_wrap=True)

@@ -120,8 +120,11 @@ def odometry_frames(scores: pd.DataFrame, cells: pd.DataFrame) -> dict[str, pd.D
 
 
 def _differing(draws: pd.DataFrame, names: Sequence[str]) -> list[str]:
-    """The odometry and the map, and what of the others is not the same in all draws."""
-    return [name for name in names if name in ("odometry", "map") or _differ(draws, name)]
+    """The odometry and the map, and what of the others is not the same in all draws; an IMU once."""
+    differing = [name for name in names if name in ("odometry", "map") or _differ(draws, name)]
+    if len(draws[["mount", "imu"]].drop_duplicates()) == len(draws["mount"].unique()):
+        return [name for name in differing if name != "imu"]  # each place has its own
+    return differing
 
 
 def _differ(draws: pd.DataFrame, *names: str) -> bool:

@@ -345,7 +345,8 @@ def test_what_the_map_costs_is_told_of_the_method_that_loses_the_most() -> None:
     exact = as_cases(planted(only("ekf_printed", "roll", 1.0)), "exact")
     told = map_paragraph(erring, exact)
     assert "known in advance (abstract, section 5.1)" in told
-    assert f"roll, {PAPER.label('gda')}, 0.300\u00b0 instead of 0.100\u00b0" in told
+    assert f"in roll {PAPER.label('gda')}, 0.300\u00b0 instead of 0.100\u00b0" in told
+    assert "in pitch none loses more than 1 %" in told and "in yaw none loses" in told
     assert "Design angles only, in roll: 0.0700\u00b0 instead of 0.0700\u00b0" in told
     assert "an ablation" in map_paragraph(exact, None) and "not asked" in map_paragraph(exact, None)
     assert "not told" in map_paragraph(erring, None)
