@@ -33,6 +33,7 @@ from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import failed_figures
 from simrail.sensors.measure import measure
+from simrail.track.design import TrackDesign
 from simrail.track.laid_track import LaidTrack
 
 if TYPE_CHECKING:
@@ -70,6 +71,8 @@ class CellResult:
         The rails that the ride was run on, if an estimate speaks of rails.
     contacts : dict of str to ndarray (k, 12)
         Forces of each wheel (`simrail.ride.truth.Truth.contacts`), mapped from disk, if the ride kept them.
+    laid : TrackDesign, optional
+        The design that was laid, where it is not the map of the recording.
     """
 
     cell: dict[str, object]
@@ -78,6 +81,12 @@ class CellResult:
     estimates: dict[str, Estimate]
     rails: LaidTrack | None = None
     contacts: dict[str, FloatArray] = field(default_factory=dict)
+    laid: TrackDesign | None = None
+
+    @property
+    def line(self) -> TrackDesign:
+        """The design that was laid; what the train knows of it is `recording.track`."""
+        return self.laid or self.recording.track
 
 
 @dataclass
@@ -237,7 +246,8 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
-    return CellResult(labels, recording, truth_at_imu(truth, recording), estimates, rails, truth.contacts)
+    motion = truth_at_imu(truth, recording)
+    return CellResult(labels, recording, motion, estimates, rails, truth.contacts, truth.track)
 
 
 def _labels(cell: Cell) -> dict[str, object]:

@@ -18,7 +18,7 @@ from simrail.campaign.worker import BatchResult, example_of
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import Plan
 from simrail.scenario.stop_rule import StopState, stop_rule_of
-from simrail.scoring.table import concat_scores, in_order
+from simrail.scoring.table import EXACT_MAP, concat_scores, in_order
 
 MOST_EXAMPLES = 6
 """Recordings that are kept for the report's figures, one per ride."""
@@ -134,12 +134,15 @@ def _without_others(results: list[BatchResult], numbers: set[int]) -> list[Batch
 
 
 def _examples(plan: Plan, packed: bytes, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
-    """The first cell of each ride over the first draw that did not fail altogether, and of added noise."""
+    """The first cell of each ride over the first draw that did not fail altogether, and of added noise.
+
+    One with an exact map, which is an ablation, only where no other has the ride.
+    """
     failed = Counter(failure.cell for failure in failures)
     shown: set[int] = set()
     noise_shown = False
     examples: list[CellResult] = []
-    for cell in listed:
+    for cell in sorted(listed, key=lambda cell: (cell.ride_number, cell.map_label == EXACT_MAP)):
         if len(examples) == MOST_EXAMPLES:
             break
         lost = failed[cell.number] >= len(plan.estimators)

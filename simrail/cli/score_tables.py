@@ -10,6 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from simrail.campaign.result import CampaignResult
+from simrail.cli.map_tables import print_map_costs, print_odometries
+from simrail.report.campaign.odometry import odometry_frames
 from simrail.report.tables.geometry import (
     JUDGED,
     QUANTITIES,
@@ -19,7 +21,14 @@ from simrail.report.tables.geometry import (
     waves_words,
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Case, Mean, cases, map_words
+from simrail.report.tables.pivot import (
+    Case,
+    Mean,
+    cases,
+    has_both_maps,
+    map_words,
+    without_ablation,
+)
 from simrail.report.tables.running import decay_words, running_words
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
@@ -52,12 +61,20 @@ def print_scores(console: Console, results: Results) -> None:
     bands = bands_by_name(results.scenario.spec)
     safety = results.scenario.spec.running_safety
     limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
-    for number, (_, members) in enumerate(cells.groupby("case", sort=True)):
+    odometries = odometry_frames(scores, cells)
+    # Of odometries alone their own table says all; what an exact map would change stands in one as well.
+    shown = without_ablation(cells)
+    alone = bool(odometries) and all(style.baseline for style in styles)
+    shown = shown[:0] if alone else shown
+    for number, (_, members) in enumerate(shown.groupby("case", sort=True)):
         if number == MOST_GROUPS:
-            console.print(f"... and {cells['case'].nunique() - number} more cases: see scores.csv")
+            console.print(f"... and {shown['case'].nunique() - number} more cases: see scores.csv")
             break
         rows = scores[scores["cell"].isin(members["cell"])]
         console.print(_case(console, rows, members, styles, bands, limit))
+    if len(shown):
+        print_map_costs(console, cases(scores, cells) if has_both_maps(cells) else [], styles)
+    print_odometries(console, odometries, by_class=alone)
     kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
     for sentence in decay_words(cases(kicks, cells)):
         console.print(Text(sentence), soft_wrap=True)

@@ -214,7 +214,11 @@ def _wrong_curves(
     cant = errors.cant_sd_m * _normals(seed, draw, "cant", len(elements))
     bend = errors.radius_relative_sd * _normals(seed, draw, "radius", len(elements))
     return tuple(
-        replace(element, radius_m=element.radius_m / (1.0 + bend[i]), cant_m=_in_mm(element.cant_m + cant[i]))
+        replace(
+            element,
+            radius_m=float(element.radius_m / (1.0 + bend[i])),
+            cant_m=_in_mm(element.cant_m + cant[i]),
+        )
         if isinstance(element, Curve)
         else element
         for i, element in enumerate(elements)
@@ -223,7 +227,7 @@ def _wrong_curves(
 
 def _in_mm(value_m: float) -> float:
     """Rounded to 1 um, so that a file in mm gives the very same number."""
-    return round(1000.0 * value_m, 3) / 1000.0
+    return float(round(1000.0 * value_m, 3)) / 1000.0
 
 
 def _with_defects(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from simrail.scenario.cells import cells
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.aggregate import aggregate
 from simrail.scoring.table import OK, SCORE_COLUMNS
+from simrail.track.file import track_by_name
 
 SHORT = [
     "ride.end_m=300.0",
@@ -56,6 +58,19 @@ def test_table_has_the_fixed_columns_and_no_failure(two_draws: CampaignResult) -
     }
     whole = two_draws.scores.query("window == 'whole' and quantity == 'roll' and metric == 'rms'")
     assert (whole["status"] == OK).all() and len(whole) == 2 * 3 * 2
+
+
+def test_the_ride_that_is_drawn_has_the_map_that_errs_beside_the_line_that_was_laid() -> None:
+    """Whichever the scenario names first; of exact maps alone one of them is drawn."""
+    both = run_campaign(short("map.exact=[true, false]", "monte_carlo.sensor_draws=1"))
+    assert both.cells["map"].tolist() == ["exact", "drawn"]
+    (example,) = both.examples
+    assert example.cell["map"] == "drawn"
+    curve = [one.line.elements[2] for one in (example, replace(example, laid=None))]
+    assert example.line == track_by_name("smooth_curve") != example.recording.track
+    assert curve[0] != curve[1] == example.recording.track.elements[2]
+    (alone,) = run_campaign(short("map.exact=true", "monte_carlo.sensor_draws=1")).examples
+    assert alone.cell["map"] == "exact" and alone.line == alone.recording.track
 
 
 def test_same_seed_gives_the_same_bits(two_draws: CampaignResult) -> None:

@@ -218,6 +218,45 @@ def test_scenarios_without_lists_have_no_such_section() -> None:
         assert is_campaign(load_scenario("go20a", overrides=[setting]))
 
 
+@pytest.fixture(scope="module")
+def with_exact(small: Scores) -> Scores:
+    """The same cells with a map that errs, and as many with an exact one, a tenth of the error."""
+    scores, cells = small
+    more = len(cells)
+    exact = cells.assign(**{"cell": cells["cell"] + more, "case": cells["case"] + 1000, "map.exact": True})
+    erring = cells.assign(**{"map": "drawn", "map.exact": False})
+    of_exact = scores.assign(cell=scores["cell"] + more, value=0.1 * scores["value"])
+    of_erring = scores.assign(map="drawn")
+    parts = [part.astype({"map": str}) for part in (of_exact, of_erring)]
+    return as_score_table(pd.concat(parts, ignore_index=True)), pd.concat([exact, erring], ignore_index=True)
+
+
+def test_an_exact_map_is_an_axis_and_no_part_of_any_other_mean(
+    small: Scores, with_exact: Scores, tables: Frames, styles: list[MethodStyle]
+) -> None:
+    scores, cells = with_exact
+    axes = campaign_axes(cells)
+    assert [axis.column for axis in axes] == [
+        "speed_kmh",
+        "direction",
+        "imu",
+        "irregularity.scale",
+        "map",
+    ]
+    assert axes[-1].words == ("the map errs", "exact (ablation)")
+    both = campaign_tables(scores, cells, axes, styles, command=MANIFEST["command"])  # type: ignore[arg-type]
+    for name in ("methods", "pairs", "consistency"):
+        pd.testing.assert_frame_equal(both[name], tables[name])
+    assert both["worst"]["rms_roll_deg"].tolist() == tables["worst"]["rms_roll_deg"].tolist()
+    assert "map" not in both["worst"]
+    along = both["axes"]
+    others = along[along["axis"] != "map"].reset_index(drop=True)
+    pd.testing.assert_frame_equal(others, tables["axes"])
+    means = along[along["axis"] == "map"].set_index(["method", "value"])["mean"]
+    for method in METHODS:
+        assert means[method, "exact (ablation)"] == pytest.approx(0.1 * means[method, "the map errs"])
+
+
 def test_heat_maps_show_the_means(small: Scores, styles: list[MethodStyle]) -> None:
     scores, cells = small
     axes = {axis.column: axis for axis in campaign_axes(cells)}

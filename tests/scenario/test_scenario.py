@@ -5,10 +5,12 @@ from __future__ import annotations
 import tomllib
 from itertools import product
 from math import radians
+from pathlib import Path
 
 import pytest
 from pydantic import Field
 
+from simrail.cli.templates import write_template
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part, judge, shipped
 from simrail.scenario import check
@@ -22,6 +24,7 @@ from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.magnetic_surroundings import Steel, Traction
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
+from simrail.track.map_errors import MapErrors
 
 GOOD = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 
@@ -50,13 +53,37 @@ def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setattr("simrail.scenario.check_ride.critical_below", hunts_above_255)
     name = name or "manchester_cases"
     plan = judge_scenario(load_scenario(name))
-    # A kick is ridden above the critical speed on purpose, and said to be.
-    expected = ("hunts above",) if name == "manchester_cases" else ()
+    # A kick is ridden above the critical speed on purpose, and one of the vehicles of the odometry has none.
+    above = {"manchester_cases": "hunts above", "odometry": "irw_car runs unstably above"}
+    expected = (above[name],) if name in above else ()
     assert len(plan.warnings) == len(expected)
     assert all(words in warning for words, warning in zip(expected, plan.warnings, strict=True))
     assert "design_angles" in plan.estimators
     grades = {cell.imu.grade for cell in cells(load_scenario(name))}
-    assert "ideal" in grades  # the floor of every estimator is in every table
+    # The floor of every estimator is in every table; a table of odometries alone has none of an estimator.
+    assert ("ideal" in grades) == (name != "odometry")
+
+
+@pytest.mark.parametrize("name", sorted(shipped("scenario")))
+def test_a_train_knows_its_line_by_a_map_that_errs_and_a_laboratory_exactly(name: str) -> None:
+    """Full-size scenarios have the default map; what shows an exact one beside it is told here."""
+    spec = load_scenario(name).spec
+    if name in ("scale_ride", "scale_track"):
+        assert spec.map is None
+        return
+    assert spec.map is not None
+    beside = {"go20a", "metro_table3", "metro_geometry", "odometry"}
+    assert axes_of(spec.map) == ({"exact": (False, True)} if name in beside else {})
+    assert next(cells(load_scenario(name))).map_label == "drawn", "the ablation does not come first"
+    assert all(part.errors() == MapErrors() for _, part in expand(spec.map) if not part.exact)
+
+
+def test_a_template_has_the_default_map(tmp_path: Path) -> None:
+    path, _ = write_template("scenario", "my_line", folder=tmp_path)
+    part = load_scenario(str(path)).spec.map
+    assert part is not None and part.errors() == MapErrors()
+    ride, _ = write_template("ride", "my_ride", folder=tmp_path)
+    assert "[map]\n" in ride.read_text(encoding="utf-8")
 
 
 def test_go20a_is_the_ride_of_the_paper() -> None:

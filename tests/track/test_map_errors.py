@@ -190,3 +190,17 @@ def test_a_map_is_a_track_file() -> None:
     read = judge(TrackFile, parse_toml(track_text(known), file="map.toml"), file="map.toml").design("map")
     assert read == known
     assert TrackDesign.from_dict(known.to_dict()) == known
+
+
+def test_a_map_holds_plain_numbers() -> None:
+    """A recording is told by its repr, which a file must give again."""
+    assert "np.float64" not in repr(draw_map(LINE, MapErrors(), seed=3, draw=0))
+
+
+def test_a_long_line_may_have_a_wrong_height_of_metres() -> None:
+    """A slope that is wrong by 0.2 permil, over 20 km."""
+    long = TrackDesign("long", 0.0, (Straight(20000.0),))
+    ends = [draw_map(long, only(gradient_sd=2e-4), seed=3, draw=k).deviation for k in range(20)]
+    heights = np.array([end.height_m[-1] for end in ends if end is not None])
+    assert_sd(heights, 4.0, 20)
+    assert np.abs(heights).max() > 1.0

@@ -7,16 +7,23 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_name
+from simrail.report.tables.pivot import MAP_AXIS, without_ablation
+from simrail.report.words.sentences import axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
-from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, FULL
+from simrail.scoring.table import CURVE_PREFIX, DRAWN_MAP, EVERY_CURVE, EXACT_MAP, FULL
 
 _FIRST = ("speed_kmh", "direction", "imu", "irregularity.scale", "irregularity.spectrum", "vehicle")
 """Columns of the table of cells that come first, and that stand for others which say the same."""
 
 _LAST = ("mount", "odometry", "map", "track", "engine", "ride")
+MAP = "map"
+"""Column of the axis that compares the map that a train has with an exact one."""
+
+MAPS = {DRAWN_MAP: "the map errs", EXACT_MAP: "exact (ablation)"}
+"""Its values in words, in their order."""
+
 _TITLES = {
     "speed_kmh": "speed, km/h",
     "direction": "direction",
@@ -51,16 +58,19 @@ class CampaignAxis:
 
 
 def is_campaign(scenario: Scenario) -> bool:
-    """Whether a scenario has lists beside its IMU grades: axes that are worth a section."""
+    """Whether a scenario has lists beside its IMU grades: axes that are worth a section.
+
+    An exact map beside the one that errs is told in a section of its own.
+    """
     spec = scenario.spec
     names = set(axes_of(spec)) | {name for part in (*spec.ride, *spec.imu) for name in axes_of(part)}
-    return bool(names - {"grade"})
+    return bool(names - {"grade", MAP_AXIS})
 
 
 def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     """The axes along which the cells differ, each told once, the usual ones first."""
     named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry", "map"))
-    varying = [n for n in named if n in cells and n != "case" and len(cells[n].unique()) > 1]
+    varying = [n for n in named if n in cells and n not in ("case", MAP_AXIS) and len(cells[n].unique()) > 1]
     others = [name for name in varying if name not in (*_FIRST, *_LAST)]
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
     columns: list[str] = []
@@ -110,6 +120,16 @@ def draws_of(
     return draws.assign(cluster=draws.groupby(tracks, sort=True).ngroup())
 
 
+def beside_map(axes: Sequence[CampaignAxis]) -> list[CampaignAxis]:
+    """The axes but that of the map."""
+    return [axis for axis in axes if axis.column != MAP]
+
+
+def along(draws: pd.DataFrame, axis: CampaignAxis) -> pd.DataFrame:
+    """Draws to be compared along an axis: those with an exact map along that of the map only."""
+    return draws if axis.column == MAP else without_ablation(draws)
+
+
 def _follows(cells: pd.DataFrame, one: str, other: str) -> bool:
     """Whether the value of `other` says that of `one`."""
     return len(cells[[one, other]].drop_duplicates()) == cells[other].nunique(dropna=False)
@@ -121,7 +141,9 @@ def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:
         values = sorted(values)
     elif name == "direction":
         values = sorted(values, reverse=True)  # standing, forward, backward
-    return CampaignAxis(name, _title(name), tuple(values), tuple(_words(value) for value in values))
+    elif name == MAP:
+        values = sorted(values, key=list(MAPS).index)
+    return CampaignAxis(name, _title(name), tuple(values), tuple(_words(value, name) for value in values))
 
 
 def _title(name: str) -> str:
@@ -134,9 +156,11 @@ def _is_none(value: object) -> bool:
     return value is None or value != value
 
 
-def _words(value: object) -> str:
+def _words(value: object, column: str) -> str:
     if _is_none(value):
         return "-"
+    if column == MAP:
+        return MAPS[str(value)]
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (int, float)):

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
-from simrail.report.campaign.axes import CampaignAxis
+from simrail.report.campaign.axes import CampaignAxis, along
 from simrail.report.figures import canvas
 from simrail.report.figures.attitude import angle_error
 from simrail.report.tables.methods import MethodStyle
@@ -19,7 +19,10 @@ MOST_CURVATURES = 4
 """Rides that are drawn over curvature."""
 
 LONG_WORD = 16
-"""Longer names of values are told in two lines, so that neighbours do not touch."""
+"""Longer names of values are told in two lines, so that neighbours do not touch;"""
+
+MOST_IN_ONE_LINE = 4
+"""of more values than these, names of half that length."""
 
 
 def box_figure(
@@ -34,8 +37,8 @@ def box_figure(
     across = min(len(axes), 2)
     with canvas.look():
         figure, panels = canvas.panels_beside(len(axes), tall_in=2.2, across=across, gap_in=0.7, right_in=0.2)
-        for number, (panel, along) in enumerate(zip(panels, axes, strict=True)):
-            _draw_boxes(panel, draws, styles, along)
+        for number, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
+            _draw_boxes(panel, along(draws, axis), styles, axis)
             panel.set_ylim(*limits)
             canvas.log_scale(panel.yaxis)
             if number % across == 0:
@@ -50,12 +53,12 @@ def _legend(figure: Figure, styles: Sequence[MethodStyle]) -> None:
     )
 
 
-def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle], along: CampaignAxis) -> None:
+def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle], axis: CampaignAxis) -> None:
     slot = 0.8 / len(styles)
     for k, style in enumerate(styles):
         own = draws[(draws["estimator"] == style.name) & (draws["value"] > 0.0)]
-        for i, value in enumerate(along.values):
-            values = own.loc[own[along.column] == value, "value"].to_numpy()
+        for i, value in enumerate(axis.values):
+            values = own.loc[own[axis.column] == value, "value"].to_numpy()
             if len(values) == 0:
                 continue
             x = i - 0.4 + (k + 0.5) * slot
@@ -66,14 +69,15 @@ def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle],
             # A box without height is seen as a bar.
             panel.plot(ends, [middle, middle], color=style.colour, lw=3.6, solid_capstyle="butt", zorder=2)
             panel.plot(ends, [middle, middle], color="white", lw=1.3, solid_capstyle="butt", zorder=4)
-    canvas.categories(panel, [in_two(word) for word in along.words])
-    panel.set_xlabel(along.title)
+    longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
+    canvas.categories(panel, [in_two(word, longest=longest) for word in axis.words])
+    panel.set_xlabel(axis.title)
 
 
-def in_two(word: str) -> str:
-    """A long name in two lines, parted at the underscore that is nearest to its middle."""
+def in_two(word: str, *, longest: int = LONG_WORD) -> str:
+    """A name longer than `longest` in two lines, parted at the underscore that is nearest to its middle."""
     places = [i for i, letter in enumerate(word) if letter == "_"]
-    if len(word) <= LONG_WORD or not places:
+    if len(word) <= longest or not places:
         return word
     at = min(places, key=lambda i: abs(i - len(word) // 2)) + 1
     return f"{word[:at]}\n{word[at:]}"
@@ -115,7 +119,7 @@ def curvature_figure(
 def _curvature_bins(example: CellResult) -> tuple[FloatArray, np.ndarray]:
     """Mean curvature (b,) 1/km of the bins ridden through for half a second, and the bin (n,) or -1."""
     motion, rate = example.motion, example.recording.imu_sheet.rate_hz
-    curvature = 1e3 * example.recording.track.frame(motion["position_m"].to_numpy()).k[:, 2]
+    curvature = 1e3 * example.line.frame(motion["position_m"].to_numpy()).k[:, 2]
     moving = np.abs(motion["speed_mps"].to_numpy()) > 0.5
     width = max(float(np.ptp(curvature)) / 10.0, 1e-6)
     bins = np.rint(curvature / width).astype(np.intp)

@@ -8,12 +8,21 @@ import numpy as np
 import pandas as pd
 
 from simrail.campaign.cell import CellResult
-from simrail.report.campaign.axes import CampaignAxis, campaign_axes, draws_of, finest, is_campaign
+from simrail.report.campaign.axes import (
+    CampaignAxis,
+    beside_map,
+    campaign_axes,
+    draws_of,
+    finest,
+    is_campaign,
+)
 from simrail.report.campaign.figures import box_figure, curvature_figure
 from simrail.report.campaign.heat import Side, heat_maps, rails_figures, side_of
+from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.tables import HEADLINES, campaign_tables, write_tables
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle, readable
+from simrail.report.tables.pivot import has_both_maps, without_ablation
 from simrail.report.tables.tables import NONE, Cell, Row, Table, method_row, number_cell, signed
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE
 
@@ -36,15 +45,28 @@ def campaign_section(data: PageData) -> list[Section]:
     # What stands beside a run has no part in one of its cells.
     command, *_ = str(data.manifest.get("command", f"simrail run {data.scenario.called}")).split(" --beside ")
     tables = campaign_tables(scores, cells, axes, styles, command=command)
+    odometries = odometry_frames(scores, cells)
     if tables["methods"].empty:
         return []
     by_name = {style.name: style for style in data.styles}
-    rails = rails_figures(scores, cells, axes, data.styles, band=data.judged_band, known=data.bands)
+    kept = without_ablation(cells)
+    rails = rails_figures(
+        scores[scores["cell"].isin(kept["cell"])],
+        kept,
+        beside_map(axes),
+        data.styles,
+        band=data.judged_band,
+        known=data.bands,
+    )
     shown = {
         "axes": [(axis.title, ", ".join(axis.words)) for axis in axes],
         "cells": len(cells),
+        "both_maps": has_both_maps(cells),
         "tracks": int(tables["methods"]["tracks"].max()),
         "rails": rails,
+        "odometry": page_tables(odometries),
+        # Where no method is under test, the odometry is what the campaign is about.
+        "odometry_first": all(style.baseline for style in styles),
         "methods": _methods_table(tables["methods"], by_name),
         "pairs": _pairs_table(tables["pairs"], by_name),
         "consistency": _consistency_table(tables["consistency"], by_name),
@@ -52,7 +74,7 @@ def campaign_section(data: PageData) -> list[Section]:
             (
                 readable(row["method"]),
                 f"{row['rms_roll_deg']:.3f}\u00b0",
-                " \u00b7 ".join(f"{axis.name} {row[axis.title]}" for axis in axes),
+                " \u00b7 ".join(f"{axis.name} {row[axis.title]}" for axis in beside_map(axes)),
                 row["command"],
             )
             for row in tables["worst"].to_dict("records")
@@ -60,16 +82,20 @@ def campaign_section(data: PageData) -> list[Section]:
         **_drawings(data, axes),
     }
     title, template = "The campaign as a whole", "campaign/section.html.j2"
-    return [Section("campaign", title, template, shown, partial(write_tables, tables=tables))]
+    return [Section("campaign", title, template, shown, partial(write_tables, tables=tables | odometries))]
 
 
 def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
     """Maps of the roll error over axes, its spread along each, and over curvature; "" where there is none."""
     styles = sorted(data.attitude_styles, key=lambda style: bool(style.baseline))[:MOST_METHODS]
     muted = {style.label for style in styles if style.baseline}
-    roll, curves = (draws_of(data.scores, data.cells, axes, window=w) for w in ("whole", EVERY_CURVE))
+    of_any_map = draws_of(data.scores, data.cells, axes)
+    roll, curves = (
+        without_ablation(draws)
+        for draws in (of_any_map, draws_of(data.scores, data.cells, axes, window=EVERY_CURVE))
+    )
     # A map over two axes of which one follows from the other would be empty but for a line of cells.
-    fine = finest(axes, data.cells)
+    fine = finest(beside_map(axes), data.cells) or list(axes)
     by_column = {axis.column: axis for axis in fine}
     speed, direction = by_column.get("speed_kmh"), by_column.get("direction")
 
@@ -95,7 +121,7 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
             if axis.column not in across.columns
         ],
         "arrows": direction is not None,
-        "spread": box_figure(roll, styles, axes[:MOST_BOXES], what="Spread of the roll error by axis"),
+        "spread": box_figure(of_any_map, styles, axes[:MOST_BOXES], what="Spread of the roll error by axis"),
         "curvature": curvature_figure(rides, styles, words=words, what="Roll error against curvature"),
     }
 
@@ -105,7 +131,7 @@ def _curve_side(curves: pd.DataFrame, examples: Sequence[CellResult]) -> Side:
     names = [str(name) for name in curves["window"].unique()]
     radius: dict[str, float] = {}
     for example in examples:
-        track = example.recording.track
+        track = example.line
         place = np.arange(track.start_m, track.end_m, 1.0)
         bend, number = track.frame(place).k[:, 2], np.asarray(track.segment(place))
         for k in np.unique(number):

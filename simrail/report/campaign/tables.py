@@ -1,8 +1,9 @@
 """Tables of a campaign as a whole: methods with their intervals, pairs of methods, worst cells.
 
 They are frames, for files (`write_tables`) and for the page alike. Means over all cells weigh every cell
-alike; tracks are the clusters of every interval, the same track draw in all cases being one of them, since
-cases meet the same draws.
+alike, and are of the map that a train has: cells with an exact one beside it, an ablation, stand on the axis
+of the map only. Tracks are the clusters of every interval, the same track draw in all cases being one of
+them, since cases meet the same draws.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,8 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.report.campaign.axes import CampaignAxis, draws_of
+from simrail.report.campaign.axes import CampaignAxis, along, beside_map, draws_of
 from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.pivot import without_ablation
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.statistics import anees_bounds, compare, coverage_bounds, levels
 
@@ -64,21 +66,25 @@ def campaign_tables(
         effect size. ``consistency``: NEES and coverage of roll with the bounds of a consistent method.
         ``worst``: cells of the largest roll error, with the command that makes each again.
     """
-    headlines = {
+    of_any_map = {
         (quantity, metric, window): draws_of(
             scores, cells, axes, quantity=quantity, metric=metric, window=window
         )
         for quantity, metric, window in HEADLINES.values()
     }
-    trust = {metric: draws_of(scores, cells, axes, metric=metric) for metric in ("nees", "coverage95")}
+    headlines = {figure: without_ablation(draws) for figure, draws in of_any_map.items()}
+    trust = {
+        metric: without_ablation(draws_of(scores, cells, axes, metric=metric))
+        for metric in ("nees", "coverage95")
+    }
     roll = headlines[HEADLINES["roll"]]
     present = [style for style in styles if (roll["estimator"] == style.name).any()]
     rows = {
         "methods": _methods(headlines, present),
-        "axes": _along(roll, axes, present),
+        "axes": _along(of_any_map[HEADLINES["roll"]], axes, present),
         "pairs": _pairs(roll, present),
         "consistency": _consistency(trust, present),
-        "worst": _worst(roll, axes, present, command),
+        "worst": _worst(roll, beside_map(axes), present, command),
     }
     return {name: pd.DataFrame(lines) for name, lines in rows.items()}
 
@@ -131,8 +137,14 @@ def _along(
         {"axis": axis.title, "value": word, "method": name, **mean}
         for axis in axes
         for value, word in zip(axis.values, axis.words, strict=True)
-        for name, _, mean in _by_method(draws[draws[axis.column] == value], styles)
+        for name, _, mean in _by_method(_at(draws, axis, value), styles)
     ]
+
+
+def _at(draws: pd.DataFrame, axis: CampaignAxis, value: object) -> pd.DataFrame:
+    """Draws with a value of an axis."""
+    own = along(draws, axis)
+    return own[own[axis.column] == value]
 
 
 def _pairs(draws: pd.DataFrame, styles: Sequence[MethodStyle]) -> list[dict[str, Any]]:

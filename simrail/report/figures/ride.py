@@ -44,7 +44,7 @@ def over_distance(
         low, high = float(position.min()), float(position.max())
         room = 0.01 * max(high - low, 1.0)
         limits = low - room, high + room
-    shade_track(axes, example.recording.track, limits=limits)
+    shade_track(axes, example.line, limits=limits)
     distance_axis(axes[-1], direction=direction_of(example) if arrow else None)
 
 

@@ -12,6 +12,8 @@ from markupsafe import Markup
 
 from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
+from simrail.report.campaign.axes import is_campaign
+from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.section import campaign_section
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
 from simrail.report.pages.frame import page_text
@@ -19,6 +21,7 @@ from simrail.report.pages.ride import ride_sections
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers import SECTIONS as PAPERS
 from simrail.report.tables.geometry import geometry_table, overview_table
+from simrail.report.tables.maps import map_groups, map_tables
 from simrail.report.tables.pivot import Case, map_words
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
@@ -26,7 +29,7 @@ from simrail.report.tables.tables import consistency_table, error_table, odometr
 from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
-from simrail.scoring.table import LEFT_OPEN, NO_SAMPLES, OK
+from simrail.scoring.table import EXACT_MAP, LEFT_OPEN, NO_SAMPLES, OK
 from simrail.track.design import TrackDesign
 
 SETS_BESIDE = ("gonzalez_2023",)
@@ -104,7 +107,7 @@ def _tracks(data: PageData) -> list[Section]:
     tracks: dict[str, TrackDesign] = {}
     stops: dict[str, dict[str, float]] = {}
     for example in data.examples:
-        track, position = example.recording.track, example.motion["position_m"]
+        track, position = example.line, example.motion["position_m"]
         tracks.setdefault(track.name, track)
         stops.setdefault(track.name, {"start": float(position.iloc[0]), "end": float(position.iloc[-1])})
     shown = [
@@ -115,7 +118,7 @@ def _tracks(data: PageData) -> list[Section]:
 
 
 def _rails(data: PageData) -> list[Section]:
-    table = overview_table(data.cases, data.styles, known=data.bands)
+    table = overview_table(data.shown_cases, data.styles, known=data.bands)
     return [_section("rails", "Rails", rails=table)] if table is not None else []
 
 
@@ -123,7 +126,7 @@ def _running(data: PageData) -> list[Section]:
     """What the ride itself was like."""
     spec = data.scenario.spec
     safety = spec.running_safety
-    table = running_table(data.cases, derailment_limit=data.derailment_limit)
+    table = running_table(data.shown_cases, derailment_limit=data.derailment_limit)
     if table is None:
         return []
     factor = 1.0 if safety is None else TRACK_SHIFT_FACTOR[safety.vehicle]
@@ -137,9 +140,18 @@ def _running(data: PageData) -> list[Section]:
     return [_section("running", "Running safety and comfort", **shown)]
 
 
+def _maps(data: PageData) -> list[Section]:
+    """What the scores are with the map that a train has, and with an exact one."""
+    groups = [
+        (group.title, map_tables(group, data.attitude_styles, data.styles))
+        for group in map_groups(data.cases)[:MOST_TABLES]
+    ]
+    return [_section("maps", "What the map costs", groups=groups)] if groups else []
+
+
 def _scores(data: PageData) -> list[Section]:
-    shown = [_case(data, case) for case in data.cases[:MOST_TABLES]]
-    left_out = max(len(data.cases) - MOST_TABLES, 0)
+    shown = [_case(data, case) for case in data.shown_cases[:MOST_TABLES]]
+    left_out = max(len(data.shown_cases) - MOST_TABLES, 0)
     return [_section("scores", "Scores", cases=shown, rows=len(data.scores), cases_left_out=left_out)]
 
 
@@ -150,7 +162,9 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
     title.append(map_words(labels["map"]))
     axes = [axis_words(*axis) for axis in case.axes.items() if axis[0] != EXACT_MAP_AXIS]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
-    words = f"mean \u00b1 standard deviation between {draws} draws of the sensors"
+    maps = data.scenario.spec.monte_carlo.map_draws if labels["map"] != EXACT_MAP else 1
+    of_maps = " and of the map" * (maps > 1)
+    words = f"mean \u00b1 standard deviation between {draws} draws of the sensors{of_maps}"
     return {
         "title": " \u00b7 ".join([*title, *axes]),
         "draws": (words if draws > 1 else "one draw") + f" over {tracks} draws of the track" * (tracks > 1),
@@ -163,7 +177,10 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
 
 def _odometry(data: PageData) -> list[Section]:
     table = odometry_table(data.cases[:MOST_TABLES])
-    return [_section("odometry", "Odometry", odometry=table)] if table.rows else []
+    # A campaign has them in a section of its own.
+    frames = {} if is_campaign(data.scenario) else odometry_frames(data.scores, data.cells)
+    shown = {"odometry": table, "over_all": page_tables(frames)}
+    return [_section("odometry", "Odometry", **shown)] if table.rows else []
 
 
 def _words(data: PageData) -> list[Section]:
@@ -194,6 +211,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     _tracks,
     _rails,
     _running,
+    _maps,
     _scores,
     _odometry,
     _words,

@@ -16,7 +16,7 @@ from simrail.report.figures.score import curves_figure, rms_figure
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.geometry import BAND, JUDGED, indicator_table, is_zero, judged_band, waves_words
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, of_cell
+from simrail.report.tables.pivot import MAP_AXIS, Case, map_words, of_cell
 from simrail.report.tables.running import running_tiles
 from simrail.report.tables.tables import Table
 from simrail.report.tables.tiles import tiles
@@ -111,15 +111,16 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
 
 
 def ride_title(example: CellResult) -> str:
-    """Name of a ride, and the values of its axes."""
+    """Name of a ride, and the values of its axes; what its map is stands in `ride_facts`."""
+    told = ("imu.grade", MAP_AXIS)
     axes = [
-        axis_words(name, value) for name, value in example.cell.items() if "." in name and name != "imu.grade"
+        axis_words(name, value) for name, value in example.cell.items() if "." in name and name not in told
     ]
     return " \u00b7 ".join([example.recording.name, *axes])
 
 
 def ride_facts(example: CellResult) -> list[str]:
-    """Length, speed, IMU and odometry of a ride, a line each."""
+    """Length, speed, IMU, odometry and map of a ride, a line each."""
     motion, recording = example.motion, example.recording
     position, speed = motion["position_m"].to_numpy(), np.abs(motion["speed_mps"].to_numpy())
     moving = speed > 0.01
@@ -130,6 +131,7 @@ def ride_facts(example: CellResult) -> list[str]:
         f"{abs(position[-1] - position[0]):.0f} m towards {way} distance, {duration:.0f} s",
         f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
         *recording_facts(recording),
+        f"the line from {map_words(str(example.cell['map']))}",
     ]
 
 

@@ -17,7 +17,7 @@ beforehand.
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from types import ModuleType
 from typing import Any, Literal
@@ -119,7 +119,10 @@ def read_paper(name: str) -> Paper:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim with its verdict: what the paper says and printed, our figures, the rule, and the cause."""
+    """A claim with its verdict: what the paper says and printed, our figures, the rule, and the cause.
+
+    ``exact`` is what became of it where the train knows its line exactly, if that was run and differs.
+    """
 
     key: str
     says: str
@@ -128,6 +131,7 @@ class Claim:
     rule: str
     verdict: Verdict
     cause: str = ""
+    exact: str = ""
 
     @property
     def tone(self) -> str:
@@ -174,3 +178,21 @@ def judged(paper: Paper, evidence: object, judges: ModuleType, *, has: Callable[
         ours, cause = (paper.written(text, **values) for text in (one.ours or paper.words[judge], one.cause))
         claims.append(Claim(one.key, says, printed, ours, rule, verdict, cause))
     return claims
+
+
+def with_exact(claims: Sequence[Claim], of_exact_map: Sequence[Claim]) -> list[Claim]:
+    """Claims that say what became of them with an exact map, an ablation: figures, and verdict if another.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+        Judged with the map that a train has.
+    of_exact_map : sequence of Claim
+        The same, judged with an exact one.
+    """
+    result = []
+    for own, other in zip(claims, of_exact_map, strict=True):
+        is_told = own.ours != other.ours and "not asked" not in (own.verdict, other.verdict)
+        verdict = f"{other.words} " if other.verdict != own.verdict else ""
+        result.append(replace(own, exact=f"{verdict}{other.ours}") if is_told else own)
+    return result

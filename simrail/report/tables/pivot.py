@@ -4,6 +4,7 @@ A case is what cells share that differ in their draws only: one ride, IMU, mount
 one value of every axis.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,10 +15,23 @@ from simrail.scoring.table import CURVE_PREFIX, EXACT_MAP, FULL, SCORE_COLUMNS
 
 CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry", "map")
 
+MAP_AXIS = "map.exact"
+"""The scenario's list that the label ``map`` tells of."""
+
 
 def map_words(known: str) -> str:
     """What the train knows of the line, for titles."""
     return "an exact map (ablation)" if known == EXACT_MAP else "a map with errors"
+
+
+def has_both_maps(table: pd.DataFrame) -> bool:
+    """Whether some rows of a table, by its column ``map``, have an exact map and others one that errs."""
+    return "map" in table and 0 < int((table["map"] == EXACT_MAP).sum()) < len(table)
+
+
+def without_ablation(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows without those of an exact map, where others have the map that a train has."""
+    return table[table["map"] != EXACT_MAP] if has_both_maps(table) else table
 
 
 class Mean(NamedTuple):
@@ -51,12 +65,13 @@ class Case:
 
     @property
     def axes(self) -> dict[str, str]:
-        """Values of the scenario's lists by dotted name; the IMU's grade is left out, ``imu`` has it.
+        """Values of the scenario's lists by dotted name, but those that ``imu`` and ``map`` have.
 
         A ride has no value of a list that stands in another ride only.
         """
+        told = ("imu.grade", MAP_AXIS)
         named = ((name, value) for name, value in self.labels.items() if "." in name)
-        return {n: value for n, value in named if not n.startswith("imu.grade") and value != "nan"}
+        return {n: value for n, value in named if not n.startswith(told) and value != "nan"}
 
     def get(
         self,
@@ -100,6 +115,24 @@ def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Case]:
         Case({name: str(value) for name, value in zip(keys, values, strict=True)}, rows, _index(rows))
         for values, rows in table.groupby(keys, observed=True, dropna=False, sort=False)
     ]
+
+
+def first_maps(all_cases: Sequence[Case]) -> list[Case]:
+    """Cases without those of an exact map, where others have the map that a train has."""
+    drawn = [case for case in all_cases if case.labels["map"] != EXACT_MAP]
+    return drawn or list(all_cases)
+
+
+def with_exact_map(case: Case, others: Sequence[Case]) -> Case | None:
+    """The case that differs in an exact map only; None if there is none, or if it is this one."""
+    if case.labels["map"] == EXACT_MAP:
+        return None
+    return next((o for o in others if o.labels["map"] == EXACT_MAP and _but_map(o) == _but_map(case)), None)
+
+
+def _but_map(case: Case) -> dict[str, str]:
+    """What a case is, beside its map."""
+    return {name: value for name, value in case.labels.items() if name not in ("map", MAP_AXIS, "case")}
 
 
 def of_cell(all_cases: list[Case], cell: dict[str, object]) -> Case | None:

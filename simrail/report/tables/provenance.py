@@ -27,7 +27,7 @@ class Part(NamedTuple):
 
 def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult]) -> list[Part]:
     """Every part that the campaign used, with its source."""
-    tracks = {example.recording.track.name: example.recording.track for example in examples}
+    tracks = {example.line.name: example.line for example in examples}
     result = [Part("track", name, _word(track.synthetic), track.source) for name, track in tracks.items()]
     if scenario.spec.irregularity is not None:
         result += _irregularities(scenario.spec.irregularity)

@@ -21,10 +21,11 @@ from simrail.report.pages.section import PageData
 from simrail.report.papers.briales_2021 import judges
 from simrail.report.papers.briales_2021.figures import spread_of
 from simrail.report.papers.briales_2021.judges import TIME_CONSTANTS_S, Evidence
-from simrail.report.papers.briales_2021.rides import GENERAL_PURPOSE, PAPER, Rides, rides_of
-from simrail.report.papers.briales_2021.section import section
-from simrail.report.papers.claim import Claim, judged
+from simrail.report.papers.briales_2021.rides import GENERAL_PURPOSE, PAPER, Rides, exact_rides, rides_of
+from simrail.report.papers.briales_2021.section import map_paragraph, section
+from simrail.report.papers.claim import Claim, judged, with_exact
 from simrail.report.tables.pivot import Case, Mean, cases
+from simrail.report.words.sentences import degrees
 from simrail.results import describe
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells, methods
@@ -231,8 +232,11 @@ def test_nothing_fails() -> None:
 
 
 def test_table_3_is_the_mean_over_the_rides() -> None:
+    """With the map that a train has; the exact one has a table of its own."""
     scores, view = campaign(FAST)[1].scores, view_of(FAST)
-    chosen = scores[(scores["metric"] == "rms") & (scores["window"] == "cropped")]
+    chosen = scores[
+        (scores["metric"] == "rms") & (scores["window"] == "cropped") & (scores["map"] == "drawn")
+    ]
     for reference, table, first in (("design", view.design, 3), ("truth", view.truth, 0)):
         row = next(row for row in table.rows if row.label == PAPER.label("gda_paper"))
         for i, quantity in enumerate(("roll", "pitch", "yaw")):
@@ -296,11 +300,84 @@ def ratio_of(scores: pd.DataFrame, ride: str, method: str, ours: str) -> tuple[f
         & (scores["metric"] == "rms")
         & (scores["reference"] == "truth")
         & (scores["ride"] == ride)
+        & (scores["map"] == "drawn")
     ]
     a, b = (chosen.loc[chosen["estimator"] == name, "value"].to_numpy() for name in (method, ours))
     ratio = a.mean() / b.mean()
     # By the delta method, the two paired by their draws.
     return float(ratio), float((a - ratio * b).std(ddof=1) / np.sqrt(len(a)) / b.mean())
+
+
+def test_the_exact_map_stands_beside_in_a_table_and_a_paragraph() -> None:
+    scores, view = campaign(FAST)[1].scores, view_of(FAST)
+    whole = scores[
+        (scores["metric"] == "rms") & (scores["window"] == "whole") & (scores["reference"] == "truth")
+    ]
+    means = (
+        whole.groupby(["estimator", "quantity", "map", "ride"], observed=True)["value"]
+        .mean()
+        .groupby(["estimator", "quantity", "map"], observed=True)
+        .mean()
+    )
+    names = PAPER.names(methods(campaign(FAST)[0]))
+    for row in view.map_table.rows:
+        name = next(names[part] for part, role in PAPER.parts.items() if role.label == row.label)
+        shown = [means[name, q, known] for q in ("roll", "pitch", "yaw") for known in ("drawn", "exact")]
+        assert [float(cell.text) for cell in row.cells] == pytest.approx(shown, abs=5.1e-4)
+    assert len(view.map_table.rows) == len(PAPER.parts)
+    design = [means["design_angles", "roll", known] for known in ("drawn", "exact")]
+    assert design[0] > design[1], "who takes the roll from the map takes its errors"
+    sizes = " instead of ".join(degrees(value) for value in design)
+    assert f"Design angles only, in roll: {sizes}." in view.map_words
+    assert all(example.cell["map"] == "drawn" for example in campaign(FAST)[1].examples)
+    exact = [claim.exact for claim in view.all_claims if claim.exact]
+    assert exact and not any(claim.exact for claim in view.all_claims if claim.verdict == "not asked")
+
+
+def as_cases(rides: Rides, known: str) -> Rides:
+    """Rides by a map."""
+    return replace(rides, cases=[replace(one, labels=one.labels | {"map": known}) for one in rides.cases])
+
+
+def test_what_the_map_costs_is_told_of_the_method_that_loses_the_most() -> None:
+    """Each figure from planted scores; the paper's own words on its map stand before them."""
+    erring = as_cases(planted(only("gda", "roll", 3.0)), "drawn")
+    exact = as_cases(planted(only("ekf_printed", "roll", 1.0)), "exact")
+    told = map_paragraph(erring, exact)
+    assert "known in advance (abstract, section 5.1)" in told
+    assert f"in roll {PAPER.label('gda')}, 0.300\u00b0 instead of 0.100\u00b0" in told
+    assert "in pitch none loses more than 1 %" in told and "in yaw none loses" in told
+    assert "Design angles only, in roll: 0.0700\u00b0 instead of 0.0700\u00b0" in told
+    assert "an ablation" in map_paragraph(exact, None) and "not asked" in map_paragraph(exact, None)
+    assert "not told" in map_paragraph(erring, None)
+
+
+def test_a_claim_says_what_an_exact_map_makes_of_it() -> None:
+    """The verdict where it is another, figures where they differ, nothing where they do not."""
+    own = verdicts(planted(only("yuan", "pitch", 0.5)))
+    found = {c.key: c for c in with_exact(list(own.values()), list(verdicts(planted(), {}).values()))}
+    assert found["yuan"].verdict == "not reproduced"
+    assert found["yuan"].exact.startswith("Reproduces. In curves")
+    assert found["sabatini"].exact == "" and found["repeatability"].exact == ""
+    slightly = only("yuan", "pitch", 1.1)
+    (other,) = with_exact([own["yuan"]], [verdicts(planted(slightly))["yuan"]])
+    assert other.exact.startswith("Reproduces.")
+    both = with_exact([verdicts(planted())["yuan"]], [verdicts(planted(slightly))["yuan"]])
+    assert both[0].exact.startswith("In curves")
+
+
+def test_rides_with_the_map_that_errs_are_judged_and_their_twins_found() -> None:
+    def one(ride: str, known: str, imu: str = "real") -> Case:
+        labels = {"ride": ride, "imu": imu, "map": known}
+        return Case(labels, pd.DataFrame(), {})
+
+    every = [one("a", "exact"), one("a", "drawn", "ideal"), one("a", "drawn"), one("b", "drawn")]
+    rides = rides_of(every, [])
+    assert rides.cases == [every[2], every[3]]
+    assert exact_rides(rides, every) is None, "b was not run with an exact map"
+    beside = exact_rides(rides_of(every[:3], []), every)
+    assert beside is not None and beside.cases == [every[0]]
+    assert rides_of(every[:1], []).cases == [every[0]]
 
 
 @pytest.mark.slow

@@ -33,8 +33,8 @@ from simrail.report.pages.section import PageData
 from simrail.report.papers.claim import Claim, judged
 from simrail.report.papers.gonzalez_2023 import judges
 from simrail.report.papers.gonzalez_2023.judges import Evidence, Peak, errata_note
-from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, rows_of
-from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, section
+from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, exact_rows, rows_of
+from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, map_paragraph, section
 from simrail.report.papers.gonzalez_2023.tunings import by_part, notes, status_table, tunings_of
 from simrail.report.tables.geometry import QUANTITIES, geometry_table, indicator_table, overview_table
 from simrail.report.tables.methods import MethodStyle
@@ -298,6 +298,52 @@ def test_what_misprints_cost_is_computed() -> None:
     assert "hardly matter" in errata_note(planted(same))
 
 
+def by_map(rows: Rows, known: str) -> Rows:
+    """Rows of a train that knows its line so."""
+    labels = {"ride": "go", "vehicle": "v", "mount": "axle", "imu": "real", "odometry": "matched"} | {
+        "map": known
+    }
+    noisy = None if rows.noisy is None else replace(rows.noisy, labels=labels | {"imu": "real_noise_added"})
+    return replace(rows, case=replace(rows.case, labels=labels), noisy=noisy)
+
+
+def test_the_map_that_errs_is_judged_and_the_exact_one_found_beside_it() -> None:
+    erring, exact = by_map(planted({("kom", "alignment"): 2.0}), "drawn"), by_map(planted(), "exact")
+    assert erring.noisy is not None and exact.noisy is not None
+    every = [exact.case, exact.noisy, erring.case, erring.noisy]
+    found = rows_of(every, [], band="paper")
+    assert found is None, "no method plays a part"
+    beside = exact_rows(erring, every)
+    assert beside is not None and (beside.case, beside.noisy) == (exact.case, exact.noisy)
+    assert exact_rows(erring, every[2:]) is None and exact_rows(exact, every) is None
+
+
+def test_rows_are_of_the_map_that_errs_whatever_comes_first() -> None:
+    ran = methods(load_scenario("metro_geometry"))
+    names = PAPER.names(ran)
+
+    def one(known: str) -> Case:
+        rows = by_map(planted(), known)
+        scores = {(names.get(key[0], key[0]), *key[1:]): mean for key, mean in rows.case.scores.items()}
+        return replace(rows.case, scores=scores)
+
+    found = rows_of([one("exact"), one("drawn")], ran, band="paper")
+    assert found is not None and found.case.labels["map"] == "drawn" and "a map with errors" in found.where
+    alone = rows_of([one("exact")], ran, band="paper")
+    assert alone is not None and "an exact map (ablation)" in alone.where
+
+
+def test_what_the_map_costs_is_told_of_the_tuning_that_loses_the_most() -> None:
+    erring = by_map(planted({("kom", "alignment"): 2.0, ("cml", "cross_level"): 1.5}), "drawn")
+    told = map_paragraph(erring, by_map(planted(), "exact"))
+    assert "as given, by functions of the place along it (abstract, section 2.1)" in told
+    assert "in alignment KOM, 1.80 instead of 0.900 mm" in told
+    assert "in cross-level CML, 0.178 instead of 0.119 mm" in told
+    assert "in vertical profile none loses more than 1 %" in told
+    assert "not told" in map_paragraph(erring, None)
+    assert "not asked" in map_paragraph(by_map(planted(), "exact"), None)
+
+
 # ---- tables and sentences ----------------------------------------------------------------------
 
 Change = dict[tuple[str, str, str], float]
@@ -389,6 +435,20 @@ def test_sentences_lay_error_baseline_and_its_causes_side_by_side() -> None:
     assert any("the alignment of ours" in f.text and "0.5 mm: kept" in f.text for f in lost)
     assert next(f for f in lost if "the cross-level of ours is off" in f.text).tone == "bad"
     assert any("50 %: too small" in f.text for f in lost)
+
+
+def test_sentences_take_twins_of_the_same_map_and_tell_the_exact_one_by_itself() -> None:
+    others = [
+        case({("ours", "cross_level", "D1"): 0.1}, odometry="truth", map="exact"),
+        case({("ours", "cross_level", "D1"): 0.7}, map="exact"),
+        case({("ours", "cross_level", "D1"): 0.9}, odometry="truth", map="drawn"),
+    ]
+    told = [f.text for f in geometry_findings(case(map="drawn"), STYLES, others)]
+    (said,) = [text for text in told if "the cross-level of ours is off" in text]
+    assert "0.270 mm with the true position, 0.210 mm with an exact map." in said
+    told = [f.text for f in geometry_findings(case(map="exact"), STYLES, others)]
+    (said,) = [text for text in told if "the cross-level of ours is off" in text]
+    assert "0.0300 mm with the true position." in said and "exact map" not in said
 
 
 def test_the_overview_has_a_row_per_case_and_marks_a_loss() -> None:

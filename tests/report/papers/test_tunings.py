@@ -38,6 +38,19 @@ def test_the_own_ride_is_told_by_the_command(scenario: Scenario) -> None:
     assert not searched_on(shipped_tuning("scale_by_hand"), scenario, FIRST)
 
 
+def test_a_search_with_an_exact_map_was_on_the_ride_with_one() -> None:
+    """Tunings of the metro were searched so; its scenario has another map as well, which is no own ride."""
+    metro = load_scenario("metro_geometry")
+    assert metro.folder is not None
+    tuning = Tuning.from_file(metro.folder / "tunings" / "metro_geometry_cml.toml")
+    own = {"ride": "go70", "mount": "axle", "track_draw": 0, "map_draw": 0, "sensor_draw": 0, "map": "exact"}
+    assert searched_on(tuning, metro, own)
+    assert not searched_on(tuning, metro, own | {"map": "drawn"})
+    assert searched_on(tuning, load_scenario("metro_geometry", overrides=["map.exact=true"]), own)
+    other = load_scenario("metro_geometry", overrides=["map.cant_sd_mm=8.0"])
+    assert not searched_on(tuning, other, own)
+
+
 def rows(sds: dict[str, float], *, draws: int = 20, tracks: int = 4) -> Rows:
     found = {
         (part, quantity, "paper", "truth", "whole", "sd"): Mean(sd, 0.1, draws)

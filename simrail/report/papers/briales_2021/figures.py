@@ -59,7 +59,7 @@ def compensation_figure(examples: Sequence[CellResult], pairs: Sequence[Sequence
         figure, axes = canvas.panels([1.35] * len(rows), top_in=0.6)
         for axis, (example, pair) in zip(axes, rows, strict=True):
             bins = Bins(example.motion["position_m"].to_numpy())
-            track = example.recording.track
+            track = example.line
             lines = [
                 canvas.draw_truth(axis, bins, example.motion["roll_rad"].to_numpy()),
                 canvas.draw_design(axis, bins.x, track.frame(bins.x).roll_rad),
@@ -90,7 +90,7 @@ def repeatability_figure(examples: Sequence[CellResult], styles: Sequence[Method
                 axis.plot(x, y, color=colour, lw=0.9, label=example.recording.name, zorder=behind)
                 lines.append(y)
             places = np.sort(bins.x)
-            lines.append(canvas.draw_design(axis, places, examples[0].recording.track.frame(places).roll_rad))
+            lines.append(canvas.draw_design(axis, places, examples[0].line.frame(places).roll_rad))
             canvas.fit_limits(axis, lines, top=0.3 if axis is axes[0] else 0.1)
             axis.set_ylabel(f"roll, \u00b0\n{style.label}", fontsize=8.2)
         canvas.legend_above(axes[0])

@@ -19,11 +19,20 @@ from simrail.report.papers.briales_2021.figures import (
     rides_figure,
     spread_of,
 )
-from simrail.report.papers.briales_2021.rides import PAPER, QUANTITIES, Rides, is_fast, rides_of
+from simrail.report.papers.briales_2021.rides import (
+    PAPER,
+    QUANTITIES,
+    Rides,
+    exact_rides,
+    is_fast,
+    rides_of,
+)
 from simrail.report.papers.briales_2021.terms import SLOW_PART_HZ, TERMS_RIDE, terms_table
-from simrail.report.papers.claim import judged
+from simrail.report.papers.claim import judged, with_exact
+from simrail.report.tables.maps import HEADS
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
+from simrail.scoring.table import EXACT_MAP
 
 _REPEATED = ("gda_paper", "ekf_per_step", "ekf")
 """Methods whose roll is laid over itself, ride upon ride."""
@@ -45,12 +54,19 @@ def section(data: PageData) -> list[Section]:
         if (name := rides.names.get(part)) and len(drawn) > 1 and all(name in e.estimates for e in drawn)
     }
     evidence = judges.Evidence(rides, spread, _wrong_sign_deg(drawn))
+    claims, exact = judged(PAPER, evidence, judges, has=rides.has), exact_rides(rides, data.cases)
+    if exact is not None:
+        # How roll repeats is of the rides that are drawn, none of which has an exact map.
+        beside = judges.Evidence(exact, {}, evidence.wrong_sign_deg)
+        claims = with_exact(claims, judged(PAPER, beside, judges, has=exact.has))
     shown = {
         "paper": PAPER,
         "design": _table(rides, looks, reference="design"),
         "truth": _table(rides, looks, reference="truth"),
         "draws": max(int(case.table["draws"].max()) for case in rides.cases),
-        "all_claims": judged(PAPER, evidence, judges, has=rides.has),
+        "all_claims": claims,
+        "map_words": map_paragraph(rides, exact),
+        "map_table": _map_table(rides, exact, looks) if exact is not None else None,
         "notes": _notes(rides),
         **_terms(drawn),
         **_drawings(rides, looks, drawn),
@@ -73,6 +89,46 @@ def _table(rides: Rides, looks: Mapping[str, MethodStyle], *, reference: str) ->
     groups = [("printed in Table 3", 3)] * beside
     groups += [("ours, 2 s cropped at both ends", 3), ("ours, whole ride", 3)]
     return Table(groups, list(QUANTITIES) * len(groups), rows)
+
+
+def map_paragraph(rides: Rides, exact: Rides | None) -> str:
+    """What the methods lose by a map that errs, beside what the paper says of its own."""
+    parts = [part for part in PAPER.parts if rides.has(part) and (exact is None or exact.has(part))]
+    costs = {
+        quantity: {
+            part: (rides.mean(part, quantity)[0], exact.mean(part, quantity)[0]) for part in parts if exact
+        }
+        for quantity in QUANTITIES
+    }
+    is_exact = {case.labels["map"] == EXACT_MAP for case in rides.cases} == {True}
+    design = costs["roll"].pop("design", None)
+    for quantity in ("pitch", "yaw"):
+        costs[quantity].pop("design", None)
+    worst = {
+        quantity: max(own, key=lambda part: own[part][0] / max(own[part][1], 1e-12))
+        for quantity, own in costs.items()
+        if own
+    }
+    return PAPER.written(
+        PAPER.words["map"],
+        costs=costs,
+        worst=worst,
+        design=design,
+        known=exact is not None,
+        is_exact=is_exact,
+    )
+
+
+def _map_table(rides: Rides, exact: Rides, looks: Mapping[str, MethodStyle]) -> Table:
+    """Errors against the truth, mean over the rides, with a map that errs and with an exact one."""
+    rows = []
+    for part, role in PAPER.parts.items():
+        if rides.has(part) and exact.has(part):
+            both = [one.mean(part, q)[0] for q in QUANTITIES for one in (rides, exact)]
+            colour = looks[part].colour if part in looks else ""
+            rows.append(Row(role.label, "", colour, [number_cell(value) for value in both]))
+    groups = [(f"{quantity}, \u00b0 rms", 2) for quantity in QUANTITIES]
+    return Table(groups, list(HEADS) * len(groups), rows)
 
 
 def _number(mean: float, sd: float) -> Cell:
@@ -115,7 +171,7 @@ def _wrong_sign_deg(examples: Sequence[CellResult]) -> float:
     for example in examples:
         if direction_of(example) < 0:
             motion, recording = example.motion, example.recording
-            curvature = recording.track.frame(motion["position_m"].to_numpy()).k[:, 2]
+            curvature = example.line.frame(motion["position_m"].to_numpy()).k[:, 2]
             lateral = float(np.abs(motion["speed_mps"].to_numpy() ** 2 * curvature).max())
             fake = float(np.degrees(np.arctan(2.0 * lateral / recording.gravity_mps2)))
             largest = max(fake, largest) if largest == largest else fake

@@ -35,7 +35,7 @@ def _sizes(example: CellResult) -> dict[str, FloatArray]:
     recording = example.recording
     terms = acceleration_terms(
         example.motion,
-        recording.track,
+        example.line,
         nominal_m=recording.mount_position_m,
         gravity_mps2=recording.gravity_mps2,
     )

@@ -4,14 +4,22 @@ Beside our own, in which case of another run: that of the track at its other siz
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simrail.campaign.stored_results import StoredResults
 from simrail.report.papers.claim import read_paper
 from simrail.report.tables.geometry import QUANTITIES
-from simrail.report.tables.pivot import NOTHING, Case, Mean, cases
+from simrail.report.tables.pivot import (
+    NOTHING,
+    Case,
+    Mean,
+    cases,
+    first_maps,
+    map_words,
+    with_exact_map,
+)
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.tables import NOISE
 
@@ -68,6 +76,11 @@ class Rows:
             return NOTHING
         return case.get(name, quantity, metric, band=self.band if filtered else "full")
 
+    def attitude(self, part: str, angle: str) -> Mean:
+        """Rms error of an angle over the whole ride, degrees; NaN and no draws if it was not run."""
+        case = self.noisy if part == "cml_noise" else self.case
+        return NOTHING if case is None else case.get(self.names.get(self.played_by(part), ""), angle, "rms")
+
     def played_by(self, part: str) -> str:
         """Part whose method plays a part: on noisy signals CML, unless a method was tuned on them."""
         return "cml" if part == "cml_noise" and part not in self.names else part
@@ -83,7 +96,8 @@ class Rows:
         """Which case is looked at, in words."""
         labels = self.case.labels
         return (
-            f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), odometry {labels['odometry']}"
+            f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), odometry {labels['odometry']}, "
+            f"{map_words(labels['map'])}"
         )
 
     @property
@@ -93,8 +107,12 @@ class Rows:
 
 
 def rows_of(all_cases: Sequence[Case], ran: Sequence[Method], *, band: str) -> Rows | None:
-    """Find the first case of a real IMU with rail geometry; None if there is none."""
+    """Find the first case of a real IMU with rail geometry; None if there is none.
+
+    With the map that a train has, where any case has it.
+    """
     names = PAPER.names(ran)
+    all_cases = first_maps(all_cases)
     real = [case for case in all_cases if case.labels["imu"] != "ideal"]
     plain = [case for case in real if not _is_noisy(case)]
     for case in [*plain, *all_cases]:
@@ -103,6 +121,13 @@ def rows_of(all_cases: Sequence[Case], ran: Sequence[Method], *, band: str) -> R
             noisy = (c for c in real if _is_noisy(c) and all(c.labels[k] == case.labels[k] for k in same))
             return Rows(case, next(noisy, None), names, band)
     return None
+
+
+def exact_rows(rows: Rows, all_cases: Sequence[Case]) -> Rows | None:
+    """The same of a train that knows its line exactly; None if that was not run."""
+    case = with_exact_map(rows.case, all_cases)
+    noisy = None if rows.noisy is None else with_exact_map(rows.noisy, all_cases)
+    return None if case is None else replace(rows, case=case, noisy=noisy)
 
 
 def _is_noisy(case: Case) -> bool:

@@ -20,8 +20,12 @@ from simrail.report.tables.tables import Cell, Row, Table
 from simrail.scenario.build_estimator import construct
 from simrail.scenario.cells import Method
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.table import EXACT_MAP
 
 EDGES = (LOWER, UPPER, CONSTRAINT)
+
+_EXACT = "map.exact=true"
+"""Setting of a search on recordings of trains that know their line exactly."""
 
 
 def tunings_of(methods: Sequence[Method], folder: Path | None) -> dict[str, Tuning]:
@@ -96,11 +100,16 @@ def searched_on(tuning: Tuning, scenario: Scenario, cell: Mapping[str, object]) 
     By the command that made it: the scenario's name and settings, ride and IMU, the first draw.
     """
     search = tuning.search
-    if search is None or len(search.fitted_on) != 1 or cell["track_draw"] or cell["sensor_draw"]:
+    is_first = not any(cell.get(draw) for draw in ("track_draw", "map_draw", "sensor_draw"))
+    if search is None or len(search.fitted_on) != 1 or not is_first:
         return False
     words = shlex.split(search.command)
     settings = [words[at + 1] for at, word in enumerate(words) if word == "--set"]
-    if words[:3] != ["simrail", "tune", scenario.name] or settings != list(scenario.overrides):
+    # Of a list of maps the cell has one, which the command names.
+    if (_EXACT in settings) != (scenario.spec.map is not None and cell["map"] == EXACT_MAP):
+        return False
+    others, own = ([one for one in said if one != _EXACT] for said in (settings, scenario.overrides))
+    if words[:3] != ["simrail", "tune", scenario.name] or others != own:
         return False
     ride = f"{scenario.name}: {cell['ride']}, {cell['mount']} on "
     return search.seed == scenario.spec.seed and search.fitted_on[0].startswith(ride)
