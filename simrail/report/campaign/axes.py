@@ -30,7 +30,6 @@ _TITLES = {
     "imu": "IMU",
     "irregularity.scale": "irregularity, times its spectrum",
     "irregularity.spectrum": "irregularity",
-    EXACT_MAP_AXIS: "exact map",
 }
 
 
