@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from simrail.report.tables.pivot import MAP_AXIS, without_ablation
-from simrail.report.words.sentences import axis_name
+from simrail.report.tables.pivot import without_ablation
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
@@ -63,13 +63,15 @@ def is_campaign(scenario: Scenario) -> bool:
     """
     spec = scenario.spec
     names = set(axes_of(spec)) | {name for part in (*spec.ride, *spec.imu) for name in axes_of(part)}
-    return bool(names - {"grade", MAP_AXIS})
+    return bool(names - {"grade", EXACT_MAP_AXIS})
 
 
 def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     """The axes along which the cells differ, each told once, the usual ones first."""
     named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry", "map"))
-    varying = [n for n in named if n in cells and n not in ("case", MAP_AXIS) and len(cells[n].unique()) > 1]
+    varying = [
+        n for n in named if n in cells and n not in ("case", EXACT_MAP_AXIS) and len(cells[n].unique()) > 1
+    ]
     others = [name for name in varying if name not in (*_FIRST, *_LAST)]
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
     columns: list[str] = []

@@ -26,7 +26,7 @@ from simrail.report.tables.pivot import Case, map_words
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
-from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words
+from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.table import EXACT_MAP, LEFT_OPEN, NO_SAMPLES, OK
@@ -160,7 +160,7 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
     labels = case.labels
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
     title.append(map_words(labels["map"]))
-    axes = [axis_words(*axis) for axis in case.axes.items() if axis[0] != EXACT_MAP_AXIS]
+    axes = [axis_words(*axis) for axis in case.axes.items()]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     maps = data.scenario.spec.monte_carlo.map_draws if labels["map"] != EXACT_MAP else 1
     of_maps = " and of the map" * (maps > 1)

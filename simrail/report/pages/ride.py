@@ -16,13 +16,13 @@ from simrail.report.figures.score import curves_figure, rms_figure
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.geometry import BAND, JUDGED, indicator_table, is_zero, judged_band, waves_words
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import MAP_AXIS, Case, map_words, of_cell
+from simrail.report.tables.pivot import Case, map_words, of_cell
 from simrail.report.tables.running import running_tiles
 from simrail.report.tables.tables import Table
 from simrail.report.tables.tiles import tiles
 from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
-from simrail.report.words.sentences import axis_words, recording_facts
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words, recording_facts
 from simrail.scenario.build import goals_mm, limits_of
 from simrail.scoring.table import EXACT_MAP
 from simrail.track.bands import BANDS, Band, why_not
@@ -112,7 +112,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
 
 def ride_title(example: CellResult) -> str:
     """Name of a ride, and the values of its axes; what its map is stands in `ride_facts`."""
-    told = ("imu.grade", MAP_AXIS)
+    told = ("imu.grade", EXACT_MAP_AXIS)
     axes = [
         axis_words(name, value) for name, value in example.cell.items() if "." in name and name not in told
     ]

@@ -10,13 +10,11 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from simrail.report.words.sentences import EXACT_MAP_AXIS
 from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
 from simrail.scoring.table import CURVE_PREFIX, EXACT_MAP, FULL, SCORE_COLUMNS
 
 CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry", "map")
-
-MAP_AXIS = "map.exact"
-"""The scenario's list that the label ``map`` tells of."""
 
 
 def map_words(known: str) -> str:
@@ -69,7 +67,7 @@ class Case:
 
         A ride has no value of a list that stands in another ride only.
         """
-        told = ("imu.grade", MAP_AXIS)
+        told = ("imu.grade", EXACT_MAP_AXIS)
         named = ((name, value) for name, value in self.labels.items() if "." in name)
         return {n: value for n, value in named if not n.startswith(told) and value != "nan"}
 
@@ -132,7 +130,7 @@ def with_exact_map(case: Case, others: Sequence[Case]) -> Case | None:
 
 def _but_map(case: Case) -> dict[str, str]:
     """What a case is, beside its map."""
-    return {name: value for name, value in case.labels.items() if name not in ("map", MAP_AXIS, "case")}
+    return {name: value for name, value in case.labels.items() if name not in ("map", EXACT_MAP_AXIS, "case")}
 
 
 def of_cell(all_cases: list[Case], cell: dict[str, object]) -> Case | None:
