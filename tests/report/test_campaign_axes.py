@@ -37,14 +37,6 @@ def test_the_speeds_of_one_ride_are_told_once() -> None:
     assert [axis.column for axis in campaign_axes(cells)] == ["speed_kmh", "ride.rest_s", "ride"]
 
 
-def test_a_map_is_exact_or_not() -> None:
-    cells = pd.DataFrame(
-        {"cell": [0, 1], "case": [0, 1], "map": ["errs", "exact"], "map.exact": [False, True]}
-    )
-    (axis,) = campaign_axes(cells)
-    assert (axis.title, axis.words) == ("exact map", ("no", "yes"))
-
-
 def test_words_of_an_axis() -> None:
     """Labels of a case are texts, those of a cell are numbers."""
     assert axis_words("ride.speed_kmh", "30.0") == axis_words("ride.speed_kmh", 30.0) == "speed 30 km/h"

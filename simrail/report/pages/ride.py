@@ -24,7 +24,6 @@ from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words, recording_facts
 from simrail.scenario.build import goals_mm, limits_of
-from simrail.scoring.table import EXACT_MAP
 from simrail.track.bands import BANDS, Band, why_not
 from simrail.track.quality import Limits
 
@@ -99,14 +98,13 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "comparisons": comparisons,
         "errors": error_figure(example, drawn) if drawn else "",
         "contact": contact_figure(example) if example.contacts else "",
-        "odometry": odometry_figure(example)
-        if example.recording.odometry_source not in (None, TRUTH)
-        else "",
+        "odometry": ""
+        if example.recording.odometry is None or example.recording.odometry_source == TRUTH
+        else odometry_figure(example),
         "geometry": geometry,
         "left_out": len(left_out),
         "rides_left_out": 0,
         "asks_of_ride": data.asks_of_ride,
-        "has_exact_map": example.cell.get("map", EXACT_MAP) == EXACT_MAP,
     }
 
 

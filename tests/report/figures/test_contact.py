@@ -23,7 +23,7 @@ def example_of(direction):
             contacts[f"{axle}.{side}"] = rows
     motion = pd.DataFrame({"position_m": place})
     track = TrackDesign("line", 0.0, (Straight(200.0),))
-    return SimpleNamespace(contacts=contacts, motion=motion, recording=SimpleNamespace(track=track))
+    return SimpleNamespace(contacts=contacts, motion=motion, line=track)
 
 
 @pytest.mark.parametrize(("direction", "axle"), [(1, "front"), (-1, "rear")])
