@@ -33,7 +33,7 @@ def known(monkeypatch):
         assert model.name == "two_axle_wagon" and gravity_mps2 == 9.81
         return 212.0 / 3.6 if top_mps > 212.0 / 3.6 else None
 
-    monkeypatch.setattr("simrail.scenario.check_ride.critical_below", critical_below)
+    monkeypatch.setattr("simrail.vehicle.hunting.critical_below", critical_below)
 
 
 @pytest.mark.parametrize("how", ["known", pytest.param("searched", marks=pytest.mark.slow)])

@@ -47,7 +47,7 @@ def hunts_above_255(model: object, top_mps: float, *, gravity_mps2: float) -> fl
 def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The critical speed of the kicked vehicle is searched for in the slow case, without a name."""
     if name == "manchester_cases":
-        monkeypatch.setattr("simrail.scenario.check_ride.critical_below", hunts_above_255)
+        monkeypatch.setattr("simrail.vehicle.hunting.critical_below", hunts_above_255)
     name = name or "manchester_cases"
     plan = judge_scenario(load_scenario(name))
     # A kick is ridden above the critical speed on purpose, and said to be.

@@ -99,9 +99,9 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "comparisons": comparisons,
         "errors": error_figure(example, drawn) if drawn else "",
         "contact": contact_figure(example) if example.contacts else "",
-        "odometry": odometry_figure(example)
-        if example.recording.odometry_source not in (None, TRUTH)
-        else "",
+        "odometry": ""
+        if example.recording.odometry is None or example.recording.odometry_source == TRUTH
+        else odometry_figure(example),
         "geometry": geometry,
         "left_out": len(left_out),
         "rides_left_out": 0,
