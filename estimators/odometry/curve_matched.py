@@ -98,7 +98,7 @@ POWER_S = 5.0
 """So long is averaged over what it shakes: it changes with the speed."""
 
 
-class YawInTrack(NamedTuple):
+class Pointing(NamedTuple):
     """How a body points against the chord of the track that it is on.
 
     Attributes
@@ -109,31 +109,37 @@ class YawInTrack(NamedTuple):
         curve to curve, m2 per m.
     sway_sd_rad, sway_length_m : float
         What it does beside that: standard deviation, and over what distance it changes.
+    lead_sd_m : float
+        The slope that it has is the track's so far behind its chord: the standard deviation of that.
     """
 
     lag_sd_m: float
     lag_walk_m: float
     sway_sd_rad: float
     sway_length_m: float
+    lead_sd_m: float
 
 
-AXLE = YawInTrack(0.5, 5e-5, 4e-4, 2.0)
+AXLE = Pointing(0.5, 5e-5, 4e-4, 2.0, 1.0)
 """It steers against its frame."""
 
-FRAME = YawInTrack(0.25, 5e-5, 4e-4, 2.0)
+FRAME = Pointing(0.25, 5e-5, 4e-4, 2.0, 1.0)
 """And any other body on axles."""
 
-ON_BOGIES = YawInTrack(0.1, 2e-6, 2.5e-4, 6.5)
+ON_BOGIES = Pointing(0.1, 2e-6, 2.5e-4, 6.5, 1.0)
 """A body on two bogies: what they do is the same at both ends, and 15 m apart."""
 
-OTHER_BODY = YawInTrack(0.7, 5e-5, 5e-3, 10.0)
+OTHER_BODY = Pointing(0.3, 5e-5, 1e-3, 8.0, 7.0)
 """A body on one bogie, or between other bodies: its suspension turns with it, and it swings after a
-transition."""
+transition. The joints of a train of such bodies pitch it with its neighbours."""
 
-UNKNOWN_BODY = YawInTrack(3.0, 5e-5, 1e-3, 4.0)
+TURNED = Pointing(0.5, 5e-5, 1.5e-3, 10.0, 1.0)
+"""On a vehicle of which rods let the axles yaw: little brings a frame back to the middle of a straight."""
+
+UNKNOWN_BODY = Pointing(3.0, 5e-5, 1e-3, 4.0, 3.0)
 """No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
 
-The sizes of all five are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
+The sizes of all six are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
 
 MOST_LAG_M = 1.0
 """Of a long wheelbase: the play in the gauge turns it by no more, in the curves that matter."""
@@ -167,8 +173,6 @@ class CurveMatchedOdometry:
     squat_sd, unsteady_s05 : float
         Of `squat`: a body that pitches by 1 deg at 1 m/s2 has 0.17. And how unsteady that is:
         what it feels, times `unsteady_s05`, is the density, per sqrt(Hz), of what disturbs it.
-    lead_sd_m : float
-        Of lead.
     heading_sd_rad : float
         White part of that.
     gate : float
@@ -177,7 +181,7 @@ class CurveMatchedOdometry:
 
     smoothed: bool = False
     start_sd_m: float = 0.05
-    tread_sd: float = 0.0015
+    tread_sd: float = 0.002
     tread_length_m: float = 25.0
     flange_sd: float = 0.008
     wheel_walk_m: float = 2e-6
@@ -186,7 +190,6 @@ class CurveMatchedOdometry:
     push_walk_m2ps5: float = 1e-6
     squat_sd: float = 0.1
     unsteady_s05: float = 0.03
-    lead_sd_m: float = 1.0
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
 
@@ -251,7 +254,7 @@ class CurveMatchedOdometry:
         states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
         steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
-        model = self._model(recording, pulse, yaw_in_track(recording, chord))
+        model = self._model(recording, pulse, pointing_of(recording, chord))
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
         curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
         if past is not None:
@@ -304,7 +307,7 @@ class CurveMatchedOdometry:
         sd = np.sqrt(wheel["acceleration_sd_mps2"].to_numpy() ** 2 + np.append(off + shaking, 0.0)[last - 1])
         return np.column_stack([own, sd])
 
-    def _model(self, recording: Recording, pulse: float, yaw: YawInTrack) -> LineModel:
+    def _model(self, recording: Recording, pulse: float, yaw: Pointing) -> LineModel:
         """Noise and constants: those of the method under their own names, with what the data sheet adds."""
         sheet = recording.imu_sheet
         own = {name: value for name, value in vars(self).items() if name in LineModel._fields}
@@ -332,9 +335,9 @@ class CurveMatchedOdometry:
         sheet, errors = recording.imu_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        yaw = yaw_in_track(recording, chord)
+        yaw = pointing_of(recording, chord)
         x[LAG] = 0.0 if chord is None else min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
-        chord_sd = 0.0 if chord is None else chord.sd_m / math.sqrt(2.0)
+        chord_sd = 0.0 if chord is None else math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
         sd[V] = STILL_SD_MPS
@@ -344,7 +347,7 @@ class CurveMatchedOdometry:
         sd[LEFT] = sd[RIGHT] = self.flange_sd
         sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
         sd[SQUAT] = self.squat_sd
-        sd[LEAD] = self.lead_sd_m if chord is not None else UNKNOWN_BODY.lag_sd_m
+        sd[LEAD] = yaw.lead_sd_m
         sd[YAW] = 5e-3
         sd[DRIFT] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
         sd[SWAY] = yaw.sway_sd_rad
@@ -367,10 +370,12 @@ def chord_of(recording: Recording) -> Chord | None:
     return None if sheet is None else sheet.chord(recording.mount_body)
 
 
-def yaw_in_track(recording: Recording, chord: Chord | None) -> YawInTrack:
+def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
     """What is known of the yaw of the mount's body in the track."""
     if recording.vehicle_sheet is None or chord is None:
         return UNKNOWN_BODY
+    if any(body.turned_by for body in recording.vehicle_sheet.bodies):
+        return TURNED
     if chord.half_wheelbase_m > 0.0:
         return ON_BOGIES
     rests_on = {body.name: body.supports for body in recording.vehicle_sheet.bodies}

@@ -8,6 +8,7 @@ over the chord, and that of a body on two bogies over the wheelbases at its ends
 
 with s the middle of the chord, a half its length and b half a wheelbase: the chord's ends are at the middles
 of their own chords, y(s +- a) = [y(s +- a + b) + y(s +- a - b)]/2, for small angles between track and body.
+Where stiffness turns the body it is the sum of H over the axles, each with its weight.
 
 Where the map has a curve of curvature k, there lies one of (1 + bend) k; a joint of two elements that the map
 has at j lies at j + shift. To first order the curvature that lies there is
@@ -113,19 +114,15 @@ def line_table(
     count = math.ceil((track.end_m - track.start_m) * PLACES_PER_M) + 1
     places = np.minimum(track.start_m + np.arange(count) / PLACES_PER_M, track.end_m)
     frame = track.frame(places)
-    centre, half, wheelbase = (
-        (0.0, 0.0, 0.0)
-        if chord is None
-        else (chord.centre_m - mount_x_m, chord.half_m, chord.half_wheelbase_m)
-    )
-    reach = abs(centre) + half + wheelbase + abs(wheel_ahead_m) + 1.0
+    centre, held_at = (0.0, ()) if chord is None else (chord.centre_m - mount_x_m, chord.held_at)
+    reach = abs(centre) + max((abs(x) for x, _ in held_at), default=0.0) + abs(wheel_ahead_m) + 1.0
     fine = np.arange(track.start_m - reach, track.end_m + reach, 1.0 / PLACES_PER_M)
     under = track.frame_extended(fine)
     curvature = under.rates[:, 2]
     ramps = _ramps(track, fine, curvature)
     columns = [under.yaw_rad, curvature, *ramps]
     heading, bend, even, odd, pitch = (
-        _along_chord(fine, column, places + centre, half, wheelbase) for column in (*columns, under.pitch_rad)
+        _along_chord(fine, column, places + centre, held_at) for column in (*columns, under.pitch_rad)
     )
     element = track.segment(np.clip(places + centre, track.start_m, track.end_m))
     curve = np.searchsorted(_curve_ends(track), places + centre, side="right")
@@ -138,19 +135,16 @@ def line_table(
 
 
 def _along_chord(
-    places: FloatArray, values: FloatArray, middle: FloatArray, half: float, wheelbase: float
+    places: FloatArray, values: FloatArray, middle: FloatArray, held_at: tuple[tuple[float, float], ...]
 ) -> FloatArray:
     """Mean of values over chords about the places ``middle``, as the module says it."""
-    if half == 0.0:
+    if not held_at:
         return np.interp(middle, places, values)
     steps = 0.5 * np.diff(places) * (values[1:] + values[:-1])
     integral = np.concatenate([[0.0], np.cumsum(steps)])
-    ends = [
-        np.interp(middle + side * half + offset, places, integral)
-        for side in (1.0, -1.0)
-        for offset in (wheelbase, -wheelbase)
-    ]
-    mean: FloatArray = (ends[0] + ends[1] - ends[2] - ends[3]) / (4.0 * half)
+    mean = np.zeros(len(middle))
+    for offset, weight in held_at:
+        mean += weight * np.interp(middle + offset, places, integral)
     return mean
 
 

@@ -209,7 +209,13 @@ class TrajectorySmoother:
         return tuple(values for values in both if values is not None)
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate attitude and place in the track frame at every IMU sample, and the rails below."""
+        """Estimate attitude and place in the track frame at every IMU sample, and the rails below.
+
+        The smoother replaces an acceleration that is not the slope of the odometry's speed
+        (`simrail.estimators.odometry.consistent`).
+        """
+        if self.smoothed:
+            recording = with_consistent_acceleration(recording)
         estimate, errors = self._trajectory(recording)
         if not self.geometry_step_m:
             return estimate
@@ -252,13 +258,7 @@ class TrajectorySmoother:
         return estimate, trace.errors
 
     def trace(self, recording: Recording) -> Trajectory:
-        """All twelve states with their covariances, the innovations, and the log-likelihood.
-
-        The smoother replaces an acceleration that is not the slope of the odometry's speed
-        (`simrail.estimators.odometry.consistent`).
-        """
-        if self.smoothed:
-            recording = with_consistent_acceleration(recording)
+        """All twelve states with their covariances, the innovations, and the log-likelihood."""
         around = None
         for _ in range(self.passes - 1):
             model = self.model(recording, around=around)

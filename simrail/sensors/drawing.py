@@ -6,15 +6,21 @@ uncertain.
 """
 
 from collections import defaultdict
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from simrail.recording.sheets.vehicle_sheet import PLACE_SD_M, SheetBody, Support, VehicleSheet
+from simrail.vehicle.guidance import heading_weights
 from simrail.vehicle.model import VehicleModel
 
 LEAST_SHARE = 1e-6
 """Share of the vehicle's weight below which two bodies do not carry each other."""
+
+LEAST_SHIFT_M = 0.2
+"""Distance along the track up to which a body that stiffness turns counts as pointing along its supports: a
+drawing has no stiffness, and no shipped vehicle but the one whose axles yaw in rods has more than 0.13 m."""
 
 ABREAST_M = 1e-3
 """Distance along the vehicle up to which two bodies carry a third one side by side."""
@@ -51,7 +57,8 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
         The place is the mean of theirs, weighted by vertical stiffness: springs at four corners bear at the
         pivot in the middle between them. Primary stiffness and damping are the sums of these elements'
         vertical ones, dampers on elastic mounts as if these were rigid; tabled laws (dry friction, bump
-        stops) are left out, and so are trailing arms, which carry no weight.
+        stops) are left out, and so are trailing arms, which carry no weight. Where stiffness turns a body
+        otherwise than its supports do (`simrail.vehicle.guidance`), that is on the drawing.
 
     Raises
     ------
@@ -87,7 +94,19 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
         name: SheetBody(name, x, tuple(supports[name]), None, *primary.get(name, (None, None)))
         for name, x in at.items()
     }
-    return VehicleSheet(tuple(bodies[name] for name in _from_the_rails_up(supports)), place_sd)
+    weights = heading_weights(vehicle)
+    sheet = VehicleSheet(tuple(bodies[name] for name in _from_the_rails_up(supports)), place_sd)
+    return replace(sheet, bodies=tuple(_with_turn(sheet, body, weights) for body in sheet.bodies))
+
+
+def _with_turn(sheet: VehicleSheet, body: SheetBody, weights: dict[str, dict[str, float]]) -> SheetBody:
+    """A body with what turns it, where that is not the chord of its supports."""
+    chord = sheet.chord(body.name)
+    turned = replace(body, turned_by=tuple(weights.get(body.name, {}).items()))
+    other = replace(sheet, bodies=tuple(turned if b is body else b for b in sheet.bodies)).chord(body.name)
+    if not turned.turned_by or chord is None or other is None:
+        return body
+    return turned if abs(other.centre_m - chord.centre_m) > LEAST_SHIFT_M else body
 
 
 def _bearings(vehicle: VehicleModel) -> list[_Bearing]:

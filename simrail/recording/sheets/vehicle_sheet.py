@@ -6,6 +6,7 @@ rests on those below it. From these it says which chord of the track a body poin
 one of its pivots to the other. It holds what a drawing has, and how far the train itself may be from it.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 PLACE_SD_M = 0.02
@@ -50,6 +51,9 @@ class SheetBody:
     primary_stiffness_npm, primary_damping_nspm : float, optional
         Of an axle: vertical stiffness and damping of its suspension, both sides together; None where the
         drawing does not say.
+    turned_by : tuple of (str, float), optional
+        Where it does not point from support to support: by how much its heading follows the lateral offset
+        of each axle, in 1/m (rad per m). They sum to 0, times the places of the axles to 1.
     """
 
     name: str
@@ -58,6 +62,7 @@ class SheetBody:
     ends_m: tuple[float, float] | None = None
     primary_stiffness_npm: float | None = None
     primary_damping_nspm: float | None = None
+    turned_by: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,13 @@ class Chord:
         How far the middle of the chord moves in a curve, against the direction of running, once the trailing
         axle of each frame stands radially; below 0 for a body that hangs between two others and is turned
         the other way, 0 for a car body on two bogies alike.
+    weights : tuple of (float, float), optional
+        Where stiffness turns the body otherwise (`SheetBody.turned_by`): places in the body's own
+        coordinates, and by how much its heading follows y there, 1/m. ``centre_m`` is then where the tangent
+        to an arc is parallel to the body; the length and the wheelbase are still those between supports.
+    shift_sd_m : float
+        Standard deviation of the middle for what of the weights is not known: the stiffness, and of an axle
+        how far play turns it, as much as ``play_m``.
     """
 
     centre_m: float
@@ -98,6 +110,22 @@ class Chord:
     half_wheelbase_m: float
     sd_m: float
     play_m: float = 0.0
+    weights: tuple[tuple[float, float], ...] = ()
+    shift_sd_m: float = 0.0
+
+    @property
+    def held_at(self) -> tuple[tuple[float, float], ...]:
+        """Offsets from ``centre_m``, and by how much the heading follows y there, 1/m; none for a tangent."""
+        if self.weights:
+            return tuple((x - self.centre_m, weight) for x, weight in self.weights)
+        if self.half_m == 0.0:
+            return ()
+        weight = 0.25 / self.half_m
+        return tuple(
+            (side * self.half_m + offset, side * weight)
+            for side in (1.0, -1.0)
+            for offset in (self.half_wheelbase_m, -self.half_wheelbase_m)
+        )
 
 
 @dataclass(frozen=True)
@@ -131,17 +159,38 @@ class VehicleSheet:
         * What runs on the rails by itself and has, alone, a body of several supports over it (an axle in
           a bogie frame, or under a two-axle wagon): the chord of that body, which guides it.
         * Any other axle: the tangent at its own place.
+
+        Where stiffness turns it otherwise, and the drawing says so, that holds.
         """
         here = self.body(body)
         if here is None:
             return None
+        chord = self._by_supports(here)
+        return self._turned(here, chord) if here.turned_by and chord is not None else chord
+
+    def _turned(self, here: SheetBody, chord: Chord) -> Chord:
+        """A chord where the stiffness between a body and its axles turns it."""
+        at = {axle.name: axle.x_m - here.x_m for axle in self.bodies}
+        weights = tuple((at[axle], weight) for axle, weight in here.turned_by)
+        centre = 0.5 * sum(weight * x * x for x, weight in weights)
+        # An axle that yaws in its rods is turned by play as much as they let it.
+        free = 0.0 if here.supports else chord.play_m
+        return replace(
+            chord,
+            centre_m=centre,
+            weights=weights,
+            shift_sd_m=math.hypot(self.stiffness_relative_sd * (centre - chord.centre_m), free),
+        )
+
+    def _by_supports(self, here: SheetBody) -> Chord | None:
+        """The chord that the supports of a body say."""
         if len({support.x_m for support in here.supports}) == 1:
             below = self.body(here.supports[0].on)
-            chord = None if below is None else self.chord(below.name)
+            chord = None if below is None else self._by_supports(below)
             return None if below is None or chord is None else _seen_from(here, below, chord)
         if here.supports:
             return self._from_support_to_support(here)
-        over = [entry for entry in self.bodies if any(support.on == body for support in entry.supports)]
+        over = [entry for entry in self.bodies if any(support.on == here.name for support in entry.supports)]
         if len(over) == 1 and len({support.x_m for support in over[0].supports}) > 1:
             return _seen_from(here, over[0], self._from_support_to_support(over[0]))
         return Chord(0.0, 0.0, 0.0, self.place_sd_m)

@@ -22,6 +22,9 @@ from simrail.recording.sheets.vehicle_sheet import (
 LONGEST_M = 40.0
 """Longest distance of two supports of a body: no vehicle has its bogies farther apart."""
 
+WEIGHTS_TOLERANCE = 1e-3
+"""Of the sums of weights, 1/m and 1: they may be rounded to four digits."""
+
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 AlongVehicle = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 Place = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]
@@ -47,6 +50,8 @@ class SheetBodyPart(Part):
         Where it rests on each of them, in its own coordinates.
     ends_m, primary_stiffness_npm, primary_damping_nspm : optional
         As in `SheetBody`.
+    turned_by, turned_by_1pm : tuple of str, tuple of float
+        As `SheetBody.turned_by`: names of axles, and the weight of each.
     """
 
     name: Name
@@ -56,9 +61,18 @@ class SheetBodyPart(Part):
     ends_m: Places | None = None
     primary_stiffness_npm: Annotated[float, Field(gt=0.0)] | None = None
     primary_damping_nspm: Annotated[float, Field(ge=0.0)] | None = None
+    turned_by: tuple[Name, ...] = ()
+    turned_by_1pm: tuple[Annotated[float, Field(ge=-100.0, le=100.0)], ...] = ()
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        if len(self.turned_by_1pm) != len(self.turned_by):
+            raise InputError(
+                "has another number of weights than of axles",
+                field="turned_by_1pm",
+                value=self.turned_by_1pm,
+                limit=f"{len(self.turned_by)} weights, one for each of turned_by",
+            )
         if len(self.pivots_m) != len(self.rests_on):
             raise InputError(
                 "has another number of places than of bodies below",
@@ -86,6 +100,7 @@ class SheetBodyPart(Part):
             ends_m=self.ends_m,
             primary_stiffness_npm=self.primary_stiffness_npm,
             primary_damping_nspm=self.primary_damping_nspm,
+            turned_by=tuple(zip(self.turned_by, self.turned_by_1pm, strict=True)),
         )
 
 
@@ -202,6 +217,8 @@ class VehicleSheetPart(Part):
                         remedy="list the axles first, then frames, then bodies",
                     )
             names.append(part.name)
+        for i, part in enumerate(self.body):
+            _check_turned(part, {other.name: other.x_m for other in self.body if not other.rests_on}, i)
 
     def sheet(self, mount_body: str) -> VehicleSheet:
         """The drawing; ``mount_body`` is the body that carries the IMU.
@@ -290,6 +307,28 @@ def _check_places(places: tuple[float, ...], field: str, ends: tuple[float, floa
             )
 
 
+def _check_turned(part: SheetBodyPart, axles: dict[str, float], number: int) -> None:
+    """Refuse weights that are not of axles, or do not turn a vehicle on a straight line with that line."""
+    unknown = next((name for name in part.turned_by if name not in axles), None)
+    if unknown is not None:
+        raise InputError(
+            "is no axle of this drawing",
+            field=f"body[{number}].turned_by",
+            value=unknown,
+            limit="one of " + ", ".join(axles),
+        )
+    total = sum(part.turned_by_1pm)
+    turn = sum(axles[name] * weight for name, weight in zip(part.turned_by, part.turned_by_1pm, strict=True))
+    if part.turned_by and (abs(total) > WEIGHTS_TOLERANCE or abs(turn - 1.0) > WEIGHTS_TOLERANCE):
+        raise InputError(
+            "do not turn a vehicle on a straight line with that line",
+            field=f"body[{number}].turned_by_1pm",
+            value=part.turned_by_1pm,
+            limit=f"a sum of 0 (here {total:g}), and of 1 times the places x_m of the axles (here {turn:g})",
+            remedy="for a body on two axles at x1 and x2 they are 1/(x1 - x2) and -1/(x1 - x2)",
+        )
+
+
 def vehicle_sheet_table(sheet: VehicleSheet) -> dict[str, Any]:
     """The table that says this drawing: what `VehicleSheetPart` reads back, bit by bit."""
     return {
@@ -304,6 +343,8 @@ def vehicle_sheet_table(sheet: VehicleSheet) -> dict[str, Any]:
                 "ends_m": body.ends_m,
                 "primary_stiffness_npm": body.primary_stiffness_npm,
                 "primary_damping_nspm": body.primary_damping_nspm,
+                "turned_by": [axle for axle, _ in body.turned_by] or None,
+                "turned_by_1pm": [weight for _, weight in body.turned_by] or None,
             }
             for body in sheet.bodies
         ],
