@@ -374,7 +374,7 @@ def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
     """What is known of the yaw of the mount's body in the track."""
     if recording.vehicle_sheet is None or chord is None:
         return UNKNOWN_BODY
-    if any(body.turned_by for body in recording.vehicle_sheet.bodies):
+    if any(body.turned_by and not body.supports for body in recording.vehicle_sheet.bodies):
         return TURNED
     if chord.half_wheelbase_m > 0.0:
         return ON_BOGIES
