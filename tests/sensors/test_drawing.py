@@ -235,8 +235,8 @@ def test_a_body_on_its_own_bogie_and_on_its_neighbour() -> None:
     sheet = drawing(train)
     on = {support.on: support.x_m for support in sheet.body("second").supports}
     assert on == {"third": pytest.approx(-7.25), "body": pytest.approx(7.25)}
-    # Its rear end on a bogie of 2.56 m, its front end on a body. On an arc y = x^2 / 2 that is parallel to the
-    # track's tangent in its middle, so that the joint is as far out as its pivots: (9.5^2 + 1.28^2) / 2.
+    # Its rear end on a bogie of 2.56 m, its front end on a body. On an arc y = x^2 / 2 that is parallel to
+    # the tangent in its middle, so that the joint is as far out as its pivots: (9.5^2 + 1.28^2) / 2.
     chord, x = sheet.chord("second"), sheet.body("second").x_m
     assert (chord.half_m, chord.half_wheelbase_m) == pytest.approx((7.25, 0.64))
     turn = (9.5**2 - (x - 7.25) ** 2) / 2.0 / 14.5
