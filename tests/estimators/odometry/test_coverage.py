@@ -42,7 +42,7 @@ def test_the_interval_holds_90_to_98_per_cent(scores: pd.DataFrame, odometry: st
 
 @pytest.mark.slow
 def test_position_on_axles_and_bodies(scores: pd.DataFrame):
-    """Causally 0.5 m rms on axles and 0.9 m on bodies, over all rides; by the clustered interval of its square.
+    """Causally 0.5 m rms on axles, 0.9 m on bodies, over all rides; by the clustered interval of its square.
 
     Without `irw_car`, which is unstable above 34 km/h on these rails: its axles go from flange to flange.
     """
