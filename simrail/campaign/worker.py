@@ -14,8 +14,8 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Self
+from dataclasses import dataclass, field
+from typing import Any
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
@@ -26,7 +26,7 @@ from simrail.core.interrupts import Check, interruptible
 from simrail.core.source_hash import score_code_hash
 from simrail.estimation.user_modules import install, sources_of
 from simrail.ride.ride import Progress, is_cached, simulate
-from simrail.ride.truth import Mount, Truth
+from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell
 from simrail.scoring.table import labelled
@@ -67,25 +67,6 @@ class BatchResult:
     worker: str = ""
 
 
-@dataclass(frozen=True)
-class RememberedTruth(Truth):
-    """A truth that works out the motion of each place once: all draws of a ride ask for it again."""
-
-    remembered: dict[Mount, pd.DataFrame] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, truth: Truth) -> Self:
-        """What remembers the motions of a truth, which must not be written to."""
-        return cls(**{entry.name: getattr(truth, entry.name) for entry in fields(Truth)})
-
-    def motion(self, mount: Mount) -> pd.DataFrame:
-        """See `Truth.motion`; IMUs of any name in one place share it."""
-        place = replace(mount, name="")
-        if place not in self.remembered:
-            self.remembered[place] = super().motion(mount)
-        return self.remembered[place]
-
-
 @dataclass
 class _Worker:
     """What this process remembers between batches: a plan, unpacked, and the ride used last."""
@@ -111,7 +92,6 @@ class _Worker:
             begun = time.perf_counter()
             truth = simulate(ride, progress=progress, told=notes.append, warn=False)
             took = time.perf_counter() - begun
-            truth = RememberedTruth.of(truth)
             facts = {key: value for key, value in truth.manifest.items() if key != "versions"}
             facts |= {"number": cell.ride_number, "ride": cell.ride.name, "track_draw": cell.track_draw}
             self.ride = cell.ride_number, truth, facts | {"from_cache": cached, "took_s": took}

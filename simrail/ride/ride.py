@@ -45,6 +45,7 @@ _SOURCES = (
     *(
         "track",
         "vehicle",
+        "ride/abeam.py",
         "ride/ride.py",
         "ride/contact_forces.py",
         "ride/contact_extremes.py",

@@ -7,7 +7,8 @@ mount follows from them by rigid-body kinematics, exactly; no engine is asked ag
 Nothing here is seen by an estimator.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ import pandas as pd
 from simrail.core.columns import CONTACT, MOTION
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.core.rotation import euler_angles, rotation_matrix
-from simrail.track.design import TrackDesign, TrackFrame
+from simrail.ride.mount_motion import Remembered, mount_motion
+from simrail.track.design import TrackDesign
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ class Truth:
     manifest: dict[str, Any]
     contacts: dict[str, FloatArray] = field(default_factory=dict)
     contact_every: int = 1
+    _remembered: Remembered = field(default_factory=Remembered, init=False, repr=False, compare=False)
 
     @property
     def rate_hz(self) -> float:
@@ -189,18 +191,28 @@ class Truth:
         axle = pick(axles, key=lambda name: self.bodies[name].offset_m, default=where)
         return f"{axle}.{side}"
 
-    def motion(self, mount: Mount) -> pd.DataFrame:
+    def motion(
+        self, mount: Mount, rows: range | None = None, columns: Sequence[str] = MOTION
+    ) -> pd.DataFrame:
         """Motion of a mount by rigid-body kinematics.
+
+        It is worked out once for each place, rows and columns: what was asked for last is remembered, up to
+        256 MB. A truth must not be written to.
 
         Parameters
         ----------
         mount : Mount
             Where, and on which body.
+        rows : range, optional
+            Numbers of the samples wanted; all by default. A row has the same bits in any company.
+        columns : sequence of str
+            Columns of `simrail.core.columns.MOTION` that are wanted. Those that do not speak of the track
+            (up to ``accel_*``) are much the cheaper ones.
 
         Returns
         -------
         pandas.DataFrame
-            Indexed by ``time_s``, columns `simrail.core.columns.MOTION`. ``gyro_*`` and ``accel_*`` are what
+            Indexed by ``time_s``; not to be written to. ``gyro_*`` and ``accel_*`` are what
             a perfect IMU at the mount would feel: C^T omega and C^T (a + g e_z). ``position_m``,
             ``speed_mps`` and ``acceleration_mps2`` are s, ds/dt and d2s/dt2 of the point of the track
             frame abeam of the mount, ``lateral_m`` and ``vertical_m`` its place in that frame.
@@ -217,110 +229,13 @@ class Truth:
                 value=mount.body,
                 limit=", ".join(self.body_names),
             )
-        body = self.bodies[mount.body]
-        rotation = rotation_matrix(body.angles)
-        lever = np.asarray(mount.position_m, dtype=np.float64) - np.array([0.0, 0.0, body.height_m])
-        omega = body.rate
-        arm_velocity = np.cross(omega, lever)
-        arm_acceleration = np.cross(body.angular_acceleration, lever) + np.cross(omega, arm_velocity)
-        position = body.position + rotation @ lever
-        velocity = body.velocity + _rotate(rotation, arm_velocity)
-        acceleration = body.acceleration + _rotate(rotation, arm_acceleration)
-        felt = acceleration + np.array([0.0, 0.0, self.gravity_mps2])
-        misalignment = np.array([[mount.roll_rad, mount.pitch_rad, mount.yaw_rad]])
-        tilt = rotation_matrix(misalignment)[0]
-        rotation = rotation @ tilt
-        guess = self.reference_position_m + body.offset_m + mount.position_m[0]
-        frame, speed, speed_rate, beside = _along_track(self.track, guess, position, velocity, acceleration)
-        angles = euler_angles(rotation) if np.any(misalignment) else body.angles
-        relative = euler_angles(np.swapaxes(frame.rotation, 1, 2) @ rotation)
-        data = np.column_stack(
-            [
-                position,
-                velocity,
-                angles,
-                omega @ tilt,
-                _rotate(np.swapaxes(rotation, 1, 2), felt),
-                frame.s_m,
-                speed,
-                speed_rate,
-                beside,
-                relative,
-            ]
-        )
-        return pd.DataFrame(data, index=pd.Index(self.time_s, name="time_s"), columns=list(MOTION))
-
-
-def _rotate(rotation: FloatArray, vectors: FloatArray) -> FloatArray:
-    rotated: FloatArray = np.einsum("nij,nj->ni", rotation, vectors)
-    return rotated
-
-
-def abeam(
-    track: TrackDesign, guess: FloatArray, position: FloatArray
-) -> tuple[TrackFrame, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Track frame abeam of points: the one whose plane normal to its X axis holds the point.
-
-    Parameters
-    ----------
-    track : TrackDesign
-        The design.
-    guess : ndarray (n,)
-        Places s to begin from, within some metres.
-    position : ndarray (n, 3)
-        The points, global.
-
-    Returns
-    -------
-    frame : TrackFrame
-    rotation : ndarray (n, 3, 3)
-        Of the frame.
-    rho : ndarray (n, 3)
-        The points in it; rho_x = 0, found by Newton's method.
-    stretch : ndarray (n,)
-        d(rho_x)/ds with the sign turned.
-    s : ndarray (n,)
-        The places.
-    """
-    s = guess
-    for _ in range(4):
-        s = np.clip(s, track.start_m, track.end_m)
-        frame = track.frame(s)
-        rotation = frame.rotation
-        rho = np.einsum("nji,nj->ni", rotation, position - frame.position)
-        stretch = 1.0 / np.cos(frame.pitch_rad) - frame.k[:, 2] * rho[:, 1] + frame.k[:, 1] * rho[:, 2]
-        step = rho[:, 0] / stretch
-        s = s + step
-        if np.max(np.abs(step)) < 1e-9:
-            break
-    return frame, rotation, rho, stretch, s
-
-
-def _along_track(
-    track: TrackDesign,
-    guess: FloatArray,
-    position: FloatArray,
-    velocity: FloatArray,
-    acceleration: FloatArray,
-) -> tuple[TrackFrame, FloatArray, FloatArray, FloatArray]:
-    """Track frame abeam of points, with ds/dt, d2s/dt2 and the (lateral, vertical) place in it.
-
-    The rates follow by differentiating the condition of `abeam` (EQUATIONS 1.1).
-    """
-    frame, rotation, rho, stretch, _ = abeam(track, guess, position)
-    v = np.einsum("nji,nj->ni", rotation, velocity)
-    a = np.einsum("nji,nj->ni", rotation, acceleration)
-    k, dk = frame.k, frame.dk
-    y, z = rho[:, 1], rho[:, 2]
-    speed = v[:, 0] / stretch
-    y_rate = v[:, 1] + speed * k[:, 0] * z
-    z_rate = v[:, 2] - speed * k[:, 0] * y
-    secant = 1.0 / np.cos(frame.pitch_rad)
-    stretch_rate = (
-        speed * (np.tan(frame.pitch_rad) * secant * frame.rates[:, 1] - dk[:, 2] * y + dk[:, 1] * z)
-        - k[:, 2] * y_rate
-        + k[:, 1] * z_rate
-    )
-    turning = speed * (k[:, 2] * v[:, 1] - k[:, 1] * v[:, 2])
-    speed_rate = (a[:, 0] + turning - speed * stretch_rate) / stretch
-    return frame, speed, speed_rate, rho[:, 1:]
+        wanted = range(len(self.time_s)) if rows is None else rows
+        # The name of a mount moves nothing: IMUs of any name in one place share its motion.
+        key = replace(mount, name=""), wanted, tuple(columns)
+        data = self._remembered.get(key)
+        if data is None:
+            data = mount_motion(self, mount, wanted, columns)
+            data.flags.writeable = False
+            self._remembered.keep(key, data)
+        index = pd.Index(self.time_s[wanted.start : wanted.stop : wanted.step], name="time_s")
+        return pd.DataFrame(data, index=index, columns=list(columns), copy=False)

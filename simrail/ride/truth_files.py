@@ -5,7 +5,6 @@ is said in `simrail.ride.truth`; which rides are kept, in `simrail.ride.cache`.
 """
 
 import json
-import mmap
 import os
 import zlib
 from pathlib import Path
@@ -57,14 +56,6 @@ def create_arrays(
             with place.open("r+b") as file:
                 os.posix_fallocate(file.fileno(), 0, place.stat().st_size)
     return made
-
-
-def let_go(arrays: dict[str, FloatArray]) -> None:
-    """Drop the pages of arrays on disk from this process; the system writes out what was changed."""
-    for array in arrays.values():
-        mapped = getattr(array, "_mmap", None)
-        if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
-            mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def write_header(

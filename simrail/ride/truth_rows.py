@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simrail.core.jit import FloatArray
+from simrail.ride.abeam import abeam
 from simrail.ride.contact_forces import contact_columns
-from simrail.ride.truth import abeam
-from simrail.ride.truth_files import create_arrays, let_go
+from simrail.ride.mount_motion import give_back
+from simrail.ride.truth_files import create_arrays
 from simrail.vehicle.engines.engine import Segment
 
 if TYPE_CHECKING:
@@ -61,14 +62,14 @@ class TruthRows:
         arrays["reference_position_m"][here] = places
         self._add_wheels(segment, here)
         self._done = here.stop
-        let_go(arrays)
+        give_back(arrays.values())
         return times
 
     def finish(self) -> None:
         """Count the wheels' angles from the first row, and bring everything to disk."""
         for w in range(len(self._ride.vehicle.wheels)):
             self._arrays[f"wheel_{w}"][:] -= self._arrays[f"wheel_{w}"][0]
-            let_go(self._arrays)
+            give_back(self._arrays.values())
         for array in self._arrays.values():
             array.flush()  # type: ignore[attr-defined]
 

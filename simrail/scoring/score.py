@@ -54,8 +54,7 @@ def truth_at_imu(truth: Truth, recording: Recording) -> pd.DataFrame:
         If the recording is not inside the time span of the truth.
     """
     mount = Mount(recording.mount, recording.mount_body, recording.mount_position_m)
-    motion = truth.motion(mount)
-    have = motion.index.to_numpy(dtype=np.float64)
+    have = truth.time_s
     want = recording.imu.index.to_numpy(dtype=np.float64)
     step = (have[-1] - have[0]) / max(len(have) - 1, 1)
     if want[0] < have[0] - 1e-6 * step or want[-1] > have[-1] + 1e-6 * step:
@@ -69,7 +68,11 @@ def truth_at_imu(truth: Truth, recording: Recording) -> pd.DataFrame:
     place = (want - have[0]) / step if step > 0 else np.zeros(len(want))
     nearest = np.rint(place).astype(np.intp)
     if np.abs(place - nearest).max() < 1e-3:
-        return motion.iloc[nearest].set_axis(recording.imu.index)
+        rows = range(nearest[0], nearest[-1] + 1, nearest[1] - nearest[0] if len(nearest) > 1 else 1)
+        if len(rows) == len(nearest) and np.array_equal(nearest, rows):
+            return truth.motion(mount, rows).set_axis(recording.imu.index)
+        return truth.motion(mount).iloc[nearest].set_axis(recording.imu.index)
+    motion = truth.motion(mount)
     columns = {name: np.interp(want, have, motion[name].to_numpy()) for name in motion.columns}
     return pd.DataFrame(columns, index=recording.imu.index)
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import ODOMETRY, ODOMETRY_SD
+from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD, VELOCITY
 from simrail.core.errors import InputError
 from simrail.core.resample import resample
 from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
@@ -95,9 +95,9 @@ def measure(
         If body or wheel is unknown, a rate does not divide the truth's, or a rail sensor has no rails to see;
         or if another odometry than the true one is asked for.
     """
-    motion = truth.motion(mount)
+    felt = truth.motion(mount, columns=IMU if earth_rate is None else (*IMU, *ATTITUDE, *VELOCITY))
     imu, delay_s = sample_imu(
-        motion,
+        felt,
         grade,
         seed=seed,
         draw=draw,
@@ -109,12 +109,13 @@ def measure(
     if grade.dropped_fraction > 0.0:
         came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
         imu, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
-    start_m = float(motion["position_m"].iloc[0])
     counts, sheet = None, None
     if encoder is not None:
-        counts, sheet = _counted(truth, motion, encoder, seed=seed, draw=draw)
+        counts, sheet = _counted(truth, mount, encoder, seed=seed, draw=draw)
+    # What else is beside the IMU meets the motion at its stamps only.
+    motion = truth.motion(mount, _rows_of(truth, imu)) if magnetometer or rail_sensor or odometry else None
     magnetic = None
-    if magnetometer is not None:
+    if magnetometer is not None and motion is not None:
         magnetic = sample_magnetometer(
             motion,
             imu.index,
@@ -125,7 +126,7 @@ def measure(
             track_m=(truth.track.start_m, truth.track.end_m),
         )
     seen = None
-    if rail_sensor is not None:
+    if rail_sensor is not None and motion is not None:
         if rails is None:
             raise InputError("a rail sensor needs rails to see", field="rails", remedy="give rails_of(ride)")
         seen = sample_rails(motion, imu.index, rail_sensor, rails, seed=seed, draw=draw, name=mount.name)
@@ -149,8 +150,8 @@ def measure(
         vehicle_sheet=vehicle_sheet,
         encoder=counts,
         encoder_sheet=sheet,
-        start_position_m=start_m,
-        odometry=None if odometry is None else true_odometry(motion, imu.index),
+        start_position_m=_place(truth, mount, 0),
+        odometry=None if odometry is None or motion is None else true_odometry(motion, imu.index),
         odometry_source=odometry or "",
         gravity_mps2=truth.gravity_mps2,
         gaps=gaps,
@@ -162,14 +163,14 @@ def measure(
 
 
 def _counted(
-    truth: Truth, motion: pd.DataFrame, encoder: EncoderSpec, *, seed: int, draw: int
+    truth: Truth, mount: Mount, encoder: EncoderSpec, *, seed: int, draw: int
 ) -> tuple[pd.DataFrame, EncoderSheet]:
     """Counts of an encoder on a ride, and what the train knows of it."""
     wheel = truth.wheel_at(encoder.wheel)
     angle, radius = truth.wheel_angle(wheel), truth.wheel_radius_m[wheel]
     if encoder.radius == "calibrated":
-        position = motion["position_m"].to_numpy()
-        radius = abs((position[-1] - position[0]) / (angle[-1] - angle[0]))
+        run = _place(truth, mount, len(truth.time_s) - 1) - _place(truth, mount, 0)
+        radius = abs(run / (angle[-1] - angle[0]))
     sheet = EncoderSheet(
         wheel=wheel,
         pulses_per_revolution=encoder.counts_per_revolution,
@@ -178,6 +179,18 @@ def _counted(
         radius_relative_sd=math.hypot(encoder.radius_error_sd, encoder.rolling_sd),
     )
     return sample_encoder(angle, truth.time_s, encoder, seed=seed, draw=draw), sheet
+
+
+def _place(truth: Truth, mount: Mount, row: int) -> float:
+    """Where a mount was, s, at a sample of the truth."""
+    return float(truth.motion(mount, range(row, row + 1), ("position_m",)).to_numpy()[0, 0])
+
+
+def _rows_of(truth: Truth, imu: pd.DataFrame) -> range:
+    """Samples of the truth at the stamps of an IMU, which are some of its own."""
+    first, second = np.searchsorted(truth.time_s, imu.index[:2].to_numpy())
+    step = int(second - first)
+    return range(int(first), int(first) + step * len(imu), step)
 
 
 def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:

@@ -11,7 +11,6 @@ import pytest
 from scipy.interpolate import PPoly
 from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry
 
-from simrail.campaign.worker import RememberedTruth
 from simrail.core.columns import ACCEL, ATTITUDE, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.toml_files import load
 from simrail.estimation.choose_odometry import with_odometry
@@ -92,7 +91,7 @@ def bend_truth(speed_mps: float = 15.0, direction: int = 1, rest_s: float = 2.0)
     """A body that does not move in the track frame, over the bend."""
     start, end = (10.0, 590.0) if direction > 0 else (590.0, 10.0)
     profile = SpeedProfile(start, end, speed_mps, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=rest_s)
-    return RememberedTruth.of(kinematic_truth(BEND, profile, height_m=0.3))
+    return kinematic_truth(BEND, profile, height_m=0.3)
 
 
 def following(laid: LaidTrack) -> dict[str, Channel]:
@@ -118,7 +117,7 @@ def line_truth(speed_kmh: float, direction: int) -> Truth:
     laid = lay(design, Irregularity("erri_b176_low", (1.5, 100.0), 40.0), seed=1)
     start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
     profile = SpeedProfile(start, end, speed_kmh / 3.6)
-    return RememberedTruth.of(kinematic_truth(design, profile, channels=following(laid), height_m=0.29))
+    return kinematic_truth(design, profile, channels=following(laid), height_m=0.29)
 
 
 @lru_cache
@@ -149,7 +148,7 @@ AXLE_AT = Mount("axle", "front", (0.0, 0.0, 0.6))
 def bogie_truth(speed_kmh: float, direction: int) -> Truth:
     """The same line, rails and speed profile, by the light-metro bogie in Exudyn."""
     start, end = (10.0, 2090.0) if direction > 0 else (2090.0, 10.0)
-    ride = simulate(
+    return simulate(
         Ride(
             name="accuracy",
             track=track_by_name("condequinto_olivar"),
@@ -159,7 +158,6 @@ def bogie_truth(speed_kmh: float, direction: int) -> Truth:
             profile=SpeedProfile(start, end, speed_kmh / 3.6),
         )
     )
-    return RememberedTruth.of(ride)
 
 
 @lru_cache
@@ -206,7 +204,7 @@ def metro_ride(speed_kmh: float, direction: int, way: tuple[float, float] = LINE
 @lru_cache
 def metro_truth(speed_kmh: float, direction: int, way: tuple[float, float] = LINE) -> Truth:
     """The truth of that ride."""
-    return RememberedTruth.of(simulate(metro_ride(speed_kmh, direction, way)))
+    return simulate(metro_ride(speed_kmh, direction, way))
 
 
 @lru_cache(maxsize=4)

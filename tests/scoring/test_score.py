@@ -364,11 +364,11 @@ def test_an_estimate_of_other_times_or_another_mount_is_refused() -> None:
 class FakeTruth:
     def __init__(self, motion: pd.DataFrame) -> None:
         self.kept, self.asked = motion, None
-        self.track = PiecewiseTrack()
+        self.track, self.time_s = PiecewiseTrack(), motion.index.to_numpy()
 
-    def motion(self, mount: Any) -> pd.DataFrame:
+    def motion(self, mount: Any, rows: range | None = None) -> pd.DataFrame:
         self.asked = mount
-        return self.kept
+        return self.kept if rows is None else self.kept.iloc[list(rows)]
 
 
 def test_truth_at_the_imu_times_takes_samples_and_interpolates_between_them() -> None:

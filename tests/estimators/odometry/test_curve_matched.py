@@ -37,7 +37,6 @@ from simrail.estimators.odometry.kernel import (
 from simrail.estimators.odometry.line_table import Line, line_at, line_table
 
 from simrail.campaign.cell import record_cell
-from simrail.campaign.worker import RememberedTruth
 from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
@@ -69,7 +68,7 @@ BIAS_RADPS = np.radians(0.05)
 @lru_cache
 def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> Truth:
     """The metro bogie on the line, irregular rails, compiled engine."""
-    ride = simulate(
+    return simulate(
         Ride(
             name="odometry",
             track=LINE,
@@ -80,7 +79,6 @@ def truth_of(speed_kmh: float, start_m: float, end_m: float, *stops: float) -> T
             engine="compiled",
         )
     )
-    return RememberedTruth.of(ride)
 
 
 @lru_cache(maxsize=8)
