@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -280,10 +281,10 @@ def cell_record(cell: Cell) -> dict[str, object]:
 
 
 def _direction(ride: RidePart) -> str:
-    """Whether a ride runs towards larger s, smaller s, or not at all."""
-    if ride.end_m is None:
-        return "standing"
-    return "forward" if ride.end_m > ride.start_m else "backward"
+    """Whether a ride runs towards larger s, smaller s, both ways, or not at all."""
+    places = (ride.start_m, *ride.ends_m)
+    ways = {"forward" if after > before else "backward" for before, after in pairwise(places)}
+    return "both ways" if len(ways) > 1 else next(iter(ways), "standing")
 
 
 def _reason_of(error: Exception) -> str:

@@ -20,6 +20,9 @@ from simrail.core.jit import FloatArray
 from simrail.ride.mount_motion import Remembered, mount_motion
 from simrail.track.design import TrackDesign
 
+TURN_M = 1.0
+"""A way back that is longer than this is a run of its own."""
+
 
 @dataclass(frozen=True)
 class Mount:
@@ -180,16 +183,37 @@ class Truth:
     def wheel_at(self, place: str) -> str:
         """Name of a wheel from its place in the direction of travel, e.g. ``"trailing.left"``.
 
-        Names of wheels are returned as they are. Left and right stay those of increasing s.
+        The direction is that in which the ride begins. Names of wheels are returned as they are. Left and
+        right stay those of increasing s.
         """
         where, _, side = place.partition(".")
         if where not in ("leading", "trailing"):
             return place
         axles = {wheel.split(".")[0] for wheel in self.wheel_angles if wheel.endswith("." + side)}
-        forward = self.reference_position_m[-1] >= self.reference_position_m[0]
+        turns = self.turning_rows
+        forward = self.reference_position_m[turns[1]] >= self.reference_position_m[0]
         pick = max if (where == "leading") == bool(forward) else min
         axle = pick(axles, key=lambda name: self.bodies[name].offset_m, default=where)
         return f"{axle}.{side}"
+
+    @property
+    def turning_rows(self) -> list[int]:
+        """Samples where the ride begins, where it turns back, and where it ends.
+
+        Less than `TURN_M` is no way: a vehicle that rocks as it comes to rest does not turn.
+        """
+        place, step = self.reference_position_m, max(1, round(0.1 * self.rate_hz))
+        rows, way, far = [0], 0.0, 0
+        for row in range(0, len(place), step):
+            moved = place[row] - place[far]
+            if way == 0.0 and abs(moved) > TURN_M:
+                way, far = np.sign(moved), row
+            elif way * moved > 0.0:
+                far = row
+            elif way * moved < -TURN_M:
+                rows.append(far)
+                way, far = -way, row
+        return [*rows, len(place) - 1]
 
     def motion(
         self, mount: Mount, rows: range | None = None, columns: Sequence[str] = MOTION

@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import radians
 from pathlib import Path
 from typing import Any, TypeVar
@@ -45,7 +46,7 @@ from simrail.track.rail_condition import FRICTION, RailCondition
 from simrail.vehicle.contact.profile_files import profiles_digest
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.speed_profile import SpeedProfile
+from simrail.vehicle.speed_profile import Coasting, Restriction, Run, SpeedProfile
 
 _Part = TypeVar("_Part", bound=Part)
 _Noun = TypeVar("_Noun")
@@ -313,13 +314,21 @@ def _profile(ride: RidePart) -> SpeedProfile:
     """Speed profile of a ride."""
     return SpeedProfile(
         start_m=ride.start_m,
-        end_m=ride.start_m if ride.end_m is None else ride.end_m,
+        end_m=ride.ends_m[0] if ride.ends_m else ride.start_m,
         speed_mps=0.0 if ride.speed_kmh is None else ride.speed_kmh / 3.6,
         acceleration_mps2=ride.acceleration_mps2,
         jerk_mps3=ride.jerk_mps3,
         rest_s=ride.rest_s,
         final_rest_s=ride.final_rest_s,
         stops=tuple((stop.position_m, stop.dwell_s) for stop in ride.stops),
+        runs=tuple(Run(after.end_m, before.turn_s or 0.0) for before, after in pairwise(ride.runs)),
+        braking_mps2=ride.braking_mps2,
+        restrictions=tuple(
+            Restriction(part.start_m, part.end_m, part.speed_kmh / 3.6) for part in ride.restriction
+        ),
+        coasting=None
+        if ride.coasting is None
+        else Coasting(ride.coasting.deceleration_mps2, ride.coasting.least_kmh / 3.6),
     )
 
 

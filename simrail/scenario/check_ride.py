@@ -5,6 +5,8 @@ lateral acceleration is warned of and one above 1.5 m/s2 is refused. Sensors are
 `simrail.scenario.check_sensors`. Faults name no file: the caller knows the scenario's.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from simrail.core.errors import InputError
@@ -12,6 +14,7 @@ from simrail.core.toml_files import blame
 from simrail.ride.hunting import hunting_warning
 from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
+from simrail.scenario.tables import RidePart
 from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
 from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
 from simrail.track.design import TrackDesign
@@ -58,14 +61,16 @@ def judge_ride(
     """
     words, vehicle = resolved.cell.ride, resolved.ride.vehicle
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
-        if words.start_m == words.end_m:
-            raise InputError(
-                "the ride ends where it starts",
-                field="end_m",
-                value=words.end_m,
-                remedy="end_m > start_m runs forward, end_m < start_m backward",
-            )
-        low, high = sorted((words.start_m, words.start_m if words.end_m is None else words.end_m))
+        for i, (begin, end) in enumerate(pairwise((words.start_m, *words.ends_m))):
+            if begin == end:
+                raise InputError(
+                    f"the {'run' if words.runs else 'ride'} ends where it starts",
+                    field=f"runs[{i}].end_m" if words.runs else "end_m",
+                    value=end,
+                    remedy="end_m > start_m runs forward, end_m < start_m backward",
+                )
+        low, high = words.reach_m
+        _judge_restrictions(words)
         if words.kick_end_m is not None and not low <= words.kick_end_m < high:
             raise InputError(
                 "the ride does not pass the end of the kick",
@@ -194,7 +199,9 @@ def _judge_places(resolved: ResolvedCell) -> None:
     words, track, ahead = resolved.cell.ride, resolved.ride.track, resolved.ride.vehicle.reach_m
     field = f"ride[{resolved.cell.ride_index}]"
     low, high = track.start_m - ahead[0], track.end_m - ahead[1]
-    places = {"start_m": words.start_m} | ({} if words.end_m is None else {"end_m": words.end_m})
+    places = {"start_m": words.start_m}
+    for i, end in enumerate(words.ends_m):
+        places[f"runs[{i}].end_m" if words.runs else "end_m"] = end
     for name, position in places.items():
         if not low <= position <= high:
             raise InputError(
@@ -205,12 +212,19 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 + (", the axles reach out from the reference point)" if any(ahead) else ")"),
                 remedy="shorten the ride or lengthen the track",
             )
-    first, last = min(places.values()), max(places.values())
+    first, last = words.reach_m
     measured = resolved.ride.irregularity.measured
     if measured is not None:
         with blame(None, "irregularity"):
             measured.check_covers(first + ahead[0], last + ahead[1])
     for i, stop in enumerate(words.stops):
+        if words.runs and any(stop.position_m == other.position_m for other in words.stops[:i]):
+            raise InputError(
+                "every run stops there already",
+                field=f"{field}.stops[{i}].position_m",
+                value=stop.position_m,
+                remedy="list each stop of the line once; every run that passes makes it",
+            )
         if not first < stop.position_m < last:
             raise InputError(
                 "the stop is not on the way",
@@ -218,6 +232,20 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 value=stop.position_m,
                 limit=f"between {first:g} and {last:g} m",
                 remedy="move the stop, or let the ride start or end elsewhere",
+            )
+
+
+def _judge_restrictions(words: RidePart) -> None:
+    """Refuse a restriction that the ride does not meet."""
+    low, high = words.reach_m
+    for i, part in enumerate(words.restriction):
+        if part.end_m <= low or part.start_m >= high:
+            raise InputError(
+                "the ride does not pass this restriction",
+                field=f"restriction[{i}].start_m",
+                value=part.start_m,
+                limit=f"between {low:g} and {high:g} m",
+                remedy="move it, or take it out",
             )
 
 

@@ -44,14 +44,15 @@ def _judge_imu(resolved: ResolvedCell) -> None:
     field = f"imu[{cell.imu_index}]"
     one_of(mount.body, vehicle.body_names, "the vehicle has no such body", field=f"{field}.body")
     offset = mount.position_m[0] + vehicle.body(mount.body).position_m[0]
-    ends = {"start_m": cell.ride.start_m, "end_m": cell.ride.end_m}
+    ends = {"start": cell.ride.start_m} | {
+        f"end of run {i + 1}": end for i, end in enumerate(cell.ride.ends_m)
+    }
+    if not cell.ride.runs and not cell.ride.stands:
+        ends = {"start": cell.ride.start_m, "end": cell.ride.ends_m[0]}
     for name, position in ends.items():
-        if position is None:
-            continue
         if not track.start_m <= position + offset <= track.end_m:
             raise InputError(
-                f"the IMU would leave track {track.name!r} at the {name.removesuffix('_m')} "
-                f"of ride {cell.ride.name}",
+                f"the IMU would leave track {track.name!r} at the {name} of ride {cell.ride.name}",
                 field=f"{field}.position_m",
                 value=f"s = {position + offset:g} m",
                 limit=f"{track.start_m:g} to {track.end_m:g} m",

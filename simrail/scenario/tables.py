@@ -111,8 +111,46 @@ class StopPart(Part):
     dwell_s: Annotated[float, Field(ge=0.0, le=3600.0)]
 
 
+class RunPart(Part):
+    """One of the ``runs`` of a ride: where it ends, and how long the train stands before the next one."""
+
+    end_m: float
+    turn_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
+
+
+class RestrictionPart(Part):
+    """``[[ride.restriction]]``: a stretch of the line that is passed more slowly, in either direction."""
+
+    start_m: float
+    end_m: float
+    speed_kmh: Annotated[float, Field(gt=0.0, le=400.0)]
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if self.end_m <= self.start_m:
+            raise InputError(
+                "the stretch has no length",
+                field="end_m",
+                value=self.end_m,
+                limit=f"> start_m = {self.start_m:g} m",
+                remedy="start_m is the smaller s, whichever way the train goes",
+            )
+        return self
+
+
+class CoastingPart(Part):
+    """``[ride.coasting]``: at its speed the train rolls, until it brakes or is as slow as ``least_kmh``."""
+
+    deceleration_mps2: Annotated[float, Field(gt=0.0, le=0.5)]
+    least_kmh: Annotated[float, Field(gt=0.0, le=400.0)]
+
+
 class RidePart(Part):
     """``[[ride]]``: one ride over the track. It runs backwards if ``end_m < start_m``.
+
+    In place of ``end_m``, ``runs`` says where each of several runs ends, and for how long the train stands
+    (``turn_s``) before the next; it is not turned: a run towards smaller s is run backwards. Every run stops
+    at those of the ``stops`` that it passes.
 
     With ``reverse = true`` it is ridden the other way, from ``end_m`` to ``start_m``, stops in turn; with
     ``reverse = [false, true]`` both ways. Without ``end_m`` and ``speed_kmh`` the vehicle stands where it
@@ -132,9 +170,16 @@ class RidePart(Part):
     drive: Listed[Literal["guide", "wheels"]] = "guide"
     reverse: Listed[bool] = False
     kick_end_m: float | None = None
+    runs: tuple[RunPart, ...] = ()
+    braking_mps2: Listed[Annotated[float, Field(gt=0.0, le=3.0)]] | None = None
+    restriction: tuple[RestrictionPart, ...] = ()
+    coasting: CoastingPart | None = None
 
     @model_validator(mode="after")
     def _goes_or_stands(self) -> RidePart:
+        if self.runs:
+            self._check_runs()
+            return self
         if (self.end_m is None) != (self.speed_kmh is None):
             missing = "end_m" if self.end_m is None else "speed_kmh"
             raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")
@@ -142,7 +187,30 @@ class RidePart(Part):
             raise ValueError("a standstill, without end_m, has no stops on the way")
         if self.end_m is None and any(each(self.reverse)):
             raise ValueError("a standstill, without end_m, cannot be reversed")
+        if self.end_m is None and (self.restriction or self.coasting):
+            raise ValueError("a standstill, without end_m, has neither restrictions nor coasting")
         return self
+
+    def _check_runs(self) -> None:
+        def refuse(problem: str, field: str, value: object, limit: str | None, remedy: str) -> None:
+            raise InputError(problem, field=field, value=value, limit=limit, remedy=remedy)
+
+        if self.end_m is not None:
+            refuse("has runs, which say where it ends", "end_m", self.end_m, None, "take out end_m, or runs")
+        if self.speed_kmh is None:
+            refuse("is missing: runs need a speed", "speed_kmh", None, None, "add speed_kmh")
+        if any(each(self.reverse)):
+            refuse("has runs, which say the ways", "reverse", True, "false", "list the runs the other way")
+        if self.kick_end_m is not None:
+            refuse(
+                "is scored over one run", "kick_end_m", self.kick_end_m, None, "use end_m in place of runs"
+            )
+        for i, run in enumerate(self.runs):
+            last = i == len(self.runs) - 1
+            if last and run.turn_s is not None:
+                refuse("no run follows", f"runs[{i}].turn_s", run.turn_s, None, "use final_rest_s")
+            if not last and run.turn_s is None:
+                refuse("is missing", f"runs[{i}].turn_s", None, "0 to 3600 s", "say how long the turn takes")
 
     @property
     def as_ridden(self) -> RidePart:
@@ -153,9 +221,21 @@ class RidePart(Part):
         return self.model_copy(update=turned)
 
     @property
+    def ends_m(self) -> tuple[float, ...]:
+        """Where each run ends; nothing of a standstill. As ridden, no list."""
+        ends = self.runs or (() if self.end_m is None else (self,))
+        return tuple(part.end_m for part in ends)  # type: ignore[misc]
+
+    @property
+    def reach_m(self) -> tuple[float, float]:
+        """Smallest and largest s of the vehicle's reference point. As ridden, no list."""
+        places = (self.start_m, *self.ends_m)
+        return min(places), max(places)
+
+    @property
     def stands(self) -> bool:
         """Whether the vehicle does not move."""
-        return self.end_m is None
+        return self.end_m is None and not self.runs
 
 
 class RailConditionPart(Part):

@@ -169,8 +169,10 @@ def _counted(
     wheel = truth.wheel_at(encoder.wheel)
     angle, radius = truth.wheel_angle(wheel), truth.wheel_radius_m[wheel]
     if encoder.radius == "calibrated":
-        run = _place(truth, mount, len(truth.time_s) - 1) - _place(truth, mount, 0)
-        radius = abs(run / (angle[-1] - angle[0]))
+        # Over all runs: one there and one back would leave nothing to divide.
+        turns = truth.turning_rows
+        run = np.abs(np.diff([_place(truth, mount, row) for row in turns])).sum()
+        radius = run / np.abs(np.diff([angle[row] for row in turns])).sum()
     sheet = EncoderSheet(
         wheel=wheel,
         pulses_per_revolution=encoder.counts_per_revolution,

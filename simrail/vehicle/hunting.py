@@ -84,7 +84,7 @@ def on_gauge(model: VehicleModel, wider_m: float) -> VehicleModel:
 
 def mean_widening_m(laid: LaidTrack, profile: SpeedProfile) -> float:
     """How much wider than designed the gauge of laid rails is, on average over a ride."""
-    low, high = sorted((profile.start_m, profile.end_m))
+    low, high = profile.reach_m
     y_left, _, y_right, _ = laid.rails(np.arange(low, high + 1.0)).T
     return float(np.mean(y_left - y_right))
 

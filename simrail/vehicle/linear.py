@@ -141,7 +141,7 @@ class RunningVehicle:
         torque, inner = np.zeros(spins), np.zeros(self.inner_states)
         memory = memory_of(len(self.data.axles))
         memory.axle_memos["s_m"] = self._nominal[self.data.axles["body"], 0]
-        drive = np.array([(0.0, (0.0, 0.0, speed_mps, _MIDDLE_M))], DRIVE)
+        drive = np.array([(0.0, (0.0, 0.0, speed_mps, _MIDDLE_M), 1.0)], DRIVE)
         spin = np.ascontiguousarray(state[12 * b : 12 * b + spins])
         zeta = np.ascontiguousarray(state[12 * b + spins :])
         forces(0.0, pose, spin, zeta, self.data._replace(drive=drive), wrench, torque, inner, memory)

@@ -137,7 +137,9 @@ def pack(
         guide=_guide(model, gravity_mps2),
         traction=traction,
         options=_options(model, track, gravity_mps2),
-        drive=np.array([(start, cubic) for start, cubic in zip(times, cubics, strict=False)], records.DRIVE),
+        drive=np.array(
+            list(zip(times[:-1], map(tuple, cubics), profile.directions, strict=True)), records.DRIVE
+        ),
         track=_writable(track.table).reshape(len(track.table), -1).view(records.TRACK)[:, 0],
         patches=np.stack([table.patches for table in contacts.tables]),
         const=np.array([table.const for table in contacts.tables], CONST),

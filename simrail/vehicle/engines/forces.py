@@ -159,6 +159,7 @@ def forces(
         t, data.guide[0], wheels_drive, data.drive, data.track, options, pose, wrench, memo, frame
     )
     if wheels_drive:
+        traction.direction = data.drive[memo.piece].direction
         efforts = driver(behind, wanted, speed, traction)
         traction_forces(
             efforts, traction, data.spins, pose, spin, zeta[brakes:], wrench, torque, zeta_rate[brakes:]

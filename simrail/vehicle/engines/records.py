@@ -104,8 +104,8 @@ OPTIONS = _record(
     linear_contact=_INDEX,
 )
 """Gravity, the grid of the track's table, and the prescribed linear contact, per wheel."""
-DRIVE = np.dtype([("start_s", "f8"), ("cubic", "f8", (4,))], align=True)
-"""A piece of the speed profile: s(t) from its start on."""
+DRIVE = np.dtype([("start_s", "f8"), ("cubic", "f8", (4,)), ("direction", "f8")], align=True)
+"""A piece of the speed profile: s(t) from its start on, and the direction of its run, 1 or -1."""
 GUIDE_MEMO = _record("s_m", piece=_INDEX)
 """What the kernel remembers from call to call: the piece of the profile and the s of the guide's body."""
 AXLE_MEMO = _record("s_m derailed_time_s derailed_s_m speed_mps shift_m lift_m", derailed=_INDEX)
