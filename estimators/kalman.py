@@ -60,13 +60,14 @@ def room_for_history(steps: int, n: int, m: int) -> History:
 
 @njit_borrowed
 def keep(states: FloatArray, covariances: FloatArray, k: int, x: FloatArray, p: FloatArray) -> None:
-    """Write state and covariance of step k into rows k.
+    """Write state and covariance of step k into rows k; the covariance of as many states as it has room for.
 
     By elements: numba compiles the assignment of a whole array for half a second, wherever it stands.
     """
     for i in range(x.shape[0]):
         states[k, i] = x[i]
-        for c in range(x.shape[0]):
+    for i in range(covariances.shape[1]):
+        for c in range(covariances.shape[1]):
             covariances[k, i, c] = p[i, c]
 
 

@@ -251,7 +251,8 @@ class CurveMatchedOdometry:
         )
         x, p = self._start(recording, pulse, chord)
         x[YAW] = line_at(grid, table, x[S]).heading
-        states, covariance = np.empty((n, STATES)), np.empty((n, STATES, STATES))
+        spoken_of = STATES if self.smoothed else V + 1
+        states, covariance = np.empty((n, STATES)), np.empty((n, spoken_of, spoken_of))
         steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
         model = self._model(recording, pulse, pointing_of(recording, chord))

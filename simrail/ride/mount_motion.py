@@ -110,8 +110,8 @@ def mount_motion(truth: Truth, mount: Mount, rows: range, columns: Sequence[str]
             motion[:m, 20:23] = _angles_near(np.swapaxes(frame, 1, 2) @ rotation[:m], mount.yaw_rad)
         data[begin : begin + m] = motion[:m, chosen]
         if begin // PIECE % _PIECES_HELD == _PIECES_HELD - 1:
-            give_back((body.position,))
-    give_back((body.position,))
+            give_back((body.position, body.velocity))
+    give_back((body.position, body.velocity))
     return data
 
 

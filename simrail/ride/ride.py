@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
@@ -58,6 +58,16 @@ _SOURCES = (
 )
 
 
+class Kept(NamedTuple):
+    """What of a long ride is kept: the motion of some bodies, and the angles of some wheels.
+
+    Of bodies, place and attitude are in double precision, the rest in single; no states of the contacts.
+    """
+
+    bodies: tuple[str, ...]
+    wheels: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Ride:
     """Everything that a truth depends on.
@@ -91,6 +101,8 @@ class Ride:
     contact_rate_hz : float
         Rate of the kept samples of forces between wheels and rails, unfiltered: `rate_hz` over a whole
         number; 0 keeps none.
+    kept : Kept, optional
+        What of a long ride is kept; None keeps everything, in double precision.
     """
 
     name: str
@@ -106,6 +118,19 @@ class Ride:
     drive: Literal["guide", "wheels"] = "guide"
     conditions: tuple[RailCondition, ...] = ()
     contact_rate_hz: float = 0.0
+    kept: Kept | None = None
+
+    @property
+    def kept_bodies(self) -> list[int]:
+        """Numbers of the bodies whose motion is kept."""
+        names = self.vehicle.body_names
+        return [i for i, name in enumerate(names) if self.kept is None or name in self.kept.bodies]
+
+    @property
+    def kept_wheels(self) -> list[int]:
+        """Numbers of the wheels whose angles are kept."""
+        names = self.vehicle.wheel_names
+        return [i for i, name in enumerate(names) if self.kept is None or name in self.kept.wheels]
 
     @property
     def contact_every(self) -> int:
@@ -128,6 +153,7 @@ class Ride:
             "drive": self.drive,
             "conditions": [asdict(condition) for condition in self.conditions],
             "contact_rate_hz": self.contact_rate_hz,
+            "kept": None if self.kept is None else self.kept._asdict(),
             "versions": dict(_versions()),
             "sources": source_hash(*_SOURCES),
         }
@@ -207,8 +233,8 @@ def simulate(
 
 def _follow(ride: Ride) -> Truth:
     """Every body of the vehicle keeps to the irregular rails at its own place: no dynamics."""
-    laid = rails_of(ride)
-    radius = ride.vehicle.wheels[0].radius_m
+    laid, model = rails_of(ride), ride.vehicle
+    radius = model.wheels[0].radius_m
     truths = {
         body.name: kinematic_truth(
             ride.track,
@@ -220,16 +246,21 @@ def _follow(ride: Ride) -> Truth:
             rate_hz=ride.rate_hz,
             gravity_mps2=ride.gravity_mps2,
         )
-        for body in ride.vehicle.bodies
+        for body in (model.bodies[i] for i in ride.kept_bodies)
     }
     first = next(iter(truths.values()))
     return replace(
         first,
         bodies={name: truth.bodies["body"] for name, truth in truths.items()},
-        wheel_angles={wheel.name: first.wheel_angles["wheel"] for wheel in ride.vehicle.wheels},
-        wheel_radius_m={wheel.name: wheel.radius_m for wheel in ride.vehicle.wheels},
-        manifest={"ride": ride.name, "engine": "kinematic", "vehicle": ride.vehicle.name},
+        wheel_angles={wheel.name: first.wheel_angles["wheel"] for wheel in model.wheels},
+        wheel_radius_m={wheel.name: wheel.radius_m for wheel in model.wheels},
+        axle_offsets_m=_axle_offsets_m(model),
+        manifest={"ride": ride.name, "engine": "kinematic", "vehicle": model.name},
     )
+
+
+def _axle_offsets_m(model: VehicleModel) -> dict[str, float]:
+    return {name: model.body(name).position_m[0] for name in model.axle_names}
 
 
 def _engine_of(name: str) -> type[ExudynEngine] | type[CompiledEngine]:
@@ -269,8 +300,13 @@ def _drive(ride: Ride, folder: Path, progress: Progress | None) -> None:
     write_header(
         folder,
         track=ride.track,
-        bodies={body.name: (body.position_m[0], body.position_m[2]) for body in model.bodies},
-        wheels={wheel.name: wheel.radius_m for wheel in model.wheels},
+        bodies={
+            body.name: (body.position_m[0], body.position_m[2])
+            for body in (model.bodies[i] for i in ride.kept_bodies)
+        },
+        wheels={wheel.name: wheel.radius_m for wheel in (model.wheels[i] for i in ride.kept_wheels)},
+        contact_wheels=model.wheel_names,
+        axle_offsets_m=_axle_offsets_m(model),
         gravity_mps2=ride.gravity_mps2,
         contact_every=ride.contact_every or 1,
         manifest={

@@ -106,6 +106,8 @@ class Truth:
         Forces and contact of each wheel, columns `simrail.core.columns.CONTACT`, if the ride kept them.
     contact_every : int
         Rows from one of them to the next: they belong to ``time_s[::contact_every]``.
+    axle_offsets_m : dict of str to float
+        How far each axle is ahead of the vehicle's reference point, where not all axles are among `bodies`.
     """
 
     time_s: FloatArray
@@ -119,6 +121,7 @@ class Truth:
     manifest: dict[str, Any]
     contacts: dict[str, FloatArray] = field(default_factory=dict)
     contact_every: int = 1
+    axle_offsets_m: dict[str, float] = field(default_factory=dict)
     _remembered: Remembered = field(default_factory=Remembered, init=False, repr=False, compare=False)
 
     @property
@@ -140,7 +143,7 @@ class Truth:
         """Rotation (n,) of a wheel relative to its axle box, rad; see `wheel_angles`."""
         if wheel not in self.wheel_angles:
             raise InputError(
-                "the vehicle has no such wheel", field="wheel", value=wheel, limit=", ".join(self.wheel_names)
+                "the ride has no such wheel", field="wheel", value=wheel, limit=", ".join(self.wheel_names)
             )
         return self.wheel_angles[wheel]
 
@@ -193,7 +196,8 @@ class Truth:
         turns = self.turning_rows
         forward = self.reference_position_m[turns[1]] >= self.reference_position_m[0]
         pick = max if (where == "leading") == bool(forward) else min
-        axle = pick(axles, key=lambda name: self.bodies[name].offset_m, default=where)
+        offsets = self.axle_offsets_m or {name: body.offset_m for name, body in self.bodies.items()}
+        axle = pick(axles, key=lambda name: offsets[name], default=where)
         return f"{axle}.{side}"
 
     @property
@@ -248,7 +252,7 @@ class Truth:
         """
         if mount.body not in self.bodies:
             raise InputError(
-                "the vehicle has no such body",
+                "the ride has no such body",
                 field="body",
                 value=mount.body,
                 limit=", ".join(self.body_names),

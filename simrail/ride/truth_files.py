@@ -20,9 +20,21 @@ from simrail.track.design import TrackDesign
 BODY_ARRAYS = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
 """Columns of a body on disk: six triples, in this order."""
 
+DOUBLE, SINGLE = ("position", "angles"), ("velocity", "acceleration", "rate", "angular_acceleration")
+"""Columns of a body of a long ride, in two arrays, of double and of single precision: single has 6e-8 of a
+value, 1e-6 m/s of a speed and 1e-4 deg/h of a slow turn, less than any sensor tells."""
+
 
 def create_arrays(
-    folder: Path, rows: int, *, bodies: int, wheels: int, wheel_states: int, contact_every: int = 0
+    folder: Path,
+    rows: int,
+    *,
+    bodies: int,
+    wheels: int,
+    wheel_states: int,
+    contact_every: int = 0,
+    contacts: int | None = None,
+    compact: bool = False,
 ) -> dict[str, FloatArray]:
     """Create the arrays of a truth on disk, to be filled piece by piece in bounded memory.
 
@@ -31,7 +43,9 @@ def create_arrays(
     dict of str to ndarray
         ``time_s`` and ``reference_position_m`` (rows,), ``body_<i>`` (rows, 18), ``wheel_<i>`` (rows,)
         and, if `wheel_states` > 0, ``wheel_state_<i>`` (rows, wheel_states), and, if `contact_every` > 0,
-        ``contact_<i>`` (k, 12) of every such row, mapped to .npy files.
+        ``contact_<i>`` (k, 12) of every such row, for `contacts` wheels (by default all), mapped to .npy
+        files. If `compact`, ``body_<i>`` (rows, 6) and ``rates_<i>`` (rows, 12) of single precision
+        (`DOUBLE`, `SINGLE`).
 
     Raises
     ------
@@ -39,18 +53,22 @@ def create_arrays(
         If the disk has no room for all of them.
     """
     shapes: dict[str, tuple[int, ...]] = {"time_s": (rows,), "reference_position_m": (rows,)}
-    shapes |= {f"body_{i}": (rows, 3 * len(BODY_ARRAYS)) for i in range(bodies)}
+    shapes |= {f"body_{i}": (rows, 3 * len(DOUBLE if compact else BODY_ARRAYS)) for i in range(bodies)}
+    if compact:
+        shapes |= {f"rates_{i}": (rows, 3 * len(SINGLE)) for i in range(bodies)}
     shapes |= {f"wheel_{i}": (rows,) for i in range(wheels)}
     if wheel_states:
         shapes |= {f"wheel_state_{i}": (rows, wheel_states) for i in range(wheels)}
     if contact_every:
         kept = -(-rows // contact_every)
-        shapes |= {f"contact_{i}": (kept, len(CONTACT)) for i in range(wheels)}
+        count = wheels if contacts is None else contacts
+        shapes |= {f"contact_{i}": (kept, len(CONTACT)) for i in range(count)}
     folder.mkdir(parents=True, exist_ok=True)
     made: dict[str, FloatArray] = {}
     for name, shape in shapes.items():
         place = folder / f"{name}.npy"
-        made[name] = np.lib.format.open_memmap(place, mode="w+", dtype=np.float64, shape=shape)
+        precision = np.float32 if name.startswith("rates_") else np.float64
+        made[name] = np.lib.format.open_memmap(place, mode="w+", dtype=precision, shape=shape)
         # A mapped file has holes: a disk that is full when they are written to kills the process.
         if hasattr(os, "posix_fallocate"):
             with place.open("r+b") as file:
@@ -67,10 +85,13 @@ def write_header(
     gravity_mps2: float,
     manifest: dict[str, Any],
     contact_every: int = 1,
+    contact_wheels: list[str] | None = None,
+    axle_offsets_m: dict[str, float] | None = None,
 ) -> None:
     """Write what goes with the arrays. Done last: a folder without it was interrupted, and is no truth.
 
-    ``bodies`` maps names to (offset_m, height_m), ``wheels`` names to radii, in the order of the arrays.
+    ``bodies`` maps names to (offset_m, height_m), ``wheels`` names to radii, in the order of the arrays;
+    ``contact_wheels`` are those whose contacts are kept, if not all of them.
     """
     plain = {
         "track": track.to_dict(),
@@ -79,6 +100,8 @@ def write_header(
         "gravity_mps2": gravity_mps2,
         "manifest": manifest,
         "contact_every": contact_every,
+        "contact_wheels": list(wheels) if contact_wheels is None else contact_wheels,
+        "axle_offsets_m": axle_offsets_m or {},
         "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))},
     }
     (folder / "truth.json").write_text(json.dumps(plain), encoding="utf-8")
@@ -113,6 +136,7 @@ def save_truth(truth: Truth, folder: Path) -> None:
         gravity_mps2=truth.gravity_mps2,
         manifest=truth.manifest,
         contact_every=truth.contact_every,
+        axle_offsets_m=truth.axle_offsets_m,
     )
 
 
@@ -139,7 +163,12 @@ def load_truth(folder: Path) -> Truth:
         stored = read(f"body_{i}")
         if len(stored) != len(time_s):
             raise ValueError(f"body_{i}.npy has {len(stored)} rows, not {len(time_s)}")
-        parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(BODY_ARRAYS)}
+        if stored.shape[1] == 3 * len(DOUBLE):
+            rates = read(f"rates_{i}")
+            parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(DOUBLE)}
+            parts |= {key: rates[:, 3 * j : 3 * j + 3] for j, key in enumerate(SINGLE)}
+        else:
+            parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(BODY_ARRAYS)}
         bodies[name] = BodyMotion(offset_m=offset, height_m=height, **parts)
     wheels = plain["wheels"]
     has_contacts = (folder / "contact_0.npy").exists()
@@ -156,8 +185,11 @@ def load_truth(folder: Path) -> Truth:
         wheel_radius_m=wheels,
         gravity_mps2=plain["gravity_mps2"],
         manifest=plain["manifest"],
-        contacts={wheel: read(f"contact_{i}") for i, wheel in enumerate(wheels)} if has_contacts else {},
+        contacts={wheel: read(f"contact_{i}") for i, wheel in enumerate(plain["contact_wheels"])}
+        if has_contacts
+        else {},
         contact_every=plain["contact_every"],
+        axle_offsets_m=plain["axle_offsets_m"],
     )
 
 

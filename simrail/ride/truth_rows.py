@@ -11,7 +11,7 @@ from simrail.core.jit import FloatArray
 from simrail.ride.abeam import abeam
 from simrail.ride.contact_forces import contact_columns
 from simrail.ride.mount_motion import give_back
-from simrail.ride.truth_files import create_arrays
+from simrail.ride.truth_files import BODY_ARRAYS, DOUBLE, SINGLE, create_arrays
 from simrail.vehicle.engines.engine import Segment
 
 if TYPE_CHECKING:
@@ -35,16 +35,20 @@ class TruthRows:
         self._arrays = create_arrays(
             folder,
             round(self.duration_s * ride.rate_hz) + 1,
-            bodies=len(model.bodies),
-            wheels=len(model.wheels),
-            wheel_states=4,
+            bodies=len(ride.kept_bodies),
+            wheels=len(ride.kept_wheels),
+            wheel_states=4 if ride.kept is None else 0,
             contact_every=ride.contact_every,
+            contacts=len(model.wheels),
+            compact=ride.kept is not None,
         )
         self._spins = list(model.spin_inertia_kgm2)
         self._done = 0
         self._place_m = ride.profile.start_m
         self._yaw_rad = np.zeros(len(model.bodies))
         self._turned_rad = np.zeros(len(model.wheels))
+        # Pitch rate and acceleration of each body in the row before.
+        self._pitch = np.zeros((0, len(model.bodies), 2))
 
     def add(self, segment: Segment) -> FloatArray:
         """Write the rows of a segment; returns their times (n,)."""
@@ -67,37 +71,51 @@ class TruthRows:
 
     def finish(self) -> None:
         """Count the wheels' angles from the first row, and bring everything to disk."""
-        for w in range(len(self._ride.vehicle.wheels)):
+        for w in range(len(self._ride.kept_wheels)):
             self._arrays[f"wheel_{w}"][:] -= self._arrays[f"wheel_{w}"][0]
             give_back(self._arrays.values())
         for array in self._arrays.values():
             array.flush()  # type: ignore[attr-defined]
 
     def _add_bodies(self, segment: Segment, here: slice) -> None:
-        for b in range(len(self._ride.vehicle.bodies)):
+        for i, b in enumerate(self._ride.kept_bodies):
             motion = segment.body(b)
             # The heading is continuous over the segments, too.
             motion[:, 11] += 2.0 * np.pi * np.round((self._yaw_rad[b] - motion[0, 11]) / (2.0 * np.pi))
             self._yaw_rad[b] = motion[-1, 11]
-            self._arrays[f"body_{b}"][here] = motion
+            if self._ride.kept is None:
+                self._arrays[f"body_{i}"][here] = motion
+            else:
+                self._arrays[f"body_{i}"][here] = motion[:, _columns(DOUBLE)]
+                self._arrays[f"rates_{i}"][here] = motion[:, _columns(SINGLE)]
 
     def _add_wheels(self, segment: Segment, here: slice) -> None:
         """Angles of the wheels in their axle boxes, which pitch; contact states; contacts that are kept."""
         arrays, model, every = self._arrays, self._ride.vehicle, self._ride.contact_every
-        begin = max(here.start - 1, 0)
-        for w, wheel in enumerate(model.wheels):
-            axle = arrays[f"body_{model.body_names.index(wheel.axle)}"]
-            pitch_rate, pitch_acceleration = axle[begin : here.stop, 13], axle[begin : here.stop, 16]
-            step_s = 1.0 / self._ride.rate_hz
-            box = self._turned_rad[w] + _integral(pitch_rate, pitch_acceleration, step_s)
+        step_s = 1.0 / self._ride.rate_hz
+        pitch = np.stack([segment.rate[:, :, 1], segment.angular_acceleration[:, :, 1]], axis=2)
+        before = len(self._pitch)
+        pitch = np.concatenate([self._pitch, pitch])
+        self._pitch = pitch[-1:].copy()
+        for i, w in enumerate(self._ride.kept_wheels):
+            wheel = model.wheels[w]
+            axle = pitch[:, model.body_names.index(wheel.axle)]
+            box = self._turned_rad[w] + _integral(axle[:, 0], axle[:, 1], step_s)
             self._turned_rad[w] = box[-1]
             spin = self._spins.index(wheel.spin)
-            arrays[f"wheel_{w}"][here] = segment.spin_rad[:, spin] - box[here.start - begin :]
-            arrays[f"wheel_state_{w}"][here] = segment.states[:, 4 * w : 4 * w + 4]
-            if every:
+            arrays[f"wheel_{i}"][here] = segment.spin_rad[:, spin] - box[before:]
+            if self._ride.kept is None:
+                arrays[f"wheel_state_{i}"][here] = segment.states[:, 4 * w : 4 * w + 4]
+        if every:
+            for w in range(len(model.wheels)):
                 kept = slice(-(-here.start // every), -(-here.stop // every))
                 told = segment.contacts[kept.start * every - here.start :: every, w]
                 arrays[f"contact_{w}"][kept] = contact_columns(told)
+
+
+def _columns(names: tuple[str, ...]) -> list[int]:
+    """Columns of some arrays of a body among all of them."""
+    return [3 * BODY_ARRAYS.index(name) + j for name in names for j in range(3)]
 
 
 def _places(ride: Ride, begin_m: float, segment: Segment) -> FloatArray:

@@ -21,8 +21,9 @@ from simrail.estimation.estimate import Estimator
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
-from simrail.ride.ride import Ride, rails_of
+from simrail.ride.ride import Kept, Ride, rails_of
 from simrail.ride.truth import Mount
+from simrail.scenario.axes import each
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import distributions_of
@@ -52,6 +53,9 @@ _Part = TypeVar("_Part", bound=Part)
 _Noun = TypeVar("_Noun")
 
 NO_IRREGULARITY = Irregularity(spectrum="none", fade_m=0.0)
+
+LONG_RIDE_S = 1800.0
+"""Of a ride that takes longer only what the scenario asks for is kept: another body asks for another ride."""
 
 _MOST_RESOLVED = 1000
 """Resolved cells that are remembered; cells come ride by ride, and draws of the sensors share one."""
@@ -187,7 +191,7 @@ class Parts:
         if key not in self._rides:
             if len(self._rides) >= _MOST_RESOLVED:
                 self._rides.clear()
-            spec, vehicle = cell.spec, self.vehicle(cell)
+            spec, vehicle, profile = cell.spec, self.vehicle(cell), _profile(cell.ride)
             rough = spec.irregularity
             self._rides[key] = Ride(
                 name=cell.ride.name,
@@ -195,15 +199,26 @@ class Parts:
                 irregularity=NO_IRREGULARITY if rough is None else self._irregularity(rough),
                 track_seed=cell.ride_seed,
                 vehicle=vehicle,
-                profile=_profile(cell.ride),
+                profile=profile,
                 engine=spec.engine,
                 step_s=spec.step_s,
                 rate_hz=spec.truth_rate_hz,
                 drive=cell.ride.drive,
                 conditions=_conditions(spec, vehicle),
                 contact_rate_hz=contact_rate_hz(spec),
+                kept=self._kept(cell, vehicle, profile),
             )
         return self._rides[key]
+
+    def _kept(self, cell: Cell, vehicle: VehicleModel, profile: SpeedProfile) -> Kept | None:
+        """What of a ride is kept: of a long one, bodies with an IMU and the wheel of the encoder."""
+        if profile.duration_s <= LONG_RIDE_S or cell.ride.kick_end_m is not None:
+            return None
+        spec = self.scenario.spec
+        bodies = {str(body) for part in spec.imu if part.is_on(cell.spec.vehicle) for body in each(part.body)}
+        places = {str(place) for place in each(spec.encoder.wheel)} if spec.encoder is not None else set()
+        wheels = {vehicle.wheel_at(place, direction=profile.direction) for place in places}
+        return Kept(tuple(sorted(bodies)), tuple(sorted(wheels)))
 
     def _irregularity(self, part: IrregularityPart) -> Irregularity:
         """Irregularity of a cell; a file of measured rails is read once."""

@@ -8,14 +8,14 @@ Figures go into the score table of `simrail.scoring.table`. Nothing here knows s
 the other metrics mean stands in `simrail.scoring.metrics`.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import ATTITUDE, MOTION, ODOMETRY, require
+from simrail.core.columns import ATTITUDE, MOTION, ODOMETRY, RELATIVE_POSITION, require
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
@@ -33,7 +33,7 @@ class Reference:
     Attributes
     ----------
     motion : pandas.DataFrame
-        True motion of the mount at the recording's IMU times.
+        True motion of the mount at the recording's IMU times, columns `SCORED` at least.
     design : ndarray (n, 3)
         Design roll, pitch and yaw of the track at the true position, rad.
     windows : dict of str to ndarray of int
@@ -45,8 +45,12 @@ class Reference:
     windows: Mapping[str, IntArray]
 
 
-def truth_at_imu(truth: Truth, recording: Recording) -> pd.DataFrame:
-    """True motion of the recording's mount at its IMU times.
+SCORED = (*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION)
+"""Columns of a motion that estimates are compared with."""
+
+
+def truth_at_imu(truth: Truth, recording: Recording, columns: Sequence[str] = MOTION) -> pd.DataFrame:
+    """True motion of the recording's mount at its IMU times, or some columns of it.
 
     Raises
     ------
@@ -70,11 +74,11 @@ def truth_at_imu(truth: Truth, recording: Recording) -> pd.DataFrame:
     if np.abs(place - nearest).max() < 1e-3:
         rows = range(nearest[0], nearest[-1] + 1, nearest[1] - nearest[0] if len(nearest) > 1 else 1)
         if len(rows) == len(nearest) and np.array_equal(nearest, rows):
-            return truth.motion(mount, rows).set_axis(recording.imu.index)
-        return truth.motion(mount).iloc[nearest].set_axis(recording.imu.index)
-    motion = truth.motion(mount)
-    columns = {name: np.interp(want, have, motion[name].to_numpy()) for name in motion.columns}
-    return pd.DataFrame(columns, index=recording.imu.index)
+            return truth.motion(mount, rows, columns).set_axis(recording.imu.index)
+        return truth.motion(mount, columns=columns).iloc[nearest].set_axis(recording.imu.index)
+    motion = truth.motion(mount, columns=columns)
+    values = {name: np.interp(want, have, motion[name].to_numpy()) for name in motion.columns}
+    return pd.DataFrame(values, index=recording.imu.index)
 
 
 def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference:
@@ -89,7 +93,7 @@ def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference
         which does not know it, the recording's map does.
     """
     track = recording.track if isinstance(truth, pd.DataFrame) else truth.track
-    motion = truth if isinstance(truth, pd.DataFrame) else truth_at_imu(truth, recording)
+    motion = truth if isinstance(truth, pd.DataFrame) else truth_at_imu(truth, recording, SCORED)
     require(motion, (*ATTITUDE, *ODOMETRY), what="truth")
     if len(motion) != len(recording.imu):
         raise InputError("the truth is not at the IMU's times", field="truth", value=len(motion))

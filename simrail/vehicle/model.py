@@ -319,6 +319,15 @@ class VehicleModel:
         """Names of the wheels, in order."""
         return [wheel.name for wheel in self.wheels]
 
+    def wheel_at(self, place: str, *, direction: int) -> str:
+        """Name of a wheel from its place in a direction of travel, e.g. ``"trailing.left"``."""
+        where, _, side = place.partition(".")
+        if where not in ("leading", "trailing"):
+            return place
+        axles = {wheel.axle for wheel in self.wheels if wheel.name.endswith("." + side)}
+        pick = max if (where == "leading") == (direction > 0) else min
+        return f"{pick(axles, key=lambda name: self.body(name).position_m[0], default=where)}.{side}"
+
     @property
     def axle_names(self) -> list[str]:
         """Names of the bodies that carry wheels, in order."""

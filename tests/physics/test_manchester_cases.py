@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from simrail.core.toml_files import load
+from simrail.ride.abeam import abeam
 from simrail.ride.ride import Ride, rails_of, simulate
-from simrail.ride.truth import abeam
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import load_scenario

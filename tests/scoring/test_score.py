@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -366,7 +367,7 @@ class FakeTruth:
         self.kept, self.asked = motion, None
         self.track, self.time_s = PiecewiseTrack(), motion.index.to_numpy()
 
-    def motion(self, mount: Any, rows: range | None = None) -> pd.DataFrame:
+    def motion(self, mount: Any, rows: range | None = None, columns: Sequence[str] = ()) -> pd.DataFrame:
         self.asked = mount
         return self.kept if rows is None else self.kept.iloc[list(rows)]
 

@@ -12,7 +12,7 @@ import pytest
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
-from simrail.ride.truth import abeam
+from simrail.ride.abeam import abeam
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.elements import Gradient
 from simrail.track.irregularity import Irregularity

@@ -1,0 +1,93 @@
+"""Of a long ride only what was asked for is kept: the same motion, in less room."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simrail.core.columns import ATTITUDE, CONTACT, IMU, ODOMETRY, POSITION
+from simrail.core.errors import InputError
+from simrail.core.toml_files import load
+from simrail.ride import cache as ride_cache
+from simrail.ride.ride import Kept, Ride, simulate
+from simrail.ride.truth import Mount, Truth
+from simrail.scenario import build
+from simrail.scenario.build import Parts
+from simrail.scenario.cells import cells
+from simrail.scenario.scenario import load_scenario
+from simrail.track.file import TrackFile
+from simrail.track.irregularity import Irregularity
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
+
+RIDE = Ride(
+    name="short",
+    track=load(TrackFile, "track", "condequinto_olivar").design("condequinto_olivar"),
+    irregularity=Irregularity("erri_b176_low", (3.0, 100.0), 20.0),
+    track_seed=4,
+    vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
+    profile=SpeedProfile(240.0, 170.0, 12.0, rest_s=1.0, final_rest_s=2.0),
+    engine="compiled",
+    contact_rate_hz=100.0,
+)
+MOUNT = Mount("imu", "front", (0.1, 0.0, 0.6))
+
+
+@pytest.fixture(scope="module")
+def rides(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Truth, Truth]]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SIMRAIL_RIDES", str(tmp_path_factory.mktemp("rides")))
+        whole = simulate(RIDE)
+        full_bytes = ride_cache.rides()[0].size_bytes
+        kept = simulate(replace(RIDE, kept=Kept(("front",), ("rear.left",))))
+        assert ride_cache.rides()[0].size_bytes < 0.35 * full_bytes
+        yield whole, kept
+
+
+def test_what_is_kept_is_that_of_the_whole_ride(rides: tuple[Truth, Truth]) -> None:
+    whole, kept = rides
+    assert kept.body_names == ["front"] and kept.wheel_names == ["rear.left"] and not kept.wheel_states
+    np.testing.assert_array_equal(kept.wheel_angle("rear.left"), whole.wheel_angle("rear.left"))
+    ours, full = kept.motion(MOUNT), whole.motion(MOUNT)
+    exact = [*POSITION, *ATTITUDE, "position_m", "lateral_m", "vertical_m"]
+    assert ours[exact].equals(full[exact])
+    # Single precision: 2^-24 of each value; accelerations of an axle are some m/s2, rates some rad/s.
+    unit = 2.0**-24
+    for columns in (IMU, ODOMETRY[1:]):
+        off = np.abs(ours[list(columns)].to_numpy() - full[list(columns)].to_numpy())
+        assert 0.0 < off.max() < 40.0 * unit
+
+
+def test_contacts_are_kept_of_every_wheel(rides: tuple[Truth, Truth]) -> None:
+    whole, kept = rides
+    for wheel in whole.wheel_names:
+        np.testing.assert_array_equal(kept.contacts[wheel], whole.contacts[wheel])
+    assert kept.contacts["front.left"].shape[1] == len(CONTACT)
+
+
+def test_wheels_are_named_by_their_place_as_before(rides: tuple[Truth, Truth]) -> None:
+    whole, kept = rides
+    # It runs backwards: the rear axle leads.
+    assert kept.wheel_at("leading.left") == whole.wheel_at("leading.left") == "rear.left"
+    assert RIDE.vehicle.wheel_at("leading.left", direction=-1) == "rear.left"
+    assert RIDE.vehicle.wheel_at("trailing.right", direction=-1) == "front.right"
+    assert RIDE.vehicle.wheel_at("front.left", direction=-1) == "front.left"
+
+
+def test_what_is_not_kept_is_told(rides: tuple[Truth, Truth]) -> None:
+    _, kept = rides
+    with pytest.raises(InputError, match="no such body"):
+        kept.motion(Mount("imu", "rear", (0.0, 0.0, 0.6)))
+    with pytest.raises(InputError, match="no such wheel"):
+        kept.wheel_angle("front.left")
+
+
+def test_a_scenario_keeps_of_a_long_ride_what_it_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load_scenario("go20a")
+    cell = next(iter(cells(scenario)))
+    assert Parts(scenario).ride(cell).kept is None
+    monkeypatch.setattr(build, "LONG_RIDE_S", 100.0)
+    assert Parts(scenario).ride(cell).kept == Kept(("front",), ("rear.left",))
