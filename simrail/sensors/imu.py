@@ -106,13 +106,17 @@ def sample_imu(
     time = motion.index.to_numpy(dtype=np.float64)
     truth_rate = float(round((len(time) - 1) / (time[-1] - time[0]), 6))
     sampling = sampling_of(truth_rate, grade.rate_hz, grade.oversampling)
-    perfect = motion[list(IMU)].to_numpy(dtype=np.float64)
-    if earth is not None:
-        perfect = perfect + _earth_terms(motion, earth)
-    felt = perfect
-    if grade.bandwidth_hz is not None:
-        felt = second_order(perfect, bandwidth_hz=grade.bandwidth_hz, rate_hz=truth_rate)
     streams = streams_of(seed, draw, name)
+    gyro, accel = (draw_response(grade, kind, streams) for kind in ("gyro", "accel"))
+    rectifies = errors and bool(np.any(gyro.rectification) or np.any(accel.rectification))
+    of_imu = motion if tuple(motion.columns) == IMU else motion[list(IMU)]
+    felt = of_imu.to_numpy(dtype=np.float64)
+    if earth is not None:
+        felt = felt + _earth_terms(motion, earth)
+    del motion, of_imu
+    shaken = np.ascontiguousarray(felt[:, 3:]) if rectifies else None
+    if grade.bandwidth_hz is not None:
+        felt = second_order(felt, bandwidth_hz=grade.bandwidth_hz, rate_hz=truth_rate)
     if errors and (grade.clock_jitter_s > 0.0 or grade.clock_drift > 0.0):
         samples, first, places = sample_by_clock(
             felt, sampling, grade, truth_rate_hz=truth_rate, streams=streams
@@ -122,12 +126,9 @@ def sample_imu(
         places = first + sampling.factor * np.arange(len(samples), dtype=np.float64)
     stamps = time[first : first + sampling.factor * len(samples) : sampling.factor]
     if errors:
-        gyro, accel = (draw_response(grade, kind, streams) for kind in ("gyro", "accel"))
         vibration = None
-        if np.any(gyro.rectification) or np.any(accel.rectification):
-            vibration = mean_square_vibration(
-                np.ascontiguousarray(perfect[:, 3:]), truth_rate, grade.vibration_averaging_s, places
-            )
+        if shaken is not None:
+            vibration = mean_square_vibration(shaken, truth_rate, grade.vibration_averaging_s, places)
         above_k = None if temperature is None else temperature.above_reference_k(stamps)
         respond(samples, gyro, accel, vibration=vibration, above_k=above_k)
         for kind, columns in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):

@@ -95,9 +95,9 @@ def measure(
         If body or wheel is unknown, a rate does not divide the truth's, or a rail sensor has no rails to see;
         or if another odometry than the true one is asked for.
     """
-    felt = truth.motion(mount, columns=IMU if earth_rate is None else (*IMU, *ATTITUDE, *VELOCITY))
+    # Held by nobody else: of a long ride it is the largest array there is.
     imu, delay_s = sample_imu(
-        felt,
+        truth.motion(mount, columns=IMU if earth_rate is None else (*IMU, *ATTITUDE, *VELOCITY)),
         grade,
         seed=seed,
         draw=draw,
