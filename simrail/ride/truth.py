@@ -2,7 +2,8 @@
 
 A `Truth` holds, at the engine's output rate, position, velocity, acceleration, attitude, angular rate
 and angular acceleration of each body, the wheel rotations and the creep states. The motion of any
-mount follows from them by rigid-body kinematics, exactly; no engine is asked again.
+mount follows from them by rigid-body kinematics, exactly; no engine is asked again. Where a ride has
+vibration, its linear short-wave part is kept apart (`Truth.short_waves`) and added there.
 
 Nothing here is seen by an estimator.
 """
@@ -17,6 +18,7 @@ from simrail.core.columns import CONTACT, MOTION
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import euler_angles, rotation_matrix
+from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.track.design import TrackDesign, TrackFrame
 
 
@@ -102,6 +104,8 @@ class Truth:
         Forces and contact of each wheel, columns `simrail.core.columns.CONTACT`, if the ride kept them.
     contact_every : int
         Rows from one of them to the next: they belong to ``time_s[::contact_every]``.
+    short_waves : ShortWaves, optional
+        Motion and loads by short waves, which neither `bodies` nor `contacts` hold; None without vibration.
     """
 
     time_s: FloatArray
@@ -115,6 +119,7 @@ class Truth:
     manifest: dict[str, Any]
     contacts: dict[str, FloatArray] = field(default_factory=dict)
     contact_every: int = 1
+    short_waves: ShortWaves | None = None
 
     @property
     def rate_hz(self) -> float:
@@ -153,7 +158,8 @@ class Truth:
             Indexed by ``time_s``, columns `simrail.core.columns.CONTACT`: forces on the wheel; Q, Y and s in
             the track frame at its axle, creep forces and creepages in the contact's plane. Where two patches
             touch, forces are of both, and creepages, place and angle of the one that carries more.
-            Where none does, all but ``position_m`` is 0.
+            Where none does, all but ``position_m`` is 0. With vibration, the forces hold what the engine
+            computed, longer waves only (``attrs["waves_above_m"]``); `short_wave_load` has the rest of Q.
 
         Raises
         ------
@@ -173,7 +179,48 @@ class Truth:
                 remedy="set contact_rate_hz, e.g. to 200.0; the kinematic engine has no forces",
             )
         index = pd.Index(self.time_s[:: self.contact_every], name="time_s")
-        return pd.DataFrame(np.array(self.contacts[name]), index=index, columns=list(CONTACT))
+        frame = pd.DataFrame(np.array(self.contacts[name]), index=index, columns=list(CONTACT))
+        if self.short_waves is not None:
+            frame.attrs["waves_above_m"] = self.short_waves.longest_wave_m
+        return frame
+
+    def short_wave_load(self, wheel: str) -> FloatArray:
+        """Vertical load (k,) of a wheel by short waves, N, at the times of `contact`; zeros without vibration.
+
+        It is linear: where it takes off more than the wheel's load, the wheel would leave the rail.
+        """
+        name = self.wheel_at(wheel)
+        if self.short_waves is None:
+            return np.zeros(len(self.contact(wheel)))
+        return np.array(self.short_waves.loads[name], dtype=np.float64)
+
+    def body(self, name: str, *, ahead_m: float = 0.0) -> BodyMotion:
+        """Motion of a body with its short-wave part, as felt ``ahead_m`` before its centre of gravity.
+
+        The place matters for a body that bends alone: there its motion is that of a rigid body that moves as
+        that part of it does.
+
+        Raises
+        ------
+        InputError
+            If the vehicle has no such body.
+        """
+        if name not in self.bodies:
+            raise InputError(
+                "the vehicle has no such body", field="body", value=name, limit=", ".join(self.body_names)
+            )
+        body = self.bodies[name]
+        if self.short_waves is None:
+            return body
+        places = np.clip(self.reference_position_m + body.offset_m, self.track.start_m, self.track.end_m)
+        speed = np.gradient(self.reference_position_m, self.time_s)
+        return superposed(
+            body,
+            self.short_waves.of(name, ahead_m),
+            self.track.frame(places),
+            speed,
+            np.gradient(speed, self.time_s),
+        )
 
     def wheel_at(self, place: str) -> str:
         """Name of a wheel from its place in the direction of travel, e.g. ``"trailing.left"``.
@@ -210,14 +257,7 @@ class Truth:
         InputError
             If the vehicle has no such body.
         """
-        if mount.body not in self.bodies:
-            raise InputError(
-                "the vehicle has no such body",
-                field="body",
-                value=mount.body,
-                limit=", ".join(self.body_names),
-            )
-        body = self.bodies[mount.body]
+        body = self.body(mount.body, ahead_m=mount.position_m[0])
         rotation = rotation_matrix(body.angles)
         lever = np.asarray(mount.position_m, dtype=np.float64) - np.array([0.0, 0.0, body.height_m])
         omega = body.rate

@@ -1,0 +1,148 @@
+"""The linear short-wave part of a truth, kept apart from what the engine computed, and the sum of both.
+
+The motion of each body in heave, roll and pitch, relative to the ride, with first and second derivatives. The
+sum is exact: heave along the normal of the track frame, roll and pitch as increments of the Euler angles,
+rates and accelerations by their kinematics, so that they are the derivatives of the pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simrail.core.jit import FloatArray
+from simrail.vehicle.vibration.linear_model import Bending
+
+if TYPE_CHECKING:
+    from simrail.ride.truth import BodyMotion
+    from simrail.track.design import TrackFrame
+
+COLUMNS = (
+    *("heave_m", "heave_mps", "heave_mps2"),
+    *("roll_rad", "roll_radps", "roll_radps2"),
+    *("pitch_rad", "pitch_radps", "pitch_radps2"),
+)
+"""Columns of a body's short-wave motion."""
+
+
+@dataclass(frozen=True)
+class ShortWaves:
+    """Motion and loads by short waves, at the times of a truth.
+
+    Attributes
+    ----------
+    sources : dict of str to str
+        Names of what shakes, and where the figures come from.
+    longest_wave_m : float
+        The engine's own ride holds longer waves of the rails, this part shorter ones.
+    motions : dict of str to ndarray (n, 9)
+        Of each body, columns `COLUMNS`, at its centre of gravity; float32 on disk.
+    bendings : dict of str to (Bending, ndarray (n, 3))
+        Shape of each body that bends, and its modal coordinate (m) with two derivatives.
+    loads : dict of str to ndarray (k,)
+        Vertical load of each wheel beyond that of the ride, N, at the times of `Truth.contact`.
+    least_share_of_load : dict of str to float
+        Least load of each wheel over its static one with this part alone; below 0 the linear contact would
+        pull.
+    """
+
+    sources: dict[str, str]
+    longest_wave_m: float
+    motions: dict[str, FloatArray]
+    bendings: dict[str, tuple[Bending, FloatArray]] = field(default_factory=dict)
+    loads: dict[str, FloatArray] = field(default_factory=dict)
+    least_share_of_load: dict[str, float] = field(default_factory=dict)
+
+    def of(self, body: str, ahead_m: float) -> FloatArray:
+        """Motion (n, 9) of a body as it is felt at a distance ahead of its centre of gravity."""
+        motion = np.array(self.motions[body], dtype=np.float64)
+        if body in self.bendings:
+            bent, coordinate = self.bendings[body]
+            rise, slope = bent.shape(ahead_m)
+            motion[:, 0:3] += rise * coordinate
+            motion[:, 6:9] -= slope * coordinate
+            # The centre of gravity is where the arm of a mount begins: its own rise comes with the pitch.
+            motion[:, 0:3] -= ahead_m * slope * coordinate
+        return motion
+
+
+def superposed(
+    body: BodyMotion, short: FloatArray, frame: TrackFrame, speed: FloatArray, speed_rate: FloatArray
+) -> BodyMotion:
+    """A body's motion with its short-wave part.
+
+    Parameters
+    ----------
+    body : BodyMotion
+        As the engine computed it; n samples.
+    short : ndarray (n, 9)
+        Its short-wave motion, `COLUMNS`.
+    frame : TrackFrame
+        Track frame at the body.
+    speed, speed_rate : ndarray (n,)
+        V = ds/dt of that frame and dV/dt.
+
+    Notes
+    -----
+    The normal e of the frame turns with it: ``e' = V k x e``, ``e'' = V' k x e + V^2 (dk x e + k x (k x e))``
+    in the axes of the frame; the heave h adds ``h e``, ``h' e + h e'``, ``h'' e + 2 h' e' + h e''``.
+    """
+    k, dk = frame.k, frame.dk
+    zero = np.zeros(len(speed))
+    # k x e and k x (k x e) of e = (0, 0, 1).
+    first = np.column_stack([k[:, 1], -k[:, 0], zero])
+    change = np.column_stack([dk[:, 1], -dk[:, 0], zero])
+    second = np.column_stack([k[:, 0] * k[:, 2], k[:, 1] * k[:, 2], -(k[:, 0] ** 2) - k[:, 1] ** 2])
+    v, a = speed[:, None], speed_rate[:, None]
+    normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), first.shape)
+    turned = v * first
+    turned_twice = a * first + v**2 * (change + second)
+    h, h1, h2 = short[:, 0:1], short[:, 1:2], short[:, 2:3]
+    rotation = frame.rotation
+
+    def in_space(vectors: FloatArray) -> FloatArray:
+        rotated: FloatArray = np.einsum("nij,nj->ni", rotation, vectors)
+        return rotated
+
+    angles, rate, slope = _turned(body, short)
+    return replace(
+        body,
+        position=body.position + in_space(h * normal),
+        velocity=body.velocity + in_space(h1 * normal + h * turned),
+        acceleration=body.acceleration + in_space(h2 * normal + 2.0 * h1 * turned + h * turned_twice),
+        angles=angles,
+        rate=rate,
+        angular_acceleration=slope,
+    )
+
+
+def _turned(body: BodyMotion, short: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Angles, rates and angular accelerations with increments of roll and pitch, by Euler kinematics.
+
+    With roll f, pitch t, yaw y: ``p = f' - y' sin t``, ``q = t' cos f + y' cos t sin f``,
+    ``r = -t' sin f + y' cos t cos f``, and their derivatives.
+    """
+    f, t = body.angles[:, 0], body.angles[:, 1]
+    p, q, r = np.asarray(body.rate).T
+    p1, q1, r1 = np.asarray(body.angular_acceleration).T
+    sf, cf, st, ct = np.sin(f), np.cos(f), np.sin(t), np.cos(t)
+    y1, t1 = (q * sf + r * cf) / ct, q * cf - r * sf
+    f1 = p + y1 * st
+    # What of q' and r' the second derivatives of the angles make.
+    of_q = q1 + t1 * f1 * sf - y1 * (f1 * ct * cf - t1 * st * sf)
+    of_r = r1 + t1 * f1 * cf + y1 * (f1 * ct * sf + t1 * st * cf)
+    y2, t2 = (of_q * sf + of_r * cf) / ct, of_q * cf - of_r * sf
+    f2 = p1 + y2 * st + y1 * t1 * ct
+    f, f1, f2 = f + short[:, 3], f1 + short[:, 4], f2 + short[:, 5]
+    t, t1, t2 = t + short[:, 6], t1 + short[:, 7], t2 + short[:, 8]
+    sf, cf, st, ct = np.sin(f), np.cos(f), np.sin(t), np.cos(t)
+    rate = [f1 - y1 * st, t1 * cf + y1 * ct * sf, -t1 * sf + y1 * ct * cf]
+    slope = [
+        f2 - y2 * st - y1 * t1 * ct,
+        t2 * cf - t1 * f1 * sf + y2 * ct * sf + y1 * (f1 * ct * cf - t1 * st * sf),
+        -t2 * sf - t1 * f1 * cf + y2 * ct * cf - y1 * (f1 * ct * sf + t1 * st * cf),
+    ]
+    angles = np.column_stack([f, t, body.angles[:, 2]])
+    return angles, np.column_stack(rate), np.column_stack(slope)
