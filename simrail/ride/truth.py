@@ -185,7 +185,7 @@ class Truth:
         return frame
 
     def short_wave_load(self, wheel: str) -> FloatArray:
-        """Vertical load (k,) of a wheel by short waves, N, at the times of `contact`; zeros without vibration.
+        """Vertical load (k,) of a wheel by short waves, N, at the times of `contact`; 0 without vibration.
 
         It is linear: where it takes off more than the wheel's load, the wheel would leave the rail.
         """

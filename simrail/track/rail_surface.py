@@ -160,7 +160,7 @@ class RailSurface:
 
 @njit
 def spline_at(coefficients: FloatArray, start: float, step: float, x: FloatArray, out: FloatArray) -> None:
-    """Values of a uniform cubic B-spline at places x (n,), into ``out``; beyond its ends those of the ends."""
+    """Values of a uniform cubic B-spline at places x (n,), into ``out``; beyond its ends the ends'."""
     last = coefficients.shape[0] - 3
     for i in range(x.shape[0]):
         u = (x[i] - start) / step
@@ -192,7 +192,7 @@ def lay_surface(sources: RailSources, design: TrackDesign, *, seed: int) -> Rail
     s: FloatArray = np.arange(first, last + 1) * STEP_M
     height = np.zeros((2, len(s)))
     if sources.roughness is not None:
-        gain = 1.0
+        gain: FloatArray | float = 1.0
         if sources.section_gain is not None:
             gain = section_gain(s, sources.section_gain, start_m=design.start_m, seed=seed)
         at = np.arange(int(first), int(last) + 1) % round(PERIOD_M / STEP_M)
@@ -210,10 +210,10 @@ def lay_surface(sources: RailSources, design: TrackDesign, *, seed: int) -> Rail
 
 
 def realise_roughness(roughness: Roughness, side: str, *, seed: int) -> FloatArray:
-    """One period of a rail's roughness, heights (`PERIOD_M` / `STEP_M`,) at s = 0, step, 2 step, ..., m.
+    """One period of a rail's roughness, heights (`PERIOD_M` / `STEP_M`,), m.
 
-    A sum of harmonics with fixed amplitudes ``sqrt(2 S df)`` and random phases, df = 1 / `PERIOD_M`: each band
-    has its power in every realisation.
+    A sum of harmonics with fixed amplitudes ``sqrt(2 S df)`` and random phases, df = 1 / `PERIOD_M`: each
+    band has its power in every realisation.
     """
     n = round(PERIOD_M / STEP_M)
     harmonics = np.arange(n // 2 + 1)

@@ -47,7 +47,8 @@ def section_scores(
     ends, scores = start_m + np.cumsum(drawn[:, 0]), drawn[:, 1]
     at = np.minimum(np.searchsorted(ends + 0.5 * PASSING_M, s_m, side="right"), count - 2)
     u = np.clip((s_m - ends[at]) / PASSING_M + 0.5, 0.0, 1.0)
-    return scores[at] + (scores[at + 1] - scores[at]) * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    passed: FloatArray = scores[at] + (scores[at + 1] - scores[at]) * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    return passed
 
 
 def section_gain(s_m: FloatArray, gain: SectionGain, *, start_m: float, seed: int) -> FloatArray:
@@ -56,4 +57,5 @@ def section_gain(s_m: FloatArray, gain: SectionGain, *, start_m: float, seed: in
     The mean of its square is 1: E exp(2 sd n) = exp(2 sd^2).
     """
     score = section_scores(s_m, gain.lengths_m, start_m=start_m, seed=seed)
-    return np.exp(gain.sd * score - gain.sd**2)
+    gains: FloatArray = np.exp(gain.sd * score - gain.sd**2)
+    return gains

@@ -30,6 +30,16 @@ def band_noise(band_hz: tuple[float, float], rate_hz: float, generator: np.rando
     return np.column_stack([np.fft.irfft(lines / omega**2), np.fft.irfft(lines / omega), np.fft.irfft(lines)])
 
 
+def noise_bands(vibration: Vibration) -> list[tuple[str, tuple[float, float]]]:
+    """Names and bands of what shakes the floor; of lines the band from the lowest to the highest."""
+    equipment = vibration.equipment
+    parts = {"equipment": equipment, "traction": vibration.traction, "passengers": vibration.passengers}
+    bands = [(f"{name}.band_hz", part.band_hz) for name, part in parts.items() if part is not None]
+    if equipment is not None and equipment.lines_hz:
+        bands.append(("equipment.lines_hz", (min(equipment.lines_hz), max(equipment.lines_hz))))
+    return bands
+
+
 class Floor:
     """The floor of one car body over a ride.
 

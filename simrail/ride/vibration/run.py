@@ -1,10 +1,10 @@
 """From a ride and its truth to what short waves add: inputs at every wheel, modes, motions of the bodies.
 
 The vehicle runs over the short-wave surface of the rails at the places that the ride put it to, with wheels
-that have turned as they did. All is linear: the ride's longer waves and this part add up. Work is done piece
-by piece in bounded memory; where the truth's rate is below that of the vibration, what it cannot hold is taken
-off the inputs by a linear-phase low-pass, which commutes with the vehicle, so that rates and accelerations
-stay derivatives.
+that have turned as they did. All is linear: the ride's longer waves and this part add up. Work is done
+piece by piece in bounded memory. Where the truth's rate is below that of the vibration, what it cannot hold
+is taken off the inputs by a linear-phase low-pass, which commutes with the vehicle, so that rates and
+accelerations stay derivatives.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from simrail.ride.vibration.floor import Floor
 from simrail.ride.vibration.sources import Vibration
 from simrail.track.rail_surface import lay_surface
 from simrail.vehicle.model import VehicleModel
-from simrail.vehicle.vibration.car_bodies import CarBody, car_bodies
+from simrail.vehicle.vibration.car_bodies import car_bodies
 from simrail.vehicle.vibration.linear_model import (
     BENDING,
     HEAVE,
@@ -30,7 +30,7 @@ from simrail.vehicle.vibration.linear_model import (
     LinearVehicle,
     linear_vehicle,
 )
-from simrail.vehicle.vibration.modal import Modes, march_modes, modes_of
+from simrail.vehicle.vibration.modal import ComplexArray, Modes, march_modes, modes_of
 from simrail.vehicle.vibration.wheels import wheel_surface
 
 _PIECE = 8192
@@ -139,8 +139,9 @@ class Shaker:
         for w, wheel in enumerate(model.wheels):
             ahead = model.body(wheel.axle).position_m[0]
             out[:, w] = self._surface.height(0 if wheel.side > 0 else 1, place + ahead)
-            if self._wheels[w] is not None:
-                out[:, w] += self._wheels[w].height(over(truth.wheel_angles[wheel.name]))
+            tread = self._wheels[w]
+            if tread is not None:
+                out[:, w] += tread.height(over(truth.wheel_angles[wheel.name]))
         return out
 
     def filtered(self, samples: IntArray) -> FloatArray:
@@ -149,7 +150,8 @@ class Shaker:
         if half == 0:
             return self.inputs(samples)
         wide = self.inputs(np.arange(samples[0] - half, samples[-1] + half + 1))
-        return signal.oaconvolve(wide, self._taps[:, None], mode="valid", axes=0)
+        low: FloatArray = signal.oaconvolve(wide, self._taps[:, None], mode="valid", axes=0)
+        return low
 
     def run(self) -> Iterator[Piece]:
         """The vibration over all rows of the truth, piece by piece, from rest on the rails."""
@@ -172,7 +174,7 @@ class Shaker:
             kept = slice((first * every) - begin, None, every)
             yield self._read(first, force[kept], push[kept], floors)
 
-    def _read(self, first: int, z: np.ndarray, push: FloatArray, floors: dict[str, Floor]) -> Piece:
+    def _read(self, first: int, z: ComplexArray, push: FloatArray, floors: dict[str, Floor]) -> Piece:
         motions, bendings, loads = self._reading.read(z, push)
         for car in car_bodies(self._model):
             floor, share = floors[car.name], self._vibration.structure_borne
@@ -185,10 +187,12 @@ class Shaker:
     def _floors(self) -> dict[str, Floor]:
         truth = self._truth
         skip = max(1, round(_COARSE_S * truth.rate_hz))
-        time, place = np.asarray(truth.time_s[::skip]), np.asarray(truth.reference_position_m[::skip])
+        time: FloatArray = np.asarray(truth.time_s[::skip])
+        place: FloatArray = np.asarray(truth.reference_position_m[::skip])
         if len(time) < 3:
-            time, place = np.arange(3) * _COARSE_S, np.full(3, place[0])
-        speed = np.gradient(place, time)
+            time = np.array([0.0, 1.0, 2.0]) * _COARSE_S
+            place = np.array([1.0, 1.0, 1.0]) * place[0]
+        speed: FloatArray = np.asarray(np.gradient(place, time), dtype=np.float64)
         return {
             car.name: Floor(
                 self._vibration,
@@ -201,11 +205,6 @@ class Shaker:
             )
             for car in car_bodies(self._model)
         }
-
-
-def carriers_of(cars: tuple[CarBody, ...]) -> set[str]:
-    """Names of all bodies that carry a car body."""
-    return {name for car in cars for name in car.carriers}
 
 
 def _low_pass(every: int) -> FloatArray:
@@ -246,7 +245,7 @@ class _Reading:
         return cls(bodies, bent, np.hstack([matrix.real, -matrix.imag]).T.copy(), np.array(inputs).T.copy())
 
     def read(
-        self, z: np.ndarray, push: FloatArray
+        self, z: ComplexArray, push: FloatArray
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray], FloatArray]:
         """Motions of bodies, bendings, and loads (n, w), from modes (n, m) and inputs (n, w)."""
         signals = np.hstack([z.real, z.imag]) @ self.of_modes + push @ self.of_inputs

@@ -1,7 +1,7 @@
 """What shakes a vehicle beyond what its multibody ride sees: named sources, each to be left out.
 
-Each source says where its figures come from in `SOURCES`; those called synthetic are this project's own. A ride
-with no vibration at all is an ablation, and tables call it so.
+Each source says where its figures come from in `SOURCES`; those called synthetic are this project's own. A
+ride with no vibration at all is an ablation, and tables call it so.
 """
 
 from dataclasses import asdict, dataclass, field

@@ -1,1 +1,1 @@
-"""A vehicle's small vertical vibration above what a multibody ride sees: its linear model, integrated exactly."""
+"""A vehicle's vertical vibration by short waves: its linear model, integrated exactly."""

@@ -319,7 +319,7 @@ class _Builder:
         return self._between(spring.inner, spring.outer, spring.position_m)
 
     def finished(self, loads: FloatArray, contact_npm: FloatArray) -> LinearVehicle:
-        """The model, without the coordinates that nothing holds and nothing moves (a wheelset's own pitch)."""
+        """The model, without coordinates that nothing holds and nothing moves (a wheelset's own pitch)."""
         series = [self._between(e.inner, e.outer, e.position_m)[e.axis] for e in self.model.series]
         rows = np.array(series).reshape(-1, len(self.coordinates))
         used = np.abs(self.stiffness).sum(0) + np.abs(self.damping).sum(0) + np.abs(rows).sum(0) > 0.0

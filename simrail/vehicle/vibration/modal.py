@@ -95,8 +95,8 @@ def modes_of(vehicle: LinearVehicle, *, step_s: float) -> Modes:
     scale = np.ones(len(a))
     scale[2 * n :] = 1.0 / np.maximum(vehicle.series_stiffness_npm, 1.0)
     a, b = scale[:, None] * a / scale, scale[:, None] * b
-    eigenvalues, vectors = np.linalg.eig(a)
-    inverse = np.linalg.inv(vectors)
+    eigenvalues, vectors = (part.astype(np.complex128) for part in np.linalg.eig(a))
+    inverse: ComplexArray = np.linalg.inv(vectors)
     off = np.abs((vectors * eigenvalues) @ inverse - a).max() / np.abs(a).max()
     if not off < _RESOLVED or eigenvalues.real.max() > _RESOLVED * np.abs(eigenvalues).max():
         raise InputError(
@@ -112,8 +112,8 @@ def modes_of(vehicle: LinearVehicle, *, step_s: float) -> Modes:
     z = kept * step_s
     small = np.abs(z) < 1e-3  # there the quotients lose digits, and their series does not
     safe = np.where(small, 1.0, z)
-    f1 = np.where(small, 1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0, np.expm1(safe) / safe)
-    f2 = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (np.expm1(safe) - safe) / safe**2)
+    f1: ComplexArray = np.where(small, 1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0, np.expm1(safe) / safe)
+    f2: ComplexArray = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (np.expm1(safe) - safe) / safe**2)
     return Modes(
         eigenvalues=kept,
         decay=np.exp(z),

@@ -43,10 +43,9 @@ def drawn_orders(shape: OutOfRound, wheel: str, *, seed: int) -> tuple[FloatArra
     """Amplitudes (orders,), m, and phases (orders,), rad, of a wheel."""
     generator = stream(seed, "wheels", "out_of_round", wheel)
     drawn = np.array([(generator.standard_normal(), generator.uniform()) for _ in range(shape.orders)])
-    n = np.arange(1, shape.orders + 1)
-    return shape.amplitude_m * n**-shape.exponent * np.exp(shape.spread * drawn[:, 0]), 2.0 * np.pi * drawn[
-        :, 1
-    ]
+    n: FloatArray = np.arange(1.0, shape.orders + 1.0)
+    amplitudes: FloatArray = shape.amplitude_m * n**-shape.exponent * np.exp(shape.spread * drawn[:, 0])
+    return amplitudes, 2.0 * np.pi * drawn[:, 1]
 
 
 @dataclass(frozen=True, eq=False)
