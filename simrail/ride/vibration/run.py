@@ -156,11 +156,7 @@ class Shaker:
     def run(self) -> Iterator[Piece]:
         """The vibration over all rows of the truth, piece by piece, from rest on the rails."""
         modes, rows, every = self.modes, len(self._truth.time_s), self.every
-        before = self.filtered(np.arange(-1, 0))[0]
-        state = np.zeros((2, len(modes.decay)), dtype=np.complex128)
-        state[1] = modes.drive @ before
-        still = np.abs(modes.eigenvalues) > 1e-9
-        state[0][still] = -state[1][still] / modes.eigenvalues[still]
+        state = -(modes.drive @ self.filtered(np.arange(-1, 0))[0]) / modes.eigenvalues
         floors = self._floors()
         step = max(_PIECE // every, 1)
         for first in range(0, rows, step):
@@ -168,11 +164,12 @@ class Shaker:
             # The samples after the last row of the piece before, to the last row of this one.
             begin = 0 if first == 0 else (first - 1) * every + 1
             samples = np.arange(begin, (first + count - 1) * every + 1)
-            push = self.filtered(samples)
+            push = self.filtered(np.arange(begin - 2, samples[-1] + 2))
             force = np.ascontiguousarray(push @ modes.drive.T)
-            march_modes(modes.decay, modes.before, modes.after, force, state)
+            z = np.empty((len(samples), len(modes.decay)), dtype=np.complex128)
+            march_modes(modes.decay, modes.weights, force, state, z)
             kept = slice((first * every) - begin, None, every)
-            yield self._read(first, force[kept], push[kept], floors)
+            yield self._read(first, z[kept], push[2:-1][kept], floors)
 
     def _read(self, first: int, z: ComplexArray, push: FloatArray, floors: dict[str, Floor]) -> Piece:
         motions, bendings, loads = self._reading.read(z, push)
