@@ -197,7 +197,9 @@ def simulate(
     """
     if ride.vibration is not None:
         truth = simulate(ride.without_vibration, progress=progress, told=told, warn=warn)
-        return replace(truth, short_waves=_shaken(ride, truth, told))
+        short = _shaken(ride, truth, told)
+        warned = [*truth.manifest.get("warnings", ()), *short.warnings()]
+        return replace(truth, short_waves=short, manifest={**truth.manifest, "warnings": warned})
     if warn and ride.engine != "kinematic" and (words := hunting_warning(ride, rails_of(ride))):
         warnings.warn(f"ride {ride.name} {words}", stacklevel=2)
     key = ride_cache.key_of(ride.describe())

@@ -18,7 +18,7 @@ from simrail.core.jit import FloatArray, IntArray
 from simrail.ride.truth import Truth
 from simrail.ride.vibration.floor import Floor
 from simrail.ride.vibration.sources import Vibration
-from simrail.track.rail_surface import lay_surface
+from simrail.track.rail_surface import RailSurface, lay_surface
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.vibration.car_bodies import car_bodies
 from simrail.vehicle.vibration.linear_model import (
@@ -92,6 +92,8 @@ class Shaker:
         The vehicle.
     seed : int
         Root seed of the track draw.
+    surface : RailSurface, optional
+        Short waves of the rails, if not those that ``vibration.rails`` draws.
 
     Raises
     ------
@@ -99,7 +101,15 @@ class Shaker:
         If the rate of the vibration is no multiple of the truth's.
     """
 
-    def __init__(self, vibration: Vibration, truth: Truth, model: VehicleModel, *, seed: int) -> None:
+    def __init__(
+        self,
+        vibration: Vibration,
+        truth: Truth,
+        model: VehicleModel,
+        *,
+        seed: int,
+        surface: RailSurface | None = None,
+    ) -> None:
         self.every = round(vibration.rate_hz / truth.rate_hz)
         if self.every < 1 or abs(self.every * truth.rate_hz - vibration.rate_hz) > 1e-6 * vibration.rate_hz:
             raise InputError(
@@ -113,7 +123,7 @@ class Shaker:
         self.vehicle = linear_vehicle_of(vibration, model, gravity_mps2=truth.gravity_mps2)
         self.modes = modes_of(self.vehicle, step_s=1.0 / vibration.rate_hz)
         self.bendings = bendings_of(vibration, model)
-        self._surface = lay_surface(vibration.rails, truth.track, seed=seed)
+        self._surface = surface or lay_surface(vibration.rails, truth.track, seed=seed)
         self._wheels = [
             None if vibration.wheels is None else wheel_surface(vibration.wheels, wheel.name, seed=seed)
             for wheel in model.wheels

@@ -55,6 +55,17 @@ class ShortWaves:
     loads: dict[str, FloatArray] = field(default_factory=dict)
     least_share_of_load: dict[str, float] = field(default_factory=dict)
 
+    def warnings(self) -> list[str]:
+        """What is beyond the linear contact, one line each."""
+        pulled = {wheel: share for wheel, share in self.least_share_of_load.items() if share < 0.0}
+        if not pulled:
+            return []
+        wheel = min(pulled, key=pulled.__getitem__)
+        return [
+            f"short waves take off {1.0 - pulled[wheel]:.2f} times the load of {wheel}: it would leave the "
+            "rail, which the linear contact of the vibration does not know"
+        ]
+
     def of(self, body: str, ahead_m: float) -> FloatArray:
         """Motion (n, 9) of a body as it is felt at a distance ahead of its centre of gravity."""
         motion = np.array(self.motions[body], dtype=np.float64)
