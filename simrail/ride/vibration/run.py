@@ -26,6 +26,7 @@ from simrail.vehicle.vibration.linear_model import (
     HEAVE,
     PITCH,
     ROLL,
+    SWAY,
     Bending,
     LinearVehicle,
     linear_vehicle,
@@ -49,7 +50,7 @@ class Piece:
     ----------
     first : int
         Its first row.
-    motions : dict of str to ndarray (n, 9)
+    motions : dict of str to ndarray (n, 12)
         Of each body, columns `simrail.ride.vibration.short_waves.COLUMNS`.
     bendings : dict of str to ndarray (n, 3)
         Modal coordinate of each body that bends, and its derivatives.
@@ -239,7 +240,7 @@ class _Reading:
     ) -> "_Reading":
         bodies, bent = tuple(model.body_names), tuple(bending.body for bending in bendings)
         take = np.array(
-            [vehicle.row(body, motion) for body in bodies for motion in (HEAVE, ROLL, PITCH)]
+            [vehicle.row(body, motion) for body in bodies for motion in (HEAVE, ROLL, PITCH, SWAY)]
             + [vehicle.row(body, BENDING) for body in bent]
         )
         parts, inputs = [], []
@@ -256,7 +257,7 @@ class _Reading:
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray], FloatArray]:
         """Motions of bodies, bendings, and loads (n, w), from modes (n, m) and inputs (n, w)."""
         signals = np.hstack([z.real, z.imag]) @ self.of_modes + push @ self.of_inputs
-        motions = {body: signals[:, 9 * i : 9 * i + 9] for i, body in enumerate(self.bodies)}
-        at = 9 * len(self.bodies)
+        motions = {body: signals[:, 12 * i : 12 * i + 12] for i, body in enumerate(self.bodies)}
+        at = 12 * len(self.bodies)
         bendings = {body: signals[:, at + 3 * i : at + 3 * i + 3] for i, body in enumerate(self.bent)}
         return motions, bendings, signals[:, at + 3 * len(self.bent) :]

@@ -1,8 +1,9 @@
 """The linear short-wave part of a truth, kept apart from what the engine computed, and the sum of both.
 
-The motion of each body in heave, roll and pitch, relative to the ride, with first and second derivatives. The
-sum is exact: heave along the normal of the track frame, roll and pitch as increments of the Euler angles,
-rates and accelerations by their kinematics, so that they are the derivatives of the pose.
+The motion of each body in heave, roll, pitch and sway, relative to the ride, with first and second
+derivatives. The sum is exact: heave and sway along the axes of the track frame, roll and pitch as increments
+of the Euler angles, rates and accelerations by their kinematics, so that they are the derivatives of the
+pose.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ COLUMNS = (
     *("heave_m", "heave_mps", "heave_mps2"),
     *("roll_rad", "roll_radps", "roll_radps2"),
     *("pitch_rad", "pitch_radps", "pitch_radps2"),
+    *("sway_m", "sway_mps", "sway_mps2"),
 )
 """Columns of a body's short-wave motion."""
 
@@ -37,7 +39,7 @@ class ShortWaves:
         Names of what shakes, and where the figures come from.
     longest_wave_m : float
         The engine's own ride holds longer waves of the rails, this part shorter ones.
-    motions : dict of str to ndarray (n, 9)
+    motions : dict of str to ndarray (n, 12)
         Of each body, columns `COLUMNS`, at its centre of gravity; float32 on disk.
     bendings : dict of str to (Bending, ndarray (n, 3))
         Shape of each body that bends, and its modal coordinate (m) with two derivatives.
@@ -67,7 +69,7 @@ class ShortWaves:
         ]
 
     def of(self, body: str, ahead_m: float) -> FloatArray:
-        """Motion (n, 9) of a body as it is felt at a distance ahead of its centre of gravity."""
+        """Motion (n, 12) of a body as it is felt at a distance ahead of its centre of gravity."""
         motion = np.array(self.motions[body], dtype=np.float64)
         if body in self.bendings:
             bent, coordinate = self.bendings[body]
@@ -88,7 +90,7 @@ def superposed(
     ----------
     body : BodyMotion
         As the engine computed it; n samples.
-    short : ndarray (n, 9)
+    short : ndarray (n, 12)
         Its short-wave motion, `COLUMNS`.
     frame : TrackFrame
         Track frame at the body.
@@ -97,20 +99,15 @@ def superposed(
 
     Notes
     -----
-    The normal e of the frame turns with it: ``e' = V k x e``, ``e'' = V' k x e + V^2 (dk x e + k x (k x e))``
-    in the axes of the frame; the heave h adds ``h e``, ``h' e + h e'``, ``h'' e + 2 h' e' + h e''``.
+    Sway and heave are a way d = (0, y, h) in the axes of the frame, which turns at ``w = V k``, with
+    ``a = V' k + V^2 dk``: it adds ``d``, ``d' + w x d`` and ``d'' + 2 w x d' + a x d + w x (w x d)``.
     """
-    k, dk = frame.k, frame.dk
+    w = speed[:, None] * frame.k
+    slope_of_w = speed_rate[:, None] * frame.k + speed[:, None] ** 2 * frame.dk
     zero = np.zeros(len(speed))
-    # k x e and k x (k x e) of e = (0, 0, 1).
-    first = np.column_stack([k[:, 1], -k[:, 0], zero])
-    change = np.column_stack([dk[:, 1], -dk[:, 0], zero])
-    second = np.column_stack([k[:, 0] * k[:, 2], k[:, 1] * k[:, 2], -(k[:, 0] ** 2) - k[:, 1] ** 2])
-    v, a = speed[:, None], speed_rate[:, None]
-    normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), first.shape)
-    turned = v * first
-    turned_twice = a * first + v**2 * (change + second)
-    h, h1, h2 = short[:, 0:1], short[:, 1:2], short[:, 2:3]
+    d, d1, d2 = (np.column_stack([zero, short[:, 9 + k], short[:, k]]) for k in range(3))
+    turned = np.cross(w, d)
+    pulled = 2.0 * np.cross(w, d1) + np.cross(slope_of_w, d) + np.cross(w, turned)
     rotation = frame.rotation
 
     def in_space(vectors: FloatArray) -> FloatArray:
@@ -120,9 +117,9 @@ def superposed(
     angles, rate, slope = _turned(body, short)
     return replace(
         body,
-        position=body.position + in_space(h * normal),
-        velocity=body.velocity + in_space(h1 * normal + h * turned),
-        acceleration=body.acceleration + in_space(h2 * normal + 2.0 * h1 * turned + h * turned_twice),
+        position=body.position + in_space(d),
+        velocity=body.velocity + in_space(d1 + turned),
+        acceleration=body.acceleration + in_space(d2 + pulled),
         angles=angles,
         rate=rate,
         angular_acceleration=slope,

@@ -1,10 +1,11 @@
 """The linear vertical model of a vehicle on a flexible track: mass, damping and stiffness matrices.
 
 Built from the same `VehicleModel` that a ride is integrated with, about its place at rest on level track.
-A sprung body has all six small motions, a body that carries wheels heave, roll and pitch (the rails hold it
-otherwise); under each wheel a rail mass goes along with it, on a spring and a damper. Wheel and rail meet in
-Hertz's contact, linear about the static load. Each element is one generalised deflection ``d = g q`` with
-a stiffness and a damping, so that
+A sprung body has all six small motions; a body that carries wheels has heave, pitch, and roll about the points
+where its wheels touch the rails, since creep holds these (up to some ``f22 / (pi V m)``, 80 Hz at 20 m/s).
+Under each wheel a rail mass goes along with it, on a spring and a damper. Wheel and rail meet in Hertz's
+contact, linear about the static load. Each element is one generalised deflection ``d = g q`` with a stiffness
+and a damping, so that
 
     M q'' + C q' + K q + sum_j g_j F_j = E r,    F_j' = k_j (g_j q' - F_j / c_j)
 
@@ -28,8 +29,8 @@ from simrail.vehicle.contact.contact import static_height
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.model import Suspension, VehicleModel
 
-HEAVE, ROLL, PITCH = 2, 3, 4
-"""Numbers of three motions among the six of a body: x, y, z, roll, pitch, yaw."""
+SWAY, HEAVE, ROLL, PITCH = 1, 2, 3, 4
+"""Numbers of some motions among the six of a body: x, y, z, roll, pitch, yaw."""
 BENDING = -1
 """Number of the coordinate of a body's bending."""
 _OF_AXLE = (HEAVE, ROLL, PITCH)
@@ -113,6 +114,8 @@ class LinearVehicle:
         Load of each wheel by the coordinates, N/m; to it comes ``contact_npm`` r.
     contact_npm : ndarray (w,)
         Stiffness of each wheel's contact.
+    axle_heights_m : dict of str to float
+        Height of each axle above the points that it rolls about.
     """
 
     coordinates: tuple[tuple[str, int], ...]
@@ -125,10 +128,13 @@ class LinearVehicle:
     input: FloatArray
     load: FloatArray
     contact_npm: FloatArray
+    axle_heights_m: dict[str, float]
 
     def row(self, body: str, motion: int) -> FloatArray:
         """Row (n,) that takes one motion of a body out of the coordinates; zeros if the rails hold it."""
         row = np.zeros(len(self.coordinates))
+        if motion == SWAY and body in self.axle_heights_m:
+            return -self.axle_heights_m[body] * self.row(body, ROLL)
         if (body, motion) in self.coordinates:
             row[self.coordinates.index((body, motion))] = 1.0
         return row
@@ -208,7 +214,7 @@ class _Builder:
     def __init__(self, model: VehicleModel, bending: Sequence[Bending]) -> None:
         self.model = model
         self.bending = {bent.body: bent for bent in bending}
-        axles = set(model.axle_names)
+        self.axles = axles = set(model.axle_names)
         for bent in bending:
             if bent.body in axles or bent.body not in model.body_names:
                 raise InputError(
@@ -229,6 +235,8 @@ class _Builder:
                 if (body.name, k) in self.coordinates:
                     at = self.coordinates.index((body.name, k))
                     self.mass[at, at] = inertia
+                    if k == ROLL and body.name in axles:
+                        self.mass[at, at] += body.mass_kg * body.position_m[2] ** 2
         for bent in bending:
             at, mass = self.coordinates.index((bent.body, BENDING)), model.body(bent.body).mass_kg
             omega = 2.0 * np.pi * bent.frequency_hz
@@ -250,6 +258,8 @@ class _Builder:
         """Rows (3, n) of the displacement of a point of a body: ``t + theta x r``, and its bending."""
         x, y, z = np.subtract(place_m, self.model.body(name).position_m)
         cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+        if name in self.axles:
+            cross[1, 0] = -place_m[2]  # an axle rolls about where its wheels touch the rails
         rows: FloatArray = np.array([self.unit(name, k) for k in range(3)]) + cross @ self.turn(name)
         if name in self.bending:
             rise, slope = self.bending[name].shape(x)
@@ -336,4 +346,5 @@ class _Builder:
             input=-loads[:, at].T,
             load=loads[:, at],
             contact_npm=contact_npm,
+            axle_heights_m={name: self.model.body(name).position_m[2] for name in self.axles},
         )

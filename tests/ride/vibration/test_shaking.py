@@ -80,7 +80,7 @@ def gliding(coach, line, speed_mps, *, duration_s=10.0, rate_hz=2000.0, start_m=
 
 
 def shaken(vibration, truth, coach, *, seed=1):
-    """Motions (n, 9) of every body, and loads (n, w)."""
+    """Motions (n, 12) of every body, and loads (n, w)."""
     pieces = list(Shaker(vibration, truth, coach, seed=seed).run())
     motions = {name: np.concatenate([p.motions[name] for p in pieces]) for name in coach.body_names}
     return motions, np.concatenate([p.loads for p in pieces])
@@ -173,7 +173,7 @@ def test_second_derivative_of_the_position(coach, line):
     truth = gliding(coach, line, 15.0, duration_s=6.0)
     motions, _ = shaken(ALL, truth, coach)
     for motion in motions.values():
-        for place in range(0, 9, 3):
+        for place in range(0, 12, 3):
             if not motion[:, place].any():
                 continue
             for low, high in ((place, place + 1), (place + 1, place + 2)):
@@ -216,7 +216,7 @@ def test_superposed_truth_is_a_motion():
     body = BodyMotion(0.0, 0.5, *(np.zeros((len(t), 3)),) * 3, base, *body_rates(base, first, second))
     v = 2.0 * np.pi * 15.0
     wave = np.column_stack([np.sin(v * t), v * np.cos(v * t), -(v**2) * np.sin(v * t)])
-    short = np.hstack([1e-3 * wave, 2e-3 * wave, -1e-3 * wave])
+    short = np.hstack([1e-3 * wave, 2e-3 * wave, -1e-3 * wave, 5e-4 * wave])
     found = superposed(body, short, frame, speed, np.full(len(t), 0.8))
     expected = body_rates(base + short[:, [3, 6, 0]] * [1, 1, 0], first + short[:, [4, 7, 1]] * [1, 1, 0],
                           second + short[:, [5, 8, 2]] * [1, 1, 0])  # fmt: skip

@@ -67,7 +67,8 @@ def test_p2_and_contact_resonance_are_those_of_two_masses_on_two_springs():
     found = frequencies(linear_vehicle(lone_axle(), undamped))
     expected = [
         *two_masses(1500.0 / 2, CONTACT_NPM, 150.0, 7e7),  # heave, half the axle on each wheel
-        *two_masses(700.0 / (2 * HALF_M**2), CONTACT_NPM, 150.0, 7e7),  # roll
+        # Roll about the points where it touches the rails, 0.46 m below.
+        *two_masses((700.0 + 1500.0 * 0.46**2) / (2 * HALF_M**2), CONTACT_NPM, 150.0, 7e7),
     ]
     np.testing.assert_allclose(found, np.sort(expected), rtol=1e-9)
     # Jenkins et al. 1974: unsprung mass and rail mass on the track, the contact being stiff beside it.
@@ -77,7 +78,8 @@ def test_p2_and_contact_resonance_are_those_of_two_masses_on_two_springs():
 
 def test_rigid_rails_leave_the_contact_alone():
     found = frequencies(linear_vehicle(lone_axle(), None))
-    expected = np.sqrt([2 * CONTACT_NPM / 1500.0, 2 * CONTACT_NPM * HALF_M**2 / 700.0]) / (2.0 * np.pi)
+    rolled = 700.0 + 1500.0 * 0.46**2
+    expected = np.sqrt([2 * CONTACT_NPM / 1500.0, 2 * CONTACT_NPM * HALF_M**2 / rolled]) / (2.0 * np.pi)
     np.testing.assert_allclose(found, np.sort(expected), rtol=1e-12)
 
 
