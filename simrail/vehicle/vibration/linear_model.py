@@ -1,8 +1,8 @@
 """The linear vertical model of a vehicle on a flexible track: mass, damping and stiffness matrices.
 
 Built from the same `VehicleModel` that a ride is integrated with, about its place at rest on level track.
-A sprung body has all six small motions; a body that carries wheels has heave, pitch, and roll about the points
-where its wheels touch the rails, since creep holds these (up to some ``f22 / (pi V m)``, 80 Hz at 20 m/s).
+A sprung body has all six small motions; a body that carries wheels has heave, pitch, and roll about where its
+wheels touch the rails, since creep holds these points (up to some ``f22 / (pi V m)``, 80 Hz at 20 m/s).
 Under each wheel a rail mass goes along with it, on a spring and a damper. Wheel and rail meet in Hertz's
 contact, linear about the static load. Each element is one generalised deflection ``d = g q`` with a stiffness
 and a damping, so that
