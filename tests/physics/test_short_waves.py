@@ -92,9 +92,9 @@ def own_cache(tmp_path_factory):
 def test_band_levels_agree(name, speed_mps):
     """Bands from 5 to 63 Hz agree within 1.5 dB: heave of axles, frames and body, roll of axles.
 
-    Roll of frames, and sway, which follows from the axles' roll by creep that here holds for sure, agree over
-    all bands together, within 1.5 and 2.5 dB. The body's roll and sway are left out: at these frequencies they
-    are a thousandth of the axles'.
+    Roll of frames, and sway, which follows from the axles' roll by creep that the linear model takes to hold,
+    agree over all bands together, within 1.5 and 2.5 dB. The body's roll and sway are left out: at these
+    frequencies they are a thousandth of the axles'.
     """
     longest = 0.0
     for body, motion, superposed, whole, long_waves in superposed_and_whole(name, speed_mps):

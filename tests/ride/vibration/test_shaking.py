@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dead_reckoning import dead_reckon
 
-from simrail.core.columns import ACCEL
+from simrail.core.columns import ACCEL, ATTITUDE, POSITION
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, is_cached, simulate
 from simrail.ride.truth import BodyMotion, Mount, Truth
+from simrail.ride.vibration.floor import Floor
 from simrail.ride.vibration.run import Shaker
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.ride.vibration.sources import (
@@ -24,7 +26,7 @@ from simrail.ride.vibration.sources import (
 from simrail.sensors.measure import measure
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
-from simrail.track.rail_surface import Dips, RailSources, Roughness, SleeperPassing
+from simrail.track.rail_surface import STEP_M, Dips, RailSources, RailSurface, Roughness, SleeperPassing
 from simrail.track.roughness import TABLES
 from simrail.track.sections import SectionGain
 from simrail.vehicle.file import VehicleFile
@@ -166,6 +168,65 @@ def test_both_rails_act_apart(coach, line):
     half = 0.75
     heave, roll = apart["axle_f1"][1000:, 2].std(), half * apart["axle_f1"][1000:, 5].std()
     assert 0.3 < roll / heave < 3.0
+
+
+def test_left_is_left(coach, line):
+    """A slow rise of the left rail alone lifts the left side: roll is positive (left side up)."""
+    truth = gliding(coach, line, 5.0, duration_s=6.0)
+    s = np.arange(0.0, 400.0, STEP_M)
+    rise = 1e-3 / (1.0 + np.exp(-(s - 215.0) / 1.0))
+    surface = RailSurface(0.0, np.ascontiguousarray(np.stack([rise, 0.0 * rise])))
+    shaker = Shaker(Vibration(support=SUPPORT), truth, coach, seed=1, surface=surface)
+    roll = np.concatenate([piece.motions["axle_f1"][:, 3] for piece in shaker.run()])
+    # The contact at the left has risen by nearly all of it: springs above take a little back.
+    assert roll[-1000:].mean() == pytest.approx(1e-3 / 1.5, rel=0.05)
+
+
+def test_gains_of_the_floor_keep_the_derivatives(coach, line):
+    """Passengers who fall silent as the train starts, motors that grow loud as it pulls: product rule."""
+    coarse = np.arange(0.0, 20.0, 0.1)
+    speed = np.clip(coarse - 5.0, 0.0, 8.0)
+    floor = Floor(
+        Vibration(passengers=Passengers(1.0), traction=Traction(1.0, (5.0, 40.0))),
+        "body",
+        time_s=coarse,
+        speed_mps=speed,
+        acceleration_mps2=np.gradient(speed, coarse),
+        rate_hz=2000.0,
+        seed=1,
+    )
+    rows = floor.at(np.arange(40000))
+    for low in (0, 1):
+        x, v = rows[:, low], rows[2:-2, low + 1]
+        slope = (8.0 * (x[3:-1] - x[1:-3]) - (x[4:] - x[:-4])) / 12.0 * 2000.0
+        # Fourth-order differences at 40 Hz: (2 pi 40/2000)^4/30, 8e-6.
+        assert np.abs(slope - v).max() < 1e-4 * np.abs(v).max()
+    standing, pulling = rows[:8000, 2], rows[14000:24000, 2]
+    assert standing.std() == pytest.approx(1.0, rel=0.25)  # some 14 independent values of 0.5 to 4 Hz
+    assert pulling.std() == pytest.approx(1.0, rel=0.1)
+    assert rows[30000:, 2].std() < 1e-2
+
+
+def test_perfect_sensors_find_the_pose_of_a_shaking_truth(tmp_path, monkeypatch):
+    """Closure at 1 kHz with everything shaking: the figures of a truth's design, 0.001 deg and 20 mm."""
+    monkeypatch.setattr(ride_cache, "cache_folder", lambda: tmp_path)
+    bogie = load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie")
+    ride = Ride(
+        name="closure",
+        track=load(TrackFile, "track", "smooth_curve").design("smooth_curve"),
+        irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 20.0),
+        track_seed=4,
+        vehicle=bogie,
+        profile=SpeedProfile(30.0, 250.0, 12.0, rest_s=1.0, final_rest_s=0.5),
+        engine="kinematic",
+        vibration=ALL,
+    )
+    truth = simulate(ride)
+    for body in ("front", "frame", "body"):
+        motion = truth.motion(Mount("m", body, (0.3, 0.2, 0.8))).iloc[2000:-1000]
+        off = dead_reckon(motion, motion.iloc[0]) - motion
+        assert np.abs(off[list(POSITION)].to_numpy()).max() < 20e-3
+        assert np.degrees(np.abs(off[list(ATTITUDE)].to_numpy()).max()) < 1e-3
 
 
 def test_second_derivative_of_the_position(coach, line):
