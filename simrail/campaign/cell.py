@@ -74,6 +74,8 @@ class CellResult:
         Forces of each wheel (`simrail.ride.truth.Truth.contacts`), mapped from disk, if the ride kept them.
     laid : TrackDesign, optional
         The design that was laid, where it is not the map of the recording.
+    shaken : dict of str to str, optional
+        What shook the ride by short waves, with where the figures come from; None if nothing did.
     """
 
     cell: dict[str, object]
@@ -83,6 +85,7 @@ class CellResult:
     rails: LaidTrack | None = None
     contacts: dict[str, FloatArray] = field(default_factory=dict)
     laid: TrackDesign | None = None
+    shaken: dict[str, str] | None = None
 
     @property
     def line(self) -> TrackDesign:
@@ -248,7 +251,8 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
     motion = truth_at_imu(truth, recording)
-    return CellResult(labels, recording, motion, estimates, rails, truth.contacts, truth.track)
+    shaken = None if truth.short_waves is None else truth.short_waves.sources
+    return CellResult(labels, recording, motion, estimates, rails, truth.contacts, truth.track, shaken)
 
 
 def _labels(cell: Cell) -> dict[str, object]:

@@ -91,7 +91,7 @@ def mount_motion(truth: Truth, mount: Mount, rows: range, columns: Sequence[str]
         here = slice(piece.start, piece.stop, piece.step)
         # Turns and yaw of the sensor follow the body's: a row needs no other.
         carry(
-            _rows_of(body, here),
+            _rows_of(truth.body(mount.body, ahead_m=mount.position_m[0], rows=here)),
             lever,
             tilt,
             mount.yaw_rad,
@@ -115,8 +115,8 @@ def mount_motion(truth: Truth, mount: Mount, rows: range, columns: Sequence[str]
     return data
 
 
-def _rows_of(body: BodyMotion, rows: slice) -> FloatArray:
-    """Rows (n, 18) of a body's motion, copied."""
+def _rows_of(body: BodyMotion) -> FloatArray:
+    """A body's motion as one array (n, 18), copied."""
     parts = (
         body.position,
         body.velocity,
@@ -125,7 +125,7 @@ def _rows_of(body: BodyMotion, rows: slice) -> FloatArray:
         body.rate,
         body.angular_acceleration,
     )
-    return np.concatenate([part[rows] for part in parts], axis=1, dtype=np.float64)
+    return np.concatenate(parts, axis=1, dtype=np.float64)
 
 
 def give_back(arrays: Iterable[FloatArray]) -> None:

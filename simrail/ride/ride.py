@@ -24,6 +24,9 @@ from simrail.ride.kinematic import kinematic_truth, rail_following
 from simrail.ride.truth import Truth
 from simrail.ride.truth_files import load_truth, save_truth, write_header
 from simrail.ride.truth_rows import TruthRows
+from simrail.ride.vibration.files import read_short_waves, write_short_waves
+from simrail.ride.vibration.short_waves import ShortWaves
+from simrail.ride.vibration.sources import Vibration
 from simrail.track.design import TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import LaidTrack, lay
@@ -56,6 +59,7 @@ _SOURCES = (
     ),
     *("core/rotation.py", "core/seeds.py", "core/jit.py"),
 )
+_VIBRATION_SOURCES = ("ride/vibration",)
 
 
 class Kept(NamedTuple):
@@ -103,6 +107,8 @@ class Ride:
         number; 0 keeps none.
     kept : Kept, optional
         What of a long ride is kept; None keeps everything, in double precision.
+    vibration : Vibration, optional
+        What shakes beside what the engine sees; None for nothing.
     """
 
     name: str
@@ -119,6 +125,7 @@ class Ride:
     conditions: tuple[RailCondition, ...] = ()
     contact_rate_hz: float = 0.0
     kept: Kept | None = None
+    vibration: Vibration | None = None
 
     @property
     def kept_bodies(self) -> list[int]:
@@ -139,7 +146,7 @@ class Ride:
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this ride from every other, versions and sources included."""
-        return {
+        plain = {
             "track": self.track.to_dict(),
             "irregularity": self.irregularity.describe(),
             "track_seed": self.track_seed,
@@ -157,6 +164,15 @@ class Ride:
             "versions": dict(_versions()),
             "sources": source_hash(*_SOURCES),
         }
+        if self.vibration is not None:
+            plain["vibration"] = self.vibration.describe()
+            plain["vibration_sources"] = source_hash(*_VIBRATION_SOURCES)
+        return plain
+
+    @property
+    def without_vibration(self) -> Ride:
+        """The ride as its engine computes it: with and without vibration it is the same."""
+        return replace(self, vibration=None)
 
 
 @lru_cache(maxsize=1)
@@ -171,7 +187,9 @@ def rails_of(ride: Ride) -> LaidTrack:
 
 
 def is_cached(ride: Ride) -> bool:
-    """Whether `simulate` would find this ride on disk."""
+    """Whether `simulate` would find this ride on disk, its vibration included."""
+    if ride.vibration is not None and not is_cached(ride.without_vibration):
+        return False
     return (ride_cache.folder() / ride_cache.key_of(ride.describe()) / "truth.json").is_file()
 
 
@@ -206,6 +224,11 @@ def simulate(
     simrail.vehicle.engines.derailment.DerailedError
         If a wheel leaves the rail.
     """
+    if ride.vibration is not None:
+        truth = simulate(ride.without_vibration, progress=progress, told=told, warn=warn)
+        short = _shaken(ride, truth, told)
+        warned = [*truth.manifest.get("warnings", ()), *short.warnings()]
+        return replace(truth, short_waves=short, manifest={**truth.manifest, "warnings": warned})
     if warn and ride.engine != "kinematic" and (words := hunting_warning(ride, rails_of(ride))):
         warnings.warn(f"ride {ride.name} {words}", stacklevel=2)
     key = ride_cache.key_of(ride.describe())
@@ -229,6 +252,27 @@ def simulate(
             except DerailedError as error:
                 raise DerailedError(with_hunting(error.derailment, ride, rails_of(ride))) from error
     return load_truth(place)
+
+
+def _shaken(ride: Ride, truth: Truth, told: Callable[[str], None] | None) -> ShortWaves:
+    """The short-wave part of a ride, worked out or found in the cache."""
+    assert ride.vibration is not None
+    key = ride_cache.key_of(ride.describe())
+    place, rows = ride_cache.folder() / key, len(truth.time_s)
+    if place.exists():
+        try:
+            short = read_short_waves(place, rows)
+        except (OSError, ValueError, KeyError) as error:
+            ride_cache.drop(key)
+            if told is not None:
+                told(f"vibration of ride {ride.name} in the cache was damaged ({error}): worked out again")
+        else:
+            ride_cache.touch(place)
+            return short
+    with ride_cache.new_ride(key) as draft:
+        manifest = {"ride": f"{ride.name} (vibration)", "vehicle": ride.vehicle.name}
+        write_short_waves(ride.vibration, truth, ride.vehicle, draft, seed=ride.track_seed, manifest=manifest)
+    return read_short_waves(place, rows)
 
 
 def _follow(ride: Ride) -> Truth:

@@ -2,7 +2,8 @@
 
 A `Truth` holds, at the engine's output rate, position, velocity, acceleration, attitude, angular rate
 and angular acceleration of each body, the wheel rotations and the creep states. The motion of any
-mount follows from them by rigid-body kinematics, exactly; no engine is asked again.
+mount follows from them by rigid-body kinematics, exactly; no engine is asked again. Where a ride has
+vibration, its linear short-wave part is kept apart (`Truth.short_waves`) and added there.
 
 Nothing here is seen by an estimator.
 """
@@ -18,7 +19,11 @@ from simrail.core.columns import CONTACT, MOTION
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.ride.mount_motion import Remembered, mount_motion
+from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.track.design import TrackDesign
+
+_SAMPLED = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
+"""Fields of `BodyMotion` with a row for each sample."""
 
 TURN_M = 1.0
 """A way back that is longer than this is a run of its own."""
@@ -108,6 +113,8 @@ class Truth:
         Rows from one of them to the next: they belong to ``time_s[::contact_every]``.
     axle_offsets_m : dict of str to float
         How far each axle is ahead of the vehicle's reference point, where not all axles are among `bodies`.
+    short_waves : ShortWaves, optional
+        Motion and loads by short waves, which neither `bodies` nor `contacts` hold; None without vibration.
     """
 
     time_s: FloatArray
@@ -122,6 +129,7 @@ class Truth:
     contacts: dict[str, FloatArray] = field(default_factory=dict)
     contact_every: int = 1
     axle_offsets_m: dict[str, float] = field(default_factory=dict)
+    short_waves: ShortWaves | None = None
     _remembered: Remembered = field(default_factory=Remembered, init=False, repr=False, compare=False)
 
     @property
@@ -161,7 +169,8 @@ class Truth:
             Indexed by ``time_s``, columns `simrail.core.columns.CONTACT`: forces on the wheel; Q, Y and s in
             the track frame at its axle, creep forces and creepages in the contact's plane. Where two patches
             touch, forces are of both, and creepages, place and angle of the one that carries more.
-            Where none does, all but ``position_m`` is 0.
+            Where none does, all but ``position_m`` is 0. With vibration, the forces hold what the engine
+            computed, longer waves only (``attrs["waves_above_m"]``); `short_wave_load` has the rest of Q.
 
         Raises
         ------
@@ -181,7 +190,53 @@ class Truth:
                 remedy="set contact_rate_hz, e.g. to 200.0; the kinematic engine has no forces",
             )
         index = pd.Index(self.time_s[:: self.contact_every], name="time_s")
-        return pd.DataFrame(np.array(self.contacts[name]), index=index, columns=list(CONTACT))
+        frame = pd.DataFrame(np.array(self.contacts[name]), index=index, columns=list(CONTACT))
+        if self.short_waves is not None:
+            frame.attrs["waves_above_m"] = self.short_waves.longest_wave_m
+        return frame
+
+    def short_wave_load(self, wheel: str) -> FloatArray:
+        """Vertical load (k,) of a wheel by short waves, N, at the times of `contact`; 0 without vibration.
+
+        It is linear: where it takes off more than the wheel's load, the wheel would leave the rail.
+        """
+        name = self.wheel_at(wheel)
+        if self.short_waves is None:
+            return np.zeros(len(self.contact(wheel)))
+        return np.array(self.short_waves.loads[name], dtype=np.float64)
+
+    def body(self, name: str, *, ahead_m: float = 0.0, rows: slice = slice(None)) -> BodyMotion:
+        """Motion of a body at some samples with its short-wave part, as felt ahead of its centre of gravity.
+
+        The place matters for a body that bends alone: there its motion is that of a rigid body that moves as
+        that part of it does.
+
+        Raises
+        ------
+        InputError
+            If the ride has no such body.
+        """
+        if name not in self.bodies:
+            raise InputError(
+                "the ride has no such body", field="body", value=name, limit=", ".join(self.body_names)
+            )
+        body = self.bodies[name]
+        body = replace(body, **{field: getattr(body, field)[rows] for field in _SAMPLED})
+        if self.short_waves is None:
+            return body
+        places = self.reference_position_m[rows] + body.offset_m
+        frame = self.track.frame(np.clip(places, self.track.start_m, self.track.end_m))
+        return superposed(body, self.short_waves.of(name, ahead_m, rows), frame, *self._speeds[:, rows])
+
+    @property
+    def _speeds(self) -> FloatArray:
+        """Speed of the reference point and its rate, (2, n)."""
+        speeds = self._remembered.get("speeds")
+        if speeds is None:
+            speed = np.gradient(self.reference_position_m, self.time_s)
+            speeds = np.stack([speed, np.gradient(speed, self.time_s)])
+            self._remembered.keep("speeds", speeds)
+        return speeds
 
     def wheel_at(self, place: str) -> str:
         """Name of a wheel from its place in the direction of travel, e.g. ``"trailing.left"``.

@@ -23,6 +23,7 @@ from simrail.recording.sheets.imu_file import ImuFile
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.ride.ride import Kept, Ride, rails_of
 from simrail.ride.truth import Mount
+from simrail.ride.vibration.sources import Vibration
 from simrail.scenario.axes import each
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
@@ -30,6 +31,7 @@ from simrail.scenario.distributions import distributions_of
 from simrail.scenario.measured_file import read_measured
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
+from simrail.scenario.vibration_tables import VibrationPart
 from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.imu import EarthRate
@@ -40,6 +42,7 @@ from simrail.track.bands import BANDS, Band
 from simrail.track.design import TrackDesign
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
+from simrail.track.join import longest_short_wave_m, step_db
 from simrail.track.laid_track import LaidTrack
 from simrail.track.map_errors import EXACT, MapErrors, draw_map
 from simrail.track.quality import Limits
@@ -192,11 +195,14 @@ class Parts:
             if len(self._rides) >= _MOST_RESOLVED:
                 self._rides.clear()
             spec, vehicle, profile = cell.spec, self.vehicle(cell), _profile(cell.ride)
-            rough = spec.irregularity
+            rough, shaken = spec.irregularity, spec.vibration
+            irregularity = NO_IRREGULARITY if rough is None else self._irregularity(rough)
+            if shaken is not None:
+                irregularity = replace(irregularity, section_gain=shaken.long_wave_gain())
             self._rides[key] = Ride(
                 name=cell.ride.name,
                 track=self.track(cell),
-                irregularity=NO_IRREGULARITY if rough is None else self._irregularity(rough),
+                irregularity=irregularity,
                 track_seed=cell.ride_seed,
                 vehicle=vehicle,
                 profile=profile,
@@ -207,6 +213,7 @@ class Parts:
                 conditions=_conditions(spec, vehicle),
                 contact_rate_hz=contact_rate_hz(spec),
                 kept=self._kept(cell, vehicle, profile),
+                vibration=None if shaken is None else _vibration(shaken, irregularity),
             )
         return self._rides[key]
 
@@ -345,6 +352,13 @@ def _profile(ride: RidePart) -> SpeedProfile:
         if ride.coasting is None
         else Coasting(ride.coasting.deceleration_mps2, ride.coasting.least_kmh / 3.6),
     )
+
+
+def _vibration(part: VibrationPart, irregularity: Irregularity) -> Vibration | None:
+    """What shakes a ride: its roughness begins where the irregularity ends, and meets it if it is to."""
+    table = part.roughness.levels()
+    step = step_db(irregularity, table, offset_db=part.roughness.offset_db) if part.join else None
+    return part.vibration(longest_short_wave_m(irregularity, table), -step if step is not None else 0.0)
 
 
 def _conditions(spec: ScenarioFile, vehicle: VehicleModel) -> tuple[RailCondition, ...]:

@@ -26,7 +26,7 @@ from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP
 
-WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity")
+WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity", "vibration")
 SENSING = ("odometry", "map", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
 
 

@@ -14,6 +14,7 @@ from simrail.core.toml_files import blame
 from simrail.ride.hunting import hunting_warning
 from simrail.ride.ride import Ride, rails_of
 from simrail.scenario.build import ResolvedCell
+from simrail.scenario.check_vibration import judge_vibration
 from simrail.scenario.tables import RidePart
 from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
 from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
@@ -96,7 +97,7 @@ def judge_ride(
             )
     _judge_contact_rate(resolved.ride)
     _judge_ride_figures(resolved)
-    warnings = _judge_step(resolved)
+    warnings = _judge_step(resolved) + judge_vibration(resolved.ride)
     if not words.stands:
         warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
     return duration, warnings, laid
@@ -119,6 +120,16 @@ def _judge_step(resolved: ResolvedCell) -> list[str]:
     vehicle, step = resolved.ride.vehicle, resolved.ride.step_s
     if resolved.ride.engine == "kinematic":
         return []
+    interval = 1.0 / resolved.ride.rate_hz
+    steps = interval / step
+    if abs(steps - round(steps)) > 1e-6:
+        raise InputError(
+            "does not divide the output interval of the truth",
+            field="step_s",
+            value=step,
+            limit=f"{interval:g} s over a whole number",
+            remedy=f"set step_s = {interval / max(round(steps), 1):g}, or a lower truth_rate_hz",
+        )
     resonance = contact_resonance(vehicle, gravity_mps2=GRAVITY_MPS2)
     advised = f"step_s = {resonance.advised_step_s:.8g}"
     frequency = f"{resonance.normal_radps / (2.0 * np.pi):.0f} Hz"

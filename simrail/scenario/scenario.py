@@ -20,6 +20,7 @@ from simrail.scenario.axes import Axis, Listed, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
 from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart
+from simrail.scenario.vibration_tables import VibrationPart
 
 
 class ScenarioFile(Part):
@@ -39,11 +40,12 @@ class ScenarioFile(Part):
     vehicle: Listed[str]
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
     step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
-    truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=1000.0)]] = 1000.0
+    truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=4000.0)]] = 1000.0
     contact_rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
     odometry: Listed[str] = ""
     irregularity: tables.IrregularityPart | None = None
+    vibration: VibrationPart | None = None
     map: tables.MapPart | None = None
     rail_condition: tuple[tables.RailConditionPart, ...] = ()
     ride: Annotated[list[tables.RidePart], Field(min_length=1)]
@@ -72,8 +74,12 @@ class ScenarioFile(Part):
     @classmethod
     def _whole_milliseconds(cls, value: float | Axis | Distribution) -> float | Axis | Distribution:
         for rate in each(value):
+            if float(rate) in (2000.0, 4000.0):
+                continue
             if abs(1000.0 / float(rate) - round(1000.0 / float(rate))) > 1e-9:
-                raise ValueError(f"is not 1000 Hz divided by a whole number: {rate}; try 250.0")
+                raise ValueError(
+                    f"is not 1000 Hz divided by a whole number, 2000 or 4000 Hz: {rate}; try 250.0"
+                )
         return value
 
     @field_validator("ride", "imu", "estimator")

@@ -30,6 +30,7 @@ from simrail.core.seeds import stream
 from simrail.track.defects import Defect
 from simrail.track.elements import require_number
 from simrail.track.measured import MeasuredRails
+from simrail.track.sections import SectionGain
 from simrail.track.spectra import SPECTRA
 
 PERIOD_M = 65536.0
@@ -68,6 +69,9 @@ class Irregularity:
         Discrete defects, added to it.
     measured : MeasuredRails, optional
         Rails from a file, added to what the spectrum gives or in its place; they fade as it does.
+    section_gain : SectionGain, optional
+        Gain by sections on alignment, vertical profile and cross-level that the spectrum gives; the gauge
+        keeps its limits.
     """
 
     spectrum: str = "none"
@@ -82,6 +86,7 @@ class Irregularity:
     end_m: float | None = None
     defects: tuple[Defect, ...] = ()
     measured: MeasuredRails | None = None
+    section_gain: SectionGain | None = None
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this irregularity from every other; of measured rails their digest."""

@@ -26,6 +26,7 @@ from simrail.track.design import TrackDesign
 from simrail.track.irregularity import PERIOD_M, SAMPLES_PER_WAVE, Irregularity, fade, realise_all
 from simrail.track.measured import FINEST_STEP_M, MeasuredRails, refuse_amplitude
 from simrail.track.rail_condition import RailCondition, check_conditions, friction_factors
+from simrail.track.sections import section_gain
 
 CHANNELS = (
     "x",
@@ -301,6 +302,9 @@ def _drawn(
         drawn = period[knots % period.shape[0]]
         start, end = stretch_m(irregularity, design)
         drawn *= fade(s, start, end_m=end, length_m=irregularity.fade_m)[:, None]
+        if irregularity.section_gain is not None:
+            gain = section_gain(s, irregularity.section_gain, start_m=design.start_m, seed=seed)
+            drawn[:, [i for i, name in enumerate(IRREGULARITY) if name != "gauge_m"]] *= gain[:, None]
     measured = irregularity.measured
     if measured is not None:
         start, end = overlap_m(measured, design)

@@ -22,7 +22,7 @@ from simrail.report.tables.tables import Table
 from simrail.report.tables.tiles import tiles
 from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
-from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words, recording_facts
+from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words, recording_facts, vibration_facts
 from simrail.scenario.build import goals_mm, limits_of
 from simrail.track.bands import BANDS, Band, why_not
 from simrail.track.quality import Limits
@@ -91,7 +91,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
     return of_scores | {
         "scenario": data.scenario,
         "styles": data.styles,
-        "facts": ride_facts(example),
+        "facts": [*ride_facts(example), *vibration_facts(spec.vibration is not None, example.shaken)],
         "speed": speed_figure(example, conditions=spec.rail_condition),
         "imu": imu_figure(example),
         "attitude": attitude_figure(example, first or drawn, what=f"Attitude, {name}") if drawn else "",

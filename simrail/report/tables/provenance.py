@@ -40,6 +40,11 @@ def parts(scenario: Scenario, cells: pd.DataFrame, examples: Sequence[CellResult
             source = f"friction {FRICTION[at.condition]:g}, a nominal value of this project"
         where = f"{at.words}, {at.start_m:g} to {at.end_m:g} m"
         result.append(Part("rail condition", where, "synthetic", source))
+    for example in examples:
+        for name, source in (example.shaken or {}).items():
+            word = "synthetic" if source.startswith("synthetic") else "from levels"
+            told = source.removeprefix("synthetic").removeprefix(": ") or "figures of this project"
+            result.append(Part("vibration", name.replace("_", " "), word, told))
     for name in _names(cells, "vehicle"):
         word, source = "synthetic", "a body that follows the rails exactly; no vehicle file"
         with suppress(InputError):

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from simrail.recording.recording import Recording
@@ -73,6 +73,30 @@ UNITS = {
 EXACT_MAP_AXIS = "map.exact"
 """Axis that says whether the train knows the line as it is."""
 
+SILENT_AXIS = "vibration.off"
+"""Axis that says whether short waves shake the vehicle."""
+
+
+def vibration_facts(has_vibration: bool, shaken: Mapping[str, str] | None) -> list[str]:
+    """What shakes a ride and what its forces hold, a line each; nothing without ``[vibration]``.
+
+    Parameters
+    ----------
+    has_vibration : bool
+        Whether the scenario has the table.
+    shaken : mapping of str to str, optional
+        Names of the sources that shake the ride, with where their figures come from; None if nothing does.
+    """
+    if not has_vibration:
+        return []
+    if shaken is None:
+        return ["no vibration by short waves (an ablation: every vehicle shakes)"]
+    named = ", ".join(name.replace("_", " ") for name in shaken)
+    return [
+        f"shaken by {named}",
+        "forces between wheels and rails hold the long waves only; short ones are superposed on the motion",
+    ]
+
 
 def axis_name(name: str) -> tuple[str, str]:
     """Words and unit of an axis: ``ride.speed_kmh`` is the speed in km/h; a unit of "" for none."""
@@ -86,6 +110,8 @@ def axis_words(name: str, value: object) -> str:
     """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
     if name == EXACT_MAP_AXIS:
         return "an exact map" if str(value) == str(True) else "a map with errors"
+    if name == SILENT_AXIS:
+        return "without vibration (ablation)" if str(value) == str(True) else "with vibration"
     words, unit = axis_name(name)
     return f"{words} {_number_or_text(value)} {unit}".rstrip()
 

@@ -1,0 +1,124 @@
+"""The short-wave part of a truth on disk: made piece by piece beside the ride that it adds to.
+
+Motions are kept as float32: relative to their size of some millimetres and metres per second squared that is
+a ten-millionth. A folder without its header was interrupted, and is no vibration.
+"""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simrail.core.jit import FloatArray
+from simrail.ride.truth import Truth
+from simrail.ride.vibration.run import Shaker
+from simrail.ride.vibration.short_waves import COLUMNS, ShortWaves
+from simrail.ride.vibration.sources import Vibration
+from simrail.vehicle.model import VehicleModel
+from simrail.vehicle.vibration.linear_model import Bending
+
+HEADER = "truth.json"
+"""Named as a truth's, so that the cache of rides counts and drops these folders too."""
+
+
+def write_short_waves(
+    vibration: Vibration,
+    truth: Truth,
+    model: VehicleModel,
+    folder: Path,
+    *,
+    seed: int,
+    manifest: dict[str, Any],
+) -> None:
+    """Work out the short-wave part of a ride and write it into a folder.
+
+    Parameters
+    ----------
+    vibration : Vibration
+        What shakes.
+    truth : Truth
+        The ride; loads are kept where it keeps contacts.
+    model : VehicleModel
+        The vehicle.
+    folder : Path
+        Where to.
+    seed : int
+        Root seed of the track draw.
+    manifest : dict
+        What the header says of the ride.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    shaker = Shaker(vibration, truth, model, seed=seed)
+    rows, every = len(truth.time_s), truth.contact_every
+
+    def create(name: str, shape: tuple[int, ...]) -> np.memmap:
+        return np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=np.float32, shape=shape)
+
+    motions = {body: create(f"motion_{i}", (rows, len(COLUMNS))) for i, body in enumerate(model.body_names)}
+    bends = {b.body: create(f"bending_{i}", (rows, 3)) for i, b in enumerate(shaker.bendings)}
+    kept = -(-rows // every) if truth.contacts else 0
+    loads = create("loads", (kept, len(model.wheels))) if kept else None
+    least = np.full(len(model.wheels), np.inf)
+    static = model.wheel_load_n(truth.gravity_mps2)
+    for piece in shaker.run():
+        here = slice(piece.first, piece.first + len(piece.loads))
+        for body, motion in piece.motions.items():
+            motions[body][here] = motion
+        for body, bend in piece.bendings.items():
+            bends[body][here] = bend
+        least = np.minimum(least, 1.0 + piece.loads.min(axis=0) / static)
+        if loads is not None:
+            first = -(-here.start // every)
+            loads[first : -(-here.stop // every)] = piece.loads[first * every - here.start :: every]
+    for array in (*motions.values(), *bends.values(), *([] if loads is None else [loads])):
+        array.flush()
+    plain = {
+        "manifest": manifest,
+        "sources": vibration.named,
+        "longest_wave_m": longest_wave_m(vibration),
+        "bodies": model.body_names,
+        "bendings": [asdict(b) for b in shaker.bendings],
+        "wheels": model.wheel_names if kept else [],
+        "least_share_of_load": dict(zip(model.wheel_names, least.tolist(), strict=True)),
+    }
+    (folder / HEADER).write_text(json.dumps(plain), encoding="utf-8")
+
+
+def longest_wave_m(vibration: Vibration) -> float:
+    """Where the short waves begin, m; 0 without roughness."""
+    rough = vibration.rails.roughness
+    return 0.0 if rough is None else rough.longest_m
+
+
+def read_short_waves(folder: Path, rows: int) -> ShortWaves:
+    """Read what `write_short_waves` wrote; arrays are mapped.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If the folder is incomplete or damaged, or not of ``rows`` rows.
+    """
+    plain = json.loads((folder / HEADER).read_text(encoding="utf-8"))
+
+    def read(name: str) -> FloatArray:
+        array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
+        return array
+
+    motions = {body: read(f"motion_{i}") for i, body in enumerate(plain["bodies"])}
+    for body, motion in motions.items():
+        if motion.shape != (rows, len(COLUMNS)):
+            raise ValueError(f"vibration of {body} has shape {motion.shape}, not ({rows}, {len(COLUMNS)})")
+    bendings = {
+        bent["body"]: (Bending(**bent), read(f"bending_{i}")) for i, bent in enumerate(plain["bendings"])
+    }
+    loads = read("loads") if plain["wheels"] else np.zeros((0, 0))
+    return ShortWaves(
+        sources=plain["sources"],
+        longest_wave_m=plain["longest_wave_m"],
+        motions=motions,
+        bendings=bendings,
+        loads={wheel: loads[:, w] for w, wheel in enumerate(plain["wheels"])},
+        least_share_of_load=plain["least_share_of_load"],
+    )

@@ -1,0 +1,1 @@
+"""A vehicle's vertical vibration by short waves: its linear model, integrated exactly."""

@@ -1,0 +1,169 @@
+"""The linear vertical model against closed forms, and against the equations that the engines ride."""
+
+import numpy as np
+import pytest
+
+from simrail.core.errors import InputError
+from simrail.core.toml_files import load
+from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.linear import running_vehicle
+from simrail.vehicle.model import Body, Guide, LinearContact, VehicleModel, Wheel, WheelRail
+from simrail.vehicle.vibration.car_bodies import car_bodies
+from simrail.vehicle.vibration.linear_model import (
+    HEAVE,
+    PITCH,
+    ROLL,
+    Bending,
+    TrackSupport,
+    contact_stiffness_npm,
+    linear_vehicle,
+)
+from simrail.vehicle.vibration.modal import state_space
+
+CONTACT_NPM, HALF_M = 1.2e9, 0.75
+SUPPORT = TrackSupport(150.0, 7e7, 1e5)
+
+
+def vehicle(name):
+    return load(VehicleFile, "vehicle", name).model(name)
+
+
+def lone_axle(mass=1500.0, roll=700.0):
+    """A wheelset on prescribed contacts that nothing stands on."""
+    contact = LinearContact(
+        f11_n=1e6, f22_n=1e6, conicity=0.1, vertical_stiffness_npm=CONTACT_NPM, vertical_damping_nspm=0.0
+    )
+    return VehicleModel(
+        name="axle",
+        title="axle",
+        source="test",
+        synthetic=True,
+        bodies=(Body("axle", mass, (roll, 100.0, roll), (0.0, 0.0, 0.46)),),
+        suspensions=(),
+        wheels=tuple(Wheel(f"axle.{s}", "axle", k, "axle", 0.46) for s, k in (("left", 1), ("right", -1))),
+        spin_inertia_kgm2={"axle": 100.0},
+        guide=Guide("axle", 1e5, 0.0, 0.0, 0.0, 0.0, 0.0),
+        wheel_rail=WheelRail("S1002", "60E1", 1.435, 0.025, 0.3, tape_circle_half_m=HALF_M, linear=contact),
+    )
+
+
+def frequencies(linear):
+    a, _ = state_space(linear)
+    found = np.linalg.eigvals(a)
+    return np.sort(np.abs(found[found.imag > 0.0])) / (2.0 * np.pi)
+
+
+def two_masses(m, k_contact, m_rail, k_track):
+    """Both natural frequencies of a mass on a contact spring on a rail mass on a track spring, Hz."""
+    a = m * m_rail
+    b = -(m * (k_contact + k_track) + m_rail * k_contact)
+    c = k_contact * k_track
+    squares = (-b + np.array([-1.0, 1.0]) * np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+    return np.sqrt(squares) / (2.0 * np.pi)
+
+
+def test_p2_and_contact_resonance_are_those_of_two_masses_on_two_springs():
+    undamped = TrackSupport(SUPPORT.mass_kg, SUPPORT.stiffness_npm, 0.0)
+    found = frequencies(linear_vehicle(lone_axle(), undamped))
+    expected = [
+        *two_masses(1500.0 / 2, CONTACT_NPM, 150.0, 7e7),  # heave, half the axle on each wheel
+        # Roll about the points where it touches the rails, 0.46 m below.
+        *two_masses((700.0 + 1500.0 * 0.46**2) / (2 * HALF_M**2), CONTACT_NPM, 150.0, 7e7),
+    ]
+    np.testing.assert_allclose(found, np.sort(expected), rtol=1e-9)
+    # Jenkins et al. 1974: unsprung mass and rail mass on the track, the contact being stiff beside it.
+    p2 = np.sqrt(7e7 / (750.0 + 150.0)) / (2.0 * np.pi)
+    assert found[1] == pytest.approx(p2, rel=0.03) or found[0] == pytest.approx(p2, rel=0.03)
+
+
+def test_rigid_rails_leave_the_contact_alone():
+    found = frequencies(linear_vehicle(lone_axle(), None))
+    rolled = 700.0 + 1500.0 * 0.46**2
+    expected = np.sqrt([2 * CONTACT_NPM / 1500.0, 2 * CONTACT_NPM * HALF_M**2 / rolled]) / (2.0 * np.pi)
+    np.testing.assert_allclose(found, np.sort(expected), rtol=1e-12)
+
+
+def test_each_wheel_has_its_own_rail():
+    """A slow rise of one rail lifts the axle by half and rolls it by the rise over the base."""
+    linear = linear_vehicle(lone_axle(), None)
+    rise = linear.response(0.01)[:, 0].real * 1e-3
+    assert linear.row("axle", HEAVE) @ rise == pytest.approx(0.5e-3, rel=1e-6)
+    assert linear.row("axle", ROLL) @ rise == pytest.approx(1e-3 / (2.0 * HALF_M), rel=1e-6)
+
+
+def held_frequencies(model):
+    """Frequencies and damping of the model with its axles held in all but pitch."""
+    linear = linear_vehicle(model, None)
+    axles = set(model.axle_names)
+    free = [i for i, (body, k) in enumerate(linear.coordinates) if body not in axles or k == PITCH]
+    n, d = len(linear.coordinates), len(linear.series)
+    a, _ = state_space(linear)
+    rows = np.array([*free, *(n + i for i in free), *range(2 * n, 2 * n + d)], dtype=int)
+    found = np.linalg.eigvals(a[np.ix_(rows, rows)])
+    return found[found.imag > 2.0 * np.pi * 3.0]
+
+
+@pytest.mark.parametrize("name", ["manchester_1", "metro_car_gz18", "metro_irw_bogie", "irw_car"])
+def test_same_vehicle_as_the_engines_ride(name):
+    """Modes above 3 Hz of the vehicle on held axles, from the linearised right-hand side of the engines.
+
+    That has what preloads add to stiffness, which this model leaves out: some percent of some hertz.
+    """
+    model = vehicle(name)
+    running = running_vehicle(model)
+    matrix, _ = running.held(running.linearised(10.0))
+    expected = np.linalg.eigvals(matrix)
+    expected = expected[expected.imag > 2.0 * np.pi * 3.3]
+    found = held_frequencies(model)
+    assert len(expected) >= 3
+    for value in expected:
+        assert np.abs(found - value).min() < 0.03 * np.abs(value)
+
+
+def test_contact_stiffness_is_three_halves_of_load_over_approach():
+    """Hertz: N = c d^1.5, so that halving the load takes the cube root of it off the stiffness."""
+    model = vehicle("manchester_1")
+    whole = contact_stiffness_npm(model)
+    half = contact_stiffness_npm(model, gravity_mps2=9.81 / 2.0)
+    np.testing.assert_allclose(half / whole, 0.5 ** (1.0 / 3.0), rtol=5e-3)
+
+
+def test_bending_is_the_first_mode_of_a_free_beam():
+    bending = Bending("body", 10.0, 0.02, 26.0)
+    x = np.linspace(-13.0, 13.0, 2001)
+    rise, slope = np.array([bending.shape(float(at)) for at in x]).T
+    mean = np.trapezoid(rise, x) / 26.0
+    assert np.trapezoid(rise**2, x) / 26.0 == pytest.approx(1.0, rel=1e-5)  # modal mass = mass
+    assert mean == pytest.approx(0.0, abs=1e-6)  # no net force on a free body
+    np.testing.assert_allclose(np.gradient(rise, x)[5:-5], slope[5:-5], atol=1e-4)
+    # Ends rise twice the rms, nodes lie at 0.2242 of the length (Blevins, Formulas for Natural Frequency).
+    assert abs(rise[0]) == pytest.approx(2.0, rel=1e-3)
+    nodes = x[:-1][np.diff(np.sign(rise)) != 0.0]
+    assert (nodes[0] + 13.0) / 26.0 == pytest.approx(0.2242, abs=1e-3)
+
+
+def test_a_free_body_bends_at_its_frequency():
+    """On springs of next to nothing a body bends as a free one does."""
+    model = vehicle("manchester_1")
+    linear = linear_vehicle(model, None, bending=[Bending("body", 25.0, 0.02, 26.0)])
+    found = frequencies(linear)
+    assert np.abs(found / 25.0 - 1.0).min() < 0.03  # what springs of some hertz add
+
+
+def test_no_axle_bends():
+    with pytest.raises(InputError, match="cannot bend") as caught:
+        linear_vehicle(vehicle("manchester_1"), None, bending=[Bending("axle_f1", 10.0, 0.02, 20.0)])
+    assert "body" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "cars", "carriers"),
+    [
+        ("manchester_1", {"body"}, {"frame_front", "frame_rear"}),
+        ("metro_irw_bogie", {"body"}, {"frame"}),
+    ],
+)
+def test_car_bodies(name, cars, carriers):
+    found = car_bodies(vehicle(name))
+    assert {car.name for car in found} == cars
+    assert {carrier for car in found for carrier in car.carriers} == carriers
