@@ -18,15 +18,13 @@ import pandas as pd
 from simrail.core.columns import CONTACT, MOTION
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.turning import turning_rows
 from simrail.ride.mount_motion import Remembered, mount_motion
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.track.design import TrackDesign
 
 _SAMPLED = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
 """Fields of `BodyMotion` with a row for each sample."""
-
-TURN_M = 1.0
-"""A way back that is longer than this is a run of its own."""
 
 
 @dataclass(frozen=True)
@@ -257,22 +255,8 @@ class Truth:
 
     @property
     def turning_rows(self) -> list[int]:
-        """Samples where the ride begins, where it turns back, and where it ends.
-
-        Less than `TURN_M` is no way: a vehicle that rocks as it comes to rest does not turn.
-        """
-        place, step = self.reference_position_m, max(1, round(0.1 * self.rate_hz))
-        rows, way, far = [0], 0.0, 0
-        for row in range(0, len(place), step):
-            moved = place[row] - place[far]
-            if way == 0.0 and abs(moved) > TURN_M:
-                way, far = np.sign(moved), row
-            elif way * moved > 0.0:
-                far = row
-            elif way * moved < -TURN_M:
-                rows.append(far)
-                way, far = -way, row
-        return [*rows, len(place) - 1]
+        """Samples where the ride begins, where it turns back, and where it ends."""
+        return turning_rows(self.reference_position_m, step=max(1, round(0.1 * self.rate_hz)))
 
     def motion(
         self, mount: Mount, rows: range | None = None, columns: Sequence[str] = MOTION

@@ -219,7 +219,11 @@ class Parts:
 
     def _kept(self, cell: Cell, vehicle: VehicleModel, profile: SpeedProfile) -> Kept | None:
         """What of a ride is kept: of a long one, bodies with an IMU and the wheel of the encoder."""
-        if profile.duration_s <= LONG_RIDE_S or cell.ride.kick_end_m is not None:
+        try:
+            duration_s = profile.duration_s
+        except InputError:  # `simrail.scenario.check_ride` says what is wrong with it
+            return None
+        if duration_s <= LONG_RIDE_S or cell.ride.kick_end_m is not None:
             return None
         spec = self.scenario.spec
         bodies = {str(body) for part in spec.imu if part.is_on(cell.spec.vehicle) for body in each(part.body)}

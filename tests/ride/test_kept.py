@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,14 +13,17 @@ from simrail.core.columns import ATTITUDE, CONTACT, IMU, ODOMETRY, POSITION
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.ride import cache as ride_cache
-from simrail.ride.ride import Kept, Ride, simulate
+from simrail.ride.ride import Kept, Ride, rails_of, simulate
 from simrail.ride.truth import Mount, Truth
+from simrail.ride.truth_rows import TruthRows
 from simrail.scenario import build
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import load_scenario
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
+from simrail.vehicle.engines.compiled_engine import CompiledEngine
+from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -91,3 +95,16 @@ def test_a_scenario_keeps_of_a_long_ride_what_it_asks_for(monkeypatch: pytest.Mo
     assert Parts(scenario).ride(cell).kept is None
     monkeypatch.setattr(build, "LONG_RIDE_S", 100.0)
     assert Parts(scenario).ride(cell).kept == Kept(("front",), ("rear.left",))
+
+
+def test_wheel_angles_do_not_feel_where_segments_end(tmp_path: Path) -> None:
+    """The boxes' pitch is integrated over the joints of segments, too; only sums are taken in other order."""
+    setup = Setup(RIDE.vehicle, rails_of(RIDE), RIDE.profile, step_s=RIDE.step_s, rate_hz=RIDE.rate_hz)
+    angles = []
+    for segment_s in (5.0, 0.01):
+        rows = TruthRows(RIDE, tmp_path / str(segment_s))
+        for segment in CompiledEngine(setup).run(rows.duration_s, segment_s=segment_s):
+            rows.add(segment)
+        rows.finish()
+        angles.append(np.load(tmp_path / str(segment_s) / "wheel_0.npy"))
+    np.testing.assert_allclose(angles[1], angles[0], rtol=0, atol=1e-12 * np.abs(angles[0]).max())

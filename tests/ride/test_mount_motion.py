@@ -94,3 +94,14 @@ def test_memory_is_bounded_and_what_was_used_last_stays() -> None:
     assert [kept.get(name) is not None for name in "abcd"] == [True, False, True, True]
     kept.keep("too large", np.zeros(301))
     assert kept.get("too large") is None and kept.nbytes == 2400
+
+
+def test_each_question_has_its_own_answer(truth: Truth) -> None:
+    """Of one truth, one after the other, in a transition: other rows, other columns, another place."""
+    whole = truth.motion(STRAIGHT)
+    at = int(np.argmax(np.abs(np.diff(whole["roll_rad"]))))
+    for rows in (range(at, at + 100), range(at + 100, at + 200), range(at + 100, at + 300, 2)):
+        for columns in (IMU, ATTITUDE):
+            assert truth.motion(STRAIGHT, rows, columns).equals(whole.iloc[list(rows)][list(columns)])
+    other = replace(STRAIGHT, position_m=(0.4, 0.2, 0.9))
+    assert truth.motion(other)["y_m"].iloc[0] == pytest.approx(whole["y_m"].iloc[0] + 0.4)

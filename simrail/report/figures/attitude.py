@@ -35,7 +35,7 @@ def attitude_figure(example: CellResult, styles: Sequence[MethodStyle], *, what:
     """
     with canvas.look():
         bins = Bins(example.motion["position_m"].to_numpy())
-        frame = example.line.frame(bins.x)
+        frame = example.line.frame(bins.place)
         design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
         figure, axes = canvas.panels([2.05, 2.05, 1.75])
         for column, (axis, angle, name) in enumerate(zip(axes, ATTITUDE, _NAMES, strict=True)):

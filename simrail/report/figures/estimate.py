@@ -35,7 +35,7 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
         x = _axis(recording)
         bins = Bins(x)
         frame = recording.track.frame_extended(place_of(recording)[bins.first])
-        design = (frame.roll_rad, frame.pitch_rad, frame.yaw_rad)
+        design = tuple(bins.parted(angle) for angle in (frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
         drawn = [name for name in ATTITUDE if name in estimate.states]
         figure, axes = canvas.panels([1.9] * len(drawn))
         for axis, name in zip(axes, drawn, strict=True):

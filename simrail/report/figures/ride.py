@@ -8,6 +8,8 @@ from matplotlib.ticker import MaxNLocator
 
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO
+from simrail.core.jit import FloatArray
+from simrail.core.turning import turning_rows
 from simrail.recording.recording import odometry_of
 from simrail.report.figures.canvas import (
     INK,
@@ -26,9 +28,16 @@ _TINTS = ("#0072B2", "#009E73", "#D55E00")
 
 
 def direction_of(example: CellResult) -> int:
-    """+1 towards larger s, -1 towards smaller s."""
+    """+1 towards larger s, -1 towards smaller s; of a ride that turns back, that of its first run."""
+    _, position = runs_of(example)
+    return 1 if position[1] >= position[0] else -1
+
+
+def runs_of(example: CellResult) -> tuple[int, FloatArray]:
+    """Number n of runs of a ride, and the places (n + 1,) between which they lie."""
     position = example.motion["position_m"].to_numpy()
-    return 1 if position[-1] >= position[0] else -1
+    rows = turning_rows(position, step=max(1, len(position) // 50_000))
+    return len(rows) - 1, position[rows]
 
 
 def over_distance(
@@ -45,7 +54,7 @@ def over_distance(
         room = 0.01 * max(high - low, 1.0)
         limits = low - room, high + room
     shade_track(axes, example.line, limits=limits)
-    distance_axis(axes[-1], direction=direction_of(example) if arrow else None)
+    distance_axis(axes[-1], direction=direction_of(example) if arrow and runs_of(example)[0] == 1 else None)
 
 
 def speed_figure(example: CellResult, *, conditions: Sequence[RailConditionPart] = ()) -> str:

@@ -11,7 +11,7 @@ from simrail.estimation.choose_odometry import TRUTH
 from simrail.report.figures.attitude import attitude_figure, error_figure
 from simrail.report.figures.contact import contact_figure
 from simrail.report.figures.geometry import bands_figure, has_rails, rails_figure, stretch_of, stretch_words
-from simrail.report.figures.ride import direction_of, imu_figure, odometry_figure, speed_figure
+from simrail.report.figures.ride import direction_of, imu_figure, odometry_figure, runs_of, speed_figure
 from simrail.report.figures.score import curves_figure, rms_figure
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.geometry import BAND, JUDGED, indicator_table, is_zero, judged_band, waves_words
@@ -120,13 +120,16 @@ def ride_title(example: CellResult) -> str:
 def ride_facts(example: CellResult) -> list[str]:
     """Length, speed, IMU, odometry and map of a ride, a line each."""
     motion, recording = example.motion, example.recording
-    position, speed = motion["position_m"].to_numpy(), np.abs(motion["speed_mps"].to_numpy())
+    speed = np.abs(motion["speed_mps"].to_numpy())
     moving = speed > 0.01
-    way = "increasing" if direction_of(example) > 0 else "decreasing"
+    runs, places = runs_of(example)
+    way = f"towards {'increasing' if direction_of(example) > 0 else 'decreasing'} distance"
+    if runs > 1:
+        way = f"in {runs} runs, to and fro between {places.min():.0f} and {places.max():.0f} m"
     mean = 3.6 * float(speed[moving].mean()) if moving.any() else 0.0
     duration = float(motion.index[-1] - motion.index[0])
     return [
-        f"{abs(position[-1] - position[0]):.0f} m towards {way} distance, {duration:.0f} s",
+        f"{np.abs(np.diff(places)).sum():.0f} m {way}, {duration:.0f} s",
         f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
         *recording_facts(recording),
         f"the line from {map_words(str(example.cell['map']))}",

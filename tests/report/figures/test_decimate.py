@@ -39,3 +39,24 @@ def test_decimation_of_a_short_or_standing_signal() -> None:
     assert bins.line(y)[1].tolist() == [0.0, 19.0]
     few = Bins(np.arange(5.0))
     assert few.envelope(np.arange(5.0)).mean.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_runs_of_a_ride_are_binned_each_by_itself() -> None:
+    """To and fro: every peak is kept where it was, and no line joins the end of a run with the next."""
+    rng = np.random.default_rng(5)
+    ways = [np.linspace(0.0, 100.0, 20_000), np.full(4000, 100.0), np.linspace(100.0, 30.0, 15_000)]
+    x = np.concatenate([*ways, np.full(500, 30.0), np.linspace(30.0, 80.0, 9000)])
+    y = rng.normal(size=len(x))
+    for sample, peak in ((10_000, 50.0), (30_000, -60.0), (45_000, 70.0)):
+        y[sample] = peak
+    bins = Bins(x, bins=600)
+    line_x, line_y = bins.line(y)
+    assert np.isfinite(line_y).all() and np.count_nonzero(np.isnan(line_x)) == 4
+    for sample, peak in ((10_000, 50.0), (30_000, -60.0), (45_000, 70.0)):
+        (at,) = np.flatnonzero(line_y == peak)
+        assert line_x[at] == pytest.approx(x[sample], abs=0.6)
+    steps = np.diff(line_x)
+    assert np.nanmax(np.abs(steps)) < 1.0  # a joint of two runs would be longer
+    way = np.sign([np.nanmean(part) for part in np.split(steps, np.flatnonzero(np.isnan(steps))[[0, 4]])])
+    assert list(way) == [1.0, -1.0, 1.0]
+    assert np.isfinite(bins.place).all() and len(bins.place) == len(bins.x) == len(bins.envelope(y).mean)
