@@ -31,7 +31,7 @@ from simrail.track.roughness import TABLES
 from simrail.track.sections import SectionGain
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
-from simrail.vehicle.vibration.linear_model import TrackSupport
+from simrail.vehicle.vibration.linear_model import Bending, TrackSupport
 from simrail.vehicle.vibration.wheels import OutOfRound, drawn_orders
 
 SUPPORT = TrackSupport(150.0, 7e7, 1e5)
@@ -180,6 +180,23 @@ def test_left_is_left(coach, line):
     roll = np.concatenate([piece.motions["axle_f1"][:, 3] for piece in shaker.run()])
     # The contact at the left has risen by nearly all of it: springs above take a little back.
     assert roll[-1000:].mean() == pytest.approx(1e-3 / 1.5, rel=0.05)
+
+
+def test_bent_body_is_one_line():
+    """The pitch of a bent body at a place is the slope of its rise there, nose down positive."""
+    bent, rng = Bending("body", 10.0, 0.02, 26.0), np.random.default_rng(1)
+    motions, coordinate = {"body": rng.standard_normal((5, 12))}, rng.standard_normal((5, 3))
+    short = ShortWaves({}, 1.5, motions, {"body": (bent, coordinate)})
+
+    def rise(x):
+        felt = short.of("body", x)
+        return felt[:, :3] - x * felt[:, 6:9]  # where a rigid body that moves as felt has its point x
+
+    for x in (-9.5, 0.0, 4.0):
+        slope = (rise(x + 1e-4) - rise(x - 1e-4)) / 2e-4
+        np.testing.assert_allclose(-slope, short.of("body", x)[:, 6:9], atol=1e-7)
+        expected = motions["body"][:, :3] - x * motions["body"][:, 6:9] + bent.shape(x)[0] * coordinate
+        np.testing.assert_allclose(rise(x), expected, atol=1e-12)
 
 
 def test_gains_of_the_floor_keep_the_derivatives(coach, line):
