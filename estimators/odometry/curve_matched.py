@@ -123,7 +123,7 @@ class Pointing(NamedTuple):
 AXLE = Pointing(0.5, 5e-5, 4e-4, 2.0, 1.0)
 """It steers against its frame."""
 
-FRAME = Pointing(0.25, 5e-5, 4e-4, 2.0, 1.0)
+FRAME = Pointing(0.15, 1e-5, 4e-4, 2.0, 1.0)
 """And any other body on axles."""
 
 ON_BOGIES = Pointing(0.1, 2e-6, 2.5e-4, 6.5, 1.0)

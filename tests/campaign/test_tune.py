@@ -89,6 +89,7 @@ def test_interrupted_it_goes_on(
     assert not list(place.glob("*unfinished*"))
 
 
+@pytest.mark.slow
 def test_known_output(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a smoother without options, between two places; without the descent, which takes long."""
     monkeypatch.setattr("simrail.estimators.tuning.search.ROUNDS", 0)

@@ -104,7 +104,10 @@ def test_on_the_tread_in_an_irregular_curve(profile):
 
 
 # One wheel of a conventional wheelset does not slide while the other holds.
-@pytest.mark.parametrize(("vehicle", "rails"), [("metro_irw_bogie", "left"), ("metro_car_gz18", "both")])
+@pytest.mark.parametrize(
+    ("vehicle", "rails"),
+    [("metro_irw_bogie", "left"), pytest.param("metro_car_gz18", "both", marks=pytest.mark.slow)],
+)
 def test_driven_and_braked_by_the_wheels_over_leaves(vehicle, rails):
     """1e-6 m/s2 rms from a start that spins to a stop that slides, on irregular rails, off the flange."""
     profile = SpeedProfile(120.0, 160.0, 6.0, **BRISK)
