@@ -119,8 +119,8 @@ def test_wheel_forces_are_of_the_size_that_is_measured():
     """Dynamic force of an axle at 72 km/h, all sources: about 1 kN in each third of an octave.
 
     Auersch, Vehicle System Dynamics 48 (2010) 235-261, finds values around 1 kN for each axle and third of an
-    octave, by two methods, for several trains, speeds and soils (abstract, read at opus4.kobv.de). Sources here
-    are synthetic but for the roughness: the median of the bands from 5 to 100 Hz within a factor of 3.
+    octave, by two methods, for several trains, speeds and soils (abstract, read at opus4.kobv.de). Sources
+    here are synthetic but for the roughness: the median of the bands from 5 to 100 Hz within a factor of 3.
     """
     vehicle = load(VehicleFile, "vehicle", "manchester_1").model("manchester_1")
     track = load(TrackFile, "track", "level_straight").design("level_straight")

@@ -13,6 +13,7 @@ from simrail.recording.sheets.imu_file import ImuFile
 from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, is_cached, simulate
 from simrail.ride.truth import BodyMotion, Mount, Truth
+from simrail.ride.vibration.files import read_short_waves, write_short_waves
 from simrail.ride.vibration.floor import Floor
 from simrail.ride.vibration.run import Shaker
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
@@ -444,13 +445,29 @@ def test_cached_beside_the_ride(ride):
     assert not is_cached(other)
     simulate(other)
     assert len([r for r in ride_cache.rides() if "vibration" in r.name]) == 2
-    # A damaged part is worked out again.
+    # A damaged part is worked out again, be it one bit.
     key = ride_cache.key_of(loud.describe())
-    (ride_cache.folder() / key / "motion_0.npy").write_bytes(b"no array")
+    damaged = ride_cache.folder() / key / "motion_6.npy"
+    before = np.array(first.short_waves.motions["body"])  # what is mapped is damaged with its file
+    content = bytearray(damaged.read_bytes())
+    content[-1] ^= 1
+    damaged.write_bytes(content)
     told = []
     mended = simulate(loud, told=told.append)
     assert "damaged" in told[0]
-    np.testing.assert_array_equal(mended.short_waves.motions["body"], first.short_waves.motions["body"])
+    np.testing.assert_array_equal(mended.short_waves.motions["body"], before)
+
+
+def test_a_wheel_that_would_leave_the_rail_is_told_of(coach, line, tmp_path):
+    """A dip of 5 mm at 20 m/s takes off more than the wheel's load."""
+    truth = gliding(coach, line, 20.0, duration_s=2.0, rate_hz=1000.0)
+    vibration = Vibration(rails=RailSources(welds=Dips(18.0, 5e-3, 0.0)), support=SUPPORT)
+    write_short_waves(vibration, truth, coach, tmp_path, seed=1, manifest={})
+    short = read_short_waves(tmp_path, len(truth.time_s))
+    assert min(short.least_share_of_load.values()) < 0.0
+    (line_of_it,) = short.warnings()
+    assert "would leave the rail" in line_of_it
+    assert ShortWaves({}, 1.5, {}, least_share_of_load={"w": 0.2}).warnings() == []
 
 
 def test_rates_must_fit(coach, line):
