@@ -93,6 +93,8 @@ def run(
         print_cell(console, alone)
         return CELL_FAILED if alone.failures else DONE
     print_scores(console, results)
+    for note in results.campaign.plan.notes:
+        console.print(note)
     return CELL_FAILED if results.campaign.failures else DONE
 
 
@@ -119,6 +121,8 @@ def check(scenario: Scenario, seed: Seed = None, settings: Settings = None) -> i
     plan = judge_scenario(read)
     for warning in plan.warnings:
         say(f"warning: {warning}")
+    for note in plan.notes:
+        print(note)
     print(f"{read.name}: fine. {read.title}")
     print(
         f"{number(plan.rides, 'ride')} of {plan.simulated_s:.0f} s in all, "

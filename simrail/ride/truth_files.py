@@ -102,7 +102,7 @@ def write_header(
         "contact_every": contact_every,
         "contact_wheels": list(wheels) if contact_wheels is None else contact_wheels,
         "axle_offsets_m": axle_offsets_m or {},
-        "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))},
+        "crc32": {file.name: checksum(file) for file in sorted(folder.glob("*.npy"))},
     }
     (folder / "truth.json").write_text(json.dumps(plain), encoding="utf-8")
 
@@ -150,7 +150,7 @@ def load_truth(folder: Path) -> Truth:
     """
     plain = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
     for name, crc32 in plain["crc32"].items():
-        if _crc32(folder / name) != crc32:
+        if checksum(folder / name) != crc32:
             raise ValueError(f"{name} is not what was written")
 
     def read(name: str) -> FloatArray:
@@ -193,7 +193,7 @@ def load_truth(folder: Path) -> Truth:
     )
 
 
-def _crc32(file: Path) -> int:
+def checksum(file: Path) -> int:
     """Checksum of a file: a disk, or a copy between machines, may change bits in silence."""
     checksum = 0
     with file.open("rb") as stream:

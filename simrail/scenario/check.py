@@ -16,6 +16,7 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
+from simrail.scenario.check_vibration import step_words
 from simrail.scenario.distributions import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import judge_stop_rule
@@ -46,6 +47,8 @@ class Plan:
         What is unusual, one line each.
     content_hash : str
         Hash of the scenario and of the parts that it names.
+    notes : tuple of str
+        What is worth knowing and not unusual, one line each.
     """
 
     scenario: Scenario = field(repr=False)
@@ -56,6 +59,7 @@ class Plan:
     estimators: dict[str, Estimator]
     warnings: tuple[str, ...]
     content_hash: str
+    notes: tuple[str, ...] = ()
 
 
 def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool = False) -> Plan:
@@ -91,16 +95,25 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         for sample in range(1, sample_count(scenario.spec)):
             parts.estimators(sample)
         judge_stop_rule(scenario, [*estimators, *_judge_ride_figures(scenario, estimators)])
-        simulated, unusual = _judge_cells(scenario, parts)
+        simulated, unusual, notes = _judge_cells(scenario, parts)
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
     return Plan(
-        scenario, parts, rides, total, simulated, estimators, tuple(dict.fromkeys(warnings)), parts.hash
+        scenario,
+        parts,
+        rides,
+        total,
+        simulated,
+        estimators,
+        tuple(dict.fromkeys(warnings)),
+        parts.hash,
+        tuple(dict.fromkeys(notes)),
     )
 
 
-def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
-    """Judge each ride, draws aside, and each set of sensors on it; simulated time of all rides, warnings."""
+def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], list[str]]:
+    """Judge each ride, draws aside, and each set of sensors on it; simulated time of all, warnings, notes."""
     warnings: list[str] = []
+    notes: list[str] = []
     simulated = 0.0
     last_ride = None
     durations: dict[tuple[object, ...], float] = {}
@@ -118,7 +131,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
             ride.rate_hz,
             ride.drive,
         )
-        ride_key = (*way, ride.irregularity, ride.step_s)
+        ride_key = (*way, ride.irregularity, ride.step_s, ride.vibration)
         if ride_key not in durations:
             rails_key = (id(ride.track), ride.irregularity, ride.conditions)
             # One is remembered: rides over the same rails come in a row, and rails of many are large.
@@ -126,6 +139,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
             durations[ride_key], unusual, laid = judge_ride(resolved, known_rails=same)
             judged_rails = rails_key, laid
             warnings += unusual
+            notes += [f"vibration: {words}" for words in [step_words(ride)] if words]
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number
             simulated += durations[ride_key] * scenario.spec.monte_carlo.track_draws
@@ -134,7 +148,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str]]:
         if sensor_key not in judged_sensors:
             judged_sensors.add(sensor_key)
             judge_sensors(resolved)
-    return simulated, warnings
+    return simulated, warnings, notes
 
 
 def _judge_score(scenario: Scenario) -> None:

@@ -15,12 +15,14 @@ from simrail.vehicle.vibration.modal import modes_of
 
 LEAST_RATE_HZ = 250.0
 """Lowest rate of a truth with vibration: below, little of it is left."""
+LARGE_STEP_DB = 3.0
+"""A larger step between roughness and spectrum, twice the power, is warned of."""
 _HELD = 0.45
 """Highest frequency of noise over the rate that holds it."""
 
 
 def judge_vibration(ride: Ride) -> list[str]:
-    """Refuse a vibration that cannot be worked out; tell the step between short and long waves.
+    """Refuse a vibration that cannot be worked out; warn of short and long waves that do not meet.
 
     Raises
     ------
@@ -37,7 +39,23 @@ def judge_vibration(ride: Ride) -> list[str]:
         linear_vehicle_of(vibration, ride.vehicle, gravity_mps2=ride.gravity_mps2),
         step_s=1.0 / vibration.rate_hz,
     )
-    return _step_words(ride, vibration)
+    return _unusual(ride, vibration)
+
+
+def step_words(ride: Ride) -> str:
+    """How far the roughness lies above or below the spectrum where they meet; "" where they do not."""
+    step, rough = _step(ride), ride.vibration and ride.vibration.rails.roughness
+    if step is None or not rough:
+        return ""
+    return (
+        f"at {rough.longest_m:.3g} m the roughness lies {abs(step):.1f} dB "
+        f"{'above' if step >= 0.0 else 'below'} the spectrum {ride.irregularity.spectrum} of the rails"
+    )
+
+
+def _step(ride: Ride) -> float | None:
+    rough = ride.vibration and ride.vibration.rails.roughness
+    return step_db(ride.irregularity, rough.table, offset_db=rough.offset_db) if rough else None
 
 
 def _judge_rates(ride: Ride, vibration: Vibration) -> None:
@@ -89,20 +107,17 @@ def _judge_waves(ride: Ride, vibration: Vibration) -> None:
             )
 
 
-def _step_words(ride: Ride, vibration: Vibration) -> list[str]:
-    rough, long_waves = vibration.rails.roughness, ride.irregularity
-    if rough is None:
+def _unusual(ride: Ride, vibration: Vibration) -> list[str]:
+    rough, step = vibration.rails.roughness, _step(ride)
+    if rough is None or step is None:
         return []
-    step = step_db(long_waves, rough.table, offset_db=rough.offset_db)
-    if step is None:
-        return []
-    words = [
-        f"vibration: at {rough.longest_m:.3g} m the roughness lies {abs(step):.1f} dB "
-        f"{'above' if step >= 0.0 else 'below'} the spectrum {long_waves.spectrum} of the rails"
-    ]
-    if long_waves.wavelengths_m[0] > 1.001 * rough.longest_m:
+    words = []
+    if abs(step) > LARGE_STEP_DB:
+        words.append(f"vibration: {step_words(ride)}; vibration.join = true scales the roughness to meet it")
+    shortest = ride.irregularity.wavelengths_m[0]
+    if shortest > 1.001 * rough.longest_m:
         words.append(
             f"vibration: no waves between {rough.longest_m:.3g} m, where the roughness table ends, and "
-            f"{long_waves.wavelengths_m[0]:g} m, where the spectrum begins"
+            f"{shortest:g} m, where the spectrum begins"
         )
     return words

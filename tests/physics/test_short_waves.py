@@ -4,6 +4,8 @@ Same vehicle, same rails, which do not give way in either: what differs is that 
 equations with all waves, and the other the linear vertical ones for the short waves alone.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import spline_filter1d
@@ -13,6 +15,7 @@ from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, rails_of, simulate
 from simrail.ride.vibration.run import Shaker
 from simrail.ride.vibration.sources import Vibration
+from simrail.scenario.vibration_tables import VibrationPart
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.rail_surface import STEP_M, RailSurface
@@ -109,3 +112,33 @@ def test_band_levels_agree(name, speed_mps):
             assert abs(together) < {"roll": 1.5, "sway": 2.5}[motion], (body, motion, together)
         longest = max(longest, np.abs(band_levels_db(long_waves) - band_levels_db(whole)).max())
     assert longest > 6.0  # the short waves do count there
+
+
+@pytest.mark.slow
+def test_wheel_forces_are_of_the_size_that_is_measured():
+    """Dynamic force of an axle at 72 km/h, all sources: about 1 kN in each third of an octave.
+
+    Auersch, Vehicle System Dynamics 48 (2010) 235-261, finds values around 1 kN for each axle and third of an
+    octave, by two methods, for several trains, speeds and soils (abstract, read at opus4.kobv.de). Sources
+    here are synthetic but for the roughness: the median of the bands from 5 to 100 Hz within a factor of 3.
+    """
+    vehicle = load(VehicleFile, "vehicle", "manchester_1").model("manchester_1")
+    track = load(TrackFile, "track", "level_straight").design("level_straight")
+    ride = replace(
+        ride_over((1.5, 100.0), vehicle, 20.0, track),
+        irregularity=Irregularity("erri_b176_low", (1.5, 100.0), 20.0),
+        contact_rate_hz=RATE_HZ,
+        vibration=VibrationPart().vibration(1.5, 0.0),
+    )
+    truth = simulate(ride)
+    steady = np.flatnonzero(np.gradient(truth.reference_position_m, truth.time_s) > 19.98)[500:-500]
+    force = sum(
+        (truth.contact(name)["wheel_load_n"].to_numpy() + truth.short_wave_load(name))[steady]
+        for name in ("axle_f1.left", "axle_f1.right")
+    )
+    window = np.hanning(len(force))
+    power = np.abs(np.fft.rfft((force - force.mean()) * window)) ** 2 * 2.0 / np.sum(window**2) / len(force)
+    frequency = np.fft.rfftfreq(len(force), 1.0 / RATE_HZ)
+    edge, centres = 10.0**0.05, 10.0 ** (np.arange(7, 21) / 10.0)
+    bands = [np.sqrt(power[(frequency >= c / edge) & (frequency < c * edge)].sum()) for c in centres]
+    assert 1000.0 / 3.0 < np.median(bands) < 3000.0, np.round(bands)

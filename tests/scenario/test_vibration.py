@@ -119,12 +119,13 @@ def test_step_is_told() -> None:
     plan = judge_scenario(scenario("scale = 2.0\n[vibration]"))
     width = 10.0 ** (-1.5 / 10.0) - 10.0 ** (-2.5 / 10.0)
     step = 10.0 * np.log10(1e-12 * 10.0**3.1 / width / rail_density(2.0))
-    (told,) = [line for line in plan.warnings if line.startswith("vibration")]
+    (told,) = plan.notes
     assert f"at 1.5 m the roughness lies {abs(step):.1f} dB {'above' if step > 0 else 'below'}" in told
-    (joined,) = [
-        line for line in judge_scenario(scenario("[vibration]\njoin = true")).warnings if "vibration" in line
-    ]
+    (joined,) = judge_scenario(scenario("[vibration]\njoin = true")).notes
     assert "lies 0.0 dB" in joined
+    assert abs(step) > 3.0
+    assert any(told in line and "join = true" in line for line in plan.warnings)
+    assert not any("vibration" in line for line in judge_scenario(scenario("[vibration]")).warnings)
 
 
 def test_a_gap_between_table_and_spectrum_is_told() -> None:

@@ -143,7 +143,9 @@ def test_sections_have_the_gain_that_is_told():
     # 60 km are 240 sections of 250 m, longer ones weighing more: some 200 independent values.
     assert np.abs(score.mean()) < 4.0 / np.sqrt(200)
     assert np.log(gain).std() == pytest.approx(0.4, rel=4.0 / np.sqrt(2 * 200))
-    assert np.mean(gain**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(np.expm1(16 * 0.4**2) / 200))
+    # Over 20 lines: g^2 = exp(2 sd n - 2 sd^2) has the mean 1 and the variance exp(4 sd^2) - 1.
+    lines = [section_gain(s, SectionGain(0.4), start_m=0.0, seed=k) ** 2 for k in range(20)]
+    assert np.mean(lines) == pytest.approx(1.0, abs=4.0 * np.sqrt(np.expm1(4 * 0.4**2) / (20 * 200)))
     lengths = np.diff(s[1:][(np.diff(score) != 0.0) & (np.diff(score, prepend=0.0)[:-1] == 0.0)])
     assert lengths.min() >= 75.0
     assert lengths.max() <= 405.0

@@ -13,6 +13,7 @@ import numpy as np
 
 from simrail.core.jit import FloatArray
 from simrail.ride.truth import Truth
+from simrail.ride.truth_files import checksum
 from simrail.ride.vibration.run import Shaker
 from simrail.ride.vibration.short_waves import COLUMNS, ShortWaves
 from simrail.ride.vibration.sources import Vibration
@@ -83,6 +84,7 @@ def write_short_waves(
         "wheels": model.wheel_names if kept else [],
         "least_share_of_load": dict(zip(model.wheel_names, least.tolist(), strict=True)),
     }
+    plain["crc32"] = {file.name: checksum(file) for file in sorted(folder.glob("*.npy"))}
     (folder / HEADER).write_text(json.dumps(plain), encoding="utf-8")
 
 
@@ -101,6 +103,10 @@ def read_short_waves(folder: Path, rows: int) -> ShortWaves:
         If the folder is incomplete or damaged, or not of ``rows`` rows.
     """
     plain = json.loads((folder / HEADER).read_text(encoding="utf-8"))
+
+    for name, crc32 in plain["crc32"].items():
+        if checksum(folder / name) != crc32:
+            raise ValueError(f"{name} is not what was written")
 
     def read(name: str) -> FloatArray:
         array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
