@@ -53,6 +53,10 @@ def rms_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
         return canvas.to_svg(figure, description=words)
 
 
+_MOST_NAMES = 8
+"""Names of curves that fit side by side."""
+
+
 def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
     """Rms roll error of every method in each curve; "" if there are no curves."""
     windows = case.curves()
@@ -66,7 +70,11 @@ def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
             canvas.draw_marks(
                 axis, scores, style, slot=slot, wide=wide, marker="D" if style.baseline else "o"
             )
-        canvas.categories(axis, [window.removeprefix(CURVE_PREFIX) for window in windows])
+        names = [window.removeprefix(CURVE_PREFIX) for window in windows]
+        if len(names) > _MOST_NAMES:
+            # Their numbers, and the radii below them: whole names would run into each other.
+            names = ["\n".join(name.split()[1:]) for name in names]
+        canvas.categories(axis, names)
         canvas.log_scale(axis.yaxis)
         axis.set_ylabel("rms roll error, \u00b0")
         canvas.legend_above(axis)
