@@ -93,7 +93,7 @@ def vibration_facts(has_vibration: bool, shaken: Mapping[str, str] | None) -> li
         return ["no vibration by short waves (an ablation: every vehicle shakes)"]
     named = ", ".join(name.replace("_", " ") for name in shaken)
     return [
-        f"shaken by {named}; unverified at axle boxes, frames and floors, where no published spectrum was had",
+        f"shaken by {named}; unverified at axle boxes, frames and floors: no published spectrum was had",
         "forces between wheels and rails hold the long waves only; short ones are superposed on the motion",
     ]
 
