@@ -184,12 +184,13 @@ class Shaker:
 
     def _read(self, first: int, z: ComplexArray, push: FloatArray, floors: dict[str, Floor]) -> Piece:
         motions, bendings, loads = self._reading.read(z, push)
+        share, extras = self._vibration.structure_borne, {}
         for car in car_bodies(self._model):
-            floor, share = floors[car.name], self._vibration.structure_borne
-            extra = floor.at(np.arange(first, first + len(z)))
+            extras[car.name] = floors[car.name].at(np.arange(first, first + len(z)))
             if share:
-                extra += share * np.mean([motions[name][:, :3] for name in car.carriers], axis=0)
-            motions[car.name][:, :3] += extra
+                extras[car.name] += share * np.mean([motions[name][:, :3] for name in car.carriers], axis=0)
+        for name, extra in extras.items():
+            motions[name][:, :3] += extra
         return Piece(first, motions, bendings, loads)
 
     def _floors(self) -> dict[str, Floor]:

@@ -39,10 +39,11 @@ class CarBody:
 
 
 def car_bodies(model: VehicleModel) -> tuple[CarBody, ...]:
-    """Car bodies of a vehicle: bodies above the axles that carry no other body on vertical springs.
+    """Car bodies of a vehicle: bodies above the frames, or above the axles where there are no frames.
 
-    A body's storey is the number of vertical springs between it and the rails; it carries those of a higher
-    storey.
+    A body's storey is the number of vertical springs between it and the axles; it carries those of a higher
+    storey. What stands on axles and carries others is a frame. A module that hangs between two others of an
+    articulated vehicle is carried by them.
     """
     joined: dict[str, list[tuple[str, float]]] = {name: [] for name in model.body_names}
     springs = [(e.inner, e.outer, e.position_m[0]) for e in model.suspensions if e.stiffness_npm[2] > 0.0]
@@ -63,7 +64,7 @@ def car_bodies(model: VehicleModel) -> tuple[CarBody, ...]:
     cars = []
     for name, at in storey.items():
         below = [(other, x) for other, x in joined[name] if storey[other] < at]
-        if at > 0 and not any(storey[other] > at for other, _ in joined[name]):
+        if at > 1 or (at == 1 and not any(storey[other] > at for other, _ in joined[name])):
             places = [x for _, x in below]
             cars.append(CarBody(name, tuple(dict.fromkeys(o for o, _ in below)), float(np.ptp(places))))
     return tuple(cars)

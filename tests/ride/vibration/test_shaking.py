@@ -350,14 +350,14 @@ def _product(angles, first, second):
 
 def test_floor_of_a_standing_train(coach, line):
     """Equipment has its rms, half of it in its lines; passengers walk while the train stands only."""
-    standing = gliding(coach, line, 0.0, duration_s=40.0)
+    standing = gliding(coach, line, 0.0, duration_s=24.0)
     floor = Vibration(equipment=Equipment(0.03), passengers=Passengers(0.0125))
     heave = shaken(floor, standing, coach)[0]["body"]
-    assert heave[2000:, 2].std() == pytest.approx(np.hypot(0.03, 0.0125), rel=0.02)
+    assert heave[2000:, 2].std() == pytest.approx(np.hypot(0.03, 0.0125), rel=0.03)
     for frequency in (24.6, 49.2, 98.4):
         # An amplitude of sqrt(2) times an rms of a sixth of the power; the noise adds some percent of it.
         assert amplitude_at(heave[:, 2], frequency) == pytest.approx(0.03 / np.sqrt(3.0), rel=0.1)
-    moving = gliding(coach, line, 10.0, duration_s=40.0)
+    moving = gliding(coach, line, 10.0, duration_s=6.0)
     assert shaken(Vibration(passengers=Passengers()), moving, coach)[0]["body"][:, 2].std() < 1e-12
     assert shaken(Vibration(traction=Traction()), moving, coach)[0]["body"][:, 2].std() < 1e-9
 

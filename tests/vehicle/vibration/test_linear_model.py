@@ -161,6 +161,12 @@ def test_no_axle_bends():
     [
         ("manchester_1", {"body"}, {"frame_front", "frame_rear"}),
         ("metro_irw_bogie", {"body"}, {"frame"}),
+        ("two_axle_wagon", {"body"}, {"front", "rear"}),
+        (
+            "metro_irw_train",
+            {"body_front", "body_middle", "body_rear"},
+            {"frame_front", "frame_rear", "body_front", "body_rear"},
+        ),
     ],
 )
 def test_car_bodies(name, cars, carriers):
