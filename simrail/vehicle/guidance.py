@@ -27,13 +27,14 @@ def heading_weights(vehicle: VehicleModel) -> dict[str, dict[str, float]]:
     names, axles = vehicle.body_names, vehicle.axle_names
     stiffness = _stiffness(vehicle)
     stiffness /= max(float(np.abs(stiffness).max()), 1.0)
-    held = np.array([_motion(names, axle, vehicle.body(axle).position_m[:2], _ACROSS) for axle in axles])
+    at = [np.array(vehicle.body(axle).position_m[:2]) for axle in axles]
+    held = np.array([_motion(names, axle, place, _ACROSS) for axle, place in zip(axles, at, strict=True)])
     n, m = len(stiffness), len(axles)
     system = np.block([[stiffness, held.T], [held, np.zeros((m, m))]])
     asked = np.vstack([np.zeros((n, m)), np.eye(m)])
     # Nothing holds the vehicle along the track: of all solutions the least.
     turns = np.linalg.lstsq(system, asked, rcond=1e-13)[0][2:n:3]
-    x = np.array([vehicle.body(axle).position_m[0] for axle in axles])
+    x = np.array(at)[:, 0]
     return {
         name: dict(zip(axles, (float(weight) for weight in row), strict=True))
         for name, row in zip(names, turns, strict=True)
