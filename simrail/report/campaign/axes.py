@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from simrail.report.tables.pivot import without_ablation
-from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_name
+from simrail.report.words.sentences import EXACT_MAP_AXIS, SILENT_AXIS, axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.aggregate import axis_columns
@@ -30,6 +30,7 @@ _TITLES = {
     "imu": "IMU",
     "irregularity.scale": "irregularity, times its spectrum",
     "irregularity.spectrum": "irregularity",
+    SILENT_AXIS: "vibration",
 }
 
 
@@ -162,6 +163,8 @@ def _words(value: object, column: str) -> str:
         return "-"
     if column == MAP:
         return MAPS[str(value)]
+    if column == SILENT_AXIS:
+        return "off (ablation)" if value else "on"
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (int, float)):
