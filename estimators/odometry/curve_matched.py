@@ -249,13 +249,14 @@ class CurveMatchedOdometry:
             mount_x_m=recording.mount_position_m[0],
             wheel_ahead_m=wheel_ahead(recording),
         )
-        x, p = self._start(recording, pulse, chord)
+        pointing = pointing_of(recording, chord)
+        x, p = self._start(recording, pulse, chord, pointing)
         x[YAW] = line_at(grid, table, x[S]).heading
         spoken_of = STATES if self.smoothed else V + 1
         states, covariance = np.empty((n, STATES)), np.empty((n, spoken_of, spoken_of))
         steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
-        model = self._model(recording, pulse, pointing_of(recording, chord))
+        model = self._model(recording, pulse, pointing)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
         curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
         if past is not None:
@@ -329,14 +330,13 @@ class CurveMatchedOdometry:
         return LineModel(**(own | sheets))
 
     def _start(
-        self, recording: Recording, pulse: float, chord: Chord | None
+        self, recording: Recording, pulse: float, chord: Chord | None, yaw: Pointing
     ) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand."""
         assert recording.encoder_sheet is not None
         sheet, errors = recording.imu_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        yaw = pointing_of(recording, chord)
         x[LAG] = 0.0 if chord is None else min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
         chord_sd = 0.0 if chord is None else math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m)
         sd = np.zeros(STATES)
