@@ -21,6 +21,9 @@ from simrail.core.jit import cache_folder
 
 LIMIT_GB = 20.0
 
+HEADER = "truth.json"
+"""File of a folder that is written last: without it a folder was interrupted and is no ride."""
+
 
 @dataclass(frozen=True)
 class CachedRide:
@@ -51,7 +54,7 @@ def key_of(description: dict[str, Any]) -> str:
 def rides() -> list[CachedRide]:
     """Every complete ride in the cache, the most recently used first."""
     cached = []
-    for place in folder().glob("[!.]*/truth.json"):
+    for place in folder().glob(f"[!.]*/{HEADER}"):
         with suppress(OSError):  # another process may drop it meanwhile
             size = sum(file.stat().st_size for file in place.parent.iterdir())
             used = place.stat().st_mtime
@@ -73,7 +76,7 @@ def clear() -> int:
 def touch(place: Path) -> None:
     """Note that a ride was used now."""
     with suppress(OSError):  # another process may have dropped it, or the cache may be read only
-        os.utime(place / "truth.json")
+        os.utime(place / HEADER)
 
 
 def drop(key: str) -> None:

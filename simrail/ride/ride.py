@@ -11,10 +11,10 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
@@ -40,6 +40,8 @@ from simrail.vehicle.speed_profile import SpeedProfile
 
 if TYPE_CHECKING:
     from simrail.vehicle.engines.exudyn_engine import ExudynEngine
+
+T = TypeVar("T")
 
 Progress = Callable[[float, float, float], None]
 """Called with (simulated seconds done, seconds in all, present speed in m/s)."""
@@ -190,7 +192,7 @@ def is_cached(ride: Ride) -> bool:
     """Whether `simulate` would find this ride on disk, its vibration included."""
     if ride.vibration is not None and not is_cached(ride.without_vibration):
         return False
-    return (ride_cache.folder() / ride_cache.key_of(ride.describe()) / "truth.json").is_file()
+    return (ride_cache.folder() / ride_cache.key_of(ride.describe()) / ride_cache.HEADER).is_file()
 
 
 def simulate(
@@ -232,17 +234,9 @@ def simulate(
     if warn and ride.engine != "kinematic" and (words := hunting_warning(ride, rails_of(ride))):
         warnings.warn(f"ride {ride.name} {words}", stacklevel=2)
     key = ride_cache.key_of(ride.describe())
-    place = ride_cache.folder() / key
-    if place.exists():
-        try:
-            truth = load_truth(place)
-        except (OSError, ValueError, KeyError) as error:
-            ride_cache.drop(key)
-            if told is not None:
-                told(f"ride {ride.name} in the cache was damaged ({error}): simulated again")
-        else:
-            ride_cache.touch(place)
-            return truth
+    kept = _kept_before(key, load_truth, told, f"ride {ride.name}", "simulated again")
+    if kept is not None:
+        return kept
     with ride_cache.new_ride(key) as draft:
         if ride.engine == "kinematic":
             save_truth(_follow(ride), draft)
@@ -251,28 +245,39 @@ def simulate(
                 _drive(ride, draft, progress)
             except DerailedError as error:
                 raise DerailedError(with_hunting(error.derailment, ride, rails_of(ride))) from error
-    return load_truth(place)
+    return load_truth(ride_cache.folder() / key)
+
+
+def _kept_before(
+    key: str, read: Callable[[Path], T], told: Callable[[str], None] | None, name: str, again: str
+) -> T | None:
+    """What the cache has of a key; None if it has nothing, or what was damaged and is dropped."""
+    place = ride_cache.folder() / key
+    if not place.exists():
+        return None
+    try:
+        found = read(place)
+    except (OSError, ValueError, KeyError) as error:
+        ride_cache.drop(key)
+        if told is not None:
+            told(f"{name} in the cache was damaged ({error}): {again}")
+        return None
+    ride_cache.touch(place)
+    return found
 
 
 def _shaken(ride: Ride, truth: Truth, told: Callable[[str], None] | None) -> ShortWaves:
     """The short-wave part of a ride, worked out or found in the cache."""
     assert ride.vibration is not None
     key = ride_cache.key_of(ride.describe())
-    place, rows = ride_cache.folder() / key, len(truth.time_s)
-    if place.exists():
-        try:
-            short = read_short_waves(place, rows)
-        except (OSError, ValueError, KeyError) as error:
-            ride_cache.drop(key)
-            if told is not None:
-                told(f"vibration of ride {ride.name} in the cache was damaged ({error}): worked out again")
-        else:
-            ride_cache.touch(place)
-            return short
+    read = partial(read_short_waves, rows=len(truth.time_s))
+    kept = _kept_before(key, read, told, f"vibration of ride {ride.name}", "worked out again")
+    if kept is not None:
+        return kept
     with ride_cache.new_ride(key) as draft:
         manifest = {"ride": f"{ride.name} (vibration)", "vehicle": ride.vehicle.name}
         write_short_waves(ride.vibration, truth, ride.vehicle, draft, seed=ride.track_seed, manifest=manifest)
-    return read_short_waves(place, rows)
+    return read(ride_cache.folder() / key)
 
 
 def _follow(ride: Ride) -> Truth:

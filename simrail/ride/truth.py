@@ -23,8 +23,8 @@ from simrail.ride.mount_motion import Remembered, mount_motion
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.track.design import TrackDesign
 
-_SAMPLED = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
-"""Fields of `BodyMotion` with a row for each sample."""
+BODY_ARRAYS = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
+"""Fields of `BodyMotion` with a row for each sample; in this order they are columns on disk."""
 
 
 @dataclass(frozen=True)
@@ -214,17 +214,21 @@ class Truth:
         InputError
             If the ride has no such body.
         """
-        if name not in self.bodies:
-            raise InputError(
-                "the ride has no such body", field="body", value=name, limit=", ".join(self.body_names)
-            )
-        body = self.bodies[name]
-        body = replace(body, **{field: getattr(body, field)[rows] for field in _SAMPLED})
+        body = self._engine_motion(name)
+        body = replace(body, **{field: getattr(body, field)[rows] for field in BODY_ARRAYS})
         if self.short_waves is None:
             return body
         places = self.reference_position_m[rows] + body.offset_m
         frame = self.track.frame(np.clip(places, self.track.start_m, self.track.end_m))
         return superposed(body, self.short_waves.of(name, ahead_m, rows), frame, *self._speeds[:, rows])
+
+    def _engine_motion(self, name: str) -> BodyMotion:
+        """What the engine computed of a body."""
+        if name not in self.bodies:
+            raise InputError(
+                "the ride has no such body", field="body", value=name, limit=", ".join(self.body_names)
+            )
+        return self.bodies[name]
 
     @property
     def _speeds(self) -> FloatArray:
@@ -289,13 +293,7 @@ class Truth:
         InputError
             If the vehicle has no such body.
         """
-        if mount.body not in self.bodies:
-            raise InputError(
-                "the ride has no such body",
-                field="body",
-                value=mount.body,
-                limit=", ".join(self.body_names),
-            )
+        self._engine_motion(mount.body)
         wanted = range(len(self.time_s)) if rows is None else rows
         # The name of a mount moves nothing: IMUs of any name in one place share its motion.
         key = replace(mount, name=""), wanted, tuple(columns)

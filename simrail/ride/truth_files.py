@@ -7,6 +7,7 @@ is said in `simrail.ride.truth`; which rides are kept, in `simrail.ride.cache`.
 import json
 import os
 import zlib
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,9 @@ import numpy as np
 
 from simrail.core.columns import CONTACT
 from simrail.core.jit import FloatArray
-from simrail.ride.truth import BodyMotion, Truth
+from simrail.ride.cache import HEADER
+from simrail.ride.truth import BODY_ARRAYS, BodyMotion, Truth
 from simrail.track.design import TrackDesign
-
-BODY_ARRAYS = ("position", "velocity", "acceleration", "angles", "rate", "angular_acceleration")
-"""Columns of a body on disk: six triples, in this order."""
 
 DOUBLE, SINGLE = ("position", "angles"), ("velocity", "acceleration", "rate", "angular_acceleration")
 """Columns of a body of a long ride, in two arrays, of double and of single precision: single has 6e-8 of a
@@ -64,16 +63,56 @@ def create_arrays(
         count = wheels if contacts is None else contacts
         shapes |= {f"contact_{i}": (kept, len(CONTACT)) for i in range(count)}
     folder.mkdir(parents=True, exist_ok=True)
-    made: dict[str, FloatArray] = {}
-    for name, shape in shapes.items():
-        place = folder / f"{name}.npy"
-        precision = np.float32 if name.startswith("rates_") else np.float64
-        made[name] = np.lib.format.open_memmap(place, mode="w+", dtype=precision, shape=shape)
-        # A mapped file has holes: a disk that is full when they are written to kills the process.
-        if hasattr(os, "posix_fallocate"):
-            with place.open("r+b") as file:
-                os.posix_fallocate(file.fileno(), 0, place.stat().st_size)
+    return {
+        name: create_array(folder, name, shape, np.float32 if name.startswith("rates_") else np.float64)
+        for name, shape in shapes.items()
+    }
+
+
+def create_array(
+    folder: Path, name: str, shape: tuple[int, ...], precision: type[np.float32 | np.float64]
+) -> np.memmap:
+    """Create an array on disk, mapped, with room for all of it.
+
+    Raises
+    ------
+    OSError
+        If the disk has no room.
+    """
+    place = folder / f"{name}.npy"
+    made: np.memmap = np.lib.format.open_memmap(place, mode="w+", dtype=precision, shape=shape)
+    # A mapped file has holes: a disk that is full when they are written to kills the process.
+    if hasattr(os, "posix_fallocate"):
+        with place.open("r+b") as file:
+            os.posix_fallocate(file.fileno(), 0, place.stat().st_size)
     return made
+
+
+def read_array(folder: Path, name: str) -> FloatArray:
+    """An array of a folder, mapped from disk."""
+    array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
+    return array
+
+
+def seal(folder: Path, plain: dict[str, Any]) -> None:
+    """Write the header of a folder, with the checksums of its arrays; done last."""
+    whole = {**plain, "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))}}
+    (folder / HEADER).write_text(json.dumps(whole), encoding="utf-8")
+
+
+def read_sealed(folder: Path) -> dict[str, Any]:
+    """The header of a folder, of which the arrays are what was written.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If the folder is incomplete or damaged.
+    """
+    plain: dict[str, Any] = json.loads((folder / HEADER).read_text(encoding="utf-8"))
+    for name, crc32 in plain["crc32"].items():
+        if _crc32(folder / name) != crc32:
+            raise ValueError(f"{name} is not what was written")
+    return plain
 
 
 def write_header(
@@ -102,9 +141,8 @@ def write_header(
         "contact_every": contact_every,
         "contact_wheels": list(wheels) if contact_wheels is None else contact_wheels,
         "axle_offsets_m": axle_offsets_m or {},
-        "crc32": {file.name: checksum(file) for file in sorted(folder.glob("*.npy"))},
     }
-    (folder / "truth.json").write_text(json.dumps(plain), encoding="utf-8")
+    seal(folder, plain)
 
 
 def save_truth(truth: Truth, folder: Path) -> None:
@@ -148,15 +186,7 @@ def load_truth(folder: Path) -> Truth:
     OSError, ValueError, KeyError
         If the folder is incomplete or damaged.
     """
-    plain = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
-    for name, crc32 in plain["crc32"].items():
-        if checksum(folder / name) != crc32:
-            raise ValueError(f"{name} is not what was written")
-
-    def read(name: str) -> FloatArray:
-        array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
-        return array
-
+    plain, read = read_sealed(folder), partial(read_array, folder)
     time_s = np.array(read("time_s"))
     bodies = {}
     for i, (name, (offset, height)) in enumerate(plain["bodies"].items()):
@@ -193,7 +223,7 @@ def load_truth(folder: Path) -> Truth:
     )
 
 
-def checksum(file: Path) -> int:
+def _crc32(file: Path) -> int:
     """Checksum of a file: a disk, or a copy between machines, may change bits in silence."""
     checksum = 0
     with file.open("rb") as stream:

@@ -11,7 +11,8 @@ from simrail.core.jit import FloatArray
 from simrail.ride.abeam import abeam
 from simrail.ride.contact_forces import contact_columns
 from simrail.ride.mount_motion import give_back
-from simrail.ride.truth_files import BODY_ARRAYS, DOUBLE, SINGLE, create_arrays
+from simrail.ride.truth import BODY_ARRAYS
+from simrail.ride.truth_files import DOUBLE, SINGLE, create_arrays
 from simrail.vehicle.engines.engine import Segment
 
 if TYPE_CHECKING:

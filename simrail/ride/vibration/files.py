@@ -4,24 +4,20 @@ Motions are kept as float32: relative to their size of some millimetres and metr
 a ten-millionth. A folder without its header was interrupted, and is no vibration.
 """
 
-import json
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from simrail.core.jit import FloatArray
 from simrail.ride.truth import Truth
-from simrail.ride.truth_files import checksum
+from simrail.ride.truth_files import create_array, read_array, read_sealed, seal
 from simrail.ride.vibration.run import Shaker
 from simrail.ride.vibration.short_waves import COLUMNS, ShortWaves
 from simrail.ride.vibration.sources import Vibration
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.vibration.linear_model import Bending
-
-HEADER = "truth.json"
-"""Named as a truth's, so that the cache of rides counts and drops these folders too."""
 
 
 def write_short_waves(
@@ -40,7 +36,7 @@ def write_short_waves(
     vibration : Vibration
         What shakes.
     truth : Truth
-        The ride; loads are kept where it keeps contacts.
+        The ride; motions are kept of its bodies, loads where it keeps contacts.
     model : VehicleModel
         The vehicle.
     folder : Path
@@ -54,21 +50,22 @@ def write_short_waves(
     shaker = Shaker(vibration, truth, model, seed=seed)
     rows, every = len(truth.time_s), truth.contact_every
 
-    def create(name: str, shape: tuple[int, ...]) -> np.memmap:
-        return np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=np.float32, shape=shape)
+    def create(name: str, *shape: int) -> np.memmap:
+        return create_array(folder, name, shape, np.float32)
 
-    motions = {body: create(f"motion_{i}", (rows, len(COLUMNS))) for i, body in enumerate(model.body_names)}
-    bends = {b.body: create(f"bending_{i}", (rows, 3)) for i, b in enumerate(shaker.bendings)}
+    motions = {body: create(f"motion_{i}", rows, len(COLUMNS)) for i, body in enumerate(truth.body_names)}
+    bendings = [bending for bending in shaker.bendings if bending.body in truth.bodies]
+    bends = {bending.body: create(f"bending_{i}", rows, 3) for i, bending in enumerate(bendings)}
     kept = -(-rows // every) if truth.contacts else 0
-    loads = create("loads", (kept, len(model.wheels))) if kept else None
+    loads = create("loads", kept, len(model.wheels)) if kept else None
     least = np.full(len(model.wheels), np.inf)
     static = model.wheel_load_n(truth.gravity_mps2)
     for piece in shaker.run():
         here = slice(piece.first, piece.first + len(piece.loads))
-        for body, motion in piece.motions.items():
-            motions[body][here] = motion
-        for body, bend in piece.bendings.items():
-            bends[body][here] = bend
+        for body, motion in motions.items():
+            motion[here] = piece.motions[body]
+        for body, bend in bends.items():
+            bend[here] = piece.bendings[body]
         least = np.minimum(least, 1.0 + piece.loads.min(axis=0) / static)
         if loads is not None:
             first = -(-here.start // every)
@@ -79,13 +76,12 @@ def write_short_waves(
         "manifest": manifest,
         "sources": vibration.named,
         "longest_wave_m": longest_wave_m(vibration),
-        "bodies": model.body_names,
-        "bendings": [asdict(b) for b in shaker.bendings],
+        "bodies": truth.body_names,
+        "bendings": [asdict(bending) for bending in bendings],
         "wheels": model.wheel_names if kept else [],
         "least_share_of_load": dict(zip(model.wheel_names, least.tolist(), strict=True)),
     }
-    plain["crc32"] = {file.name: checksum(file) for file in sorted(folder.glob("*.npy"))}
-    (folder / HEADER).write_text(json.dumps(plain), encoding="utf-8")
+    seal(folder, plain)
 
 
 def longest_wave_m(vibration: Vibration) -> float:
@@ -102,16 +98,7 @@ def read_short_waves(folder: Path, rows: int) -> ShortWaves:
     OSError, ValueError, KeyError
         If the folder is incomplete or damaged, or not of ``rows`` rows.
     """
-    plain = json.loads((folder / HEADER).read_text(encoding="utf-8"))
-
-    for name, crc32 in plain["crc32"].items():
-        if checksum(folder / name) != crc32:
-            raise ValueError(f"{name} is not what was written")
-
-    def read(name: str) -> FloatArray:
-        array: FloatArray = np.load(folder / f"{name}.npy", mmap_mode="r")
-        return array
-
+    plain, read = read_sealed(folder), partial(read_array, folder)
     motions = {body: read(f"motion_{i}") for i, body in enumerate(plain["bodies"])}
     for body, motion in motions.items():
         if motion.shape != (rows, len(COLUMNS)):

@@ -106,7 +106,7 @@ class Segment:
     contacts: RecordArray
 
     def body(self, index: int) -> FloatArray:
-        """Motion (n, 18) of one body: the columns of `simrail.ride.truth_files.BODY_ARRAYS`."""
+        """Motion (n, 18) of one body: the columns of `simrail.ride.truth.BODY_ARRAYS`."""
         return np.hstack(
             [
                 self.position[:, index],
