@@ -218,7 +218,10 @@ class Parts:
         return self._rides[key]
 
     def _kept(self, cell: Cell, vehicle: VehicleModel, profile: SpeedProfile) -> Kept | None:
-        """What of a ride is kept: of a long one, bodies with an IMU and the wheel of the encoder."""
+        """What of a ride is kept: of a long one, bodies with an IMU and the wheel of the encoder.
+
+        Short waves come from every wheel by its angle. In silence as many are kept: it is the same ride.
+        """
         try:
             duration_s = profile.duration_s
         except InputError:  # `simrail.scenario.check_ride` says what is wrong with it
@@ -229,6 +232,8 @@ class Parts:
         bodies = {str(body) for part in spec.imu if part.is_on(cell.spec.vehicle) for body in each(part.body)}
         places = {str(place) for place in each(spec.encoder.wheel)} if spec.encoder is not None else set()
         wheels = {vehicle.wheel_at(place, direction=profile.direction) for place in places}
+        if cell.spec.vibration is not None:
+            wheels = set(vehicle.wheel_names)
         return Kept(tuple(sorted(bodies)), tuple(sorted(wheels)))
 
     def _irregularity(self, part: IrregularityPart) -> Irregularity:

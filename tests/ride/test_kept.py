@@ -108,3 +108,22 @@ def test_wheel_angles_do_not_feel_where_segments_end(tmp_path: Path) -> None:
         rows.finish()
         angles.append(np.load(tmp_path / str(segment_s) / "wheel_0.npy"))
     np.testing.assert_allclose(angles[1], angles[0], rtol=0, atol=1e-12 * np.abs(angles[0]).max())
+
+
+def test_a_long_ride_that_shakes_is_that_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Wheels out of round ask for the angle of every wheel; of what is kept the short waves are the same."""
+    monkeypatch.setenv("SIMRAIL_RIDES", str(tmp_path))
+    overrides = ["vibration={}", "engine=compiled", "ride.end_m=50.0", "ride.rest_s=1.0", "map.exact=true"]
+    scenario = load_scenario("go20a", overrides=overrides)
+    cell = next(iter(cells(scenario)))
+    whole = simulate(Parts(scenario).ride(cell))
+    monkeypatch.setattr(build, "LONG_RIDE_S", 1.0)
+    ride = Parts(scenario).ride(cell)
+    assert ride.kept is not None and ride.kept.bodies == ("front",)
+    kept = simulate(ride)
+    assert whole.short_waves is not None and kept.short_waves is not None
+    assert list(kept.short_waves.motions) == ["front"]
+    np.testing.assert_array_equal(kept.short_waves.motions["front"], whole.short_waves.motions["front"])
+    assert kept.short_waves.least_share_of_load == whole.short_waves.least_share_of_load
