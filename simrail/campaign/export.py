@@ -111,7 +111,7 @@ def export(
 def _write_contact(truth: Truth, folder: Path, *, format: Format) -> None:
     """Write the forces of every wheel, a file each."""
     folder.mkdir()
-    for wheel in truth.wheel_names:
+    for wheel in truth.contacts or truth.wheel_names:
         write_frame(truth.contact(wheel), folder / f"{wheel}.{format}", format=format)
 
 

@@ -104,7 +104,7 @@ def axles_of(truth: Truth, vehicle: VehicleModel, *, factor: float = 1.0) -> lis
     static = dict(zip(vehicle.wheel_names, vehicle.wheel_load_n(truth.gravity_mps2), strict=True))
     rate_hz = truth.rate_hz / truth.contact_every
     by_axle: dict[str, list[str]] = {}
-    for wheel in truth.wheel_names:
+    for wheel in vehicle.wheel_names:
         by_axle.setdefault(wheel.rpartition(".")[0], []).append(wheel)
     axles = []
     for names in by_axle.values():

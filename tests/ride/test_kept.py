@@ -20,6 +20,7 @@ from simrail.scenario import build
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
 from simrail.scenario.scenario import load_scenario
+from simrail.scoring.ride_figures import axles_of
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
@@ -35,7 +36,7 @@ RIDE = Ride(
     vehicle=load(VehicleFile, "vehicle", "metro_irw_bogie").model("metro_irw_bogie"),
     profile=SpeedProfile(240.0, 170.0, 12.0, rest_s=1.0, final_rest_s=2.0),
     engine="compiled",
-    contact_rate_hz=100.0,
+    contact_rate_hz=200.0,
 )
 MOUNT = Mount("imu", "front", (0.1, 0.0, 0.6))
 
@@ -68,8 +69,12 @@ def test_what_is_kept_is_that_of_the_whole_ride(rides: tuple[Truth, Truth]) -> N
 def test_contacts_are_kept_of_every_wheel(rides: tuple[Truth, Truth]) -> None:
     whole, kept = rides
     for wheel in whole.wheel_names:
-        np.testing.assert_array_equal(kept.contacts[wheel], whole.contacts[wheel])
+        assert kept.contact(wheel).equals(whole.contact(wheel))
     assert kept.contacts["front.left"].shape[1] == len(CONTACT)
+    # Running safety is that of every axle by both of its wheels.
+    for ours, full in zip(axles_of(kept, RIDE.vehicle), axles_of(whole, RIDE.vehicle), strict=True):
+        assert ours.series.wheels == full.series.wheels and len(full.series.wheels) == 2
+        np.testing.assert_array_equal(ours.series.guiding_force_n, full.series.guiding_force_n)
 
 
 def test_wheels_are_named_by_their_place_as_before(rides: tuple[Truth, Truth]) -> None:
