@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from simrail.estimators.kalman import fixed_interval, room_for_history
 from simrail.estimators.odometry.curve_matched import AXLE as YAW_OF_AXLE
-from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, wheel_ahead
+from simrail.estimators.odometry.curve_matched import UNKNOWN_BODY, CurveMatchedOdometry, wheel_ahead
 from simrail.estimators.odometry.kernel import (
     BEND,
     DRIFT,
@@ -367,7 +367,7 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     sheet = recording.encoder_sheet
     pulse = 2.0 * np.pi * sheet.wheel_radius_m / sheet.pulses_per_revolution
     grid, table = line_table(recording.track)
-    x, p = method._start(recording, pulse, None)
+    x, p = method._start(recording, pulse, None, UNKNOWN_BODY)
     place = recording.odometry.iloc[first * 5]
     x[S], x[V] = place["position_m"], place["speed_mps"]
     x[YAW] = np.interp(x[S], grid[0] + np.arange(len(table)) / grid[1], table[:, 0])
