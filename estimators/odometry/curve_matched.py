@@ -148,7 +148,7 @@ MOST_LAG_M = 1.0
 """Of a long wheelbase: the play in the gauge turns it by no more, in the curves that matter."""
 
 CUT_LAG_SD = 0.3
-"""Of what that leaves out of the play, as much is the standard deviation of the lag: how sharp the curves are."""
+"""Of what that leaves out of the play, so much is the sd of the lag: nobody says how sharp the curves are."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
