@@ -34,6 +34,7 @@ from simrail.estimators.track_relative.states import (
     EVEN,
     GYRO_BIAS,
     HEADING,
+    LAG,
     LEFT,
     ODD,
     PITCH,
@@ -89,6 +90,8 @@ class Noise(NamedTuple):
         m2/s5, intensity of the acceleration's random walk.
     wheel_walk, tread_sd, tread_length : float
         m2/m; relative, m.
+    lag_walk : float
+        m2/m.
     gyro_walk, accel_walk : float
         Of biases, rad2/s3, m2/s5.
     forgotten_sd : ndarray (5,)
@@ -103,6 +106,7 @@ class Noise(NamedTuple):
     wheel_walk: float
     tread_sd: float
     tread_length: float
+    lag_walk: float
     gyro_walk: float
     accel_walk: float
     forgotten_sd: FloatArray
@@ -303,6 +307,7 @@ def predict(x: FloatArray, p: FloatArray, flow: FloatArray, dt: float, noise: No
     p[A, V] = p[V, A]
     p[V, V] += q * dt**3 / 3.0
     p[WAY, WAY] += noise.wheel_walk * way
+    p[LAG, LAG] += noise.lag_walk * way
     for i in range(3):
         p[GYRO_BIAS[i], GYRO_BIAS[i]] += noise.gyro_walk * dt
         p[ACCEL_BIAS[i], ACCEL_BIAS[i]] += noise.accel_walk * dt

@@ -17,6 +17,7 @@ from simrail.estimators.track_relative.states import S
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.vehicle_sheet import Chord
+from simrail.track.design import TrackDesign
 
 STEP_M = 0.25
 """Of the table: that of the odometry's."""
@@ -41,9 +42,9 @@ class Ground(NamedTuple):
         d pitch/ds.
     gravity : tuple of three Dual
         Unit vector against gravity, track axes.
-    askew_yaw, askew_pitch : Dual
-        Angles of the body's chord less those of the track under the mount.
-    askew_yaw_1, askew_pitch_1 : Dual
+    askew_roll, askew_yaw, askew_pitch : Dual
+        Angles of the body on its chord less those of the track under the mount.
+    askew_roll_1, askew_yaw_1, askew_pitch_1 : Dual
         Their slopes, 1/m.
     bend, bend_1, bend_2, lean, lean_1, lean_2, dip, dip_1 : Dual
         Curvature and roll over the chord, eased, and their slopes; of the curvature of the profile.
@@ -64,8 +65,10 @@ class Ground(NamedTuple):
     dk: tuple[Dual, Dual, Dual]
     pitch_slope: Dual
     gravity: tuple[Dual, Dual, Dual]
+    askew_roll: Dual
     askew_yaw: Dual
     askew_pitch: Dual
+    askew_roll_1: Dual
     askew_yaw_1: Dual
     askew_pitch_1: Dual
     bend: Dual
@@ -96,7 +99,8 @@ def ground_at(recording: Recording, chord: Chord | None, place: FloatArray) -> G
     under = track.frame(grid)
     askew_yaw, askew_pitch = table[:, 7], table[:, 5] - under.pitch_rad
     bend, dip = _eased(table[:, 1]), _eased(np.gradient(table[:, 5], grid))
-    lean = _eased(_over_chord(under.roll_rad, chord))
+    borne = _over_chord(track, grid, recording, chord)
+    lean, askew_roll = _eased(borne), borne - under.roll_rad
     roll_slope = np.gradient(under.roll_rad, grid)
     even, odd = table[:, 2], table[:, 3]
     weight = np.where(np.abs(even) + np.abs(odd) > 1e-12, even / np.where(even + odd == 0.0, 1.0, even + odd), 0.0)
@@ -130,6 +134,7 @@ def ground_at(recording: Recording, chord: Chord | None, place: FloatArray) -> G
             Dual(cp * cr, {S: -cp * sr * roll_1 - sp * cr * pitch_1}),
         ),
         **dict(zip(("askew_yaw", "askew_yaw_1"), known(askew_yaw), strict=True)),
+        **dict(zip(("askew_roll", "askew_roll_1"), known(askew_roll), strict=True)),
         **dict(zip(("askew_pitch", "askew_pitch_1"), known(askew_pitch), strict=True)),
         **dict(zip(("bend", "bend_1", "bend_2"), known(bend, 2), strict=True)),
         **dict(zip(("lean", "lean_1", "lean_2"), known(lean, 2), strict=True)),
@@ -154,13 +159,20 @@ def _eased(values: FloatArray) -> FloatArray:
     return np.asarray(ndimage.gaussian_filter1d(values, EASE_M / STEP_M, mode="nearest"))
 
 
-def _over_chord(values: FloatArray, chord: Chord | None) -> FloatArray:
-    """Mean over the two ends of a chord."""
-    if chord is None or chord.half_m == 0.0:
-        return values
-    away = round(chord.half_m / STEP_M)
-    padded = np.pad(values, away, mode="edge")
-    return 0.5 * (padded[2 * away :] + padded[: len(padded) - 2 * away])
+def _over_chord(
+    track: TrackDesign, grid: FloatArray, recording: Recording, chord: Chord | None
+) -> FloatArray:
+    """Roll of the track under a body: the mean of those under the two ends of its chord.
+
+    An axle rolls with the track where it is, though its frame points it along a chord.
+    """
+    sheet = recording.vehicle_sheet
+    here = None if sheet is None else sheet.body(recording.mount_body)
+    if chord is None or here is None or not here.supports:
+        return track.frame(grid).roll_rad
+    middle = grid + chord.centre_m - recording.mount_position_m[0]
+    ends = [track.frame_extended(middle + side * chord.half_m).roll_rad for side in (1.0, -1.0)]
+    return np.asarray(0.5 * (ends[0] + ends[1]))
 
 
 def _share_of_cant(roll: FloatArray, curve: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ Jacobian follows.
     h_m     = CURVE h - EVEN even - ODD odd                       curvature that the map has not
     q       = V^2 (bend + h_m)/g + lean + cant_m                  cant deficiency over g, over the chord
     cant_m  = CANT share + CANT_ALONG - EVEN even_r - ODD odd_r   roll that the map has not
-    rho     = (ROLL + TILT q + cant_m,
+    rho     = (ROLL + TILT q + cant_m + askew,
                PITCH + SQUAT A/g + LEAD dip + SLOPE + askew,
                YAW - LAG bend + askew)                            body in the map's track
     w       = V k + V h_m e_v,      e_v upwards in track axes
@@ -103,12 +103,12 @@ def pose_of(x: list[Dual], ground: Ground, around: Around) -> Pose:
     rate = 1.0 if around.in_time else run
     behind = x[at.LAG] * (-sense)
     rho = (
-        x[at.ROLL] + x[at.TILT] * q + cant,
+        x[at.ROLL] + x[at.TILT] * q + cant + ground.askew_roll,
         x[at.PITCH] + x[at.SQUAT] * a * (1.0 / g) + x[at.LEAD] * ground.dip * (-sense) + x[at.SLOPE] + ground.askew_pitch,
         x[at.YAW] + behind * ground.bend + ground.askew_yaw,
     )
     rho_rate = (
-        x[at.ROLL_RATE] * rate + x[at.TILT] * q_rate + cant_rate,
+        x[at.ROLL_RATE] * rate + x[at.TILT] * q_rate + cant_rate + v * ground.askew_roll_1,
         x[at.PITCH_RATE] * run
         + x[at.SQUAT] * (around.jerk / g)
         + x[at.LEAD] * v * ground.dip_1 * (-sense)

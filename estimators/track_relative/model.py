@@ -159,6 +159,7 @@ def noise_of(recording: Recording, motion: Motion) -> Noise:
         wheel_walk=WHEEL_WALK_M,
         tread_sd=TREAD_SD,
         tread_length=TREAD_LENGTH_M,
+        lag_walk=pointing_of(recording, chord_of(recording)).lag_walk_m,
         gyro_walk=2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
         accel_walk=2.0 * sheet.accel_bias_instability_mps2**2 / 300.0 + 1e-14,
         forgotten_sd=_map_sds(recording),

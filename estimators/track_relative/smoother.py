@@ -51,7 +51,9 @@ class TrackRelativeSmoother:
         chord = chord_of(recording)
         motion = self.motion or motion_of(recording)
         states = first_guess(steps, motion, lag_of(chord), y_bend_of(recording, chord))
-        for _ in range(self.passes if self.smoothed else 1):
+        for number in range(self.passes if self.smoothed else 1):
+            if number > 0:
+                states = relinearised(states)
             model = model_of(recording, steps, motion, chord, states)
             if self.smoothed:
                 states, covariance, nll, surprises = smooth(model)
@@ -62,6 +64,18 @@ class TrackRelativeSmoother:
     def estimate(self, recording: Recording) -> Estimate:
         steps, model, states, covariance, nll, surprises = self.trace(recording)
         return said(recording, steps, self.motion or motion_of(recording), chord_of(recording), states, covariance, causal=self.causal)
+
+
+def relinearised(states):
+    """States about which to linearise again: of the train on its map, of the map and the suspension.
+
+    Not those of the body in its track: what they multiply is a motion of the body as well, and a smoothed one is
+    smaller than the true one, so that the product would be made up by a state that is constant.
+    """
+    again = np.zeros_like(states)
+    kept = [at.S, at.V, at.A, at.TILT, at.LAG, at.Y_BEND]
+    again[:, kept] = states[:, kept]
+    return again
 
 
 def motion_of(recording):
