@@ -226,7 +226,7 @@ class CurveMatchedOdometry:
         InputError
             If the recording has no encoder.
         """
-        states = self._at_imu_times(self.trace(recording), recording)
+        states = self.at_imu_times(self.trace(recording), recording)
         return Estimate(states=states, mount=recording.mount)
 
     def trace(self, recording: Recording) -> Steps:
@@ -269,7 +269,7 @@ class CurveMatchedOdometry:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
 
-    def _at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
+    def at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
         """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
         calm = _calm(steps, smoothed=self.smoothed)
@@ -343,7 +343,7 @@ class CurveMatchedOdometry:
         sheet, errors = recording.imu_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        x[LAG], chord_sd = (0.0, 0.0) if chord is None else _lag_of(chord)
+        x[LAG], chord_sd = (0.0, 0.0) if chord is None else lag_of(chord)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
         sd[V] = STILL_SD_MPS
@@ -370,7 +370,7 @@ class CurveMatchedOdometry:
         )
 
 
-def _lag_of(chord: Chord) -> tuple[float, float]:
+def lag_of(chord: Chord) -> tuple[float, float]:
     """By how much the tangent lies behind the chord, m, and the sd of that by the drawing."""
     lag = min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
     sd = math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m, CUT_LAG_SD * (chord.play_m - lag))

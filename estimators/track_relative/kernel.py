@@ -127,8 +127,6 @@ class Model(NamedTuple):
         `FLOWS` of the step that leads there.
     said_columns, said : ndarray of int (7, u), ndarray (n, 7, u)
         Rows of the outputs.
-    start, start_covariance : ndarray (49,), (49, 49)
-        Before the first update.
     dt : float
         s.
     noise : Noise
@@ -141,8 +139,6 @@ class Model(NamedTuple):
     flows: FloatArray
     said_columns: IntArray
     said: FloatArray
-    start: FloatArray
-    start_covariance: FloatArray
     dt: float
     noise: Noise
 
@@ -443,9 +439,8 @@ def run_segment(
     """
     total = 0.0
     for k in range(first, last):
-        if k > 0:
-            transition(model.flows[k], model.dt, model.noise, scratch)
-            predict(x, p, model.flows[k], model.dt, model.noise, scratch)
+        transition(model.flows[k], model.dt, model.noise, scratch)
+        predict(x, p, model.flows[k], model.dt, model.noise, scratch)
         at = k - first
         if kept is not None:
             for i in range(STATES):
@@ -553,9 +548,8 @@ def run_back(
             smooth(segment, at, lam, info, smoothed[k])
             if covariance.shape[0] > 0:
                 speak(segment.covariances[at], info, model.said_columns, model.said[k], said, work, covariance[k])
-            if k > 0:
-                transition(model.flows[k], model.dt, model.noise, scratch)
-                predict_back(lam, info, model.flows[k], model.dt, model.noise, scratch)
+            transition(model.flows[k], model.dt, model.noise, scratch)
+            predict_back(lam, info, model.flows[k], model.dt, model.noise, scratch)
 
 
 @njit_borrowed

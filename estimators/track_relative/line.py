@@ -1,176 +1,122 @@
 """The map under a body, at the places of a ride: what the track-relative smoother takes of it.
 
-A body points along a chord of the track (`simrail.estimators.odometry.line_table`) and rolls with the cant and
-the curvature that its whole length is on: both are brought over the chord, and over a window of
-`EASE_M`, within which the suspension follows. How a joint's shift changes curvature and cant is as in that
-module: the slope times the joint's weight, by the parity of its number.
+A body points along a chord of the track (`simrail.estimators.odometry.line_table`) and rolls with the track under
+the two ends of that chord; its suspension follows cant and curvature within a window of `EASE_M`. How the shift of
+a joint changes curvature and cant is as in that module: the slope times the joint's weight, by the parity of its
+number.
+
+A quantity of the map depends on the place, which is a state: each is a `Dual` of S.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
-from simrail.estimators.odometry.line_table import line_table
-from simrail.estimators.track_relative.dual import Dual
+from simrail.estimators.odometry.curve_matched import chord_of
+from simrail.estimators.odometry.line_table import PLACES_PER_M, line_table
+from simrail.estimators.track_relative.dual import Dual, Vector
 from simrail.estimators.track_relative.states import S
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
-from simrail.recording.sheets.vehicle_sheet import Chord
-from simrail.track.design import TrackDesign
-
-STEP_M = 0.25
-"""Of the table: that of the odometry's."""
+from simrail.track.design import TrackFrame
 
 EASE_M = 1.5
 """Standard deviation of the window over which a suspension follows cant and curvature."""
 
-_FLAT = 1e-7
+LEVEL_1PM = 1e-7
 """1/m: where the slope's own slope is less, there is no vertical curve."""
 
+NO_CANT_RAD = 1e-3
+"""A curve of which the roll stays below has no cant that could err."""
 
-class Ground(NamedTuple):
-    """The map at the places of n steps: what depends on the place, as `Dual` of S.
+NO_RAMP_1PM2 = 1e-12
+"""1/m2: where the curvature's slope is less, there is no transition."""
+
+
+class Lines(NamedTuple):
+    """The map over its whole length, on a grid of places, for one mount.
 
     Attributes
     ----------
-    roll, pitch, yaw : ndarray (n,)
-        Of the track, rad.
-    k, dk : tuple of three Dual
-        Darboux curvatures per metre, and their slopes (EQUATIONS 1.1).
-    pitch_slope : Dual
-        d pitch/ds.
-    gravity : tuple of three Dual
-        Unit vector against gravity, track axes.
-    askew_roll, askew_yaw, askew_pitch : Dual
-        Angles of the body on its chord less those of the track under the mount.
-    askew_roll_1, askew_yaw_1, askew_pitch_1 : Dual
-        Their slopes, 1/m.
-    bend, bend_1, bend_2, lean, lean_1, lean_2, dip, dip_1 : Dual
-        Curvature and roll over the chord, eased, and their slopes; of the curvature of the profile.
-    even, odd, even_roll, odd_roll : ndarray (n,)
-        Slope of curvature and of roll by the weights of the joints of even and odd number.
-    canted, canted_1 : Dual
-        Share of the curve's full cant, 0 to 1, and its slope.
-    element, curve : ndarray (n,)
-        Numbers, whole.
-    vertical : ndarray (n,) of bool
-        In a vertical curve.
+    places : ndarray (m,)
+    askew_roll, askew_pitch, askew_yaw : ndarray (m,)
+        Angles of the body on its chord less those of the track under the mount, rad.
+    bend, lean, dip : ndarray (m,)
+        Eased: curvature of the track over the chord, its roll, and the slope of its pitch.
+    canted : ndarray (m,)
+        Share of a curve's full cant, 0 to 1.
+    even, odd, even_roll, odd_roll : ndarray (m,)
+        Slope of curvature and roll, by the weights of the joints of even and odd number.
+    element, curve : ndarray (m,)
+        Numbers of the element, and of the stretch that has one curve's error.
+    vertical : ndarray (m,)
+        1 in a vertical curve, else 0.
     """
 
-    roll: FloatArray
-    pitch: FloatArray
-    yaw: FloatArray
-    k: tuple[Dual, Dual, Dual]
-    dk: tuple[Dual, Dual, Dual]
-    pitch_slope: Dual
-    gravity: tuple[Dual, Dual, Dual]
-    askew_roll: Dual
-    askew_yaw: Dual
-    askew_pitch: Dual
-    askew_roll_1: Dual
-    askew_yaw_1: Dual
-    askew_pitch_1: Dual
-    bend: Dual
-    bend_1: Dual
-    bend_2: Dual
-    lean: Dual
-    lean_1: Dual
-    lean_2: Dual
-    dip: Dual
-    dip_1: Dual
+    places: FloatArray
+    askew_roll: FloatArray
+    askew_pitch: FloatArray
+    askew_yaw: FloatArray
+    bend: FloatArray
+    lean: FloatArray
+    dip: FloatArray
+    canted: FloatArray
     even: FloatArray
     odd: FloatArray
     even_roll: FloatArray
     odd_roll: FloatArray
-    canted: Dual
-    canted_1: Dual
     element: FloatArray
     curve: FloatArray
-    vertical: np.ndarray
+    vertical: FloatArray
 
 
-def ground_at(recording: Recording, chord: Chord | None, place: FloatArray) -> Ground:
-    """The map at places (n,); beyond its ends it is as at its ends."""
+def lines_of(recording: Recording) -> Lines:
+    """The map of a recording, for its mount."""
     track = recording.track
-    place = np.clip(place, track.start_m, track.end_m)
-    _, table = line_table(track, chord=chord, mount_x_m=recording.mount_position_m[0])
-    grid = np.minimum(track.start_m + STEP_M * np.arange(len(table)), track.end_m)
-    under = track.frame(grid)
-    askew_yaw, askew_pitch = table[:, 7], table[:, 5] - under.pitch_rad
-    bend, dip = _eased(table[:, 1]), _eased(np.gradient(table[:, 5], grid))
-    borne = _over_chord(track, grid, recording, chord)
-    lean, askew_roll = _eased(borne), borne - under.roll_rad
-    roll_slope = np.gradient(under.roll_rad, grid)
-    even, odd = table[:, 2], table[:, 3]
-    weight = np.where(np.abs(even) + np.abs(odd) > 1e-12, even / np.where(even + odd == 0.0, 1.0, even + odd), 0.0)
-    canted = _share_of_cant(under.roll_rad, table[:, 9])
-    nearest = np.clip(np.round((place - track.start_m) / STEP_M).astype(int), 0, len(grid) - 1)
-
-    def at(values: FloatArray) -> FloatArray:
-        return np.interp(place, grid, values)
-
-    def known(values: FloatArray, times: int = 1) -> list[Dual]:
-        """Values, and ``times`` slopes of them, each with its own slope by S."""
-        rows = [values]
-        for _ in range(times + 1):
-            rows.append(np.gradient(rows[-1], grid))
-        return [Dual(at(row), {S: at(slope)}) for row, slope in zip(rows[:-1], rows[1:], strict=True)]
-
-    frame = track.frame(place)
-    sr, cr = np.sin(frame.roll_rad), np.cos(frame.roll_rad)
-    sp, cp = np.sin(frame.pitch_rad), np.cos(frame.pitch_rad)
-    roll_1, pitch_1 = frame.rates[:, 0], frame.rates[:, 1]
-    return Ground(
-        roll=frame.roll_rad,
-        pitch=frame.pitch_rad,
-        yaw=frame.yaw_rad,
-        k=_vector(frame.k, frame.dk),
-        dk=_vector(frame.dk, np.zeros_like(frame.dk)),
-        pitch_slope=Dual(pitch_1, {S: frame.second[:, 1]}),
-        gravity=(
-            Dual(-sp, {S: -cp * pitch_1}),
-            Dual(cp * sr, {S: cp * cr * roll_1 - sp * sr * pitch_1}),
-            Dual(cp * cr, {S: -cp * sr * roll_1 - sp * cr * pitch_1}),
-        ),
-        **dict(zip(("askew_yaw", "askew_yaw_1"), known(askew_yaw), strict=True)),
-        **dict(zip(("askew_roll", "askew_roll_1"), known(askew_roll), strict=True)),
-        **dict(zip(("askew_pitch", "askew_pitch_1"), known(askew_pitch), strict=True)),
-        **dict(zip(("bend", "bend_1", "bend_2"), known(bend, 2), strict=True)),
-        **dict(zip(("lean", "lean_1", "lean_2"), known(lean, 2), strict=True)),
-        **dict(zip(("dip", "dip_1"), known(dip), strict=True)),
-        even=at(even),
-        odd=at(odd),
-        even_roll=at(roll_slope * weight),
-        odd_roll=at(roll_slope * (1.0 - weight) * (np.abs(even) + np.abs(odd) > 1e-12)),
-        **dict(zip(("canted", "canted_1"), known(canted), strict=True)),
-        element=table[nearest, 8],
-        curve=table[nearest, 9],
-        vertical=np.abs(at(np.gradient(under.pitch_rad, grid))) > _FLAT,
+    _, table = line_table(track, chord=chord_of(recording), mount_x_m=recording.mount_position_m[0])
+    heading_askew, even, odd, pitch, curve = table[:, 7], table[:, 2], table[:, 3], table[:, 5], table[:, 9]
+    places = np.minimum(track.start_m + np.arange(len(table)) / PLACES_PER_M, track.end_m)
+    under = track.frame(places)
+    borne = _roll_over_chord(recording, places)
+    ramp = even + odd
+    in_transition = np.abs(even) + np.abs(odd) > NO_RAMP_1PM2
+    share = np.where(in_transition, even / np.where(ramp == 0.0, 1.0, ramp), 0.0)
+    roll_slope = np.where(in_transition, under.rates[:, 0], 0.0)
+    return Lines(
+        places=places,
+        askew_roll=borne - under.roll_rad,
+        askew_pitch=pitch - under.pitch_rad,
+        askew_yaw=heading_askew,
+        bend=_eased(table[:, 1]),
+        lean=_eased(borne),
+        dip=_eased(np.gradient(pitch, places)),
+        canted=_share_of_cant(under.roll_rad, curve),
+        even=even,
+        odd=odd,
+        even_roll=roll_slope * share,
+        odd_roll=roll_slope * (1.0 - share),
+        element=table[:, 8],
+        curve=curve,
+        vertical=(np.abs(under.rates[:, 1]) > LEVEL_1PM).astype(np.float64),
     )
 
 
-def _vector(values: FloatArray, slopes: FloatArray) -> tuple[Dual, Dual, Dual]:
-    x, y, z = (Dual(values[:, i], {S: slopes[:, i]}) for i in range(3))
-    return x, y, z
-
-
 def _eased(values: FloatArray) -> FloatArray:
-    return np.asarray(ndimage.gaussian_filter1d(values, EASE_M / STEP_M, mode="nearest"))
+    return np.asarray(ndimage.gaussian_filter1d(values, EASE_M * PLACES_PER_M, mode="nearest"))
 
 
-def _over_chord(
-    track: TrackDesign, grid: FloatArray, recording: Recording, chord: Chord | None
-) -> FloatArray:
+def _roll_over_chord(recording: Recording, places: FloatArray) -> FloatArray:
     """Roll of the track under a body: the mean of those under the two ends of its chord.
 
     An axle rolls with the track where it is, though its frame points it along a chord.
     """
-    sheet = recording.vehicle_sheet
+    chord, sheet, track = chord_of(recording), recording.vehicle_sheet, recording.track
     here = None if sheet is None else sheet.body(recording.mount_body)
     if chord is None or here is None or not here.supports:
-        return track.frame(grid).roll_rad
-    middle = grid + chord.centre_m - recording.mount_position_m[0]
+        return track.frame(places).roll_rad
+    middle = places + chord.centre_m - recording.mount_position_m[0]
     ends = [track.frame_extended(middle + side * chord.half_m).roll_rad for side in (1.0, -1.0)]
     return np.asarray(0.5 * (ends[0] + ends[1]))
 
@@ -181,6 +127,104 @@ def _share_of_cant(roll: FloatArray, curve: FloatArray) -> FloatArray:
     for number in np.unique(curve):
         here = curve == number
         most = np.abs(roll[here]).max()
-        if most > 1e-3:
+        if most > NO_CANT_RAD:
             share[here] = np.abs(roll[here]) / most
     return share
+
+
+class Ground(NamedTuple):
+    """The map at the places of n steps.
+
+    Attributes
+    ----------
+    frame : TrackFrame
+        Of the track under the mount.
+    k, dk : Vector
+        Darboux curvatures per metre, and their slopes (EQUATIONS 1.1).
+    pitch_slope : Dual
+        d pitch/ds.
+    up : Vector
+        Unit vector against gravity, track axes.
+    askew, askew_slope : Vector
+        Roll, pitch and yaw of the body on its chord less those of the track, and their slopes, 1/m.
+    bend, lean : tuple of three Dual
+        As in `Lines`, with their first and second slope.
+    dip, canted : tuple of two Dual
+        With their first slope.
+    even, odd, even_roll, odd_roll : ndarray (n,)
+        As in `Lines`.
+    """
+
+    frame: TrackFrame
+    k: Vector
+    dk: Vector
+    pitch_slope: Dual
+    up: Vector
+    askew: Vector
+    askew_slope: Vector
+    bend: tuple[Dual, ...]
+    lean: tuple[Dual, ...]
+    dip: tuple[Dual, ...]
+    canted: tuple[Dual, ...]
+    even: FloatArray
+    odd: FloatArray
+    even_roll: FloatArray
+    odd_roll: FloatArray
+
+
+def ground_at(recording: Recording, lines: Lines, place: FloatArray) -> Ground:
+    """The map at places (n,); beyond its ends it is as at its ends."""
+    track = recording.track
+    place = np.clip(place, track.start_m, track.end_m)
+
+    def known(values: FloatArray, slopes: int) -> tuple[Dual, ...]:
+        """A quantity and so many of its slopes, each a Dual."""
+        rows = [values]
+        for _ in range(slopes + 1):
+            rows.append(np.gradient(rows[-1], lines.places))
+        read = [np.interp(place, lines.places, row) for row in rows]
+        return tuple(Dual(value, {S: slope}) for value, slope in zip(read[:-1], read[1:], strict=True))
+
+    askew = [known(values, 1) for values in (lines.askew_roll, lines.askew_pitch, lines.askew_yaw)]
+    frame = track.frame(place)
+    return Ground(
+        frame=frame,
+        k=_vector(frame.k, frame.dk),
+        dk=_vector(frame.dk, np.zeros_like(frame.dk)),
+        pitch_slope=Dual(frame.rates[:, 1], {S: frame.second[:, 1]}),
+        up=_up(frame),
+        askew=(askew[0][0], askew[1][0], askew[2][0]),
+        askew_slope=(askew[0][1], askew[1][1], askew[2][1]),
+        bend=known(lines.bend, 2),
+        lean=known(lines.lean, 2),
+        dip=known(lines.dip, 1),
+        canted=known(lines.canted, 1),
+        even=np.interp(place, lines.places, lines.even),
+        odd=np.interp(place, lines.places, lines.odd),
+        even_roll=np.interp(place, lines.places, lines.even_roll),
+        odd_roll=np.interp(place, lines.places, lines.odd_roll),
+    )
+
+
+def _up(frame: TrackFrame) -> Vector:
+    """Unit vector against gravity in the axes of the track, with its slopes along it."""
+    sr, cr = np.sin(frame.roll_rad), np.cos(frame.roll_rad)
+    sp, cp = np.sin(frame.pitch_rad), np.cos(frame.pitch_rad)
+    roll, pitch = frame.rates[:, 0], frame.rates[:, 1]
+    return (
+        Dual(-sp, {S: -cp * pitch}),
+        Dual(cp * sr, {S: cp * cr * roll - sp * sr * pitch}),
+        Dual(cp * cr, {S: -cp * sr * roll - sp * cr * pitch}),
+    )
+
+
+def _vector(values: FloatArray, slopes: FloatArray) -> Vector:
+    x, y, z = (Dual(values[:, i], {S: slopes[:, i]}) for i in range(3))
+    return x, y, z
+
+
+def numbers_at(lines: Lines, place: FloatArray) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray]:
+    """Numbers of element and curve (n,), and where vertical curves are, at places (n,)."""
+    at = np.round((place - lines.places[0]) * PLACES_PER_M).astype(np.int64)
+    at = np.clip(at, 0, len(lines.places) - 1)
+    return lines.element[at].astype(np.int64), lines.curve[at].astype(np.int64), lines.vertical[at]

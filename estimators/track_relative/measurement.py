@@ -43,7 +43,7 @@ class Around(NamedTuple):
     gravity : float
         m/s2.
     in_time : bool
-        The roll's derivative is by time, not by distance: a body that sways.
+        The derivative of the roll is by time, not by distance: a body that sways.
     """
 
     states: FloatArray
@@ -54,8 +54,37 @@ class Around(NamedTuple):
     in_time: bool
 
 
+class Deviation(NamedTuple):
+    """How the track differs from the map, and what that makes of the cant deficiency.
+
+    Attributes
+    ----------
+    curvature : Dual
+        That the map has not, 1/m.
+    cant, cant_rate : Dual
+        Roll that the map has not, rad and rad/s.
+    q, q_rate, q_rate_2 : Dual
+        Cant deficiency over g, over the body's chord, and its derivatives by time.
+    """
+
+    curvature: Dual
+    cant: Dual
+    cant_rate: Dual
+    q: Dual
+    q_rate: Dual
+    q_rate_2: Dual
+
+
 class Pose(NamedTuple):
-    """The body in the map's track, and what it is made of."""
+    """The body in the map's track.
+
+    Attributes
+    ----------
+    rho, rho_rate : Vector
+        Small turn out of the map's track, and its rate.
+    y, y_rate, y_rate_2, z, z_rate, z_rate_2 : Dual
+        Place of the mount in the track, and its derivatives by time.
+    """
 
     rho: Vector
     rho_rate: Vector
@@ -65,105 +94,86 @@ class Pose(NamedTuple):
     z: Dual
     z_rate: Dual
     z_rate_2: Dual
-    off_curvature: Dual
 
 
 def duals(states: FloatArray) -> list[Dual]:
-    """Every state as a Dual."""
+    """Every state of (n, 49) as a Dual."""
     one = np.ones(len(states))
     return [Dual(states[:, i], {i: one}) for i in range(states.shape[1])]
 
 
-def pose_of(x: list[Dual], ground: Ground, around: Around) -> Pose:
+def deviation_of(x: list[Dual], ground: Ground, around: Around) -> Deviation:
+    """The track against the map, and the cant deficiency on it."""
+    v, a, per_g = x[at.V], x[at.A], 1.0 / around.gravity
+    square, run = v * v, _run(x, around)
+    bend, lean, canted = ground.bend, ground.lean, ground.canted
+    curvature = x[at.CURVE] * bend[0] - x[at.EVEN] * ground.even - x[at.ODD] * ground.odd
+    joints = x[at.EVEN] * ground.even_roll + x[at.ODD] * ground.odd_roll
+    cant = x[at.CANT] * canted[0] + x[at.CANT_ALONG] - joints
+    cant_rate = x[at.CANT] * canted[1] * v + x[at.CANT_ALONG_1] * run
+    bent_rate = square * v * bend[1] * (1.0 + x[at.CURVE]) + 2.0 * (v * a * bend[0])
+    bent_rate_2 = square * square * bend[2] + 5.0 * (square * a * bend[1])
+    return Deviation(
+        curvature=curvature,
+        cant=cant,
+        cant_rate=cant_rate,
+        q=square * (bend[0] + curvature) * per_g + lean[0] + cant,
+        q_rate=bent_rate * per_g + v * lean[1] + cant_rate,
+        q_rate_2=bent_rate_2 * per_g + square * lean[2] + a * lean[1],
+    )
+
+
+def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> Pose:
     """Where the body is in the map's track, and how that changes with time."""
-    v, a, g, sense = x[at.V], x[at.A], around.gravity, around.sense
-    # Where the speed multiplies what the body does in the track, it is taken for known: a smoothed motion is smaller
-    # than the true one, and the speed would be raised until the product fits.
-    run = v.value * sense  # d(distance)/dt
-    own = v.value * v.value
-    off = x[at.CURVE] * ground.bend - x[at.EVEN] * ground.even - x[at.ODD] * ground.odd
-    cant = (
-        x[at.CANT] * ground.canted
-        + x[at.CANT_ALONG]
-        - x[at.EVEN] * ground.even_roll
-        - x[at.ODD] * ground.odd_roll
-    )
-    cant_rate = x[at.CANT] * ground.canted_1 * v + x[at.CANT_ALONG_1] * run
-    square = v * v
-    q = square * (ground.bend + off) * (1.0 / g) + ground.lean + cant
-    turning = 1.0 + x[at.CURVE]
-    q_rate = (
-        (square * v * ground.bend_1 * turning + 2.0 * (v * a * ground.bend)) * (1.0 / g)
-        + v * ground.lean_1
-        + cant_rate
-    )
-    q_rate_2 = (square * square * ground.bend_2 + 5.0 * (square * a * ground.bend_1)) * (1.0 / g) + (
-        square * ground.lean_2 + a * ground.lean_1
-    )
-    rate = 1.0 if around.in_time else run
-    behind = x[at.LAG] * (-sense)
+    v, a, g = x[at.V], x[at.A], around.gravity
+    run, behind = _run(x, around), -around.sense
+    lag, lead = x[at.LAG] * behind, x[at.LEAD] * behind
+    rolls = x[at.ROLL_RATE] * (1.0 if around.in_time else run)
     rho = (
-        x[at.ROLL] + x[at.TILT] * q + cant + ground.askew_roll,
-        x[at.PITCH] + x[at.SQUAT] * a * (1.0 / g) + x[at.LEAD] * ground.dip * (-sense) + x[at.SLOPE] + ground.askew_pitch,
-        x[at.YAW] + behind * ground.bend + ground.askew_yaw,
+        x[at.ROLL] + x[at.TILT] * track.q + track.cant + ground.askew[0],
+        x[at.PITCH] + x[at.SQUAT] * a * (1.0 / g) + lead * ground.dip[0] + x[at.SLOPE] + ground.askew[1],
+        x[at.YAW] + lag * ground.bend[0] + ground.askew[2],
     )
     rho_rate = (
-        x[at.ROLL_RATE] * rate + x[at.TILT] * q_rate + cant_rate + v * ground.askew_roll_1,
+        rolls + x[at.TILT] * track.q_rate + track.cant_rate + v * ground.askew_slope[0],
         x[at.PITCH_RATE] * run
         + x[at.SQUAT] * (around.jerk / g)
-        + x[at.LEAD] * v * ground.dip_1 * (-sense)
-        + v * ground.askew_pitch_1,
-        x[at.YAW_RATE] * run + behind * v * ground.bend_1 + v * ground.askew_yaw_1,
+        + lead * v * ground.dip[1]
+        + v * ground.askew_slope[1],
+        x[at.YAW_RATE] * run + lag * v * ground.bend[1] + v * ground.askew_slope[2],
     )
-    gain = a.value * sense
+    own, gain = v.value * v.value, a.value * around.sense
+    bend_rate_2 = v * v * ground.bend[2] + a * ground.bend[1]
     return Pose(
         rho=rho,
         rho_rate=rho_rate,
-        y=around.nominal[0] + x[at.Y] + x[at.Y_TILT] * q + x[at.Y_BEND] * ground.bend,
-        y_rate=x[at.Y_1] * run + x[at.Y_TILT] * q_rate + x[at.Y_BEND] * v * ground.bend_1,
+        y=around.nominal[0] + x[at.Y] + x[at.Y_TILT] * track.q + x[at.Y_BEND] * ground.bend[0],
+        y_rate=x[at.Y_1] * run + x[at.Y_TILT] * track.q_rate + x[at.Y_BEND] * v * ground.bend[1],
         y_rate_2=x[at.Y_2] * own
         + x[at.Y_1] * gain
-        + x[at.Y_TILT] * q_rate_2
-        + x[at.Y_BEND] * (square * ground.bend_2 + a * ground.bend_1),
+        + x[at.Y_TILT] * track.q_rate_2
+        + x[at.Y_BEND] * bend_rate_2,
         z=around.nominal[1] + x[at.Z],
         z_rate=x[at.Z_1] * run,
         z_rate_2=x[at.Z_2] * own + x[at.Z_1] * gain,
-        off_curvature=off,
     )
+
+
+def _run(x: list[Dual], around: Around) -> FloatArray:
+    """d(distance)/dt (n,), for what the body does in the track: the speed is taken for known there.
+
+    A smoothed motion is smaller than the true one: as a state the speed would be raised until the product fits.
+    """
+    return np.asarray(x[at.V].value * around.sense)
 
 
 def shown(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
     """What three gyros and three accelerometers show, rad/s and m/s2."""
-    pose = pose_of(x, ground, around)
-    v, a, g = x[at.V], x[at.A], around.gravity
-    square = v * v
-    up = ground.gravity
-    off = v * pose.off_curvature
-    rate: Vector = tuple(v * k + off * e for k, e in zip(ground.k, up, strict=True))  # type: ignore[assignment]
-    # Slope of the track frame's turn: alpha = a k + V^2 k'.
-    alpha: Vector = tuple(a * k + square * dk for k, dk in zip(ground.k, ground.dk, strict=True))  # type: ignore[assignment]
-    secant = 1.0 / np.cos(ground.pitch)
-    stretch = np.tan(ground.pitch) * secant
-    away = square * pose.off_curvature
-    zero = Dual(np.zeros(len(around.jerk)))
-    place: Vector = (zero, pose.y, pose.z)
-    moves: Vector = (zero, pose.y_rate, pose.z_rate)
-    carried = cross(alpha, place)
-    around_axis = cross(rate, cross(rate, place))
-    coriolis = cross(rate, moves)
-    force = (
-        g * up[0] + a * secant + square * ground.pitch_slope * stretch,
-        g * up[1] + square * ground.k[2] * secant + away * up[2] + pose.y_rate_2,
-        g * up[2] - square * ground.k[1] * secant - away * up[1] + pose.z_rate_2,
-    )
-    felt: Vector = tuple(
-        force[i] + carried[i] + around_axis[i] + 2.0 * coriolis[i] for i in range(3)
-    )  # type: ignore[assignment]
-    seen = turned(rate, pose.rho)
-    gyro = [
-        seen[i] + pose.rho_rate[i] + x[at.GYRO_BIAS[i]] + x[at.GYRO_OF_Z[i]] * rate[2] for i in range(3)
-    ]
-    borne = turned(felt, pose.rho)
+    track = deviation_of(x, ground, around)
+    pose = pose_of(x, ground, around, track)
+    rate = _rate(x, ground, track)
+    seen, borne = turned(rate, pose.rho), turned(_felt(x, ground, around, track, pose, rate), pose.rho)
+    gyro = [seen[i] + pose.rho_rate[i] + x[at.GYRO_BIAS[i]] + x[at.GYRO_OF_Z[i]] * rate[2] for i in range(3)]
     accel = [
         borne[i] + x[at.ACCEL_BIAS[i]] + x[at.ACCEL_OF_X[i]] * borne[0] + x[at.ACCEL_OF_Y[i]] * borne[1]
         for i in range(3)
@@ -171,19 +181,48 @@ def shown(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
     return [*gyro, *accel]
 
 
-def told(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
-    """What the estimate says: roll, pitch and yaw less those of the map at S, S, V, y and z.
+def _rate(x: list[Dual], ground: Ground, track: Deviation) -> Vector:
+    """Angular rate of the track frame, its own axes."""
+    v, k, up = x[at.V], ground.k, ground.up
+    off = v * track.curvature
+    return v * k[0] + off * up[0], v * k[1] + off * up[1], v * k[2] + off * up[2]
 
-    The angles' values are those of the body's turn out of the map's track; their slopes include that the map
-    is read at S.
+
+def _felt(
+    x: list[Dual], ground: Ground, around: Around, track: Deviation, pose: Pose, rate: Vector
+) -> Vector:
+    """Specific force at the mount, track axes (EQUATIONS 1.1)."""
+    v, a, g = x[at.V], x[at.A], around.gravity
+    k, dk, up, square = ground.k, ground.dk, ground.up, v * v
+    secant = 1.0 / np.cos(ground.frame.pitch_rad)
+    stretch = np.tan(ground.frame.pitch_rad) * secant
+    away = square * track.curvature
+    zero = Dual(np.zeros(len(around.jerk)))
+    place, moves = (zero, pose.y, pose.z), (zero, pose.y_rate, pose.z_rate)
+    alpha = (a * k[0] + square * dk[0], a * k[1] + square * dk[1], a * k[2] + square * dk[2])
+    swung, pulled, coriolis = cross(alpha, place), cross(rate, cross(rate, place)), cross(rate, moves)
+    carried = [swung[i] + pulled[i] + 2.0 * coriolis[i] for i in range(3)]
+    return (
+        g * up[0] + a * secant + square * ground.pitch_slope * stretch + carried[0],
+        g * up[1] + square * k[2] * secant + away * up[2] + pose.y_rate_2 + carried[1],
+        g * up[2] - square * k[1] * secant - away * up[1] + pose.z_rate_2 + carried[2],
+    )
+
+
+def told(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
+    """What the estimate says: turn of the body out of the map's track (three), S, V, y and z.
+
+    The slopes are those of roll, pitch and yaw of the body, in which the map is read at S and turned by HEADING.
     """
-    pose = pose_of(x, ground, around)
-    roll_slope = ground.k[0].value + np.sin(ground.pitch) * ground.k[2].value
-    yaw_slope = (
-        ground.k[2].value * np.cos(ground.roll) + ground.k[1].value * np.sin(ground.roll)
-    ) / np.cos(ground.pitch)
+    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
     here = x[at.S] - around.states[:, at.S]
-    roll = pose.rho[0] + here * roll_slope
-    pitch = pose.rho[1] + here * ground.pitch_slope.value
-    yaw = pose.rho[2] + x[at.HEADING] + here * yaw_slope
-    return [roll, pitch, yaw, x[at.S], x[at.V], pose.y, pose.z]
+    roll, pitch, yaw = ground.frame.rates.T
+    return [
+        pose.rho[0] + here * roll,
+        pose.rho[1] + here * pitch,
+        pose.rho[2] + here * yaw + x[at.HEADING],
+        x[at.S],
+        x[at.V],
+        pose.y,
+        pose.z,
+    ]

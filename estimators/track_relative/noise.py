@@ -1,9 +1,16 @@
-"""How much a body moves in its track, by the class of its mount, and what the sheets say of the rest.
+"""How much a body moves in its track, by the class of its mount.
 
-The sizes are synthetic: of simrail's vehicles on good rails at 20 to 100 km/h.
+The sizes are synthetic: of simrail's vehicles on good rails at 20 to 100 km/h, by the likelihood of rides
+that are not those of any shipped scenario.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
+
+from simrail.core.errors import InputError
+from simrail.recording.recording import Recording
+
+AT_MPS = 70.0 / 3.6
+"""Speed at which `Motion.gyro` and `Motion.accel` hold; they grow with its power of 1.5."""
 
 
 @dataclass(frozen=True)
@@ -12,16 +19,27 @@ class Motion:
 
     Attributes
     ----------
-    roll_sd, roll_length, pitch_sd, pitch_length, yaw_sd, yaw_length : float
-        rad and m.
+    roll_sd, pitch_sd, yaw_sd : float
+        Standard deviations of its angles, rad.
+    roll_length, pitch_length, yaw_length : float
+        Lengths over which they change, m.
     y_sd, y_length, z_sd, z_length : float
-        m.
+        Of the place of the mount beside the nominal one, m.
     sway_hz, damping : float
-        Of a roll that sways in time; 0 Hz: it is over the distance.
-    gyro, accel : float, tuple of float
-        White motion that the model lacks, at `AT_MPS`, rad/s and m/s2.
-    tilt, tilt_sd, squat_sd, y_tilt_sd, y_bend_sd : float
-        Of TILT, SQUAT, Y_TILT (m), Y_BEND (m2).
+        Natural frequency and damping ratio of a roll that sways in time; 0 Hz: it is over the distance.
+    gyro, accel_x, accel_y, accel_z : float
+        White motion that the model lacks, per sample of 125 Hz at `AT_MPS`, rad/s and m/s2.
+    tilt, tilt_sd : float
+        Roll flexibility: rad of roll per rad of cant deficiency, its mean and standard deviation.
+    squat_sd : float
+        rad of pitch per g.
+    y_tilt_sd, y_bend_sd : float
+        Lateral place per rad of cant deficiency, m, and per curvature, m2.
+
+    Raises
+    ------
+    InputError
+        If a value is negative, or a length or damping 0.
     """
 
     roll_sd: float = 1.3e-3
@@ -35,37 +53,64 @@ class Motion:
     z_sd: float = 3.7e-3
     z_length: float = 5.1
     sway_hz: float = 0.0
-    damping: float = 0.1
+    damping: float = 0.3
     gyro: float = 1e-3
-    accel: tuple[float, float, float] = (0.14, 0.11, 0.08)
+    accel_x: float = 0.14
+    accel_y: float = 0.11
+    accel_z: float = 0.08
     tilt: float = 0.0
     tilt_sd: float = 0.1
     squat_sd: float = 0.01
     y_tilt_sd: float = 0.05
     y_bend_sd: float = 1.0
 
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            divides = entry.name == "damping" or entry.name.endswith("_length")
+            if not 0.0 <= value < 1e6 or (divides and value == 0.0):
+                raise InputError(
+                    "is out of range", field=entry.name, value=value, limit="> 0" if divides else ">= 0"
+                )
 
-AT_MPS = 70.0 / 3.6
-"""Speed at which `Motion.gyro` and `Motion.accel` hold; they grow with its power of 1.5."""
 
 AXLE = Motion()
+"""What runs on the rails by itself."""
+
 FRAME = Motion()
+"""A bogie frame."""
+
 BODY = Motion(
     roll_sd=3e-3,
     sway_hz=0.51,
-    damping=0.3,
     pitch_sd=6e-4,
     pitch_length=3.0,
     yaw_sd=1e-3,
     yaw_length=10.0,
-    y_sd=4e-3,
     y_length=8.0,
     z_sd=2.5e-3,
     z_length=8.0,
-    accel=(0.3, 0.15, 0.05),
+    accel_x=0.3,
+    accel_y=0.15,
+    accel_z=0.05,
     tilt=0.2,
     tilt_sd=0.3,
     squat_sd=0.1,
     y_tilt_sd=0.3,
     y_bend_sd=5.0,
 )
+"""What rests on bogies, or on axles with nothing upon it; and a body of which there is no drawing."""
+
+
+def motion_of(recording: Recording) -> Motion:
+    """That of the mount's class, by the vehicle's drawing."""
+    sheet = recording.vehicle_sheet
+    here = None if sheet is None else sheet.body(recording.mount_body)
+    if sheet is None or here is None:
+        return BODY
+    if not here.supports:
+        return AXLE
+    below = [sheet.body(support.on) for support in here.supports]
+    on_axles = all(body is None or not body.supports for body in below)
+    bears = any(support.on == here.name for body in sheet.bodies for support in body.supports)
+    return FRAME if on_axles and bears else BODY

@@ -1,145 +1,270 @@
-"""The track-relative smoother, and its filter: attitude, place and speed of a body with honest intervals."""
+"""The track-relative smoother, and its filter: attitude, place and speed of a body, the rails below, and how sure.
 
-from dataclasses import dataclass, field
+A railway vehicle never leaves its track, and its track is on a map: what an IMU on it shows is, nearly all, known
+before. The estimate is of the small rest, in three layers (`simrail.estimators.track_relative.states`): the body in
+the track, the track in the map, the train on the line; and of the sensors. What is a deviation in space is a process
+over the distance, so that a train that stands measures its sensors and nothing else. The map is not believed: each
+curve has its own cant, curvature and place, known as well as the map's sheet says.
+
+Forwards it is a Kalman filter, which is to be had as a causal estimate; backwards a fixed-interval smoother. All is
+linear about the odometry (`simrail.estimators.track_relative.model`), of which nothing else is taken: the wheel
+is a measurement. The smoother linearises a second time, about what it has found of the train.
+
+The formulation is ours. It owes to Briales et al. 2021 the compensation by the design track, to Gonzalez-Carbajal et
+al. 2023 the state of a body in the track frame, and to Hartikainen and Sarkka 2010 processes over space as states.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.odometry.curve_matched import chord_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
+    ROWS,
     SEGMENT,
-    Model,
     room_for_segment,
     room_to_work,
     run_back,
     run_filter,
 )
-from simrail.estimators.track_relative.dual import Dual
 from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import Around, duals, pose_of
-from simrail.estimators.track_relative.model import _sense as sense_of
-from simrail.estimators.track_relative.model import first_guess, lag_of, model_of, steps_of, y_bend_of
-from simrail.estimators.track_relative.noise import AXLE, BODY, FRAME, Motion
+from simrail.estimators.track_relative.measurement import deviation_of, duals, pose_of
+from simrail.estimators.track_relative.model import Course, about, course_of, linearised, steps_of
+from simrail.estimators.track_relative.noise import Motion, motion_of
+from simrail.estimators.track_relative.prior import PARTS
+from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 
-from simrail.core.columns import ATTITUDE, ATTITUDE_SD, ODOMETRY, RELATIVE_POSITION, RELATIVE_POSITION_SD
+from simrail.core.columns import (
+    ATTITUDE,
+    ATTITUDE_SD,
+    INNOVATION,
+    ODOMETRY,
+    RATE_INNOVATION,
+    RELATIVE_POSITION,
+    RELATIVE_POSITION_SD,
+)
+from simrail.core.errors import InputError, one_of
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 
+MOST_PASSES = 4
+"""Two are enough: the train is found to a decimetre by the first."""
+
+PIECE = 32 * SEGMENT
+"""Steps that are linearised at a time: a minute's worth, 15 MB."""
+
+SD_COLUMNS = (*ATTITUDE_SD, "position_sd_m", "speed_sd_mps", *RELATIVE_POSITION_SD)
+"""Standard deviations, in the order of the kernel's outputs."""
+
+
+class Trace(NamedTuple):
+    """All that is estimated, at n steps.
+
+    Attributes
+    ----------
+    course : Course
+        About which the last pass was linearised.
+    states : ndarray (n, 49)
+    covariance : ndarray (n, 7, 7)
+        Of roll, pitch, yaw, S, V, y and z.
+    surprises : ndarray (n, 8)
+        Innovations of the filter over their standard deviations; NaN for a measurement that was not made.
+    log_likelihood : float
+        Of all measurements, but for a constant.
+    """
+
+    course: Course
+    states: FloatArray
+    covariance: FloatArray
+    surprises: FloatArray
+    log_likelihood: float
+
 
 @dataclass(frozen=True)
 class TrackRelativeSmoother:
-    """Smoother over the track."""
+    """Smoother of a body in its track, on a map that errs.
+
+    Attributes
+    ----------
+    smoothed : bool
+        False stops after the filter, which is causal.
+    passes : int
+        How often to linearise and smooth; the filter does it once.
+    rate_hz : float
+        Rate of its steps: the IMU is averaged over each.
+    motion : Motion, optional
+        How the body moves in its track; that of the mount's class (`simrail.estimators.track_relative.noise`) if
+        not given.
+    without : tuple of str
+        Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), to show what each
+        is for.
+    geometry_step_m : float
+        Distance of the places of the rail geometry; 0 leaves the geometry out.
+    """
 
     smoothed: bool = True
     passes: int = 2
     rate_hz: float = 125.0
     motion: Motion | None = None
+    without: tuple[str, ...] = ()
+    geometry_step_m: float = 0.25
 
     needs = ("encoder",)
-    label = "track-relative smoother"
-    cites = ()
+    cites = ("Briales et al. 2021", "Gonzalez-Carbajal et al. 2023", "Hartikainen and Sarkka 2010")
+
+    def __post_init__(self) -> None:
+        for name in self.without:
+            if name not in PARTS:
+                raise InputError("is no part of the state", field="without", value=name, limit=one_of(PARTS))
+        out = "is out of range"
+        for name, is_good, limit in (
+            ("passes", self.passes in range(1, MOST_PASSES + 1), f"1 to {MOST_PASSES}"),
+            ("rate_hz", 10.0 <= self.rate_hz <= 1000.0, "10 to 1000 Hz"),
+            ("geometry_step_m", 0.0 <= self.geometry_step_m < 100.0, "0 (none) or more, m"),
+        ):
+            if not is_good:
+                raise InputError(out, field=name, value=getattr(self, name), limit=limit)
 
     @property
     def causal(self) -> bool:
+        """The filter is causal, the smoother is not."""
         return not self.smoothed
 
-    def trace(self, recording):
-        steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
-        chord = chord_of(recording)
-        motion = self.motion or motion_of(recording)
-        states = first_guess(steps, motion, lag_of(chord), y_bend_of(recording, chord))
-        for number in range(self.passes if self.smoothed else 1):
-            if number > 0:
-                states = relinearised(states)
-            model = model_of(recording, steps, motion, chord, states)
-            if self.smoothed:
-                states, covariance, nll, surprises = smooth(model)
-            else:
-                states, covariance, nll, surprises = filtered(model)
-        return steps, model, states, covariance, nll, surprises
+    @property
+    def label(self) -> str:
+        """What a reader calls it."""
+        return "track-relative smoother" if self.smoothed else "track-relative filter"
 
     def estimate(self, recording: Recording) -> Estimate:
-        steps, model, states, covariance, nll, surprises = self.trace(recording)
-        return said(recording, steps, self.motion or motion_of(recording), chord_of(recording), states, covariance, causal=self.causal)
+        """Estimate attitude, place, speed and the rails at every IMU sample.
+
+        Raises
+        ------
+        InputError
+            If the recording has no encoder.
+        """
+        trace = self.trace(recording)
+        estimate = Estimate(
+            states=_states(trace, causal=self.causal),
+            mount=recording.mount,
+            innovations=_innovations(trace),
+        )
+        if not self.geometry_step_m:
+            return estimate
+        along = recording.with_odometry(estimate.states[list(ODOMETRY)], "own")
+        return Estimate(
+            **(vars(estimate) | {"geometry": geometry_of(sight_of(estimate, along), step_m=self.geometry_step_m)})
+        )
+
+    def trace(self, recording: Recording) -> Trace:
+        """All states, at the filter's own steps."""
+        motion = motion_of(recording) if self.motion is None else self.motion
+        steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
+        course = course_of(recording, steps, motion, self.without)
+        trace = _run(course, smoothed=self.smoothed)
+        for _ in range(self.passes - 1 if self.smoothed else 0):
+            trace = _run(about(course, trace.states), smoothed=True)
+        return trace
 
 
-def relinearised(states):
-    """States about which to linearise again: of the train on its map, of the map and the suspension.
-
-    Not those of the body in its track: what they multiply is a motion of the body as well, and a smoothed one is
-    smaller than the true one, so that the product would be made up by a state that is constant.
-    """
-    again = np.zeros_like(states)
-    kept = [at.S, at.V, at.A, at.TILT, at.LAG, at.Y_BEND]
-    again[:, kept] = states[:, kept]
-    return again
+def _pieces(n: int) -> Iterator[slice]:
+    for first in range(0, n, PIECE):
+        yield slice(first, min(first + PIECE, n))
 
 
-def motion_of(recording):
-    sheet = recording.vehicle_sheet
-    if sheet is None:
-        return BODY
-    supports = sheet.body(recording.mount_body).supports
-    if not supports:
-        return AXLE
-    return FRAME if all(not sheet.body(s.on).supports for s in supports) and len(sheet.bodies) > 3 else BODY
-
-
-def filtered(model: Model):
-    n = len(model.measured)
-    states, covariance = np.empty((n, at.STATES)), np.empty((n, OUTPUTS, OUTPUTS))
-    surprises = np.full((n, 8), np.nan)
-    x, p = model.start.copy(), model.start_covariance.copy()
-    none = np.empty((0, at.STATES))
-    nll = run_filter(
-        model, none, np.empty((0, at.STATES, at.WIDTH)), states, covariance, surprises, room_to_work(), x, p
-    )
-    return states, covariance, nll, surprises
-
-
-def smooth(model: Model):
-    n = len(model.measured)
-    count = -(-n // SEGMENT)
+def _run(course: Course, *, smoothed: bool) -> Trace:
+    """Filter, and smoother if wanted, a piece at a time."""
+    n = len(course.steps.time_s)
+    count = -(-n // SEGMENT) if smoothed else 0
     starts, squares = np.empty((count, at.STATES)), np.empty((count, at.STATES, at.WIDTH))
-    x, p = model.start.copy(), model.start_covariance.copy()
-    surprises = np.full((n, 8), np.nan)
-    none, none3 = np.empty((0, at.STATES)), np.empty((0, OUTPUTS, OUTPUTS))
-    nll = run_filter(model, starts, squares, none, none3, surprises, room_to_work(), x, p)
     states, covariance = np.empty((n, at.STATES)), np.empty((n, OUTPUTS, OUTPUTS))
-    run_back(
-        model, starts, squares, states, covariance, room_for_segment(SEGMENT), room_to_work(), x, p,
-        np.zeros(at.STATES), np.zeros((at.STATES, at.WIDTH)), np.zeros((OUTPUTS, at.WIDTH)),
-        np.zeros((OUTPUTS, at.WIDTH)),
-    )
-    return states, covariance, nll, surprises
+    surprises, work = np.full((n, ROWS), np.nan), room_to_work()
+    x, p, total = course.start.copy(), course.start_covariance.copy(), 0.0
+    wanted = slice(0, 0) if smoothed else slice(None)
+    for rows in _pieces(n):
+        model = linearised(course, rows)
+        kept = slice(rows.start // SEGMENT, -(-rows.stop // SEGMENT)) if smoothed else slice(0, 0)
+        total += run_filter(
+            model,
+            starts[kept],
+            squares[kept],
+            states[rows][wanted],
+            covariance[rows][wanted],
+            surprises[rows],
+            work,
+            x,
+            p,
+        )
+    if smoothed:
+        lam, info = np.zeros(at.STATES), np.zeros((at.STATES, at.WIDTH))
+        segment, lines = room_for_segment(SEGMENT), np.zeros((2, OUTPUTS, at.WIDTH))
+        for rows in reversed(list(_pieces(n))):
+            kept = slice(rows.start // SEGMENT, -(-rows.stop // SEGMENT))
+            model = linearised(course, rows)
+            run_back(
+                model,
+                starts[kept],
+                squares[kept],
+                states[rows],
+                covariance[rows],
+                segment,
+                work,
+                x,
+                p,
+                lam,
+                info,
+                lines[0],
+                lines[1],
+            )
+    return Trace(course, states, covariance, surprises, -0.5 * total)
 
 
-def said(recording, steps, motion, chord, states, covariance, *, causal) -> Estimate:
-    track = recording.track
-    around = Around(states, np.zeros(len(states)), sense_of(states[:, at.V]), recording.mount_position_m[1:], recording.gravity_mps2, motion.sway_hz > 0)
-    ground = ground_at(recording, chord, states[:, at.S])
-    pose = pose_of(duals(states), ground, around)
-    columns = [*(a.value for a in pose.rho), states[:, at.HEADING], states[:, at.S], states[:, at.V], states[:, at.A], pose.y.value, pose.z.value]
-    rates = [*(a.value for a in pose.rho_rate), np.zeros(len(states)), states[:, at.V], states[:, at.A], np.zeros(len(states)), pose.y_rate.value, pose.z_rate.value]
-    values = np.column_stack(columns)
-    sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+def _states(trace: Trace, *, causal: bool) -> pd.DataFrame:
+    """Estimate at every IMU sample: between steps, or, if causal, from the last one on."""
+    course, states = trace.course, trace.states
+    recording, steps, track = course.recording, course.steps, course.recording.track
+    around = course.around._replace(states=states)
+    ground, x = ground_at(recording, course.lines, states[:, at.S]), duals(states)
+    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
+    found = [*(angle.value for angle in pose.rho), *states[:, [at.HEADING, at.S, at.V, at.A]].T]
+    values = np.column_stack([*found, pose.y.value, pose.z.value])
+    sd = np.sqrt(np.maximum(np.diagonal(trace.covariance, axis1=1, axis2=2), 0.0))
     time = recording.imu.index.to_numpy(dtype=np.float64)
     if causal:
-        end = steps.time_s + 0.5 * steps.dt
-        last = np.maximum(np.searchsorted(end, time + 1e-9, side="right") - 1, 0)
-        ahead = np.clip(time - steps.time_s[last], 0.0, 2.0 * steps.dt)
-        full = values[last] + ahead[:, None] * np.column_stack(rates)[last]
-        sd = sd[last]
+        none = np.zeros(len(states))
+        rates = [*(rate.value for rate in pose.rho_rate), none, states[:, at.V], states[:, at.A], none]
+        last = np.maximum(np.searchsorted(steps.end_s, time + 1e-9, side="right") - 1, 0)
+        ahead = np.minimum(time - steps.time_s[last], 2.0 * steps.dt)[:, None]
+        moves = np.column_stack([*rates, pose.y_rate.value, pose.z_rate.value])
+        values, sd = values[last] + ahead * moves[last], sd[last]
     else:
-        full = np.column_stack([np.interp(time, steps.time_s, c) for c in values.T])
-        sd = np.column_stack([np.interp(time, steps.time_s, c) for c in sd.T])
-    frame = track.frame(np.clip(full[:, 4], track.start_m, track.end_m))
-    base = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad + full[:, 3]]))
-    angles = euler_angles(base @ rotation_matrix(full[:, :3]))
-    angles[:, 2] += 2 * np.pi * np.round((frame.yaw_rad + full[:, 3] - angles[:, 2]) / (2 * np.pi))
-    table = np.column_stack([angles, full[:, [4, 5, 6]], full[:, 7:9], sd])
-    names = [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *ATTITUDE_SD, "position_sd_m", "speed_sd_mps", *RELATIVE_POSITION_SD]
-    return Estimate(states=pd.DataFrame(table, index=recording.imu.index, columns=names), mount=recording.mount)
+        values, sd = _between(time, steps.time_s, values), _between(time, steps.time_s, sd)
+    frame = track.frame(np.clip(values[:, 4], track.start_m, track.end_m))
+    heading = frame.yaw_rad + values[:, 3]
+    base = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, heading]))
+    angles = euler_angles(base @ rotation_matrix(values[:, :3]))
+    # Counted as the map counts it, whole turns included.
+    angles[:, 2] += 2.0 * np.pi * np.round((heading - angles[:, 2]) / (2.0 * np.pi))
+    columns = [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
+    return pd.DataFrame(
+        np.column_stack([angles, values[:, 4:], sd]), index=recording.imu.index, columns=columns
+    )
+
+
+def _between(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:
+    return np.column_stack([np.interp(time, at_s, column) for column in values.T])
+
+
+def _innovations(trace: Trace) -> pd.DataFrame:
+    """Innovations of the step that a sample is in, over their sds times those of the measurement alone."""
+    course, steps = trace.course, trace.course.steps
+    time = course.recording.imu.index.to_numpy(dtype=np.float64)
+    last = np.clip(np.searchsorted(steps.end_s, time + 1e-9, side="right") - 1, 0, None)
+    seen = trace.surprises[:, :6]
+    table = np.column_stack([seen, (seen**2).sum(axis=1)])[last]
+    return pd.DataFrame(table, index=course.recording.imu.index, columns=[*RATE_INNOVATION, *INNOVATION])
