@@ -55,8 +55,8 @@ from simrail.estimators.track_relative.states import (
 
 from simrail.core.jit import FloatArray, IntArray, njit, njit_borrowed
 
-ROWS = 8
-"""Scalar measurements of a step: three gyros, three accelerometers, the wheel, rest."""
+ROWS = 7
+"""Scalar measurements of a step: three gyros, three accelerometers, the wheel."""
 
 SEGMENT = 256
 """Steps between two that the filter keeps."""
@@ -71,9 +71,10 @@ ORIGIN = (V, A, SCALE, TREAD, LEFT, RIGHT, CURVE, EVEN, ODD, V, A, A)
 FORGETS = (TREAD, SLOPE, CURVE, CANT, EVEN, ODD)
 """States that a step may shrink, to nothing where what they speak of is behind."""
 
-FLOWS = 12
+FLOWS = 13
 """Numbers of a step: way run (m, >= 0), way (m, signed), shares of heading by CURVE, EVEN and ODD, shares of
-the wheel's path in curves to the left and right, and what is kept of `FORGETS` but for the first: 5."""
+the wheel's path in curves to the left and right, what is kept of `FORGETS` but for the first: 5, and the variance
+that WAY gains, m2."""
 
 
 class Noise(NamedTuple):
@@ -88,8 +89,8 @@ class Noise(NamedTuple):
         Of a roll that sways in time: natural frequency and damping ratio; 0 Hz for none.
     jerk : float
         m2/s5, intensity of the acceleration's random walk.
-    wheel_walk, tread_sd, tread_length : float
-        m2/m; relative, m.
+    tread_sd, tread_length : float
+        Relative, m.
     lag_walk : float
         m2/m.
     gyro_walk, accel_walk : float
@@ -103,7 +104,6 @@ class Noise(NamedTuple):
     sway_hz: float
     damping: float
     jerk: float
-    wheel_walk: float
     tread_sd: float
     tread_length: float
     lag_walk: float
@@ -117,13 +117,13 @@ class Model(NamedTuple):
 
     Attributes
     ----------
-    columns, coefficients : ndarray of int (8, w), ndarray (n, 8, w)
+    columns, coefficients : ndarray of int (7, w), ndarray (n, 7, w)
         Rows of the measurements.
-    measured : ndarray (n, 8)
+    measured : ndarray (n, 7)
         z less what the linearised model has as its constant: e = measured - H x.
-    variances : ndarray (n, 8)
+    variances : ndarray (n, 7)
         Of each; not finite for one that is not made.
-    flows : ndarray (n, 12)
+    flows : ndarray (n, 13)
         `FLOWS` of the step that leads there.
     said_columns, said : ndarray of int (7, u), ndarray (n, 7, u)
         Rows of the outputs.
@@ -275,7 +275,9 @@ def shares(flow: FloatArray, dt: float) -> tuple[float, ...]:
 
 
 @njit_borrowed
-def predict(x: FloatArray, p: FloatArray, flow: FloatArray, dt: float, noise: Noise, scratch: Scratch) -> None:
+def predict(
+    x: FloatArray, p: FloatArray, flow: FloatArray, dt: float, noise: Noise, scratch: Scratch
+) -> None:
     """X <- F x, P <- F P F' + Q, in place; `transition` must have been called."""
     n = x.shape[0]
     moves = shares(flow, dt)
@@ -302,7 +304,7 @@ def predict(x: FloatArray, p: FloatArray, flow: FloatArray, dt: float, noise: No
     p[V, A] += 0.5 * q * dt**2
     p[A, V] = p[V, A]
     p[V, V] += q * dt**3 / 3.0
-    p[WAY, WAY] += noise.wheel_walk * way
+    p[WAY, WAY] += flow[12]
     p[LAG, LAG] += noise.lag_walk * way
     for i in range(3):
         p[GYRO_BIAS[i], GYRO_BIAS[i]] += noise.gyro_walk * dt
@@ -343,7 +345,9 @@ def block(
 
 
 @njit_borrowed
-def block_back(lam: FloatArray, info: FloatArray, first: int, m: int, f: FloatArray, lines: FloatArray) -> None:
+def block_back(
+    lam: FloatArray, info: FloatArray, first: int, m: int, f: FloatArray, lines: FloatArray
+) -> None:
     """Lam <- F' lam, Lam <- F' Lam F for such a block."""
     n, width = info.shape
     for i in range(m):
@@ -434,7 +438,7 @@ def run_segment(
 ) -> float:
     """Steps ``first`` to ``last`` of the filter, in place; returns -2 log-likelihood but for a constant.
 
-    ``kept``, ``filtered`` (n, 49) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, 8), the
+    ``kept``, ``filtered`` (n, 49) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, 7), the
     innovations over their sds, are written where there is room.
     """
     total = 0.0
@@ -547,7 +551,15 @@ def run_back(
                     unmeasure(lam, info, model, k, m, segment, at, scratch)
             smooth(segment, at, lam, info, smoothed[k])
             if covariance.shape[0] > 0:
-                speak(segment.covariances[at], info, model.said_columns, model.said[k], said, work, covariance[k])
+                speak(
+                    segment.covariances[at],
+                    info,
+                    model.said_columns,
+                    model.said[k],
+                    said,
+                    work,
+                    covariance[k],
+                )
             transition(model.flows[k], model.dt, model.noise, scratch)
             predict_back(lam, info, model.flows[k], model.dt, model.noise, scratch)
 

@@ -223,7 +223,9 @@ def _vector(values: FloatArray, slopes: FloatArray) -> Vector:
     return x, y, z
 
 
-def numbers_at(lines: Lines, place: FloatArray) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray]:
+def numbers_at(
+    lines: Lines, place: FloatArray
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray]:
     """Numbers of element and curve (n,), and where vertical curves are, at places (n,)."""
     at = np.round((place - lines.places[0]) * PLACES_PER_M).astype(np.int64)
     at = np.clip(at, 0, len(lines.places) - 1)

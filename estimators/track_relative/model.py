@@ -18,7 +18,7 @@ from simrail.estimators.track_relative.kernel import FLOWS, Model, Noise
 from simrail.estimators.track_relative.line import Ground, Lines, ground_at, lines_of, numbers_at
 from simrail.estimators.track_relative.measurement import Around, duals, shown, told
 from simrail.estimators.track_relative.noise import AT_MPS, Motion
-from simrail.estimators.track_relative.prior import REST_SD_MPS, first_state, noise_of, start_of
+from simrail.estimators.track_relative.prior import first_state, noise_of, start_of
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY
 from simrail.core.errors import InputError
@@ -36,6 +36,9 @@ LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 1e-5, 1e-3
 
 TURNING_MPS = 0.2
 """Below this a train that comes to rest sways to and fro: that is no change of direction."""
+
+LOST_M = 1.0
+"""Of the wheel's way, per step in which it slips: it says nothing, and begins anew after that."""
 
 JERK_S = 1.0
 """Over which the slope of the acceleration is taken."""
@@ -146,9 +149,7 @@ def course_of(recording: Recording, steps: Steps, motion: Motion, without: Colle
     states[:, [at.S, at.V, at.A]] = steps.odometry
     empty = np.empty(0)
     _, lateral, height = recording.mount_position_m
-    around = Around(
-        states, empty, empty, (lateral, height), recording.gravity_mps2, motion.sway_hz > 0.0
-    )
+    around = Around(states, empty, empty, (lateral, height), recording.gravity_mps2, motion.sway_hz > 0.0)
     course = Course(recording, lines_of(recording), motion, noise, start, covariance, steps, around, empty)
     return about(course, states)
 
@@ -166,9 +167,7 @@ def about(course: Course, states: FloatArray) -> Course:
     followed = np.zeros_like(states)
     followed[:, FOLLOWED] = states[:, FOLLOWED]
     speed, dt = states[:, at.V], course.steps.dt
-    around = course.around._replace(
-        states=followed, jerk=_jerk(states[:, at.A], dt), sense=_sense(speed)
-    )
+    around = course.around._replace(states=followed, jerk=_jerk(states[:, at.A], dt), sense=_sense(speed))
     return course._replace(around=around, way=0.5 * dt * (speed + np.concatenate([speed[:1], speed[:-1]])))
 
 
@@ -178,11 +177,11 @@ def linearised(course: Course, rows: slice) -> Model:
     around = whole._replace(states=whole.states[rows], jerk=whole.jerk[rows], sense=whole.sense[rows])
     ground, n = ground_at(course.recording, course.lines, around.states[:, at.S]), len(around.jerk)
     x = duals(around.states)
-    values, columns, coefficients = table_of([*shown(x, ground, around), x[at.WAY], x[at.V]], n)
+    values, columns, coefficients = table_of([*shown(x, ground, around), x[at.WAY]], n)
     _, said_columns, said = table_of(told(x, ground, around), n)
     # z - h(x0) - H (x - x0) = (z - h(x0) + H x0) - H x
     constant = np.einsum("nmw,nmw->nm", coefficients, around.states[:, columns])
-    measured = np.column_stack([steps.signals[rows], steps.way[rows], np.zeros(n)])
+    measured = np.column_stack([steps.signals[rows], steps.way[rows]])
     return Model(
         columns=columns,
         coefficients=coefficients,
@@ -197,7 +196,7 @@ def linearised(course: Course, rows: slice) -> Model:
 
 
 def _variances(course: Course, rows: slice) -> FloatArray:
-    """Of the measurements (n, 8); infinite where one is not made."""
+    """Of the measurements (n, 7); infinite where one is not made."""
     sheet, steps, motion = course.recording.imu_sheet, course.steps, course.motion
     assert course.recording.encoder_sheet is not None
     rate = 1.0 / steps.dt
@@ -207,9 +206,8 @@ def _variances(course: Course, rows: slice) -> FloatArray:
     own = (motion.accel_x, motion.accel_y, motion.accel_z)
     pulse = course.recording.encoder_sheet.pulse_m
     wheel = np.where(steps.slipping[rows], np.inf, pulse**2 / 12.0)
-    rest = np.where(steps.resting[rows], REST_SD_MPS**2, np.inf)
     columns = [gyro + motion.gyro**2 * moves] * 3 + [accel + sd**2 * moves for sd in own]
-    return np.ascontiguousarray(np.column_stack([*columns, wheel, rest]))
+    return np.ascontiguousarray(np.column_stack([*columns, wheel]))
 
 
 def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:
@@ -224,6 +222,8 @@ def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:
     out[:, 2], out[:, 3], out[:, 4] = way * curvature, -way * ground.even, -way * ground.odd
     out[:, 5], out[:, 6] = np.maximum(flank, 0.0), np.maximum(-flank, 0.0)
     element, curve, vertical = numbers_at(course.lines, np.concatenate([[before], place[rows]]))
+    slips = course.steps.slipping[rows]
+    out[:, 12] = np.where(slips, LOST_M**2, CurveMatchedOdometry().wheel_walk_m * np.abs(way))
     out[:, 7] = np.where(vertical[1:] > 0.0, np.exp(-np.abs(way) / VERTICAL_LENGTH_M), 1.0)
     out[np.diff(curve) != 0, 8:10] = 0.0
     # Element i lies between joints i and i + 1: a train from below has i behind it and meets i + 1, one

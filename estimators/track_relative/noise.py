@@ -95,7 +95,7 @@ BODY = Motion(
     accel_z=0.05,
     tilt=0.2,
     tilt_sd=0.3,
-    squat_sd=0.1,
+    squat_sd=0.03,
     y_tilt_sd=0.3,
     y_bend_sd=5.0,
 )

@@ -71,7 +71,6 @@ def noise_of(recording: Recording, motion: Motion, without: Collection[str] = ()
         sway_hz=motion.sway_hz,
         damping=motion.damping,
         jerk=JERK_M2PS5,
-        wheel_walk=method.wheel_walk_m,
         tread_sd=method.tread_sd,
         tread_length=method.tread_length_m,
         lag_walk=0.0 if "lag" in without else pointing_of(recording, chord_of(recording)).lag_walk_m,

@@ -72,7 +72,7 @@ class Trace(NamedTuple):
     states : ndarray (n, 49)
     covariance : ndarray (n, 7, 7)
         Of roll, pitch, yaw, S, V, y and z.
-    surprises : ndarray (n, 8)
+    surprises : ndarray (n, 7)
         Innovations of the filter over their standard deviations; NaN for a measurement that was not made.
     log_likelihood : float
         Of all measurements, but for a constant.
@@ -158,7 +158,10 @@ class TrackRelativeSmoother:
             return estimate
         along = recording.with_odometry(estimate.states[list(ODOMETRY)], "own")
         return Estimate(
-            **(vars(estimate) | {"geometry": geometry_of(sight_of(estimate, along), step_m=self.geometry_step_m)})
+            **(
+                vars(estimate)
+                | {"geometry": geometry_of(sight_of(estimate, along), step_m=self.geometry_step_m)}
+            )
         )
 
     def trace(self, recording: Recording) -> Trace:
