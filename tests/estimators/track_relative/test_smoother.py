@@ -118,6 +118,34 @@ def test_intervals_hold_on_a_ride(
         assert (squares_over_variances(estimate, rough_motion(0, direction)) < 3.0**2).all()
 
 
+DRAWS = 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mount", ["drawn", "not drawn"])
+@pytest.mark.parametrize("smoothed", [False, True], ids=["filter", "smoother"])
+def test_intervals_hold_over_draws(
+    rough: Callable, rough_motion: Callable, mount: str, smoothed: bool
+) -> None:
+    """Of track, map and sensors, both directions: none is covered less often than its 95 % interval says.
+
+    Samples of a ride are anything but independent: each ride counts once, by its share of samples covered.
+    More may be covered: the body of these rides moves less than the smoother fears.
+    """
+    shares = []
+    smoother = TrackRelativeSmoother(smoothed=smoothed, geometry_step_m=0.0)
+    for draw in range(DRAWS):
+        for direction in (1, -1):
+            recording = rough(draw, direction)
+            estimate = smoother.estimate(drawn(recording) if mount == "drawn" else recording)
+            error = errors(estimate, rough_motion(draw, direction)).abs()
+            shares.append((error < 1.96 * estimate.states[list(SD_COLUMNS)].to_numpy()).mean())
+    table = pd.DataFrame(shares)
+    slack = 2.6 * table.std() / np.sqrt(len(table))
+    assert (table.mean() + slack > 0.95).all(), table.mean()
+    assert (table.mean() > 0.85).all()
+
+
 # --- What it says -----------------------------------------------------------------------------------------
 
 
