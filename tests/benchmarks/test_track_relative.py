@@ -53,7 +53,7 @@ MOST_BYTES = 1.5e9
 
 @lru_cache
 def ride() -> Recording:
-    """Some 100 s over the line at 70 km/h; of its IMU nothing is exact, since filterpy inverts covariances."""
+    """Some 100 s over the line at 70 km/h. Of its IMU nothing is exact: filterpy inverts covariances."""
     recording = measure(
         kinematic_truth(track_by_name("condequinto_olivar"), SpeedProfile(10.0, 1500.0, 70.0 / 3.6)),
         name="benchmark",
