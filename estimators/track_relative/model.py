@@ -98,8 +98,9 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool) -> Steps:
     counts = wheel["pulse_count"].to_numpy(dtype=np.float64)
     way = (counts[np.maximum(read, 0)] - counts[0]) * recording.encoder_sheet.pulse_m
     ends = time[block - 1 :: block][:n]
-    known = np.searchsorted(trace.time_s, ends + 1e-9, side="right") - 1
-    resting = np.where(known >= 0, trace.resting[np.maximum(known, 0)], True)
+    # Before the odometry's first step, which a short ride does not have, the train stands.
+    known = np.searchsorted(trace.time_s, ends + 1e-9, side="right")
+    resting = np.concatenate([[True], trace.resting])[known]
     odometry[resting, 1:] = 0.0
     return Steps(
         time_s=mean(time[:, None])[:, 0],
@@ -108,7 +109,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool) -> Steps:
         signals=mean(recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)),
         way=mean(way[:, None])[:, 0],
         odometry=odometry,
-        slipping=np.where(known >= 0, trace.slipping[np.maximum(known, 0)], False),
+        slipping=np.concatenate([[False], trace.slipping])[known],
         resting=resting,
     )
 

@@ -15,7 +15,7 @@ from simrail.estimators.track_relative.noise import Motion
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import ImuSheet, Recording
-from simrail.track.design import Curve
+from simrail.track.design import Curve, Transition
 
 JERK_M2PS5 = 0.05
 """Intensity of the acceleration's random walk: service traction changes by some 0.2 m/s2 in a second."""
@@ -170,12 +170,17 @@ def _sensor_sds(sd: FloatArray, recording: Recording) -> None:
 
 
 def heading_sd(recording: Recording) -> float:
-    """Of the map's yaw where the ride begins: that of all curves from the map's origin on."""
+    """Of the map's yaw where the ride begins: that of all curves from the map's origin on.
+
+    A transition turns by half its length at the curvature of either end: it belongs to its curve.
+    """
     track, total, place = recording.track, 0.0, recording.track.start_m
-    for element in track.elements:
+    around = (None, *track.elements, None)
+    for before, element, behind in zip(around, track.elements, around[2:], strict=False):
         if place >= recording.start_position_m:
             break
         if isinstance(element, Curve):
-            total += (element.length_m / element.radius_m) ** 2
+            ramps = [side.length_m for side in (before, behind) if isinstance(side, Transition)]
+            total += ((element.length_m + 0.5 * sum(ramps)) / element.radius_m) ** 2
         place += element.length_m
     return math.hypot(START_HEADING_SD_RAD, recording.map_errors.radius_relative_sd * math.sqrt(total))

@@ -119,8 +119,7 @@ class TrackRelativeSmoother:
 
     def __post_init__(self) -> None:
         for name in self.without:
-            if name not in PARTS:
-                raise InputError("is no part of the state", field="without", value=name, limit=one_of(PARTS))
+            one_of(name, PARTS, "is no part of the state", field="without")
         out = "is out of range"
         for name, is_good, limit in (
             ("passes", self.passes in range(1, MOST_PASSES + 1), f"1 to {MOST_PASSES}"),

@@ -1,0 +1,121 @@
+"""The map under a body: against the design track, chords in closed form, and a map with joints moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simrail.estimators.track_relative.line import ground_at, lines_of, numbers_at
+
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
+from simrail.recording.sheets.vehicle_sheet import SheetBody, Support, VehicleSheet
+from simrail.track.alignment import element_starts
+from simrail.track.design import Curve, Straight, Transition
+
+COACH = VehicleSheet(
+    (
+        SheetBody("front axle", 5.0),
+        SheetBody("rear axle", -4.0),
+        SheetBody("body", 0.0, (Support("rear axle", -4.0), Support("front axle", 5.0))),
+    )
+)
+"""A body on two axles, of which the middle is half a metre before its reference point."""
+
+
+def at(recording: Recording, place: float) -> int:
+    return round((place - recording.track.start_m) * 4.0)
+
+
+def test_the_ground_is_the_track_under_the_mount(exact_bend: Recording) -> None:
+    place = np.array([45.0, 81.3, 130.0, 190.2, 300.0])
+    ground, frame = ground_at(exact_bend, lines_of(exact_bend), place), exact_bend.track.frame(place)
+    for found, wanted in ((ground.k, frame.k), (ground.dk, frame.dk), (ground.up, frame.rotation[:, 2, :])):
+        np.testing.assert_allclose(np.column_stack([part.value for part in found]), wanted, atol=1e-15)
+    # Without a drawing a body points where the track does, and follows it eased: roll'' (1.5 m)^2/2 or less.
+    for askew in (*ground.askew, *ground.askew_slope):
+        np.testing.assert_allclose(askew.value, 0.0, atol=1e-15)
+    np.testing.assert_allclose(ground.bend[0].value, frame.rates[:, 2], atol=1e-7)
+    np.testing.assert_allclose(ground.lean[0].value, frame.roll_rad, atol=3e-4)
+    np.testing.assert_allclose(ground.dip[0].value, frame.rates[:, 1], atol=1e-7)
+
+
+def test_beyond_its_ends_the_map_is_as_at_its_ends(exact_bend: Recording) -> None:
+    lines, track = lines_of(exact_bend), exact_bend.track
+    beyond = ground_at(exact_bend, lines, np.array([track.start_m - 5.0, track.end_m + 9.0]))
+    ends = ground_at(exact_bend, lines, np.array([track.start_m, track.end_m]))
+    np.testing.assert_array_equal(beyond.frame.yaw_rad, ends.frame.yaw_rad)
+    np.testing.assert_array_equal(beyond.bend[0].value, ends.bend[0].value)
+
+
+def test_a_share_of_the_cant_is_one_in_a_curve_and_none_on_a_straight(exact_bend: Recording) -> None:
+    canted = lines_of(exact_bend).canted
+    for place, share in ((30.0, 0.0), (130.0, 1.0), (210.0, 0.0), (300.0, 1.0), (450.0, 0.0)):
+        assert canted[at(exact_bend, place)] == pytest.approx(share, abs=1e-12)
+    assert canted[at(exact_bend, 80.0)] == pytest.approx(0.5, abs=0.01)  # a ramp is odd about its middle
+
+
+def test_a_body_on_two_axles_is_askew_as_its_chord_says(exact_bend: Recording) -> None:
+    """In a curve it points along the tangent at its middle, half a metre before the mount at 0."""
+    recording = replace(exact_bend, vehicle_sheet=COACH, mount_position_m=(2.5, 0.2, 0.6))
+    lines, track = lines_of(recording), recording.track
+    middle = 0.5 - 2.5
+    here = at(recording, 130.0)
+    assert lines.askew_yaw[here] == pytest.approx(middle / 250.0, rel=1e-3)
+    assert lines.bend[here] == pytest.approx(1.0 / 250.0, rel=1e-9)
+    # It rolls with the mean of the track under its axles.
+    for place in (65.0, 80.0, 130.0):
+        ends = track.frame(np.array([place + middle - 4.5, place, place + middle + 4.5])).roll_rad
+        roll = lines.askew_roll[at(recording, place)]
+        assert roll == pytest.approx(0.5 * (ends[0] + ends[2]) - ends[1], abs=1e-12)
+    # On a slope that changes by 1/R its pitch is that of its middle.
+    here = at(recording, 180.0)
+    assert lines.askew_pitch[here] == pytest.approx(middle * lines.dip[here], rel=0.02)
+    # An axle rolls with the track that it stands on, though a body points it.
+    axle = lines_of(replace(recording, mount_body="front axle", mount_position_m=(0.0, 0.0, 0.5)))
+    np.testing.assert_allclose(axle.askew_roll, 0.0, atol=1e-15)
+    assert axle.askew_yaw[at(recording, 130.0)] == pytest.approx((0.5 - 5.0) / 250.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("joint", range(1, 5))
+def test_joints_shift_curvature_and_cant(exact_bend: Recording, joint: int) -> None:
+    """A track of which one joint lies elsewhere has what the weights say, to the square of the shift.
+
+    Of that order are k' d^2/L and roll' d^2/L, and all within the shift of a joint.
+    """
+    shift, track = 0.2, exact_bend.track
+    elements = list(track.elements)
+    for i, more in ((joint - 1, shift), (joint, -shift)):
+        elements[i] = replace(elements[i], length_m=elements[i].length_m + more)
+    laid = replace(track, elements=tuple(elements))
+    lines = lines_of(exact_bend)
+    starts = element_starts(track.elements, track.start_m)
+    away = np.abs(lines.places[:, None] - starts).min(axis=1) > 1.0
+    places = lines.places[away]
+    by, by_roll = (lines.odd, lines.odd_roll) if joint % 2 else (lines.even, lines.even_roll)
+    near = (places > starts[joint - 1]) & (places < starts[joint + 1])
+    before, behind = track.frame(places), laid.frame(places)
+    for moved, weight, size in (
+        (behind.rates[:, 2] - before.rates[:, 2], by[away], 1e-4),
+        (behind.roll_rad - before.roll_rad, by_roll[away], 2e-3),
+    ):
+        np.testing.assert_allclose(
+            moved[near], -shift * weight[near], rtol=0, atol=4.0 * size * shift**2 / 40.0 + 1e-9
+        )
+        assert np.abs(moved[near]).max() > 0.5 * shift * size
+        np.testing.assert_allclose(moved[~near], 0.0, atol=1e-7)
+
+
+def test_places_have_the_numbers_of_their_element_and_curve(exact_bend: Recording) -> None:
+    lines, track = lines_of(exact_bend), exact_bend.track
+    place: FloatArray = np.array([5.0, 61.0, 101.0, 199.0, 210.0, 232.0, 400.0])
+    element, curve, vertical = numbers_at(lines, place)
+    assert element.tolist() == [0, 1, 2, 3, 4, 5, 8]
+    kinds = [Straight, Transition, Curve, Transition, Straight, Transition, Straight]
+    assert [type(track.elements[i]) for i in element] == kinds
+    assert curve.tolist() == [0, 0, 0, 0, 0, 1, 1]  # they are parted in the middle of the straight, at 215 m
+    assert numbers_at(lines, np.array([214.0, 216.0]))[1].tolist() == [0, 1]
+    # Vertical curves: R |slope behind - slope before|, half to either side of 180 m.
+    assert numbers_at(lines, np.array([150.0, 156.0, 180.0, 204.0, 210.0]))[2].tolist() == [0, 1, 1, 1, 0]
+    assert set(vertical.tolist()) <= {0.0, 1.0}

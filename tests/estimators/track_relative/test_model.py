@@ -1,0 +1,178 @@
+"""A ride in steps, and its linear model: means of samples, joints that are forgotten, no future."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.line import ground_at
+from simrail.estimators.track_relative.measurement import duals, shown
+from simrail.estimators.track_relative.model import _jerk, _sense, about, course_of, linearised, steps_of
+from simrail.estimators.track_relative.noise import AXLE, BODY
+from twins.track_relative import whole_rows
+
+from simrail.core.columns import ACCEL, GYRO
+from simrail.core.errors import InputError
+from simrail.recording.recording import Recording, beginning
+from simrail.track.alignment import element_starts
+
+
+def test_a_step_is_the_mean_of_its_samples(rough: Callable) -> None:
+    recording: Recording = rough()
+    steps = steps_of(recording, 125.0, smoothed=False)
+    imu = recording.imu[[*GYRO, *ACCEL]].to_numpy()
+    assert steps.dt == 2.0 / 250.0
+    assert len(steps.signals) == len(imu) // 2
+    np.testing.assert_allclose(steps.signals[5], imu[10:12].mean(axis=0), rtol=1e-15)
+    time = recording.imu.index.to_numpy()
+    np.testing.assert_allclose(steps.time_s[[0, 7]], [time[:2].mean(), time[14:16].mean()])
+    np.testing.assert_array_equal(steps.end_s[[0, 7]], time[[1, 15]])
+    ten = steps_of(recording, 25.0, smoothed=False)
+    np.testing.assert_allclose(ten.signals[3], imu[30:40].mean(axis=0), rtol=1e-12)
+
+
+def test_the_wheels_way_is_that_of_its_counts(rough: Callable) -> None:
+    """The counter's last reading at each sample, from the ride's first count on."""
+    recording: Recording = rough()
+    assert recording.encoder is not None and recording.encoder_sheet is not None
+    steps = steps_of(recording, 125.0, smoothed=False)
+    counts = recording.encoder["pulse_count"].to_numpy(dtype=float)
+    way = (
+        np.interp(steps.time_s, recording.encoder.index, counts - counts[0]) * recording.encoder_sheet.pulse_m
+    )
+    # A reading is at most one period of the counter old, and as old as a count is coarse.
+    slack = 15.5 / recording.encoder_sheet.rate_hz + 2.0 * recording.encoder_sheet.pulse_m
+    assert np.abs(steps.way - way).max() < slack
+    assert steps.way[-1] == pytest.approx(580.0, rel=0.01)
+
+
+def test_a_step_takes_nothing_from_later(rough: Callable) -> None:
+    recording: Recording = rough()
+    whole = steps_of(recording, 125.0, smoothed=False)
+    part = steps_of(beginning(recording, samples=4000), 125.0, smoothed=False)
+    for name in ("signals", "way", "odometry", "slipping", "resting"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[:2000], err_msg=name)
+
+
+def test_no_encoder_is_said(rough: Callable) -> None:
+    for missing in ({"encoder": None}, {"encoder_sheet": None}):
+        with pytest.raises(InputError, match="encoder"):
+            steps_of(replace(rough(), **missing), 125.0, smoothed=True)
+
+
+def test_the_linear_model_is_the_measurement_where_it_is_linearised(rough: Callable) -> None:
+    """There its innovation is z - h(x), whatever the states; its rows are the slopes."""
+    recording: Recording = rough()
+    steps = steps_of(recording, 125.0, smoothed=True)
+    course = course_of(recording, steps, BODY, ())
+    moved = course.around.states.copy()
+    moved[:, at.TILT], moved[:, at.LAG], moved[:, at.Y_BEND], moved[:, at.S] = (
+        0.3,
+        0.4,
+        2.0,
+        moved[:, at.S] + 0.2,
+    )
+    course = about(course, moved)
+    rows = slice(1500, 1600)
+    model, x0 = linearised(course, rows), course.around.states[rows]
+    around = course.around._replace(states=x0, jerk=course.around.jerk[rows], sense=course.around.sense[rows])
+    ground = ground_at(recording, course.lines, x0[:, at.S])
+    h = np.array([row.value for row in shown(duals(x0), ground, around)]).T
+    linear = np.array([whole_rows(model.columns, c) @ x for c, x in zip(model.coefficients, x0, strict=True)])
+    np.testing.assert_allclose((model.measured - linear)[:, :6], steps.signals[rows] - h, rtol=0, atol=1e-12)
+    np.testing.assert_allclose((model.measured - linear)[:, 6], steps.way[rows] - x0[:, at.WAY], atol=1e-9)
+    np.testing.assert_array_equal(
+        whole_rows(model.columns, model.coefficients[0])[6], np.eye(at.STATES)[at.WAY]
+    )
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_joint_is_forgotten_once_it_is_behind(rough: Callable, direction: int) -> None:
+    """EVEN and ODD are of the joints at the ends of the element: one changes just where its joint does."""
+    recording: Recording = rough(0, direction)
+    steps = steps_of(recording, 125.0, smoothed=True)
+    course = course_of(recording, steps, AXLE, ())
+    flows = linearised(course, slice(0, len(steps.time_s))).flows
+    starts = element_starts(recording.track.elements, recording.track.start_m)
+    nearest = np.round(course.around.states[:, at.S] * 4.0) / 4.0  # as the map is tabled
+    element = np.searchsorted(starts, nearest + 1e-9, side="right") - 1
+    ends = np.column_stack([element, element + 1])
+    even, odd = ends[np.arange(len(ends)), element % 2], ends[np.arange(len(ends)), 1 - element % 2]
+    for column, joint in ((10, even), (11, odd)):
+        np.testing.assert_array_equal(
+            np.flatnonzero(np.diff(joint)) + 1, np.flatnonzero(flows[:, column] == 0.0)
+        )
+    assert set(np.unique(flows[:, 10:])) >= {0.0, 1.0}
+    assert (flows[:, 10] == 0.0).sum() + (flows[:, 11] == 0.0).sum() == 8
+    # Curve and cant begin anew once, between the two curves, at 215 m of the design.
+    for column in (8, 9):
+        (where,) = np.flatnonzero(flows[:, column] == 0.0)
+        assert abs(course.around.states[where, at.S] - 215.0) < 2.0
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_flows_add_up_over_a_ride(rough: Callable, bend: Callable, direction: int) -> None:
+    """To its way, to the angle that it turns by, and over a vertical curve to its length."""
+    recording: Recording = replace(rough(0, direction), track=bend(15.0, 1).track)
+    steps = steps_of(recording, 125.0, smoothed=True)
+    course = course_of(recording, steps, AXLE, ())
+    flows, track = linearised(course, slice(0, len(steps.time_s))).flows, recording.track
+    place = course.around.states[[0, -1], at.S]
+    assert flows[:, 1].sum() == pytest.approx(place[1] - place[0], abs=0.05)
+    assert (flows[:, 0] == np.abs(flows[:, 1])).all()
+    yaw = track.frame(place).yaw_rad
+    assert flows[:, 2].sum() == pytest.approx(yaw[1] - yaw[0], abs=1e-4)
+    # A joint that is shifted by one metre turns the line by k' (half of the transition) = k/2.
+    side = np.abs(course.around.states[:, at.S] - 80.0) < 22.0
+    for column in (3, 4):
+        assert abs(flows[side, column].sum()) == pytest.approx(
+            0.5 / abs(track.elements[2].radius_m), rel=0.02
+        )
+    near = np.abs(course.around.states[:, at.S] - 180.0) < 40.0
+    # R times the change of slope, and half of each of the ramps of some 5 m by which it begins and ends.
+    assert 1500.0 * 0.035 < -7.0 * np.log(flows[near, 7]).sum() < 1500.0 * 0.035 + 6.0
+
+
+def test_a_wheel_that_slips_is_not_measured(rough: Callable) -> None:
+    recording: Recording = rough()
+    steps = steps_of(recording, 125.0, smoothed=True)
+    slips = steps.slipping.copy()
+    slips[2000:2010] = True
+    model = linearised(course_of(recording, steps._replace(slipping=slips), AXLE, ()), slice(1990, 2020))
+    assert np.isinf(model.variances[10:20, 6]).all()
+    assert np.isfinite(model.variances[:10]).all() and np.isfinite(model.variances[:, :6]).all()
+    assert (model.flows[10:20, 12] == 1.0).all() and model.flows[:10, 12].max() < 1e-2
+
+
+def test_white_motion_grows_with_the_speed(rough: Callable) -> None:
+    """Variance by the third power of V; at 70 km/h and 125 Hz it is the class's own, beside the sensor's."""
+    recording: Recording = rough()
+    steps = steps_of(recording, 125.0, smoothed=True)
+    course = course_of(recording, steps, AXLE, ())
+    states = course.around.states.copy()
+    states[:, at.V] = 70.0 / 3.6
+    fast = linearised(about(course, states), slice(0, 1)).variances[0]
+    states[:, at.V] = 35.0 / 3.6
+    slow = linearised(about(course, states), slice(0, 1)).variances[0]
+    states[:, at.V] = 0.0
+    still = linearised(about(course, states), slice(0, 1)).variances[0]
+    np.testing.assert_allclose(fast[:6] - still[:6], np.square([1e-3] * 3 + [0.14, 0.11, 0.08]), rtol=1e-9)
+    np.testing.assert_allclose(fast[:6] - still[:6], 8.0 * (slow[:6] - still[:6]), rtol=1e-9)
+    sheet = recording.imu_sheet
+    assert still[0] == pytest.approx(sheet.gyro_noise_radpsqrts**2 * 125.0, rel=0.01)
+    assert still[3] == pytest.approx(sheet.accel_noise_mpsqrts**2 * 125.0, rel=0.02)
+
+
+def test_the_sense_of_travel_is_held_at_rest() -> None:
+    speed = np.array([0.0, 0.1, -0.1, 3.0, 0.1, -0.1, -3.0, -0.1, 0.1, 0.0, 3.0])
+    assert _sense(speed).tolist() == [1, 1, 1, 1, 1, 1, -1, -1, -1, -1, 1]
+
+
+def test_the_jerk_is_the_slope_of_the_acceleration_of_the_past() -> None:
+    time = 0.008 * np.arange(1000)
+    np.testing.assert_allclose(_jerk(0.3 * time, 0.008)[200:], 0.3)
+    step = np.where(time > 4.0, 1.0, 0.0)
+    assert not _jerk(step, 0.008)[time <= 4.0].any()

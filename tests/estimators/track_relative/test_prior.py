@@ -1,0 +1,132 @@
+"""What is known before a ride: stationary where it should be, by the sheets, nothing of what is left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import twins.track_relative as twin
+from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.noise import AXLE, BODY, FRAME, Motion, motion_of
+from simrail.estimators.track_relative.prior import PARTS, first_state, heading_sd, noise_of, start_of
+
+from simrail.core.errors import InputError
+from simrail.recording.sheets.vehicle_sheet import SheetBody, Support, VehicleSheet
+
+WAGON = VehicleSheet(
+    (
+        SheetBody("front axle", 2.0),
+        SheetBody("rear axle", -2.0),
+        SheetBody("frame", 0.0, (Support("rear axle", -2.0), Support("front axle", 2.0))),
+        SheetBody("car", 0.0, (Support("frame", 0.0), Support("other frame", -12.0))),
+        SheetBody("tender", 30.0, (Support("tender axle", -2.0), Support("other axle", 2.0))),
+        SheetBody("tender axle", 28.0),
+    )
+)
+
+
+def test_the_class_of_a_mount_is_that_of_the_drawing(rough: Callable) -> None:
+    drawn = replace(rough(), vehicle_sheet=WAGON)
+    classes = {"front axle": AXLE, "frame": FRAME, "car": BODY, "tender": BODY, "not drawn": BODY}
+    for body, motion in classes.items():
+        assert motion_of(replace(drawn, mount_body=body)) is motion
+    assert motion_of(rough()) is BODY
+
+
+@pytest.mark.parametrize("name", ["roll_sd", "gyro", "pitch_length", "damping", "y_length"])
+def test_a_motion_out_of_range_is_refused(name: str) -> None:
+    for value in (
+        -1.0,
+        math.nan,
+        math.inf,
+        *([0.0] if name in ("pitch_length", "damping", "y_length") else []),
+    ):
+        with pytest.raises(InputError, match=name) as caught:
+            Motion(**{name: value})
+        assert caught.value.field == name
+
+
+@pytest.mark.parametrize("motion", [AXLE, BODY], ids=["by distance", "by time"])
+def test_the_body_begins_as_it_stays(rough: Callable, motion: Motion) -> None:
+    """The start's covariance of each process is the stationary one of its differential equation."""
+    recording = rough()
+    noise = noise_of(recording, motion)
+    _, p = start_of(recording, motion, noise)
+    for process in twin.processes(noise):
+        rows = slice(process.first, process.first + len(process.p))
+        if process.first != at.CANT_ALONG:
+            np.testing.assert_allclose(p[rows, rows], process.p, rtol=1e-9, atol=1e-9 * process.p.max())
+        across = p[rows].copy()
+        across[:, rows] = 0.0
+        assert not across.any()
+    along = p[at.CANT_ALONG, at.CANT_ALONG]
+    assert math.sqrt(along) == pytest.approx(5e-4 / recording.track.rail_base_m)
+    assert not p[:, at.STATES :].any()
+    assert np.array_equal(p[:, : at.STATES], p[:, : at.STATES].T)
+
+
+def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:
+    """A bound b of a sheet is taken for uniform: b/sqrt(3). The map's cant is over the rails' distance."""
+    recording = rough()
+    sheet, base = recording.imu_sheet, recording.track.rail_base_m
+    noise = noise_of(recording, AXLE)
+    sd = np.sqrt(np.diag(start_of(recording, AXLE, noise)[1]))
+    turn, scale = sheet.package_misalignment_rad / math.sqrt(3.0), sheet.gyro_scale_error / math.sqrt(3.0)
+    assert sd[at.GYRO_BIAS[0]] == pytest.approx(sheet.gyro_turn_on_bias_radps / math.sqrt(3.0))
+    bias, force = sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), sheet.accel_scale_error / math.sqrt(3.0)
+    # What is across gravity feels it by the turn of the package, what is along it by its scale.
+    across = [math.hypot(bias, 9.81 * turn)] * 2
+    np.testing.assert_allclose(sd[list(at.ACCEL_BIAS)], [*across, math.hypot(bias, 9.81 * force)])
+    np.testing.assert_allclose(sd[list(at.GYRO_OF_Z)], [turn, turn, scale])
+    np.testing.assert_allclose(sd[list(at.ACCEL_OF_X)], [force, turn, turn])
+    np.testing.assert_allclose(sd[list(at.ACCEL_OF_Y)], [turn, force, turn])
+    assert sd[at.CANT] == pytest.approx(0.004 / base)
+    assert sd[at.CURVE] == 0.01
+    assert sd[at.EVEN] == sd[at.ODD] == 0.3
+    assert sd[at.SLOPE] == recording.map_errors.gradient_sd
+    assert sd[at.SCALE] == pytest.approx(recording.encoder_sheet.radius_relative_sd)
+    walk = 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + sheet.gyro_random_walk_radpspsqrts**2
+    assert noise.gyro_walk == pytest.approx(walk)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_what_is_left_out_is_known_and_stays(rough: Callable, part: str) -> None:
+    recording = rough()
+    noise = noise_of(recording, BODY, [part])
+    _, p = start_of(recording, BODY, noise, [part])
+    left = list(PARTS[part])
+    assert not p[left].any() and not p[:, left].any()
+    with_all = np.diag(start_of(recording, BODY, noise_of(recording, BODY))[1])
+    others = [i for i in range(at.STATES) if i not in left and with_all[i] > 0.0]
+    assert (np.diag(p)[others] > 0.0).all()
+    driven = {
+        "cant_along": noise.sd[3], "lag": noise.lag_walk, "gyro_bias": noise.gyro_walk,
+        "accel_bias": noise.accel_walk, "slope": noise.forgotten_sd[0], "curve": noise.forgotten_sd[1],
+        "cant": noise.forgotten_sd[2], "joints": noise.forgotten_sd[3:].max(),
+    }  # fmt: skip
+    assert all((size == 0.0) == (name == part) for name, size in driven.items())
+
+
+def test_the_heading_is_as_sure_as_the_curves_before(rough: Callable) -> None:
+    """The angle of each curve with its transitions errs by the relative error of its radius."""
+    recording = rough()
+    yaw = recording.track.frame(np.array([10.0, 215.0, 500.0])).yaw_rad
+    angles = np.diff(yaw)
+    assert np.abs(angles).min() > 0.3
+    for place, passed in ((50.0, 0), (215.0, 1), (500.0, 2)):
+        wanted = math.hypot(1e-3, 0.01 * math.hypot(*angles[:passed]))
+        found = heading_sd(replace(recording, start_position_m=place))
+        assert found == pytest.approx(wanted, rel=0.01)
+
+
+def test_a_mount_is_carried_inside_a_curve_by_the_versine(rough: Callable) -> None:
+    """Over a chord of half length c the middle lies c^2/(2 R) inside the arc: that much per curvature."""
+    drawn = replace(rough(), vehicle_sheet=WAGON, mount_body="frame", mount_position_m=(0.5, 0.0, 1.0))
+    x = first_state(drawn, FRAME)
+    radius, half = 300.0, 2.0
+    arc = lambda u: radius - math.sqrt(radius**2 - u**2)  # noqa: E731
+    assert x[at.Y_BEND] / radius == pytest.approx(arc(half) - arc(0.5), rel=1e-3)
+    assert x[at.S] == drawn.start_position_m
