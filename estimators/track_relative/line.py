@@ -20,6 +20,7 @@ from simrail.estimators.track_relative.states import S
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
+from simrail.recording.sheets.vehicle_sheet import Chord
 from simrail.track.design import TrackFrame
 
 EASE_M = 1.5
@@ -45,6 +46,8 @@ class Lines(NamedTuple):
         Angles of the body on its chord less those of the track under the mount, rad.
     bend, lean, dip : ndarray (m,)
         Eased: curvature of the track over the chord, its roll, and the slope of its pitch.
+    torsion : ndarray (m,)
+        Roll of the track under the body that rests on this one, less that under this one, rad.
     canted : ndarray (m,)
         Share of a curve's full cant, 0 to 1.
     even, odd, even_roll, odd_roll : ndarray (m,)
@@ -62,6 +65,7 @@ class Lines(NamedTuple):
     bend: FloatArray
     lean: FloatArray
     dip: FloatArray
+    torsion: FloatArray
     canted: FloatArray
     even: FloatArray
     odd: FloatArray
@@ -92,6 +96,7 @@ def lines_of(recording: Recording) -> Lines:
         bend=_eased(table[:, 1]),
         lean=_eased(borne),
         dip=_eased(np.gradient(pitch, places)),
+        torsion=_roll_above(recording, places, borne) - borne,
         canted=_share_of_cant(under.roll_rad, curve),
         even=even,
         odd=odd,
@@ -112,12 +117,30 @@ def _roll_over_chord(recording: Recording, places: FloatArray) -> FloatArray:
 
     An axle rolls with the track where it is, though its frame points it along a chord.
     """
-    chord, sheet, track = chord_of(recording), recording.vehicle_sheet, recording.track
+    chord, sheet = chord_of(recording), recording.vehicle_sheet
     here = None if sheet is None else sheet.body(recording.mount_body)
     if chord is None or here is None or not here.supports:
-        return track.frame(places).roll_rad
-    middle = places + chord.centre_m - recording.mount_position_m[0]
-    ends = [track.frame_extended(middle + side * chord.half_m).roll_rad for side in (1.0, -1.0)]
+        return recording.track.frame(places).roll_rad
+    return _mean_roll(recording, places, chord, recording.mount_position_m[0])
+
+
+def _roll_above(recording: Recording, places: FloatArray, borne: FloatArray) -> FloatArray:
+    """The same of the one body that rests on this one, and twists it; ``borne`` where there is none."""
+    sheet = recording.vehicle_sheet
+    here = None if sheet is None else sheet.body(recording.mount_body)
+    if sheet is None or here is None or not here.supports:
+        return borne
+    above = [body for body in sheet.bodies if any(support.on == here.name for support in body.supports)]
+    chord = sheet.chord(above[0].name) if len(above) == 1 else None
+    if chord is None:
+        return borne
+    return _mean_roll(recording, places, chord, recording.mount_position_m[0] + here.x_m - above[0].x_m)
+
+
+def _mean_roll(recording: Recording, places: FloatArray, chord: Chord, mount_x_m: float) -> FloatArray:
+    """Mean roll under both ends of a chord, over the places of a mount at ``mount_x_m`` of its body."""
+    middle = places + chord.centre_m - mount_x_m
+    ends = [recording.track.frame_extended(middle + side * chord.half_m).roll_rad for side in (1.0, -1.0)]
     return np.asarray(0.5 * (ends[0] + ends[1]))
 
 
@@ -149,7 +172,7 @@ class Ground(NamedTuple):
         Roll, pitch and yaw of the body on its chord less those of the track, and their slopes, 1/m.
     bend, lean : tuple of three Dual
         As in `Lines`, with their first and second slope.
-    dip, canted : tuple of two Dual
+    dip, torsion, canted : tuple of two Dual
         With their first slope.
     even, odd, even_roll, odd_roll : ndarray (n,)
         As in `Lines`.
@@ -165,6 +188,7 @@ class Ground(NamedTuple):
     bend: tuple[Dual, ...]
     lean: tuple[Dual, ...]
     dip: tuple[Dual, ...]
+    torsion: tuple[Dual, ...]
     canted: tuple[Dual, ...]
     even: FloatArray
     odd: FloatArray
@@ -198,6 +222,7 @@ def ground_at(recording: Recording, lines: Lines, place: FloatArray) -> Ground:
         bend=known(lines.bend, 2),
         lean=known(lines.lean, 2),
         dip=known(lines.dip, 1),
+        torsion=known(lines.torsion, 1),
         canted=known(lines.canted, 1),
         even=np.interp(place, lines.places, lines.even),
         odd=np.interp(place, lines.places, lines.odd),

@@ -31,8 +31,8 @@ class Motion:
         White motion that the model lacks, per sample of 125 Hz at `AT_MPS`, rad/s and m/s2.
     tilt, tilt_sd : float
         Roll flexibility: rad of roll per rad of cant deficiency, its mean and standard deviation.
-    squat_sd : float
-        rad of pitch per g.
+    squat_sd, torsion_sd : float
+        rad of pitch per g; rad of roll per rad by which the body above rolls more than the track here.
     y_tilt_sd, y_bend_sd : float
         Lateral place per rad of cant deficiency, m, and per curvature, m2.
 
@@ -61,6 +61,7 @@ class Motion:
     tilt: float = 0.0
     tilt_sd: float = 0.1
     squat_sd: float = 0.01
+    torsion_sd: float = 0.0
     y_tilt_sd: float = 0.05
     y_bend_sd: float = 1.0
 
@@ -77,7 +78,7 @@ class Motion:
 AXLE = Motion()
 """What runs on the rails by itself."""
 
-FRAME = Motion()
+FRAME = Motion(torsion_sd=0.15)
 """A bogie frame."""
 
 BODY = Motion(

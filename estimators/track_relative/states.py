@@ -6,6 +6,7 @@ The state has three layers, each relative to the one below, and what the sensors
                          Y, Y_1, Y_2, Z, Z_1, Z_2    m, place of the mount beside the nominal one, and its
                                                      derivatives by distance
                          TILT     rad of roll per rad of cant deficiency: suspension (quasi-static)
+                         TORSION  rad of roll per rad by which the body that it bears rolls more than the track here
                          SQUAT    rad of pitch per g of acceleration
                          LAG      m, how far behind its chord a body points, in the direction of travel
                          LEAD     m, the same of its slope
@@ -38,10 +39,12 @@ GYRO_OF_Z = (40, 41, 42)
 ACCEL_OF_X = (43, 44, 45)
 ACCEL_OF_Y = (46, 47, 48)
 
-STATES = 49
+TORSION = 49
+
+STATES = 50
 
 WIDTH = 52
-"""Length of a row of the covariance: the last three are always zero, and fill the vector registers."""
+"""Length of a row of the covariance: the last two are always zero, and fill the vector registers."""
 
 PAIRS = (ROLL, PITCH, YAW, CANT_ALONG)
 """First states of those with one derivative."""
