@@ -78,6 +78,31 @@ def test_a_body_on_two_axles_is_askew_as_its_chord_says(exact_bend: Recording) -
     assert axle.askew_yaw[at(recording, 130.0)] == pytest.approx((0.5 - 5.0) / 250.0, rel=1e-3)
 
 
+def test_a_frame_is_twisted_by_what_rests_on_it(exact_bend: Recording) -> None:
+    """By the mean roll of the track under the ends of that, less the mean under its own."""
+    metro = VehicleSheet(
+        (
+            *(SheetBody(f"axle {i}", x) for i, x in enumerate((10.0, 8.0, -8.0, -10.0))),
+            SheetBody("front frame", 9.0, (Support("axle 1", -1.0), Support("axle 0", 1.0))),
+            SheetBody("rear frame", -9.0, (Support("axle 3", -1.0), Support("axle 2", 1.0))),
+            SheetBody("car", 0.0, (Support("rear frame", -9.0), Support("front frame", 9.0))),
+        )
+    )
+    frame = replace(
+        exact_bend, vehicle_sheet=metro, mount_body="front frame", mount_position_m=(0.4, 0.0, 1.0)
+    )
+    lines, track = lines_of(frame), frame.track
+    for place in (75.0, 80.0, 92.0, 175.0):
+        middle = place - 0.4  # of the frame; that of the car is 9 m behind
+        roll = track.frame(middle + np.array([1.0, -1.0, 0.0, -18.0])).roll_rad
+        wanted = 0.5 * (roll[2] + roll[3]) - 0.5 * (roll[0] + roll[1])
+        assert abs(wanted) > 1e-3
+        assert lines.torsion[at(frame, place)] == pytest.approx(wanted, abs=1e-12)
+    for body in ("axle 0", "car"):
+        assert not lines_of(replace(frame, mount_body=body)).torsion.any()
+    assert not lines_of(exact_bend).torsion.any()
+
+
 @pytest.mark.parametrize("joint", range(1, 5))
 def test_joints_shift_curvature_and_cant(exact_bend: Recording, joint: int) -> None:
     """A track of which one joint lies elsewhere has what the weights say, to the square of the shift.

@@ -33,7 +33,7 @@ SIZES = {
     (at.CURVE,): 0.01,
     (at.EVEN, at.ODD): 0.5,
     (at.HEADING, at.SCALE, at.TREAD, at.LEFT, at.RIGHT): 2e-3,
-    (at.TILT, at.Y_TILT): 0.3,
+    (at.TILT, at.TORSION, at.Y_TILT): 0.3,
     (at.SQUAT,): 0.02,
     (at.LAG, at.LEAD): 0.5,
     (at.Y_BEND,): 2.0,
@@ -50,7 +50,7 @@ MOTION = [
 
 
 def random_states(place: FloatArray, speed: FloatArray, name: str) -> FloatArray:
-    """States (n, 49) at places and speeds."""
+    """States (n, 50) at places and speeds."""
     rng, n = stream(8, "shown", name), len(place)
     states = np.zeros((n, at.STATES))
     for numbers, size in SIZES.items():
@@ -72,7 +72,7 @@ def wavy(lines: Lines) -> Lines:
     s = lines.places
     sizes = {
         "askew_roll": 2e-3, "askew_pitch": 1e-3, "askew_yaw": 3e-3, "bend": 2e-3, "lean": 0.02, "dip": 2e-4,
-        "canted": 0.3, "even": 1e-4, "odd": 7e-5, "even_roll": 1e-3, "odd_roll": 8e-4,
+        "canted": 0.3, "torsion": 4e-3, "even": 1e-4, "odd": 7e-5, "even_roll": 1e-3, "odd_roll": 8e-4,
     }  # fmt: skip
     waves = {
         name: getattr(lines, name) + size * np.sin(s / (5.0 + i) + i)
@@ -150,13 +150,11 @@ def test_slopes_by_the_place_equal_steps_on_the_map(exact_bend: Recording, formu
         moved = states.copy()
         moved[:, at.S] += side * h
         ground = ground_at(exact_bend, lines, moved[:, at.S])._replace(dk=here.dk)
-        rows = np.array([row.value for row in formula(duals(moved), ground, around)])
-        if formula is told:  # there the turn is out of the map's track at the place about which all is linear
-            angles, angles_here = (
-                np.array([frame.roll_rad, frame.pitch_rad, frame.yaw_rad])
-                for frame in (ground.frame, here.frame)
-            )
-            rows[:3] += angles - angles_here - (moved[:, at.S] - states[:, at.S]) * here.frame.rates.T
+        # The turn is out of the map's track where the train is: about the moved states.
+        linear_about = around if formula is shown else around_of(moved)
+        rows = np.array([row.value for row in formula(duals(moved), ground, linear_about)])
+        if formula is told:
+            rows[:3] += [ground.frame.roll_rad, ground.frame.pitch_rad, ground.frame.yaw_rad]
         sides.append(rows)
     wanted = (sides[0] - sides[1]) / (2.0 * h)
     found = formula(duals(states), here, around)
@@ -166,12 +164,25 @@ def test_slopes_by_the_place_equal_steps_on_the_map(exact_bend: Recording, formu
         assert (error < 1e-5 + (left_out if formula is shown and number == 3 else 0.0)).all()
 
 
+def test_the_outputs_are_the_states_that_they_are_named_after(exact_bend: Recording) -> None:
+    """Roll, pitch, yaw, S, V, y and z by the states of that name; and the yaw by the heading of the map."""
+    states = random_states(PLACES, SPEEDS, "outputs")
+    rows = told(
+        duals(states), ground_at(exact_bend, lines_of(exact_bend), states[:, at.S]), around_of(states)
+    )
+    named = (at.ROLL, at.PITCH, at.YAW, at.S, at.V, at.Y, at.Z)
+    for number, state in (*enumerate(named), (2, at.HEADING)):
+        np.testing.assert_array_equal(rows[number].slopes[state], 1.0)
+    for number, value in ((3, PLACES), (4, SPEEDS)):
+        np.testing.assert_array_equal(rows[number].value, value)
+
+
 # --- Motion through time ----------------------------------------------------------------------------------
 
 POLYNOMIALS = {
     "askew_roll": (1e-3, 2e-4, -3e-5), "askew_pitch": (-8e-4, 1e-4, 2e-5), "askew_yaw": (2e-3, -3e-4, 4e-5),
     "bend": (3e-3, 9e-5, -4e-6), "lean": (-0.05, -1.5e-3, 6e-5), "dip": (3e-4, 2e-5, 1e-6),
-    "canted": (0.6, 0.02, 1e-3),
+    "torsion": (6e-3, -4e-4, 2e-5), "canted": (0.6, 0.02, 1e-3),
 }  # fmt: skip
 """Of the distance from the place: value, slope, and half the second slope."""
 
@@ -198,8 +209,8 @@ def smooth_ground(track: TrackDesign, place: float) -> Ground:
         frame=frame, k=k, dk=dk, pitch_slope=Dual(frame.rates[:, 1]),
         up=tuple(Dual(up[:, i]) for i in range(3)), askew=tuple(a[0] for a in askew),
         askew_slope=tuple(a[1] for a in askew), bend=known("bend", 2), lean=known("lean", 2),
-        dip=known("dip", 1), canted=known("canted", 1), even=zero + EVEN, odd=zero + ODD,
-        even_roll=zero + EVEN_ROLL, odd_roll=zero + ODD_ROLL,
+        dip=known("dip", 1), torsion=known("torsion", 1), canted=known("canted", 1),
+        even=zero + EVEN, odd=zero + ODD, even_roll=zero + EVEN_ROLL, odd_roll=zero + ODD_ROLL,
     )  # type: ignore[arg-type]  # fmt: skip
 
 
@@ -237,7 +248,7 @@ class Moving(NamedTuple):
         pitch = x[at.PITCH] + x[at.PITCH_RATE] * run + x[at.SQUAT] * acceleration / GRAVITY + x[at.SLOPE]
         pitch = pitch - self.sense * x[at.LEAD] * polynomial("dip", d)
         yaw = x[at.YAW] + x[at.YAW_RATE] * run - self.sense * x[at.LAG] * polynomial("bend", d)
-        roll = x[at.ROLL] + rolled + x[at.TILT] * q + cant
+        roll = x[at.ROLL] + rolled + x[at.TILT] * q + x[at.TORSION] * polynomial("torsion", d) + cant
         askew = [polynomial(name, d) for name in ("askew_roll", "askew_pitch", "askew_yaw")]
         return np.column_stack([roll + askew[0], pitch + askew[1], yaw + askew[2]])
 
