@@ -16,6 +16,7 @@ from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
 from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.odometry.encoder import EncoderOdometry
+from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
 from simrail.cli.templates import write_template
@@ -76,6 +77,8 @@ OURS = [
     TrajectorySmoother(with_covariance=False),
     TrajectorySmoother(smoothed=False),
     TrajectorySmoother(smoothed=False, printed=True, rest_bias=False),
+    TrackRelativeSmoother(),
+    TrackRelativeSmoother(smoothed=False),
 ]
 
 
@@ -91,6 +94,8 @@ BACKWARDS = {
     "imufusion": Imufusion(),
     "trajectory": TrajectorySmoother(draws=2),
     "trajectory_filter": TrajectorySmoother(smoothed=False),
+    "track_relative": TrackRelativeSmoother(),
+    "track_relative_filter": TrackRelativeSmoother(smoothed=False),
 }
 
 

@@ -1,8 +1,9 @@
 """Are the covariances true? On a world that is exactly the filter's, over many draws, two-sided.
 
 States are drawn from the filter's own start and moved by its own transition and noise, over a stretch of a
-ride that leaves a straight for a curve; measurements are drawn of its own linear rows. Then the NEES of any group
-of states is chi-square, and so is the NIS, whatever the rows mean: that is for the tests of the measurement.
+ride that leaves a straight for a curve; measurements are drawn of its own linear rows. Then the NEES of any
+group of states is chi-square, and so is the NIS, whatever the rows mean: that is for the tests of the
+measurement.
 """
 
 from __future__ import annotations
