@@ -1,1 +1,1 @@
-"""Smoother and filter of a body relative to its track, of the track relative to its map, and of the sensors."""
+"""Smoother and filter of a body relative to its track, and of the track relative to its map."""

@@ -9,7 +9,7 @@ from typing import Union
 
 import numpy as np
 
-from simrail.core.jit import FloatArray
+from simrail.core.jit import FloatArray, IntArray
 
 Term = Union["Dual", FloatArray, float]
 
@@ -87,7 +87,7 @@ def turned(vector: Vector, rotation: Vector) -> Vector:
     )
 
 
-def table_of(duals: list[Dual], n: int) -> tuple[np.ndarray, FloatArray, FloatArray]:
+def table_of(duals: list[Dual], n: int) -> tuple[FloatArray, IntArray, FloatArray]:
     """Values, and slopes as rows of few entries: (n, m), columns (m, w) and coefficients (n, m, w).
 
     A row has as many entries as the longest one; those beyond its own are zeros of state 0.

@@ -1,9 +1,10 @@
 """Compiled loops of the track-relative smoother: the filter, and the way back, in segments.
 
-A linear Kalman filter of 50 states whose transition is a few small blocks: what is a process over the distance
-stands still with the train. The way back is the modified Bryson-Frazier recursion of `simrail.estimators.kalman`.
-It needs the filter's covariance at every step, 20 kB: the filter keeps one in `SEGMENT` steps, and the way back
-runs it again over each segment, so that memory grows with the square root of the ride's length only.
+A linear Kalman filter of 50 states whose transition is a few small blocks: what is a process over the
+distance stands still with the train. The way back is the modified Bryson-Frazier recursion of
+`simrail.estimators.kalman`. It needs the filter's covariance at every step, 20 kB: the filter keeps one in
+`SEGMENT` steps, and the way back runs it again over each segment, so that memory grows with the square root
+of the ride's length only.
 
 Not here: what the measurements are (`simrail.estimators.track_relative.measurement`), and how noisy
 (`simrail.estimators.track_relative.noise`).
@@ -26,7 +27,6 @@ from simrail.estimators.kalman import (
     withdraw,
 )
 from simrail.estimators.track_relative.states import (
-    A,
     ACCEL_BIAS,
     CANT,
     CANT_ALONG,
@@ -47,6 +47,7 @@ from simrail.estimators.track_relative.states import (
     WAY,
     WIDTH,
     YAW,
+    A,
     S,
     V,
     Y,
@@ -73,8 +74,8 @@ FORGETS = (TREAD, SLOPE, CURVE, CANT, EVEN, ODD)
 
 FLOWS = 13
 """Numbers of a step: way run (m, >= 0), way (m, signed), shares of heading by CURVE, EVEN and ODD, shares of
-the wheel's path in curves to the left and right, what is kept of `FORGETS` but for the first: 5, and the variance
-that WAY gains, m2."""
+the wheel's path in curves to the left and right, what is kept of `FORGETS` but for the first: 5, and the
+variance that WAY gains, m2."""
 
 
 class Noise(NamedTuple):
@@ -315,7 +316,7 @@ def predict(
 def block(
     x: FloatArray, p: FloatArray, first: int, m: int, f: FloatArray, q: FloatArray, lines: FloatArray
 ) -> None:
-    """The m states from ``first`` move by F (m, m) with noise Q; the covariance stays symmetric to the bit."""
+    """The m states from ``first`` move by F (m, m) with noise Q; P stays symmetric to the bit."""
     n, width = p.shape
     for i in range(m):
         total = 0.0
@@ -501,17 +502,16 @@ def run_filter(
     ``starts`` and ``start_covariances``, of one row per segment or none, keep what each begins with.
     """
     n = model.measured.shape[0]
-    total, number = 0.0, 0
-    for first in range(0, n, SEGMENT):
+    total = 0.0
+    for number in range(-(-n // SEGMENT)):
         if starts.shape[0] > 0:
             for i in range(STATES):
                 starts[number, i] = x[i]
                 for c in range(WIDTH):
                     start_covariances[number, i, c] = p[i, c]
-        total += run_segment(
-            x, p, model, first, min(first + SEGMENT, n), None, scratch, filtered, covariance, surprises
-        )
-        number += 1
+        first = number * SEGMENT
+        last = min(first + SEGMENT, n)
+        total += run_segment(x, p, model, first, last, None, scratch, filtered, covariance, surprises)
     return total
 
 
@@ -549,7 +549,7 @@ def run_back(
             for m in range(ROWS - 1, -1, -1):
                 if segment.inverses[at, m] > 0.0:
                     unmeasure(lam, info, model, k, m, segment, at, scratch)
-            smooth(segment, at, lam, info, smoothed[k])
+            smooth(segment, at, lam, smoothed[k])
             if covariance.shape[0] > 0:
                 speak(
                     segment.covariances[at],
@@ -606,7 +606,7 @@ def unmeasure(
 
 
 @njit_borrowed
-def smooth(segment: Segment, at: int, lam: FloatArray, info: FloatArray, out: FloatArray) -> None:
+def smooth(segment: Segment, at: int, lam: FloatArray, out: FloatArray) -> None:
     """X = x^- - P^- lam."""
     for i in range(STATES):
         total = segment.states[at, i]

@@ -1,13 +1,14 @@
 """The map under a body, at the places of a ride: what the track-relative smoother takes of it.
 
-A body points along a chord of the track (`simrail.estimators.odometry.line_table`) and rolls with the track under
-the two ends of that chord; its suspension follows cant and curvature within a window of `EASE_M`. How the shift of
-a joint changes curvature and cant is as in that module: the slope times the joint's weight, by the parity of its
-number.
+A body points along a chord of the track (`simrail.estimators.odometry.line_table`) and rolls with the track
+under the two ends of that chord; its suspension follows cant and curvature within a window of `EASE_M`. How
+the shift of a joint changes curvature and cant is as in that module: the slope times the joint's weight, by
+the parity of its number.
 
 A quantity of the map depends on the place, which is a state: each is a `Dual` of S.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -207,7 +208,7 @@ def ground_at(recording: Recording, lines: Lines, place: FloatArray) -> Ground:
         for _ in range(slopes + 1):
             rows.append(np.gradient(rows[-1], lines.places))
         read = [np.interp(place, lines.places, row) for row in rows]
-        return tuple(Dual(value, {S: slope}) for value, slope in zip(read[:-1], read[1:], strict=True))
+        return tuple(Dual(value, {S: slope}) for value, slope in pairwise(read))
 
     askew = [known(values, 1) for values in (lines.askew_roll, lines.askew_pitch, lines.askew_yaw)]
     frame = track.frame(place)

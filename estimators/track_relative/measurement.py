@@ -1,8 +1,8 @@
 """What an IMU should show of a body in its track: gyro and accelerometer as functions of the state.
 
-The rigid-body kinematics of paper 001 (section 2; EQUATIONS 1.1, 1.2, 3.2), without its small angles where they cost
-something, with the states of `simrail.estimators.track_relative.states`. All is written once, with `Dual`: the
-Jacobian follows.
+The rigid-body kinematics of paper 001 (section 2; EQUATIONS 1.1, 1.2, 3.2), without its small angles where
+they cost something, with the states of `simrail.estimators.track_relative.states`. All is written once, with
+`Dual`: the Jacobian follows.
 
     h_m     = CURVE h - EVEN even - ODD odd                       curvature that the map has not
     q       = V^2 (bend + h_m)/g + lean + cant_m                  cant deficiency over g, over the chord
@@ -166,7 +166,8 @@ def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> 
 def _run(x: list[Dual], around: Around) -> FloatArray:
     """d(distance)/dt (n,), for what the body does in the track: the speed is taken for known there.
 
-    A smoothed motion is smaller than the true one: as a state the speed would be raised until the product fits.
+    A smoothed motion is smaller than the true one: as a state the speed would be raised until the product
+    fits.
     """
     return np.asarray(x[at.V].value * around.sense)
 
@@ -216,7 +217,8 @@ def _felt(
 def told(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
     """What the estimate says: turn of the body out of the map's track (three), S, V, y and z.
 
-    The slopes are those of roll, pitch and yaw of the body, in which the map is read at S and turned by HEADING.
+    The slopes are those of roll, pitch and yaw of the body, in which the map is read at S and turned by
+    HEADING.
     """
     pose = pose_of(x, ground, around, deviation_of(x, ground, around))
     here = x[at.S] - around.states[:, at.S]

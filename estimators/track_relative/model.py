@@ -1,8 +1,8 @@
 """A ride in steps, and its linear model for the kernels of the track-relative smoother.
 
-The IMU is averaged over steps; all is linearised about a course (`Course`): at first that of an odometry with the
-body at rest in the map's track, then that of the smoothed train. The odometry is that only: its place and speed
-are no measurements, since they are made of the same signals.
+The IMU is averaged over steps; all is linearised about a course (`Course`): at first that of an odometry
+with the body at rest in the map's track, then that of the smoothed train. The odometry is that only: its
+place and speed are no measurements, since they are made of the same signals.
 """
 
 from collections.abc import Collection
@@ -158,8 +158,8 @@ def course_of(recording: Recording, steps: Steps, motion: Motion, without: Colle
 FOLLOWED = (at.S, at.V, at.A, at.TILT, at.LAG, at.Y_BEND)
 """States about which to linearise anew: of the train, and how its body follows cant and curves.
 
-Not those of the body in its track: what multiplies them is a motion of the body as well, and a smoothed motion is
-smaller than the true one, so that a state that is constant would make up for the product.
+Not those of the body in its track: what multiplies them is a motion of the body as well, and a smoothed
+motion is smaller than the true one, so that a state that is constant would make up for the product.
 """
 
 

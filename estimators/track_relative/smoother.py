@@ -1,17 +1,19 @@
-"""The track-relative smoother, and its filter: attitude, place and speed of a body, the rails below, and how sure.
+"""The track-relative smoother, and its filter: attitude, place and speed, and how sure they are.
 
-A railway vehicle never leaves its track, and its track is on a map: what an IMU on it shows is, nearly all, known
-before. The estimate is of the small rest, in three layers (`simrail.estimators.track_relative.states`): the body in
-the track, the track in the map, the train on the line; and of the sensors. What is a deviation in space is a process
-over the distance, so that a train that stands measures its sensors and nothing else. The map is not believed: each
-curve has its own cant, curvature and place, known as well as the map's sheet says.
+A railway vehicle never leaves its track, and its track is on a map: what an IMU on it shows is, nearly all,
+known before. The estimate is of the small rest, in three layers
+(`simrail.estimators.track_relative.states`): the body in the track, the track in the map, the train on the
+line; and of the sensors. What is a deviation in space is a process over the distance, so that a train that
+stands measures its sensors and nothing else. The map is not believed: each curve has its own cant, curvature
+and place, known as well as the map's sheet says.
 
-Forwards it is a Kalman filter, which is to be had as a causal estimate; backwards a fixed-interval smoother. All is
-linear about the odometry (`simrail.estimators.track_relative.model`), of which nothing else is taken: the wheel
-is a measurement. The smoother linearises a second time, about what it has found of the train.
+Forwards it is a Kalman filter, which is to be had as a causal estimate; backwards a fixed-interval smoother.
+All is linear about the odometry (`simrail.estimators.track_relative.model`), of which nothing else is taken:
+the wheel is a measurement. The smoother linearises a second time, about what it has found of the train.
 
-The formulation is ours. It owes to Briales et al. 2021 the compensation by the design track, to Gonzalez-Carbajal et
-al. 2023 the state of a body in the track frame, and to Hartikainen and Sarkka 2010 processes over space as states.
+The formulation is ours. It owes to Briales et al. 2021 the compensation by the design track, to
+Gonzalez-Carbajal et al. 2023 the state of a body in the track frame, and to Hartikainen and Sarkka 2010
+processes over space as states.
 """
 
 from collections.abc import Iterator
@@ -98,11 +100,11 @@ class TrackRelativeSmoother:
     rate_hz : float
         Rate of its steps: the IMU is averaged over each.
     motion : Motion, optional
-        How the body moves in its track; that of the mount's class (`simrail.estimators.track_relative.noise`) if
-        not given.
+        How the body moves in its track; that of the mount's class
+        (`simrail.estimators.track_relative.noise`) if not given.
     without : tuple of str
-        Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), to show what each
-        is for.
+        Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), to show what
+        each is for.
     geometry_step_m : float
         Distance of the places of the rail geometry; 0 leaves the geometry out.
     """

@@ -2,29 +2,36 @@
 
 The state has three layers, each relative to the one below, and what the sensors do to all of them:
 
-    body in the track    ROLL, ROLL_RATE, PITCH, PITCH_RATE, YAW, YAW_RATE     rad, and its derivative
-                         Y, Y_1, Y_2, Z, Z_1, Z_2    m, place of the mount beside the nominal one, and its
-                                                     derivatives by distance
+    body in the track    ROLL, ROLL_RATE, PITCH, PITCH_RATE, YAW, YAW_RATE
+                                  rad, and derivatives by distance (of a roll that sways: by time)
+                         Y, Y_1, Y_2, Z, Z_1, Z_2
+                                  m, place of the mount beside the nominal one, and derivatives by distance
                          TILT     rad of roll per rad of cant deficiency: suspension (quasi-static)
-                         TORSION  rad of roll per rad by which the body that it bears rolls more than the track here
+                         TORSION  rad of roll per rad by which the body above rolls more than the track here
                          SQUAT    rad of pitch per g of acceleration
                          LAG      m, how far behind its chord a body points, in the direction of travel
                          LEAD     m, the same of its slope
-                         Y_TILT, Y_BEND    lateral place per rad of cant deficiency, m, and per curvature, m2
+                         Y_TILT, Y_BEND
+                                  lateral place per rad of cant deficiency, m, and per curvature, m2
     track in the map     CANT     rad, of the curve's cant at its full height
-                         CANT_ALONG, CANT_ALONG_1    rad, of the cant along the line, and derivative by distance
+                         CANT_ALONG, CANT_ALONG_1
+                                  rad, of the cant along the line, and its derivative by distance
                          SLOPE    rad, of the gradient
                          HEADING  rad, of the yaw: it counts from the start and is in no measurement
                          CURVE    relative, of the curve's curvature
-                         EVEN, ODD    m, shift of the joints of even and odd number
+                         EVEN, ODD
+                                  m, shift of the joints of even and odd number
     train on the line    S, V, A  m, m/s, m/s2: place, speed and acceleration of the mount along the map
                          WAY      m, that the encoder's wheel should show
-                         SCALE, TREAD, LEFT, RIGHT    relative, of its rolling radius: constant, wandering,
-                                                      in curves to either side
-    sensors              GYRO_BIAS, ACCEL_BIAS    three each
-                         GYRO_OF_Z    relative, what each gyro shows of the rate about Z: three
-                         ACCEL_OF_X, ACCEL_OF_Y    relative, what each accelerometer shows of the force along X
-                                                   and Y: three each (of Z, gravity: that is in the bias)
+                         SCALE, TREAD, LEFT, RIGHT
+                                  relative, of its rolling radius: constant, wandering, in curves to a side
+    sensors              GYRO_BIAS, ACCEL_BIAS
+                                  rad/s, m/s2: three each
+                         GYRO_OF_Z
+                                  relative, what each gyro shows of the rate about Z: three
+                         ACCEL_OF_X, ACCEL_OF_Y
+                                  relative, what each accelerometer shows of the force along X and along Y:
+                                  three each (what it shows of gravity, along Z, is in its bias)
 
 The order is chosen for the transition (`simrail.estimators.track_relative.kernel`): pairs, triples, chains.
 """
