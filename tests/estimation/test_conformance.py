@@ -94,7 +94,7 @@ BACKWARDS = {
     "imufusion": Imufusion(),
     "trajectory": TrajectorySmoother(draws=2),
     "trajectory_filter": TrajectorySmoother(smoothed=False),
-    "track_relative": TrackRelativeSmoother(),
+    "track_relative": TrackRelativeSmoother(passes=1),
     "track_relative_filter": TrackRelativeSmoother(smoothed=False),
 }
 

@@ -224,7 +224,7 @@ def test_consistent_over_200_draws(
     judge(world_by(rough, worlds, motion), 200)
 
 
-@pytest.mark.parametrize("scale", [0.8, 1.25])
+@pytest.mark.parametrize("scale", [0.8, pytest.param(1.25, marks=pytest.mark.slow)])
 def test_a_noise_wrong_by_a_quarter_is_noticed(
     rough: Callable, worlds: dict[str, Callable[[], World]], scale: float
 ) -> None:
@@ -237,3 +237,29 @@ def test_a_noise_wrong_by_a_quarter_is_noticed(
         name = "place in the track"
         low, high = interval(draws, len(GROUPS[name]), tests=len(found) * len(AT))
         assert not low < found[smoothed, name][-1] < high
+
+
+@pytest.mark.parametrize("hours", [0.1, pytest.param(1.5, marks=pytest.mark.slow)])
+def test_covariances_stay_such_on_a_long_ride(rough: Callable, hours: float) -> None:
+    """One ride after another, with rests: however many steps, no eigenvalue is below zero but by rounding."""
+    recording = rough()
+    steps = steps_of(recording, 125.0, smoothed=True)
+    course = course_of(recording, steps, BODY, ())
+    model = linearised(course, slice(0, len(steps.time_s)))
+    x, p, work = course.start.copy(), course.start_covariance.copy(), room_to_work()
+    none, none3, said = (
+        np.empty((0, at.STATES)),
+        np.empty((0, at.STATES, at.WIDTH)),
+        np.empty((0, OUTPUTS, OUTPUTS)),
+    )
+    for _ in range(round(hours * 3600.0 / (len(steps.time_s) * steps.dt))):
+        x[:] = course.start
+        run_filter(model, none, none3, none, said, np.empty((0, ROWS)), work, x, p)
+    sd = np.sqrt(np.diag(p))
+    known = sd > 0.0  # of the rest the sheets leave nothing open
+    assert known.sum() > 30 and not p[~known].any()
+    correlation = (p[:, : at.STATES] / np.where(known, sd, 1.0)[:, None] / np.where(known, sd, 1.0))[known][
+        :, known
+    ]
+    np.testing.assert_allclose(correlation, correlation.T, rtol=0, atol=1e-9)
+    assert np.linalg.eigvalsh(correlation).min() > -1e-9

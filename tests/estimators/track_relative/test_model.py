@@ -125,12 +125,15 @@ def test_flows_add_up_over_a_ride(rough: Callable, bend: Callable, direction: in
     assert (flows[:, 0] == np.abs(flows[:, 1])).all()
     yaw = track.frame(place).yaw_rad
     assert flows[:, 2].sum() == pytest.approx(yaw[1] - yaw[0], abs=1e-4)
-    # A joint that is shifted by one metre turns the line by k' (half of the transition) = k/2.
+    # A joint that lies elsewhere turns the line behind it, as much as that of a track that was laid so.
     side = np.abs(course.around.states[:, at.S] - 80.0) < 22.0
-    for column in (3, 4):
-        assert abs(flows[side, column].sum()) == pytest.approx(
-            0.5 / abs(track.elements[2].radius_m), rel=0.02
-        )
+    for joint, column in ((1, 4), (2, 3)):
+        elements = list(track.elements)
+        for i, more in ((joint - 1, 0.2), (joint, -0.2)):
+            elements[i] = replace(elements[i], length_m=elements[i].length_m + more)
+        behind = np.array([125.0])
+        turned = replace(track, elements=tuple(elements)).frame(behind).yaw_rad - track.frame(behind).yaw_rad
+        assert 0.2 * flows[side, column].sum() == pytest.approx(direction * turned[0], rel=0.02)
     near = np.abs(course.around.states[:, at.S] - 180.0) < 40.0
     # R times the change of slope, and half of each of the ramps of some 5 m by which it begins and ends.
     assert 1500.0 * 0.035 < -7.0 * np.log(flows[near, 7]).sum() < 1500.0 * 0.035 + 6.0
