@@ -1,6 +1,6 @@
 """Compiled loops of the track-relative smoother: the filter, and the way back, in segments.
 
-A linear Kalman filter of 50 states whose transition is a few small blocks: what is a process over the
+A linear Kalman filter of 51 states whose transition is a few small blocks: what is a process over the
 distance stands still with the train. The way back is the modified Bryson-Frazier recursion of
 `simrail.estimators.kalman`. It needs the filter's covariance at every step, 20 kB: the filter keeps one in
 `SEGMENT` steps, and the way back runs it again over each segment, so that memory grows with the square root
@@ -164,7 +164,7 @@ class Scratch(NamedTuple):
     kept : ndarray (6,)
         What is kept of `FORGETS`.
     h, v : ndarray (52,)
-    gain : ndarray (50,)
+    gain : ndarray (51,)
     lines : ndarray (3, 52)
     """
 
@@ -439,7 +439,7 @@ def run_segment(
 ) -> float:
     """Steps ``first`` to ``last`` of the filter, in place; returns -2 log-likelihood but for a constant.
 
-    ``kept``, ``filtered`` (n, 50) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, 7), the
+    ``kept``, ``filtered`` (n, 51) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, 7), the
     innovations over their sds, are written where there is room.
     """
     total = 0.0
@@ -531,9 +531,9 @@ def run_back(
     said: FloatArray,
     work: FloatArray,
 ) -> None:
-    """Smoothed states (n, 50) and covariances (n, 7, 7) of the outputs, from the starts of the segments.
+    """Smoothed states (n, 51) and covariances (n, 7, 7) of the outputs, from the starts of the segments.
 
-    ``said`` and ``work`` are (7, 52) and (7, 52), all zero, as ``lam`` (50,) and ``info`` (50, 52).
+    ``said`` and ``work`` are (7, 52) and (7, 52), all zero, as ``lam`` (51,) and ``info`` (51, 52).
     """
     n = model.measured.shape[0]
     none, none3 = smoothed[:0], covariance[:0]

@@ -7,7 +7,7 @@ they cost something, with the states of `simrail.estimators.track_relative.state
     h_m     = CURVE h - EVEN even - ODD odd                       curvature that the map has not
     q       = V^2 (bend + h_m)/g + lean + cant_m                  cant deficiency over g, over the chord
     cant_m  = CANT share + CANT_ALONG - EVEN even_r - ODD odd_r   roll that the map has not
-    rho     = (ROLL + TILT q + TORSION twist + cant_m + askew,
+    rho     = (ROLL + TILT q + TILT_RATE q_dot + TORSION twist + cant_m + askew,
                PITCH + SQUAT A/g + LEAD dip + SLOPE + askew,
                YAW - LAG bend + askew)                            body in the map's track
     w       = V k + V h_m e_v,      e_v upwards in track axes
@@ -33,7 +33,7 @@ class Around(NamedTuple):
 
     Attributes
     ----------
-    states : ndarray (n, 50)
+    states : ndarray (n, 51)
     jerk : ndarray (n,)
         Slope of the acceleration, m/s3.
     sense : ndarray (n,)
@@ -97,7 +97,7 @@ class Pose(NamedTuple):
 
 
 def duals(states: FloatArray) -> list[Dual]:
-    """Every state of (n, 50) as a Dual."""
+    """Every state of (n, 51) as a Dual."""
     one = np.ones(len(states))
     return [Dual(states[:, i], {i: one}) for i in range(states.shape[1])]
 
@@ -129,14 +129,16 @@ def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> 
     run, behind = _run(x, around), -around.sense
     lag, lead = x[at.LAG] * behind, x[at.LEAD] * behind
     rolls = x[at.ROLL_RATE] * (1.0 if around.in_time else run)
+    tilt = x[at.TILT] * track.q + x[at.TILT_RATE] * track.q_rate
+    tilt_rate = x[at.TILT] * track.q_rate + x[at.TILT_RATE] * track.q_rate_2
     rho = (
-        x[at.ROLL] + x[at.TILT] * track.q + track.cant + x[at.TORSION] * ground.torsion[0] + ground.askew[0],
+        x[at.ROLL] + tilt + track.cant + x[at.TORSION] * ground.torsion[0] + ground.askew[0],
         x[at.PITCH] + x[at.SQUAT] * a * (1.0 / g) + lead * ground.dip[0] + x[at.SLOPE] + ground.askew[1],
         x[at.YAW] + lag * ground.bend[0] + ground.askew[2],
     )
     rho_rate = (
         rolls
-        + x[at.TILT] * track.q_rate
+        + tilt_rate
         + track.cant_rate
         + x[at.TORSION] * v * ground.torsion[1]
         + v * ground.askew_slope[0],

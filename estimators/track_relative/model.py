@@ -123,7 +123,7 @@ class Course(NamedTuple):
     lines : Lines
     motion : Motion
     noise : Noise
-    start, start_covariance : ndarray (50,), (50, 52)
+    start, start_covariance : ndarray (51,), (51, 52)
     steps : Steps
     around : Around
         Of all n steps.
@@ -164,7 +164,7 @@ motion is smaller than the true one, so that a state that is constant would make
 
 
 def about(course: Course, states: FloatArray) -> Course:
-    """The course with states (n, 50) to linearise about; of those, what is `FOLLOWED`."""
+    """The course with states (n, 51) to linearise about; of those, what is `FOLLOWED`."""
     followed = np.zeros_like(states)
     followed[:, FOLLOWED] = states[:, FOLLOWED]
     speed, dt = states[:, at.V], course.steps.dt

@@ -31,6 +31,8 @@ class Motion:
         White motion that the model lacks, per sample of 125 Hz at `AT_MPS`, rad/s and m/s2.
     tilt, tilt_sd : float
         Roll flexibility: rad of roll per rad of cant deficiency, its mean and standard deviation.
+    tilt_rate_sd : float
+        Of TILT_RATE, s: by so long the suspension follows late, times its flexibility.
     squat_sd, torsion_sd : float
         rad of pitch per g; rad of roll per rad by which the body above rolls more than the track here.
     y_tilt_sd, y_bend_sd : float
@@ -60,6 +62,7 @@ class Motion:
     accel_z: float = 0.08
     tilt: float = 0.0
     tilt_sd: float = 0.1
+    tilt_rate_sd: float = 0.0
     squat_sd: float = 0.01
     torsion_sd: float = 0.0
     y_tilt_sd: float = 0.05
@@ -96,6 +99,7 @@ BODY = Motion(
     accel_z=0.05,
     tilt=0.2,
     tilt_sd=0.3,
+    tilt_rate_sd=0.05,
     squat_sd=0.03,
     y_tilt_sd=0.3,
     y_bend_sd=5.0,

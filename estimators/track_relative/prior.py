@@ -33,7 +33,7 @@ START_HEADING_SD_RAD = 1e-3
 """Of the map's yaw at its origin."""
 
 PARTS = {
-    "tilt": (at.TILT,),
+    "tilt": (at.TILT, at.TILT_RATE),
     "squat": (at.SQUAT,),
     "torsion": (at.TORSION,),
     "lag": (at.LAG,),
@@ -94,7 +94,7 @@ def _walk(sheet: ImuSheet, sensor: str) -> float:
 def start_of(
     recording: Recording, motion: Motion, noise: Noise, without: Collection[str] = ()
 ) -> tuple[FloatArray, FloatArray]:
-    """State (50,) and covariance (50, 52) of a train that stands where it is known to stand."""
+    """State (51,) and covariance (51, 52) of a train that stands where it is known to stand."""
     x, sd = first_state(recording, motion), np.zeros(at.STATES)
     _body_sds(sd, noise)
     _train_sds(sd, recording, motion)
@@ -112,7 +112,7 @@ def start_of(
 
 
 def first_state(recording: Recording, motion: Motion) -> FloatArray:
-    """State (50,) before anything is measured."""
+    """State (51,) before anything is measured."""
     chord, x = chord_of(recording), np.zeros(at.STATES)
     x[at.S], x[at.TILT] = recording.start_position_m, motion.tilt
     if chord is not None:
@@ -148,7 +148,7 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
     sd[at.HEADING] = heading_sd(recording)
     sd[at.TILT], sd[at.SQUAT] = motion.tilt_sd, motion.squat_sd
-    sd[at.TORSION] = motion.torsion_sd
+    sd[at.TORSION], sd[at.TILT_RATE] = motion.torsion_sd, motion.tilt_rate_sd
     sd[at.Y_TILT], sd[at.Y_BEND] = motion.y_tilt_sd, motion.y_bend_sd
     sd[at.LAG] = math.hypot(pointing.lag_sd_m, 0.0 if chord is None else lag_of(chord)[1])
     sd[at.LEAD] = pointing.lead_sd_m

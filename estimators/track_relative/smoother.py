@@ -71,7 +71,7 @@ class Trace(NamedTuple):
     ----------
     course : Course
         About which the last pass was linearised.
-    states : ndarray (n, 50)
+    states : ndarray (n, 51)
     covariance : ndarray (n, 7, 7)
         Of roll, pitch, yaw, S, V, y and z.
     surprises : ndarray (n, 7)

@@ -7,6 +7,8 @@ The state has three layers, each relative to the one below, and what the sensors
                          Y, Y_1, Y_2, Z, Z_1, Z_2
                                   m, place of the mount beside the nominal one, and derivatives by distance
                          TILT     rad of roll per rad of cant deficiency: suspension (quasi-static)
+                         TILT_RATE
+                                  s, the same per rad/s of it: the suspension follows late
                          TORSION  rad of roll per rad by which the body above rolls more than the track here
                          SQUAT    rad of pitch per g of acceleration
                          LAG      m, how far behind its chord a body points, in the direction of travel
@@ -46,12 +48,12 @@ GYRO_OF_Z = (40, 41, 42)
 ACCEL_OF_X = (43, 44, 45)
 ACCEL_OF_Y = (46, 47, 48)
 
-TORSION = 49
+TORSION, TILT_RATE = 49, 50
 
-STATES = 50
+STATES = 51
 
 WIDTH = 52
-"""Length of a row of the covariance: the last two are always zero, and fill the vector registers."""
+"""Length of a row of the covariance: the last one is always zero, and fills the vector registers."""
 
 PAIRS = (ROLL, PITCH, YAW, CANT_ALONG)
 """First states of those with one derivative."""
