@@ -47,7 +47,7 @@ GROUPS = {
     "body on its suspension": (at.LEFT, at.RIGHT, at.TILT, at.SQUAT, at.LAG, at.LEAD, at.Y_TILT),
     "biases": (at.Y_BEND, *at.GYRO_BIAS, *at.ACCEL_BIAS),
     "scales": (*at.GYRO_OF_Z, *at.ACCEL_OF_X),
-    "axes and torsion": (*at.ACCEL_OF_Y, at.TORSION),
+    "axes and torsion": (*at.ACCEL_OF_Y, at.TORSION, at.TILT_RATE),
 }
 """All states."""
 
@@ -69,7 +69,7 @@ def world_of(recording: Recording, motion: Motion) -> World:
     )
     recording = replace(recording, imu_sheet=sheet)
     steps = steps_of(recording, 125.0, smoothed=True)
-    course = course_of(recording, steps, replace(motion, torsion_sd=0.15), ())
+    course = course_of(recording, steps, replace(motion, torsion_sd=0.15, tilt_rate_sd=0.05), ())
     first = int(np.searchsorted(steps.odometry[:, 0], 56.0))
     model = linearised(course, slice(first, first + SAMPLES))
     return World(model, course.start, course.start_covariance)
@@ -84,7 +84,7 @@ def square_root(covariance: FloatArray) -> FloatArray:
 
 
 def drawn(world: World, draws: int, scale: float) -> tuple[FloatArray, FloatArray]:
-    """States (n, draws, 50) and measurements (draws, n, 7); ``scale`` spoils the noise of both."""
+    """States (n, draws, m) and measurements (draws, n, 7); ``scale`` spoils the noise of both."""
     model, rng = world.model, stream(9, "track-relative consistency", draws)
     x = (
         world.start
@@ -100,7 +100,7 @@ def drawn(world: World, draws: int, scale: float) -> tuple[FloatArray, FloatArra
 
 
 class Found(NamedTuple):
-    """Filtered and smoothed states (n, 50), innovations (n, 7), covariances (n, 7, 7) of what is said."""
+    """Filtered and smoothed states (n, m), innovations (n, 7), covariances (n, 7, 7) of what is said."""
 
     filtered: FloatArray
     smoothed: FloatArray

@@ -195,7 +195,7 @@ def require_covariance(found: FloatArray, wanted: FloatArray, within: float) -> 
 
 
 def joint(model: Model, start: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Means (n, 50) and covariances (n, 50, 50) of all states given all measurements, by one big normal law.
+    """Means (n, m) and covariances (n, m, m) of all states given all measurements, by one big normal law.
 
     All states are a linear map of white noise: of the start, and of each step. The rows of measurements are
     in units of their own noise, so that what is inverted is I + A A'.

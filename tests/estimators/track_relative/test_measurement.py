@@ -35,6 +35,7 @@ SIZES = {
     (at.HEADING, at.SCALE, at.TREAD, at.LEFT, at.RIGHT): 2e-3,
     (at.TILT, at.TORSION, at.Y_TILT): 0.3,
     (at.SQUAT,): 0.02,
+    (at.TILT_RATE,): 0.05,
     (at.LAG, at.LEAD): 0.5,
     (at.Y_BEND,): 2.0,
     at.GYRO_BIAS: 1e-3,
@@ -50,7 +51,7 @@ MOTION = [
 
 
 def random_states(place: FloatArray, speed: FloatArray, name: str) -> FloatArray:
-    """States (n, 50) at places and speeds."""
+    """States (n, m) at places and speeds."""
     rng, n = stream(8, "shown", name), len(place)
     states = np.zeros((n, at.STATES))
     for numbers, size in SIZES.items():
@@ -125,6 +126,7 @@ def test_slopes_equal_the_complex_step(exact_bend: Recording, formula: Shown, in
 def test_the_speed_is_known_where_the_body_moves(exact_bend: Recording) -> None:
     """Its slope is that of a body at rest in the track but for the terms of the rates' own products."""
     states = random_states(PLACES, SPEEDS, "slopes")
+    states[:, at.TILT_RATE] = 0.0  # it turns the body by the rate of the cant: of second order in all
     ground = ground_at(exact_bend, lines_of(exact_bend), states[:, at.S])
     still = states.copy()
     still[:, MOTION] = 0.0
@@ -248,7 +250,9 @@ class Moving(NamedTuple):
         pitch = x[at.PITCH] + x[at.PITCH_RATE] * run + x[at.SQUAT] * acceleration / GRAVITY + x[at.SLOPE]
         pitch = pitch - self.sense * x[at.LEAD] * polynomial("dip", d)
         yaw = x[at.YAW] + x[at.YAW_RATE] * run - self.sense * x[at.LAG] * polynomial("bend", d)
-        roll = x[at.ROLL] + rolled + x[at.TILT] * q + x[at.TORSION] * polynomial("torsion", d) + cant
+        h = 1e-3
+        late = x[at.TILT_RATE] * (self.deviation(t + h)[2] - self.deviation(t - h)[2]) / (2.0 * h)
+        roll = x[at.ROLL] + rolled + x[at.TILT] * q + late + x[at.TORSION] * polynomial("torsion", d) + cant
         askew = [polynomial(name, d) for name in ("askew_roll", "askew_pitch", "askew_yaw")]
         return np.column_stack([roll + askew[0], pitch + askew[1], yaw + askew[2]])
 
@@ -312,8 +316,13 @@ def left_out(body: Moving, rho_rate: FloatArray, rate: FloatArray) -> tuple[floa
     q_rate_2 += abs(x[at.CANT]) * (v * v * canted[1] + abs(a) * canted[0]) + abs(x[at.CANT_ALONG_1] * a)
     y_rate, y_rate_2 = abs(x[at.Y_TILT]) * q_rate, abs(x[at.Y_TILT]) * q_rate_2
     moving, speed = float(np.linalg.norm(rho_rate)), float(np.linalg.norm(rate))
-    gyro = 0.5 * rho * moving + rho**3 / 6.0 * speed + abs(x[at.TILT]) * q_rate
-    accel = rho**3 / 6.0 * 1.1 * GRAVITY + (abs(a) * off + v * v * off_slope) * arm
+    late = abs(x[at.TILT_RATE])
+    gyro = 0.5 * rho * moving + rho**3 / 6.0 * speed + abs(x[at.TILT]) * q_rate + late * q_rate_2
+    accel = (
+        late * q_rate * 1.1 * GRAVITY
+        + rho**3 / 6.0 * 1.1 * GRAVITY
+        + (abs(a) * off + v * v * off_slope) * arm
+    )
     return gyro + 1e-7, accel + y_rate_2 + 2.0 * speed * y_rate + 1e-6
 
 
@@ -337,6 +346,7 @@ def test_a_body_moved_through_time_shows_it(
     """Rotations and places by the meaning of the states, differentiated by numbers."""
     track = bend(15.0, 1).track
     states = random_states(np.full(5, place), np.full(5, speed), f"{place} {speed}")
+    states[:3, at.TILT_RATE] = 0.0  # of which more is left out than of all else
     sense, jerk, ground = float(np.sign(speed)), 0.1, smooth_ground(track, place)
     for x in states:
         found = np.array(

@@ -51,7 +51,7 @@ def moved(generator: FloatArray, p: FloatArray, run: float) -> tuple[FloatArray,
 
 
 class Step(NamedTuple):
-    """F and Q (50, 50) of a step."""
+    """F and Q (m, m) of a step."""
 
     f: FloatArray
     q: FloatArray
@@ -113,7 +113,7 @@ def _step(model: Model, flow: FloatArray, ours: list[Process]) -> Step:
 
 
 def whole_rows(columns: np.ndarray, coefficients: FloatArray) -> FloatArray:
-    """Rows (7, 50) of those of few entries."""
+    """Rows (7, m) of those of few entries."""
     rows = np.zeros((len(columns), at.STATES))
     for row, (states, values) in enumerate(zip(columns, coefficients, strict=True)):
         np.add.at(rows[row], states, values)
@@ -121,7 +121,7 @@ def whole_rows(columns: np.ndarray, coefficients: FloatArray) -> FloatArray:
 
 
 class Found(NamedTuple):
-    """States (n, 50), covariances (n, 50, 50), innovations over their sds (n, 7), -2 log-likelihood.
+    """States (n, m), covariances (n, m, m), innovations over their sds (n, 7), -2 log-likelihood.
 
     The innovations are those of measurements taken one after another, as the kernel takes them.
     """
