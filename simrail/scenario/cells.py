@@ -24,7 +24,7 @@ from simrail.scenario.axes import axes_of, drawn, each, expand
 from simrail.scenario.distributions import Value, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
-from simrail.scoring.table import DRAWN_MAP, EXACT_MAP
+from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity", "vibration")
 SENSING = ("odometry", "map", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
@@ -89,6 +89,11 @@ class Cell:
     def map_label(self) -> str:
         """What tables call the map."""
         return EXACT_MAP if self.spec.map is None or self.spec.map.exact else DRAWN_MAP
+
+    @property
+    def vibration_label(self) -> str:
+        """What tables call the vibration."""
+        return SILENT if self.spec.vibration is None or self.spec.vibration.off else SHAKEN
 
     @property
     def _sample_name(self) -> tuple[str | int, ...]:

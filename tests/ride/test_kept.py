@@ -95,11 +95,17 @@ def test_what_is_not_kept_is_told(rides: tuple[Truth, Truth]) -> None:
 
 
 def test_a_scenario_keeps_of_a_long_ride_what_it_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("go20a")
-    cell = next(iter(cells(scenario)))
-    assert Parts(scenario).ride(cell).kept is None
-    monkeypatch.setattr(build, "LONG_RIDE_S", 100.0)
-    assert Parts(scenario).ride(cell).kept == Kept(("front",), ("rear.left",))
+    """Of one whose wheels shake it, the angle of every wheel as well."""
+    for settings, wheels in (
+        (["vibration.wheels.on=false"], ("rear.left",)),
+        ([], ("front.left", "front.right", "rear.left", "rear.right")),
+    ):
+        scenario = load_scenario("go20a", overrides=settings)
+        cell = next(iter(cells(scenario)))
+        monkeypatch.setattr(build, "LONG_RIDE_S", 1000.0)
+        assert Parts(scenario).ride(cell).kept is None
+        monkeypatch.setattr(build, "LONG_RIDE_S", 100.0)
+        assert Parts(scenario).ride(cell).kept == Kept(("front",), wheels)
 
 
 def test_wheel_angles_do_not_feel_where_segments_end(tmp_path: Path) -> None:
