@@ -120,7 +120,7 @@ class Pointing(NamedTuple):
     lead_sd_m: float
 
 
-AXLE = Pointing(0.5, 5e-5, 4e-4, 2.0, 1.0)
+AXLE = Pointing(0.25, 2e-5, 4e-4, 2.0, 1.0)
 """It steers against its frame."""
 
 FRAME = Pointing(0.15, 1e-5, 4e-4, 2.0, 1.0)
@@ -136,13 +136,19 @@ transition. The joints of a train of such bodies pitch it with its neighbours.""
 TURNED = Pointing(0.5, 5e-5, 1.5e-3, 10.0, 1.0)
 """On a vehicle of which rods let the axles yaw: little brings a frame back to the middle of a straight."""
 
+TURNED_AXLE = Pointing(1.5, 5e-5, 3e-3, 60.0, 1.0)
+"""And its axles: they turn in their rods by as much in a wide curve as in a tight one, for all its length."""
+
 UNKNOWN_BODY = Pointing(3.0, 5e-5, 1e-3, 4.0, 3.0)
 """No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
 
-The sizes of all six are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
+The sizes of all seven are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
 
 MOST_LAG_M = 1.0
 """Of a long wheelbase: the play in the gauge turns it by no more, in the curves that matter."""
+
+CUT_LAG_SD = 0.3
+"""Of what that leaves out of the play, so much is the sd of the lag: nobody says how sharp the curves are."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -337,8 +343,7 @@ class CurveMatchedOdometry:
         sheet, errors = recording.imu_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        x[LAG] = 0.0 if chord is None else min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
-        chord_sd = 0.0 if chord is None else math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m)
+        x[LAG], chord_sd = (0.0, 0.0) if chord is None else _lag_of(chord)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
         sd[V] = STILL_SD_MPS
@@ -365,6 +370,13 @@ class CurveMatchedOdometry:
         )
 
 
+def _lag_of(chord: Chord) -> tuple[float, float]:
+    """By how much the tangent lies behind the chord, m, and the sd of that by the drawing."""
+    lag = min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
+    sd = math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m, CUT_LAG_SD * (chord.play_m - lag))
+    return lag, sd
+
+
 def chord_of(recording: Recording) -> Chord | None:
     """The chord along which the body of the mount points, if the train has a drawing."""
     sheet = recording.vehicle_sheet
@@ -375,12 +387,12 @@ def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
     """What is known of the yaw of the mount's body in the track."""
     if recording.vehicle_sheet is None or chord is None:
         return UNKNOWN_BODY
-    if any(body.turned_by and not body.supports for body in recording.vehicle_sheet.bodies):
-        return TURNED
-    if chord.half_wheelbase_m > 0.0:
-        return ON_BOGIES
     rests_on = {body.name: body.supports for body in recording.vehicle_sheet.bodies}
     supports = rests_on[recording.mount_body]
+    if any(body.turned_by and not body.supports for body in recording.vehicle_sheet.bodies):
+        return TURNED if supports else TURNED_AXLE
+    if chord.half_wheelbase_m > 0.0:
+        return ON_BOGIES
     if not supports:
         return AXLE
     return FRAME if all(not rests_on[support.on] for support in supports) else OTHER_BODY
