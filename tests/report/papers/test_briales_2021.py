@@ -279,8 +279,8 @@ def test_claims_on_the_fast_rides() -> None:
     found = {claim.key: claim for claim in view_of(FAST).all_claims}
     reproduces = {"sabatini", "general_purpose", "same_yaw", "backward_gda", "repeatability"}
     assert {key for key in reproduces if found[key].verdict != "reproduced"} == set()
-    # A step of the GDA is as long whatever it goes by: on an axle that shakes it hardly follows what it feels,
-    # so that the uncompensated one errs less in curves. Without vibration, compensation pays as the paper says.
+    # A step of the GDA is as long whatever it goes by: on an axle that shakes it hardly follows what it
+    # feels, so that the uncompensated one errs less in curves. Without vibration compensation pays.
     assert found["compensation"].verdict == "not reproduced"
     assert dict(found["compensation"].ablated)["Without vibration (ablation)"].startswith("Reproduces.")
     assert found["backward_ekf"].verdict == "not reproduced"
