@@ -296,7 +296,9 @@ def test_spread_of_planted_errors() -> None:
     assert spread_of(shifted, "planted") == pytest.approx(np.std([0.3, -0.1], ddof=1), rel=1e-9)
 
 
-def ratio_of(scores: pd.DataFrame, ride: str, method: str, ours: str) -> tuple[float, float]:
+def ratio_of(
+    scores: pd.DataFrame, ride: str, method: str, ours: str, *, vibration: str
+) -> tuple[float, float]:
     """Roll error in curves of one method over another's: the ratio of the means, and its standard error."""
     chosen = scores[
         (scores["quantity"] == "roll")
@@ -305,7 +307,7 @@ def ratio_of(scores: pd.DataFrame, ride: str, method: str, ours: str) -> tuple[f
         & (scores["reference"] == "truth")
         & (scores["ride"] == ride)
         & (scores["map"] == "drawn")
-        & (scores["vibration"] == "on")
+        & (scores["vibration"] == vibration)
     ]
     a, b = (chosen.loc[chosen["estimator"] == name, "value"].to_numpy() for name in (method, ours))
     ratio = a.mean() / b.mean()
@@ -416,7 +418,12 @@ def test_claims_on_all_rides() -> None:
     holds = {
         key: claim.verdict == "reproduced" for key, claim in found.items() if not key.startswith("size_")
     }
-    fallen = {"yuan", "backward_ekf"}
+    # What vibration does to the GDA takes two of the claims.
+    fallen = {"yuan", "backward_ekf", "compensation", "gda_slightly_better"}
+    silent = {
+        key: dict(claim.ablated).get("Without vibration (ablation)", "") for key, claim in found.items()
+    }
+    assert all(silent[key].startswith("Reproduces.") for key in ("compensation", "gda_slightly_better"))
     assert holds == {key: key not in fallen for key in holds}
     assert found["size_commercial"].verdict == "not reproduced"
     assert len(view.repeats) == 4
@@ -427,7 +434,8 @@ def test_claims_on_all_rides() -> None:
         for part in GENERAL_PURPOSE:
             for ours in ("ekf", "gda"):
                 ride, names = case.labels["ride"], rides.names
-                times, error = ratio_of(result.scores, ride, names[part], names[ours])
+                # Without vibration: on an axle that shakes an uncompensated GDA hardly feels the curves.
+                times, error = ratio_of(result.scores, ride, names[part], names[ours], vibration="off")
                 # Ten draws of a bias do not settle a factor of 4.2: only what chance does not explain counts.
                 assert times + 2.0 * error > limit, (ride, part, ours)
     for part in ("ekf", "gda"):
