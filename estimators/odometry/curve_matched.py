@@ -120,8 +120,11 @@ class Pointing(NamedTuple):
     lead_sd_m: float
 
 
-ON_AXLES = Pointing(0.15, 1e-5, 4e-4, 2.0, 1.0)
-"""An axle, which steers against its frame, a frame, and any other body on axles."""
+AXLE = Pointing(0.25, 2e-5, 4e-4, 2.0, 1.0)
+"""It steers against its frame."""
+
+FRAME = Pointing(0.15, 1e-5, 4e-4, 2.0, 1.0)
+"""And any other body on axles."""
 
 ON_BOGIES = Pointing(0.1, 2e-6, 2.5e-4, 6.5, 1.0)
 """A body on two bogies: what they do is the same at both ends, and 15 m apart."""
@@ -139,7 +142,7 @@ TURNED_AXLE = Pointing(1.5, 5e-5, 3e-3, 60.0, 1.0)
 UNKNOWN_BODY = Pointing(3.0, 5e-5, 1e-3, 4.0, 3.0)
 """No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
 
-The sizes of all six are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
+The sizes of all seven are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
 
 MOST_LAG_M = 1.0
 """Of a long wheelbase: the play in the gauge turns it by no more, in the curves that matter."""
@@ -390,7 +393,9 @@ def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
         return TURNED if supports else TURNED_AXLE
     if chord.half_wheelbase_m > 0.0:
         return ON_BOGIES
-    return ON_AXLES if all(not rests_on[support.on] for support in supports) else OTHER_BODY
+    if not supports:
+        return AXLE
+    return FRAME if all(not rests_on[support.on] for support in supports) else OTHER_BODY
 
 
 def wheel_ahead(recording: Recording) -> float:

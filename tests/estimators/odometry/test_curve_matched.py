@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from simrail.estimators.kalman import fixed_interval, room_for_history
-from simrail.estimators.odometry.curve_matched import ON_AXLES as YAW_OF_AXLE
+from simrail.estimators.odometry.curve_matched import AXLE as YAW_OF_AXLE
 from simrail.estimators.odometry.curve_matched import UNKNOWN_BODY, CurveMatchedOdometry, wheel_ahead
 from simrail.estimators.odometry.kernel import (
     BEND,
