@@ -378,7 +378,7 @@ def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran
     assert order == sorted(order)
     assert "smoother and 1 alike" in ride and "400 m" not in ran.page
     assert "The track here is 1:10 as well." in ran.page
-    assert "1 ride, 2 IMUs" in ran.page
+    assert "1 ride, 1 IMU in 2 grades" in ran.page
     assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
 
 
