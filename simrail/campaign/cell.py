@@ -265,6 +265,7 @@ def _labels(cell: Cell) -> dict[str, object]:
         "imu": cell.imu.grade,
         "odometry": cell.spec.odometry,
         "map": cell.map_label,
+        "vibration": cell.vibration_label,
         "track_draw": cell.track_draw,
         "sensor_draw": cell.sensor_draw,
     }

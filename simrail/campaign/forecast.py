@@ -1,15 +1,18 @@
 """What a scenario will run, and about what it will take: ``simrail run NAME --plan``.
 
 Numbers of cells, rides and cached rides are counted. Rows, time and disk are those of one cell, run as the
-campaign runs it, times the number of cells, or of seconds ridden. Its ride stays in the cache, where the
-campaign finds it. A machine that is busy, rides on other engines and vehicles, or recordings at other rates
-make them differ: they are an estimate, no promise.
+campaign runs it, times the number of cells, or of seconds ridden. What an engine computes counts once for all
+rides that differ in their vibration only, and the short waves beside it once for each. Its ride stays in the
+cache, where the campaign finds it. A machine that is busy, rides on other engines and vehicles, or recordings
+at other rates make them differ: they are an estimate, no promise.
 """
 
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, islice
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.filesize import decimal
@@ -19,7 +22,8 @@ from simrail.campaign.cell import STAGES
 from simrail.campaign.worker import BatchResult, forget, pack, run_batch, run_ride
 from simrail.core.interrupts import interruptible
 from simrail.ride import cache as ride_cache
-from simrail.ride.ride import Ride, is_cached
+from simrail.ride.ride import Ride, is_cached, simulate
+from simrail.ride.vibration.run import Shaker
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import Plan, judge_scenario
@@ -31,6 +35,9 @@ SCORE_ROW_BYTES = 8.0
 
 MOST_LOOKED_UP = 2000
 """Rides that are looked for in the cache, each in some 10 ms."""
+
+MOST_LISTED = 200
+"""Of more rides, so many are looked at, over the first draw of the track: others share as much."""
 
 _STAGE_WORDS = {
     "simulate": "rides that the cache lacks",
@@ -91,42 +98,102 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     """
     plan = judge_scenario(scenario, many=many)
     look = plan.rides <= MOST_LOOKED_UP
-    rides = [
-        (not (look and is_cached(ride)), ride.profile.duration_s, first)
-        for first, ride in islice(_rides(scenario, plan.parts), None if look else 1)
-    ]
-    cached = [duration for is_new, duration, _ in rides if not is_new]
-    *_, cheapest = min(rides, key=lambda ride: ride[:2])
-    duration_s, cost, ride_bytes = _cost_of(cheapest, plan.parts)
-    cells_s = plan.cells * plan.simulated_s / plan.rides
-    seconds = dict.fromkeys(STAGES, cells_s) | {"simulate": plan.simulated_s - sum(cached)}
-    rows = plan.cells * len(cost.scores)
+    draws, most = (scenario.spec.monte_carlo.track_draws, None) if look else (1, MOST_LISTED)
+    rides = [_Planned.of(*one, look=look) for one in islice(_rides(scenario, plan.parts, draws), most)]
+    scale = plan.simulated_s / sum(ride.duration_s for ride in rides)
+    # Shaken if any is: a ride in silence would not tell what short waves take.
+    cheapest = min(rides, key=lambda ride: (not ride.is_shaken, not ride.is_cached, ride.duration_s))
+    cost = _cost_of(cheapest.cell, plan.parts)
+    kept = [scale * seconds / cost.duration_s for seconds in _seconds(rides)]
+    missing = [ride for ride in rides if not ride.is_cached]
+    new = [scale * seconds / cost.duration_s for seconds in _seconds(missing, new=True)]
+    recorded = plan.cells * plan.simulated_s / plan.rides / cost.duration_s
+    simulated = new[0] * cost.engine_s + new[1] * cost.vibration_s
+    rows = plan.cells * len(cost.result.scores)
     return Forecast(
         plan=plan,
-        cached=len(cached) if look else None,
+        cached=len(rides) - len(missing) if look else None,
         rows=rows,
-        stages_s={stage: seconds[stage] * cost.cpu_s[stage] / duration_s for stage in STAGES},
-        ride_bytes=plan.simulated_s * ride_bytes / duration_s,
+        stages_s={stage: recorded * cost.result.cpu_s[stage] for stage in STAGES} | {"simulate": simulated},
+        ride_bytes=kept[0] * cost.engine_bytes + kept[1] * cost.vibration_bytes,
         score_bytes=SCORE_ROW_BYTES * rows,
-        failed={failure.estimator: failure.reason for failure in cost.failures},
+        failed={failure.estimator: failure.reason for failure in cost.result.failures},
     )
 
 
-def _rides(scenario: Scenario, parts: Parts) -> Iterator[tuple[Cell, Ride]]:
-    """Every ride, with its first cell."""
+def _rides(scenario: Scenario, parts: Parts, draws: int) -> Iterator[tuple[Cell, Ride]]:
+    """Every ride over the first draws of the track, with its first cell."""
     for _, group in groupby(first_cells(scenario), key=lambda cell: cell.ride_number):
         first = next(group)
-        for draw in range(scenario.spec.monte_carlo.track_draws):
+        for draw in range(draws):
             cell = replace(first, ride_number=first.ride_number + draw, track_draw=draw)
             yield cell, parts.ride(cell)
 
 
-def _cost_of(cell: Cell, parts: Parts) -> tuple[float, BatchResult, float]:
-    """Run a cell as the campaign does, a second time where kernels are compiled.
+class _Planned(NamedTuple):
+    """A ride that will be run.
 
-    Returns the simulated time, what came of the cell with the processor time of its stages, and the disk
-    that its ride takes.
+    Attributes
+    ----------
+    cell : Cell
+        Its first cell.
+    duration_s : float
+        Simulated time.
+    engine_key : str
+        Key of what its engine computes, which rides that differ in their vibration share.
+    is_shaken : bool
+        Whether it has short waves of its own.
+    has_engine, is_cached : bool
+        Whether the cache has that of the engine, and all of it.
     """
+
+    cell: Cell
+    duration_s: float
+    engine_key: str
+    is_shaken: bool
+    has_engine: bool
+    is_cached: bool
+
+    @classmethod
+    def of(cls, cell: Cell, ride: Ride, *, look: bool) -> "_Planned":
+        """Look at a ride, and for it in the cache."""
+        own = ride.without_vibration
+        key, has_engine = ride_cache.key_of(own.describe()), look and is_cached(own)
+        has_all = has_engine and (ride.vibration is None or is_cached(ride))
+        return cls(cell, ride.profile.duration_s, key, ride.vibration is not None, has_engine, has_all)
+
+
+def _seconds(rides: Sequence[_Planned], *, new: bool = False) -> tuple[float, float]:
+    """Seconds that engines compute, and that are shaken; ``new``: of what the cache lacks."""
+    engine = {ride.engine_key: ride.duration_s for ride in rides if not (new and ride.has_engine)}
+    return sum(engine.values()), sum(ride.duration_s for ride in rides if ride.is_shaken)
+
+
+class _Cost(NamedTuple):
+    """What a cell and its ride take.
+
+    Attributes
+    ----------
+    duration_s : float
+        Simulated time.
+    result : BatchResult
+        What came of the cell, with the processor time of its stages.
+    engine_s, vibration_s : float
+        Processor time of what the engine computes, and of the short waves beside it.
+    engine_bytes, vibration_bytes : float
+        Disk that they take.
+    """
+
+    duration_s: float
+    result: BatchResult
+    engine_s: float
+    vibration_s: float
+    engine_bytes: float
+    vibration_bytes: float
+
+
+def _cost_of(cell: Cell, parts: Parts) -> _Cost:
+    """Run a cell as the campaign does, a second time where kernels are compiled."""
     packed, ride = pack(parts), parts.ride(cell)
     duration = max(ride.profile.duration_s, 1e-3)
     with interruptible():
@@ -136,11 +203,33 @@ def _cost_of(cell: Cell, parts: Parts) -> tuple[float, BatchResult, float]:
             result = run_batch(packed, (cell,))
         finally:
             forget()
-    place = ride_cache.folder() / ride_cache.key_of(ride.describe())
     engine = result.ride.get("real_time_factor")
     seconds = duration / engine + result.ride["setup_s"] if engine else simulated.cpu_s["simulate"]
-    size = sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0
-    return duration, replace(result, cpu_s=result.cpu_s | {"simulate": seconds}), size
+    shaken = ride.vibration is not None
+    return _Cost(
+        duration,
+        result,
+        seconds,
+        _vibration_s(ride) if shaken else 0.0,
+        _bytes_of(ride.without_vibration),
+        _bytes_of(ride) if shaken else 0.0,
+    )
+
+
+def _vibration_s(ride: Ride) -> float:
+    """Processor time of the short waves of a ride that is in the cache."""
+    assert ride.vibration is not None
+    truth = simulate(ride.without_vibration, warn=False)
+    begun = time.process_time()
+    for _ in Shaker(ride.vibration, truth, ride.vehicle, seed=ride.track_seed).run():
+        pass
+    return time.process_time() - begun
+
+
+def _bytes_of(ride: Ride) -> float:
+    """Disk that a ride takes in the cache, or its short waves if it has any."""
+    place = ride_cache.folder() / ride_cache.key_of(ride.describe())
+    return sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0
 
 
 def print_forecast(console: Console, expected: Forecast) -> None:

@@ -18,7 +18,8 @@ from simrail.campaign.worker import BatchResult, example_of
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import Plan
 from simrail.scenario.stop_rule import StopState, stop_rule_of
-from simrail.scoring.table import EXACT_MAP, concat_scores, in_order
+from simrail.scoring.ablations import without_ablations
+from simrail.scoring.table import concat_scores, in_order
 
 MOST_EXAMPLES = 6
 """Recordings that are kept for the report's figures, one per ride."""
@@ -107,10 +108,12 @@ def gather(
         former = rides.get(result.ride_number)
         if result.ride and (former is None or (former["from_cache"] and not result.ride["from_cache"])):
             rides[result.ride_number] = result.ride
+    table = pd.DataFrame.from_records([cell_record(cell) for cell in listed])
+    drawn = set(without_ablations(table)["cell"]) if listed else set()
     return CampaignResult(
         scores=in_order(concat_scores(result.scores for result in results)),
-        cells=pd.DataFrame.from_records([cell_record(cell) for cell in listed]),
-        examples=_examples(plan, packed, listed, failures),
+        cells=table,
+        examples=_examples(plan, packed, [cell for cell in listed if cell.number in drawn], failures),
         rides=[rides[number] for number in sorted(rides)],
         wall_s={stage: sum(result.wall_s[stage] for result in results) for stage in STAGES},
         cpu_s={stage: sum(result.cpu_s[stage] for result in results) for stage in STAGES},
@@ -134,15 +137,12 @@ def _without_others(results: list[BatchResult], numbers: set[int]) -> list[Batch
 
 
 def _examples(plan: Plan, packed: bytes, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
-    """The first cell of each ride over the first draw that did not fail altogether, and of added noise.
-
-    One with an exact map, which is an ablation, only where no other has the ride.
-    """
+    """The first cell of each ride over the first draw that did not fail altogether, and of added noise."""
     failed = Counter(failure.cell for failure in failures)
     shown: set[int] = set()
     noise_shown = False
     examples: list[CellResult] = []
-    for cell in sorted(listed, key=lambda cell: (cell.ride_number, cell.map_label == EXACT_MAP)):
+    for cell in sorted(listed, key=lambda cell: cell.ride_number):
         if len(examples) == MOST_EXAMPLES:
             break
         lost = failed[cell.number] >= len(plan.estimators)

@@ -73,6 +73,9 @@ def read_results(folder: Path, *, field: str, remedy: str) -> StoredResults:
     if "map" not in scores:
         # Written before trains had maps of their own: each knew the line as it was laid.
         scores["map"], cells["map"] = "exact", "exact"
+    if "vibration" not in scores:
+        # Written before tables said so: no scenario but one of vibration itself had any.
+        scores["vibration"], cells["vibration"] = "off", "off"
     for what, names, needed in (
         ("manifest", manifest, ("scenario", "settings", "seed", "scenario_text")),
         ("score table", scores, SCORE_COLUMNS),

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from simrail.campaign.result import CampaignResult
-from simrail.cli.map_tables import print_map_costs, print_odometries
+from simrail.cli.ablation_tables import print_costs, print_odometries
 from simrail.report.campaign.odometry import odometry_frames
 from simrail.report.tables.geometry import (
     JUDGED,
@@ -21,17 +21,12 @@ from simrail.report.tables.geometry import (
     waves_words,
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import (
-    Case,
-    Mean,
-    cases,
-    has_both_maps,
-    map_words,
-    without_ablation,
-)
+from simrail.report.tables.pivot import Case, Mean, cases
 from simrail.report.tables.running import decay_words, running_words
+from simrail.report.words.ablations import state_words
 from simrail.results import Results
 from simrail.scenario.build import bands_by_name
+from simrail.scoring.ablations import ABLATIONS, has_both, without_ablations
 from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.running_safety import DERAILMENT_LIMIT
 from simrail.scoring.table import OK
@@ -62,8 +57,8 @@ def print_scores(console: Console, results: Results) -> None:
     safety = results.scenario.spec.running_safety
     limit = DERAILMENT_LIMIT if safety is None else safety.derailment_limit
     odometries = odometry_frames(scores, cells)
-    # Of odometries alone their own table says all; what an exact map would change stands in one as well.
-    shown = without_ablation(cells)
+    # Of odometries alone their own table says all; what ablations would change stands in others.
+    shown = without_ablations(cells)
     alone = bool(odometries) and all(style.baseline for style in styles)
     shown = shown[:0] if alone else shown
     for number, (_, members) in enumerate(shown.groupby("case", sort=True)):
@@ -72,8 +67,8 @@ def print_scores(console: Console, results: Results) -> None:
             break
         rows = scores[scores["cell"].isin(members["cell"])]
         console.print(_case(console, rows, members, styles, bands, limit))
-    if len(shown):
-        print_map_costs(console, cases(scores, cells) if has_both_maps(cells) else [], styles)
+    if len(shown) and any(has_both(cells, one) for one in ABLATIONS):
+        print_costs(console, cases(scores, cells), styles)
     print_odometries(console, odometries, by_class=alone)
     kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
     for sentence in decay_words(cases(kicks, cells)):
@@ -129,7 +124,8 @@ def _case(
     draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
     title = Text(
         f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
-        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}, {map_words(first['map'])}",
+        f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}, "
+        f"{state_words(first.to_dict(), comma=', ')}",
         style="bold",
     )
     wanted = rows["metric"].isin(("rms", "sd", "us_per_sample")) | (rows["estimator"] == RIDE)

@@ -80,6 +80,9 @@ def mount_motion(truth: Truth, mount: Mount, rows: range, columns: Sequence[str]
     chosen = [MOTION.index(name) for name in columns]
     abeam = any(name not in _INERTIAL for name in columns)
     data = np.empty((len(rows), len(chosen)))
+    mapped = [body.position, body.velocity, truth.reference_position_m]
+    if truth.short_waves is not None:
+        mapped += truth.short_waves.arrays(mount.body)
     motion, acceleration, rotation = (
         np.empty((PIECE, len(MOTION))),
         np.empty((PIECE, 3)),
@@ -110,8 +113,8 @@ def mount_motion(truth: Truth, mount: Mount, rows: range, columns: Sequence[str]
             motion[:m, 20:23] = _angles_near(np.swapaxes(frame, 1, 2) @ rotation[:m], mount.yaw_rad)
         data[begin : begin + m] = motion[:m, chosen]
         if begin // PIECE % _PIECES_HELD == _PIECES_HELD - 1:
-            give_back((body.position, body.velocity))
-    give_back((body.position, body.velocity))
+            give_back(mapped)
+    give_back(mapped)
     return data
 
 

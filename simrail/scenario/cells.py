@@ -7,7 +7,8 @@ sample of the scenario's distributions, and in their draws) share a *case*: scor
 the cells of a case.
 
 A list compares: its values meet the same draws. A distribution is chance: each of its samples has
-draws of its own.
+draws of its own. Of lists that set an ablation beside what a train has, an exact map and silence, one thing
+is taken away at a time: no cell has both.
 
 Nothing depends on the order: seeds are found by name (`ride_seed`, `sensor_seed`), so a cell gives
 the same scores alone, among others, or in another order.
@@ -24,7 +25,7 @@ from simrail.scenario.axes import axes_of, drawn, each, expand
 from simrail.scenario.distributions import Value, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
-from simrail.scoring.table import DRAWN_MAP, EXACT_MAP
+from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity", "vibration")
 SENSING = ("odometry", "map", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
@@ -89,6 +90,11 @@ class Cell:
     def map_label(self) -> str:
         """What tables call the map."""
         return EXACT_MAP if self.spec.map is None or self.spec.map.exact else DRAWN_MAP
+
+    @property
+    def vibration_label(self) -> str:
+        """What tables call the vibration."""
+        return SILENT if self.spec.vibration is None or self.spec.vibration.off else SHAKEN
 
     @property
     def _sample_name(self) -> tuple[str | int, ...]:
@@ -205,6 +211,8 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
     for k, (sensing_settings, sensing, i, imu_settings, imu) in enumerate(listed):
         if not imu.is_on(world.spec.vehicle):
             continue
+        if _takes_both(spec, world.spec, sensing):
+            continue
         sensing_drawn, concrete = drawn(sensing, world.values, fields=SENSING)
         imu_drawn, mounted = drawn(imu, world.values, prefix=f"imu.{imu.name}.", shown="imu.")
         settings = world.settings | sensing_settings | sensing_drawn | imu_settings | imu_drawn
@@ -223,6 +231,20 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
             sensor_draw=0,
             settings=settings | of_estimators,
         )
+
+
+def _sets_both(spec: ScenarioFile) -> bool:
+    """Whether both ablations stand beside what a train has."""
+    if spec.map is None or spec.vibration is None:
+        return False
+    return len(set(each(spec.map.exact))) > 1 and len(set(each(spec.vibration.off))) > 1
+
+
+def _takes_both(spec: ScenarioFile, world: ScenarioFile, sensing: ScenarioFile) -> bool:
+    """Whether a cell would have both ablations of a scenario that sets each beside what a train has."""
+    if not _sets_both(spec):
+        return False
+    return bool(world.vibration and world.vibration.off and sensing.map and sensing.map.exact)
 
 
 def sensor_draws(spec: ScenarioFile, imu: ImuPart) -> int:
@@ -244,14 +266,19 @@ def count(scenario: Scenario) -> tuple[int, int]:
     spec = scenario.spec
     worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * sample_count(spec)
     rides = worlds * spec.monte_carlo.track_draws
-    maps = _size(spec, SENSING)
+    maps = rides * _size(spec, SENSING)
     if spec.map is not None:
         exact = each(spec.map.exact)
-        maps = maps // len(exact) * sum(1 if one else spec.monte_carlo.map_draws for one in exact)
+        exact_draws = sum(1 for one in exact if one)
+        maps = maps // len(exact) * ((len(exact) - exact_draws) * spec.monte_carlo.map_draws + exact_draws)
+        if _sets_both(spec):
+            off = each(spec.vibration.off) if spec.vibration is not None else []
+            silent = rides * sum(1 for one in off if one) // len(off)
+            maps -= silent * (_size(spec, SENSING) // len(exact)) * exact_draws
     vehicles = each(spec.vehicle)
     on = [(part, sum(part.is_on(str(vehicle)) for vehicle in vehicles)) for part in spec.imu]
     recorded = sum(n * _size(part) * sensor_draws(spec, part) for part, n in on)
-    return rides, rides * maps * recorded // len(vehicles)
+    return rides, maps * recorded // len(vehicles)
 
 
 def methods(scenario: Scenario, *, sample: int = 0) -> list[Method]:

@@ -180,6 +180,14 @@ class RidePart(Part):
         if self.runs:
             self._check_runs()
             return self
+        if "runs" in self.model_fields_set:
+            raise InputError(
+                "is empty: the ride goes nowhere",
+                field="runs",
+                value="[]",
+                limit="one run or more",
+                remedy="say where each run ends, or take out runs and give end_m",
+            )
         if (self.end_m is None) != (self.speed_kmh is None):
             missing = "end_m" if self.end_m is None else "speed_kmh"
             raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")

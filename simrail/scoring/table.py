@@ -38,6 +38,7 @@ LABEL_COLUMNS = (
     "imu",
     "odometry",
     "map",
+    "vibration",
     "tuning",
     "track_draw",
     "sensor_draw",
@@ -93,6 +94,8 @@ WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", 
 METRICS = ("rms", "mean", "sd", "p95", "p9985", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 EXACT_MAP, DRAWN_MAP = "exact", "drawn"
 """What the train knows of the line: all of it, an ablation, or a map with errors."""
+SHAKEN, SILENT = "on", "off"
+"""Whether short waves and wheels shake the vehicle; off is an ablation."""
 OK = "ok"
 NO_SAMPLES = "no samples"
 """Status of a figure over a window that the ride does not have."""

@@ -22,6 +22,8 @@ def ride(lines: str) -> str:
 # name: (lines, parts of the message)
 FAULTS: dict[str, tuple[str, list[str]]] = {
     "end and runs": (RUNS + "end_m = 590.0\n", ["ride[0].end_m", "590", "has runs", "take out"]),
+    "no run": ("runs = []\n", ["ride[0].runs", "[]", "is empty", "one run or more", "give end_m"]),
+    "no run beside an end": ("runs = []\nend_m = 590.0\n", ["ride[0].runs", "is empty"]),
     "reversed": (RUNS + "reverse = true\n", ["ride[0].reverse", "list the runs the other way"]),
     "kick": (RUNS + "kick_end_m = 100.0\n", ["ride[0].kick_end_m", "over one run", "end_m"]),
     "no turning time": (RUNS.replace(", turn_s = 20.0", ""), ["ride[0].runs[0].turn_s", "is missing"]),

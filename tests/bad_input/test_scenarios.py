@@ -502,7 +502,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         _stop(width=None),
         ["stop.width", "is required"],
     ),
-    "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 27", "quotes"]),
+    "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 28", "quotes"]),
     "a key twice": ("seed = 1", "seed = 1\nseed = 2", ["not valid TOML"]),
     "a table where a list belongs": ("[[ride]]", "[ride]", ["ride", "array of tables"]),
     "no rides": ("[[ride]]", "[[rides]]", ["rides", "unknown key", "did you mean ride?"]),

@@ -73,6 +73,17 @@ def test_the_ride_that_is_drawn_has_the_map_that_errs_beside_the_line_that_was_l
     assert alone.cell["map"] == "exact" and alone.line == alone.recording.track
 
 
+def test_rides_that_are_drawn_shake_where_any_does() -> None:
+    """A ride in silence is a ride of its own, and an ablation: it is drawn where no other is."""
+    both = run_campaign(short("vibration.off=[true, false]", "monte_carlo.sensor_draws=1"))
+    assert not both.failures and set(both.cells["vibration"]) == {"on", "off"}
+    assert both.scores.groupby("cell")["vibration"].first().tolist() == both.cells["vibration"].tolist()
+    (example,) = both.examples
+    assert example.cell["vibration"] == "on" and example.shaken
+    (alone,) = run_campaign(short("vibration.off=true", "monte_carlo.sensor_draws=1")).examples
+    assert alone.cell["vibration"] == "off" and alone.shaken is None
+
+
 def test_same_seed_gives_the_same_bits(two_draws: CampaignResult) -> None:
     again = run_campaign(short())
     pd.testing.assert_frame_equal(

@@ -77,6 +77,22 @@ def test_the_ride_of_the_cell_that_is_timed_is_one_of_the_campaign(
     assert (more.plan.rides, more.cached) == (6, 4)
 
 
+def test_disk_and_time_hold_short_waves_of_each_ride_and_its_engine_once() -> None:
+    """Rides that shake beside the same in silence, and with wheels of two sizes: one ride of the engine."""
+    settings = ["ride.reverse=false", "monte_carlo.track_draws=1", "monte_carlo.sensor_draws=1"]
+    settings += ["vibration.off=[false, true]", "vibration.wheels.amplitude_um=[30.0, 60.0]", "seed=77"]
+    before = {ride.key for ride in ride_cache.rides()}
+    expected = forecast(scenario(*settings))
+    done = run_campaign(scenario(*settings), workers=1)
+    assert expected.plan.rides == len(done.rides) == 2 * 2 and not done.failures
+    new = [ride for ride in ride_cache.rides() if ride.key not in before]
+    assert len(new) == 1 + 2, "what the engine computed, and each size of the wheels"
+    assert expected.ride_bytes == pytest.approx(sum(ride.size_bytes for ride in new), rel=0.05)
+    assert expected.stages_s["simulate"] > 0.0
+    again = forecast(scenario(*settings))
+    assert again.cached == 4 and again.stages_s["simulate"] == 0.0
+
+
 def test_time_is_of_the_right_size(expected_and_done: tuple[Forecast, CampaignResult, float]) -> None:
     """Processor time, not wall time. A machine that others use still swings by a factor of two."""
     expected, _, seconds = expected_and_done

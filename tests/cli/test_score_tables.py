@@ -83,6 +83,7 @@ def scores(*, bands: dict[str, str], rails: bool = True) -> tuple[pd.DataFrame, 
         "imu": "lord_3dm_gx4_25",
         "odometry": "encoder",
         "map": "exact",
+        "vibration": "off",
         "tuning": "default",
         "track_draw": 0,
     }

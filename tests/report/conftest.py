@@ -129,6 +129,7 @@ def example_ride(*, backward: bool = False, rate: float = 50.0, name: str = "go"
         "imu": "lord_3dm_gx4_25",
         "odometry": "encoder",
         "map": "exact",
+        "vibration": "off",
     }
     return CellResult(cell, recording, motion, estimates)
 

@@ -41,11 +41,5 @@ def test_words_of_an_axis() -> None:
     """Labels of a case are texts, those of a cell are numbers."""
     assert axis_words("ride.speed_kmh", "30.0") == axis_words("ride.speed_kmh", 30.0) == "speed 30 km/h"
     assert axis_words("irregularity.spectrum", "fra_4") == "spectrum fra_4"
-    for value, words in ((True, "an exact map"), ("False", "a map with errors")):
+    for value, words in ((True, "an exact map (ablation)"), ("False", "a map with errors")):
         assert axis_words("map.exact", value) == words
-
-
-def test_silence_is_called_an_ablation() -> None:
-    cells = pd.DataFrame({"cell": [0, 1], "vibration.off": [False, True]})
-    (axis,) = campaign_axes(cells)
-    assert (axis.title, axis.words) == ("vibration", ("on", "off (ablation)"))

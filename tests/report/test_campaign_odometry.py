@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 from scipy import stats
 
-from simrail.cli.map_tables import print_odometries
+from simrail.cli.ablation_tables import print_odometries
 from simrail.report.campaign.odometry import odometry_draws, odometry_frames, page_tables
 from simrail.scoring.table import SCORE_COLUMNS, as_score_table
 
@@ -45,6 +45,7 @@ def campaign(*, exact: bool = True, mounts: tuple[str, ...] = MOUNTS, odometry: 
             "imu": "lord_3dm_gx4_25",
             "odometry": odometry,
             "map": known,
+            "vibration": "on",
             "tuning": "default",
             "track_draw": track,
             "sensor_draw": 0,

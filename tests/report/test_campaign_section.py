@@ -117,6 +117,7 @@ def campaign(
     cells["speed_kmh"] = cells["ride.speed_kmh"]
     cells["direction"] = np.where(cells["ride.reverse"], "backward", "forward")
     fixed = {"ride": "out", "vehicle": "none", "mount": "axle", "odometry": "encoder", "map": "exact"}
+    fixed["vibration"] = "off"
     for name, value in (fixed | {"track": "test_line", "engine": "kinematic"}).items():
         cells[name] = value
     n, rows = len(cells), len(methods) * len(FIGURES)
@@ -147,6 +148,7 @@ def campaign(
             "imu",
             "odometry",
             "map",
+            "vibration",
             "track_draw",
             "sensor_draw",
         )

@@ -18,7 +18,7 @@ from simrail.estimation.estimate import Estimate
 from simrail.report.pages.page import write_report
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
-from simrail.scoring.table import concat_scores, failed_figures, labelled
+from simrail.scoring.table import LABEL_COLUMNS, concat_scores, failed_figures, labelled
 
 Rides = Callable[..., CellResult]
 Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
@@ -154,7 +154,7 @@ def test_failures_are_on_the_page_and_do_not_stop_it(
     one.estimates["ekf_compensated"] = Estimate(states=states, mount="axle")
     del one.estimates["vqf"]
     scores, cells = tables(one)
-    labels = {name: scores[name].iloc[0] for name in scores.columns[:11]}
+    labels = {name: scores[name].iloc[0] for name in LABEL_COLUMNS if name != "estimator"}
     failed = labelled([(failed_figures("LinAlgError: singular matrix"), labels | {"estimator": "vqf"})])
     path = tmp_path / "report.html"
     write_report(

@@ -336,7 +336,9 @@ def test_intervals_are_told_of_the_band_that_counts_where_there_are_any() -> Non
     one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
     found = {("ours", "vertical_profile", "full", "truth", "whole", "sd"): Mean(0.4, 0.0, 2)}
     found["ours", "alignment", "full", "truth", "whole", "coverage95"] = Mean(0.5, 0.0, 2)
-    case = Case({"imu": "ideal", "odometry": "truth", "map": "exact"}, planted("D1").table, found)
+    case = Case(
+        {"imu": "ideal", "odometry": "truth", "map": "exact", "vibration": "off"}, planted("D1").table, found
+    )
     text = "The 95 % interval of ours, of the unfiltered rails, holds the true alignment in 50 %: too small."
     assert text in [said.text for said in geometry_findings(case, [one], [])]
     found["ours", "alignment", "D1", "truth", "whole", "coverage95"] = Mean(0.95, 0.0, 2)
@@ -350,7 +352,7 @@ def test_a_goal_is_asked_of_d1_alone() -> None:
     }
     found["ours", "vertical_profile", "full", "truth", "whole", "sd"] = Mean(0.4, 0.0, 2)
     one = MethodStyle("ours", "ours", "", True, "", None, "#000000", "-")
-    labels = {"imu": "ideal", "odometry": "truth", "map": "exact"}
+    labels = {"imu": "ideal", "odometry": "truth", "map": "exact", "vibration": "off"}
     for bands, is_asked in ((("D1", "paper"), True), (("paper",), False)):
         case = Case(labels, planted(*bands).table, found)
         said = geometry_findings(case, [one], [], goals_mm={"alignment": 0.3})
@@ -376,7 +378,7 @@ def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran
     assert order == sorted(order)
     assert "smoother and 1 alike" in ride and "400 m" not in ran.page
     assert "The track here is 1:10 as well." in ran.page
-    assert "1 ride, 2 IMUs" in ran.page
+    assert "1 ride, 1 IMU in 2 grades" in ran.page
     assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
 
 

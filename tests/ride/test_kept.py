@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from simrail.ride.truth_rows import TruthRows
 from simrail.scenario import build
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import cells
-from simrail.scenario.scenario import load_scenario
+from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.scoring.ride_figures import axles_of
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
@@ -95,11 +96,16 @@ def test_what_is_not_kept_is_told(rides: tuple[Truth, Truth]) -> None:
 
 
 def test_a_scenario_keeps_of_a_long_ride_what_it_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("go20a")
-    cell = next(iter(cells(scenario)))
-    assert Parts(scenario).ride(cell).kept is None
-    monkeypatch.setattr(build, "LONG_RIDE_S", 100.0)
-    assert Parts(scenario).ride(cell).kept == Kept(("front",), ("rear.left",))
+    """Of one that may shake, the angle of every wheel as well."""
+    shaking = load_scenario("go20a")
+    text = re.sub(r"(?ms)^\[vibration\].*?\n\n", "", shaking.text)
+    silent = read_scenario(text, name="go20a")
+    for scenario, wheels in ((silent, ("rear.left",)), (shaking, tuple(sorted(RIDE.vehicle.wheel_names)))):
+        cell = next(iter(cells(scenario)))
+        monkeypatch.setattr(build, "LONG_RIDE_S", 1000.0)
+        assert Parts(scenario).ride(cell).kept is None
+        monkeypatch.setattr(build, "LONG_RIDE_S", 100.0)
+        assert Parts(scenario).ride(cell).kept == Kept(("front",), wheels)
 
 
 def test_wheel_angles_do_not_feel_where_segments_end(tmp_path: Path) -> None:

@@ -69,6 +69,33 @@ def test_maps_are_drawn_for_each_draw_of_the_track_and_an_exact_one_once() -> No
     assert [cell.number for cell in first_cells(read)] == [0, 6]
 
 
+def test_one_thing_is_taken_away_at_a_time() -> None:
+    """Of two lists of ablations no cell has both; beside an ablation throughout a list keeps its own."""
+    table = (
+        "[map]\nexact = [false, true]\n[vibration]\noff = [false, true]\nwheels.amplitude_um = [30.0, 60.0]"
+    )
+    read = scenario(table)
+    all_cells = list(cells(read))
+    labels = [(cell.map_label, cell.vibration_label) for cell in all_cells]
+    assert set(labels) == {("drawn", "on"), ("exact", "on"), ("drawn", "off")}
+    tracks, wheels, maps, sensors = 2, 2, 3, 2
+    assert labels.count(("exact", "on")) == tracks * wheels * sensors
+    assert labels.count(("drawn", "off")) == labels.count(("drawn", "on")) == tracks * wheels * maps * sensors
+    assert count(read) == (2 * tracks * wheels, len(all_cells))
+    assert [cell.number for cell in all_cells] == list(range(len(all_cells)))
+    firsts = list(first_cells(read))
+    assert len(firsts) == len({cell.case for cell in all_cells}) == 3 * wheels
+    by_number = {cell.number: cell for cell in all_cells}
+    assert all(by_number[one.number].settings == one.settings for one in firsts)
+    for table, silent in (
+        ("[map]\nexact = true\n[vibration]\noff = [false, true]", ("exact", "off")),
+        ("[map]\nexact = [false, true]\n[vibration]\noff = true", ("exact", "off")),
+    ):
+        read = scenario(table)
+        labels = [(cell.map_label, cell.vibration_label) for cell in cells(read)]
+        assert silent in labels and count(read)[1] == len(labels)
+
+
 def test_a_map_is_the_same_whatever_is_asked_first() -> None:
     one, parts = listed("[map]")
     two, others = listed("[map]")

@@ -21,6 +21,7 @@ from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.overrides import override
 from simrail.scenario.scenario import load_scenario, read_scenario
+from simrail.scenario.vibration_tables import VibrationPart
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.magnetic_surroundings import Steel, Traction
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
@@ -76,6 +77,27 @@ def test_a_train_knows_its_line_by_a_map_that_errs_and_a_laboratory_exactly(name
     assert axes_of(spec.map) == ({"exact": (False, True)} if name in beside else {})
     assert next(cells(load_scenario(name))).map_label == "drawn", "the ablation does not come first"
     assert all(part.errors() == MapErrors() for _, part in expand(spec.map) if not part.exact)
+
+
+@pytest.mark.parametrize("name", sorted(shipped("scenario")))
+def test_full_size_vehicles_shake_by_default_and_say_it(name: str) -> None:
+    """Each with the sources of the bare table; what shows silence beside it is told here.
+
+    A scale model, a body that follows the rails, and noise at rest are without, and say why.
+    """
+    scenario = load_scenario(name)
+    part, first = scenario.spec.vibration, next(cells(scenario))
+    if name in ("scale_ride", "scale_track", "quick_kinematic", "standstill"):
+        assert part is None and first.vibration_label == "off"
+        assert "# Without [vibration]" in scenario.text or "Without\n# [vibration]" in scenario.text
+        return
+    assert part is not None and first.vibration_label == "on", "the ablation does not come first"
+    beside = {"go20a", "metro_table3", "metro_geometry", "shaking"}
+    assert axes_of(part) == ({"off": (False, True)} if name in beside else {})
+    default = VibrationPart().model_dump(exclude={"off", "join", "rate_hz"})
+    assert part.model_dump(exclude={"off", "join", "rate_hz"}) == default
+    labels = {(cell.vibration_label, cell.spec.vibration.off) for cell in cells(scenario)}
+    assert labels == ({("on", False), ("off", True)} if name in beside else {("on", False)})
 
 
 def test_a_template_has_the_default_map(tmp_path: Path) -> None:

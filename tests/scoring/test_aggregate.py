@@ -18,6 +18,7 @@ LABELS: dict[str, object] = {
     "imu": "ideal",
     "odometry": "encoder",
     "map": "exact",
+    "vibration": "off",
     "tuning": "default",
 }
 

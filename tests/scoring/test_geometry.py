@@ -161,7 +161,9 @@ def test_what_is_left_open_is_told_once_and_is_no_failure():
     # 900 m hold waves of 150 m, and not those of 200 m that D3 has for alignment.
     assert ("vertical_profile", "D3") not in empty and ("gauge", "D3") not in empty
     assert empty.index.is_unique
-    labels = dict.fromkeys(("scenario", "ride", "vehicle", "mount", "imu", "odometry", "map", "tuning"), "x")
+    labels = dict.fromkeys(
+        ("scenario", "ride", "vehicle", "mount", "imu", "odometry", "map", "vibration", "tuning"), "x"
+    )
     labels |= {"estimator": "e", "cell": 0, "track_draw": 0, "sensor_draw": 0}
     assert aggregate(table.assign(**labels))["failed"].sum() == 0
 

@@ -437,6 +437,7 @@ LABELS: dict[str, object] = {
     "imu": "ideal",
     "odometry": "encoder",
     "map": "exact",
+    "vibration": "off",
     "tuning": "recommended",
     "track_draw": 0,
     "sensor_draw": 0,
@@ -453,8 +454,8 @@ def figures(**words: object) -> pd.DataFrame:
 
 def test_columns_and_vocabulary_are_those_of_the_design() -> None:
     written = (
-        "cell, scenario, ride, vehicle, mount, imu, odometry, map, tuning, track_draw, sensor_draw, "
-        "estimator, quantity, band, reference, window, metric, value, unit, n_samples, status"
+        "cell, scenario, ride, vehicle, mount, imu, odometry, map, vibration, tuning, track_draw, "
+        "sensor_draw, estimator, quantity, band, reference, window, metric, value, unit, n_samples, status"
     )
     assert ", ".join(SCORE_COLUMNS) == written
     quantities = (

@@ -7,22 +7,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from simrail.report.tables.pivot import without_ablation
-from simrail.report.words.sentences import EXACT_MAP_AXIS, SILENT_AXIS, axis_name
+from simrail.report.words.ablations import value_words
+from simrail.report.words.sentences import axis_name
 from simrail.scenario.axes import axes_of
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.ablations import ABLATIONS, AXES, COLUMNS, without_ablations
 from simrail.scoring.aggregate import axis_columns
-from simrail.scoring.table import CURVE_PREFIX, DRAWN_MAP, EVERY_CURVE, EXACT_MAP, FULL
+from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, FULL
 
 _FIRST = ("speed_kmh", "direction", "imu", "irregularity.scale", "irregularity.spectrum", "vehicle")
 """Columns of the table of cells that come first, and that stand for others which say the same."""
 
-_LAST = ("mount", "odometry", "map", "track", "engine", "ride")
-MAP = "map"
-"""Column of the axis that compares the map that a train has with an exact one."""
+_LAST = ("mount", "odometry", *COLUMNS, "track", "engine", "ride")
 
-MAPS = {DRAWN_MAP: "the map errs", EXACT_MAP: "exact (ablation)"}
-"""Its values in words, in their order."""
+_ABLATIONS = {one.column: one for one in ABLATIONS}
 
 _TITLES = {
     "speed_kmh": "speed, km/h",
@@ -30,7 +28,6 @@ _TITLES = {
     "imu": "IMU",
     "irregularity.scale": "irregularity, times its spectrum",
     "irregularity.spectrum": "irregularity",
-    SILENT_AXIS: "vibration",
 }
 
 
@@ -60,19 +57,17 @@ class CampaignAxis:
 def is_campaign(scenario: Scenario) -> bool:
     """Whether a scenario has lists beside its IMU grades: axes that are worth a section.
 
-    An exact map beside the one that errs is told in a section of its own.
+    An ablation beside what a train has is told in a section of its own.
     """
     spec = scenario.spec
     names = set(axes_of(spec)) | {name for part in (*spec.ride, *spec.imu) for name in axes_of(part)}
-    return bool(names - {"grade", EXACT_MAP_AXIS})
+    return bool(names - {"grade", *AXES})
 
 
 def campaign_axes(cells: pd.DataFrame) -> list[CampaignAxis]:
     """The axes along which the cells differ, each told once, the usual ones first."""
-    named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry", "map"))
-    varying = [
-        n for n in named if n in cells and n not in ("case", EXACT_MAP_AXIS) and len(cells[n].unique()) > 1
-    ]
+    named = dict.fromkeys((*axis_columns(cells), "ride", "vehicle", "mount", "imu", "odometry", *COLUMNS))
+    varying = [n for n in named if n in cells and n not in ("case", *AXES) and len(cells[n].unique()) > 1]
     others = [name for name in varying if name not in (*_FIRST, *_LAST)]
     ordered = [name for name in (*_FIRST, *others, *_LAST) if name in varying]
     columns: list[str] = []
@@ -122,14 +117,14 @@ def draws_of(
     return draws.assign(cluster=draws.groupby(tracks, sort=True).ngroup())
 
 
-def beside_map(axes: Sequence[CampaignAxis]) -> list[CampaignAxis]:
-    """The axes but that of the map."""
-    return [axis for axis in axes if axis.column != MAP]
+def beside_ablations(axes: Sequence[CampaignAxis]) -> list[CampaignAxis]:
+    """The axes but those of ablations."""
+    return [axis for axis in axes if axis.column not in COLUMNS]
 
 
 def along(draws: pd.DataFrame, axis: CampaignAxis) -> pd.DataFrame:
-    """Draws to be compared along an axis: those with an exact map along that of the map only."""
-    return draws if axis.column == MAP else without_ablation(draws)
+    """Draws to be compared along an axis: those of an ablation along its own axis only."""
+    return without_ablations(draws, but=_ABLATIONS.get(axis.column))
 
 
 def _follows(cells: pd.DataFrame, one: str, other: str) -> bool:
@@ -143,8 +138,8 @@ def _axis(cells: pd.DataFrame, name: str) -> CampaignAxis:
         values = sorted(values)
     elif name == "direction":
         values = sorted(values, reverse=True)  # standing, forward, backward
-    elif name == MAP:
-        values = sorted(values, key=list(MAPS).index)
+    elif name in _ABLATIONS:
+        values = sorted(values, key=[_ABLATIONS[name].own, _ABLATIONS[name].ablated].index)
     return CampaignAxis(name, _title(name), tuple(values), tuple(_words(value, name) for value in values))
 
 
@@ -161,10 +156,8 @@ def _is_none(value: object) -> bool:
 def _words(value: object, column: str) -> str:
     if _is_none(value):
         return "-"
-    if column == MAP:
-        return MAPS[str(value)]
-    if column == SILENT_AXIS:
-        return "off (ablation)" if value else "on"
+    if column in _ABLATIONS:
+        return value_words(_ABLATIONS[column], value)
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (int, float)):

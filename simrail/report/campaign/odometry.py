@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from simrail.report.campaign.axes import MAPS
 from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
+from simrail.report.words.ablations import value_words
+from simrail.scoring.ablations import MAP, without_ablations
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, FULL
 
@@ -74,8 +75,10 @@ class OdometryTable(NamedTuple):
 def odometry_draws(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
     """One row per cell whose odometry has a position error: `PLACES`, ride class, `FIGURES` and ``cluster``.
 
-    Over whole rides, against the truth. The true odometry is left out.
+    Over whole rides, against the truth. The true odometry is left out, and so are rides without vibration
+    where others have it.
     """
+    scores = without_ablations(scores, but=MAP)
     name = scores["estimator"].astype(str)
     chosen = name.str.startswith(PREFIX) & (name != TRUE) & (scores["window"] == "whole")
     chosen &= (scores["reference"] == "truth") & (scores["band"] == FULL) & scores["value"].notna()
@@ -179,7 +182,7 @@ def odometry_tables(frames: Mapping[str, pd.DataFrame]) -> list[OdometryTable]:
 def row_words(name: str, value: object) -> str:
     """What a row is of, in words: ``60 km/h``, ``the map errs``."""
     if name == "map":
-        return MAPS[str(value)]
+        return value_words(MAP, value)
     if value == "all":
         return {"speed_kmh": "all speeds", "direction": "both ways"}.get(name, "all")
     return f"{value:g} km/h" if name == "speed_kmh" else str(value)

@@ -10,7 +10,7 @@ import pandas as pd
 from simrail.campaign.cell import CellResult
 from simrail.report.campaign.axes import (
     CampaignAxis,
-    beside_map,
+    beside_ablations,
     campaign_axes,
     draws_of,
     finest,
@@ -22,8 +22,9 @@ from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.tables import HEADLINES, campaign_tables, write_tables
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle, readable
-from simrail.report.tables.pivot import has_both_maps, without_ablation
 from simrail.report.tables.tables import NONE, Cell, Row, Table, method_row, number_cell, signed
+from simrail.report.words.ablations import WORDS
+from simrail.scoring.ablations import ABLATIONS, has_both, without_ablations
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE
 
 MOST_METHODS = 8
@@ -49,11 +50,11 @@ def campaign_section(data: PageData) -> list[Section]:
     if tables["methods"].empty:
         return []
     by_name = {style.name: style for style in data.styles}
-    kept = without_ablation(cells)
+    kept = without_ablations(cells)
     rails = rails_figures(
         scores[scores["cell"].isin(kept["cell"])],
         kept,
-        beside_map(axes),
+        beside_ablations(axes),
         data.styles,
         band=data.judged_band,
         known=data.bands,
@@ -61,7 +62,9 @@ def campaign_section(data: PageData) -> list[Section]:
     shown = {
         "axes": [(axis.title, ", ".join(axis.words)) for axis in axes],
         "cells": len(cells),
-        "both_maps": has_both_maps(cells),
+        "ablations": [
+            (WORDS[one].title[0], one.column, WORDS[one].cost) for one in ABLATIONS if has_both(cells, one)
+        ],
         "tracks": int(tables["methods"]["tracks"].max()),
         "rails": rails,
         "odometry": page_tables(odometries),
@@ -74,7 +77,7 @@ def campaign_section(data: PageData) -> list[Section]:
             (
                 readable(row["method"]),
                 f"{row['rms_roll_deg']:.3f}\u00b0",
-                " \u00b7 ".join(f"{axis.name} {row[axis.title]}" for axis in beside_map(axes)),
+                " \u00b7 ".join(f"{axis.name} {row[axis.title]}" for axis in beside_ablations(axes)),
                 row["command"],
             )
             for row in tables["worst"].to_dict("records")
@@ -89,13 +92,13 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
     """Maps of the roll error over axes, its spread along each, and over curvature; "" where there is none."""
     styles = sorted(data.attitude_styles, key=lambda style: bool(style.baseline))[:MOST_METHODS]
     muted = {style.label for style in styles if style.baseline}
-    of_any_map = draws_of(data.scores, data.cells, axes)
+    of_all = draws_of(data.scores, data.cells, axes)
     roll, curves = (
-        without_ablation(draws)
-        for draws in (of_any_map, draws_of(data.scores, data.cells, axes, window=EVERY_CURVE))
+        without_ablations(draws)
+        for draws in (of_all, draws_of(data.scores, data.cells, axes, window=EVERY_CURVE))
     )
     # A map over two axes of which one follows from the other would be empty but for a line of cells.
-    fine = finest(beside_map(axes), data.cells) or list(axes)
+    fine = finest(beside_ablations(axes), data.cells) or list(axes)
     by_column = {axis.column: axis for axis in fine}
     speed, direction = by_column.get("speed_kmh"), by_column.get("direction")
 
@@ -121,7 +124,7 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
             if axis.column not in across.columns
         ],
         "arrows": direction is not None,
-        "spread": box_figure(of_any_map, styles, axes[:MOST_BOXES], what="Spread of the roll error by axis"),
+        "spread": box_figure(of_all, styles, axes[:MOST_BOXES], what="Spread of the roll error by axis"),
         "curvature": curvature_figure(rides, styles, words=words, what="Roll error against curvature"),
     }
 

@@ -1,9 +1,9 @@
 """Tables of a campaign as a whole: methods with their intervals, pairs of methods, worst cells.
 
 They are frames, for files (`write_tables`) and for the page alike. Means over all cells weigh every cell
-alike, and are of the map that a train has: cells with an exact one beside it, an ablation, stand on the axis
-of the map only. Tracks are the clusters of every interval, the same track draw in all cases being one of
-them, since cases meet the same draws.
+alike, and are of what a train has: cells of an ablation beside it stand on the axis of that ablation only.
+Tracks are the clusters of every interval, the same track draw in all cases being one of them, since cases
+meet the same draws.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.report.campaign.axes import CampaignAxis, along, beside_map, draws_of
+from simrail.report.campaign.axes import CampaignAxis, along, beside_ablations, draws_of
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import without_ablation
+from simrail.scoring.ablations import without_ablations
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.statistics import anees_bounds, compare, coverage_bounds, levels
 
@@ -66,25 +66,25 @@ def campaign_tables(
         effect size. ``consistency``: NEES and coverage of roll with the bounds of a consistent method.
         ``worst``: cells of the largest roll error, with the command that makes each again.
     """
-    of_any_map = {
+    of_all = {
         (quantity, metric, window): draws_of(
             scores, cells, axes, quantity=quantity, metric=metric, window=window
         )
         for quantity, metric, window in HEADLINES.values()
     }
-    headlines = {figure: without_ablation(draws) for figure, draws in of_any_map.items()}
+    headlines = {figure: without_ablations(draws) for figure, draws in of_all.items()}
     trust = {
-        metric: without_ablation(draws_of(scores, cells, axes, metric=metric))
+        metric: without_ablations(draws_of(scores, cells, axes, metric=metric))
         for metric in ("nees", "coverage95")
     }
     roll = headlines[HEADLINES["roll"]]
     present = [style for style in styles if (roll["estimator"] == style.name).any()]
     rows = {
         "methods": _methods(headlines, present),
-        "axes": _along(of_any_map[HEADLINES["roll"]], axes, present),
+        "axes": _along(of_all[HEADLINES["roll"]], axes, present),
         "pairs": _pairs(roll, present),
         "consistency": _consistency(trust, present),
-        "worst": _worst(roll, beside_map(axes), present, command),
+        "worst": _worst(roll, beside_ablations(axes), present, command),
     }
     return {name: pd.DataFrame(lines) for name, lines in rows.items()}
 

@@ -20,14 +20,16 @@ from simrail.report.pages.frame import page_text
 from simrail.report.pages.ride import ride_sections
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers import SECTIONS as PAPERS
+from simrail.report.tables.ablations import cost_tables, pairs_of
 from simrail.report.tables.geometry import geometry_table, overview_table
-from simrail.report.tables.maps import map_groups, map_tables
-from simrail.report.tables.pivot import Case, map_words
+from simrail.report.tables.pivot import Case
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
+from simrail.report.words.ablations import WORDS, state_words
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.ablations import ABLATIONS
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.table import EXACT_MAP, LEFT_OPEN, NO_SAMPLES, OK
 from simrail.track.design import TrackDesign
@@ -69,7 +71,8 @@ def write_report(
         methods=len(data.styles),
         draws=(spec.track_draws, spec.sensor_draws),
         ride_count=cells["ride"].nunique(),
-        imus=len(scores[["mount", "imu"]].drop_duplicates()),
+        imus=scores["mount"].nunique(),
+        grades=scores["imu"].nunique(),
         contents=[(section.anchor, section.title) for section in sections],
         sections=[(one.anchor, one.title, Markup(page_text(one.template, **one.data))) for one in sections],
     )
@@ -140,13 +143,20 @@ def _running(data: PageData) -> list[Section]:
     return [_section("running", "Running safety and comfort", **shown)]
 
 
-def _maps(data: PageData) -> list[Section]:
-    """What the scores are with the map that a train has, and with an exact one."""
-    groups = [
-        (group.title, map_tables(group, data.attitude_styles, data.styles))
-        for group in map_groups(data.cases)[:MOST_TABLES]
-    ]
-    return [_section("maps", "What the map costs", groups=groups)] if groups else []
+def _ablations(data: PageData) -> list[Section]:
+    """What the scores are with what a train has, and with each ablation beside it."""
+    sections = []
+    for one in ABLATIONS:
+        groups = [
+            (group.title, cost_tables(group, data.attitude_styles, data.styles))
+            for group in pairs_of(data.cases, one)[:MOST_TABLES]
+        ]
+        groups = [group for group in groups if group[1]]
+        if groups:
+            shown = {"groups": groups, "legend": WORDS[one].legend, "own": WORDS[one].title[0]}
+            template = "pages/sections/ablation.html.j2"
+            sections.append(Section(f"{one.column}-costs", WORDS[one].cost, template, shown))
+    return sections
 
 
 def _scores(data: PageData) -> list[Section]:
@@ -159,7 +169,7 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
     """The tables of one case."""
     labels = case.labels
     title = [labels["ride"], f"IMU {labels['mount']} ({labels['imu']})", f"odometry {labels['odometry']}"]
-    title.append(map_words(labels["map"]))
+    title.append(state_words(labels))
     axes = [axis_words(*axis) for axis in case.axes.items()]
     tracks, draws = int(case.table["track_draws"].max()), int(case.table["draws"].max())
     maps = data.scenario.spec.monte_carlo.map_draws if labels["map"] != EXACT_MAP else 1
@@ -211,7 +221,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     _tracks,
     _rails,
     _running,
-    _maps,
+    _ablations,
     _scores,
     _odometry,
     _words,

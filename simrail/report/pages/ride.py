@@ -16,14 +16,16 @@ from simrail.report.figures.score import curves_figure, rms_figure
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.geometry import BAND, JUDGED, indicator_table, is_zero, judged_band, waves_words
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, map_words, of_cell
+from simrail.report.tables.pivot import Case, of_cell
 from simrail.report.tables.running import running_tiles
 from simrail.report.tables.tables import Table
 from simrail.report.tables.tiles import tiles
+from simrail.report.words.ablations import value_words
 from simrail.report.words.findings import findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
-from simrail.report.words.sentences import EXACT_MAP_AXIS, axis_words, recording_facts, vibration_facts
+from simrail.report.words.sentences import axis_words, recording_facts, vibration_facts
 from simrail.scenario.build import goals_mm, limits_of
+from simrail.scoring.ablations import AXES, MAP
 from simrail.track.bands import BANDS, Band, why_not
 from simrail.track.quality import Limits
 
@@ -91,7 +93,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
     return of_scores | {
         "scenario": data.scenario,
         "styles": data.styles,
-        "facts": [*ride_facts(example), *vibration_facts(spec.vibration is not None, example.shaken)],
+        "facts": [*ride_facts(example), *vibration_facts(example.shaken)],
         "speed": speed_figure(example, conditions=spec.rail_condition),
         "imu": imu_figure(example),
         "attitude": attitude_figure(example, first or drawn, what=f"Attitude, {name}") if drawn else "",
@@ -109,8 +111,8 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
 
 
 def ride_title(example: CellResult) -> str:
-    """Name of a ride, and the values of its axes; what its map is stands in `ride_facts`."""
-    told = ("imu.grade", EXACT_MAP_AXIS)
+    """Name of a ride, and the values of its axes; its map and what shakes it stand in the facts."""
+    told = ("imu.grade", *AXES)
     axes = [
         axis_words(name, value) for name, value in example.cell.items() if "." in name and name not in told
     ]
@@ -132,7 +134,7 @@ def ride_facts(example: CellResult) -> list[str]:
         f"{np.abs(np.diff(places)).sum():.0f} m {way}, {duration:.0f} s",
         f"mean {mean:.1f} km/h while moving, at most {3.6 * float(speed.max()):.1f} km/h",
         *recording_facts(recording),
-        f"the line from {map_words(str(example.cell['map']))}",
+        f"the line from {value_words(MAP, example.cell['map'], title=True)}",
     ]
 
 

@@ -12,13 +12,13 @@ from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
 from simrail.report.tables.geometry import band_of_all
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
-from simrail.report.tables.pivot import Case, cases, first_maps
+from simrail.report.tables.pivot import Case, cases, first_cases
 from simrail.scenario.build import bands_by_name
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.scenario import Scenario
+from simrail.scoring.ablations import ablation_count
 from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.running_safety import DERAILMENT_LIMIT
-from simrail.scoring.table import EXACT_MAP
 from simrail.track.bands import Band
 
 
@@ -51,13 +51,13 @@ class PageData:
 
     @cached_property
     def cases(self) -> list[Case]:
-        """Scores by case, averaged over the draws; those of an exact map, an ablation, last."""
-        return sorted(cases(self.scores, self.cells), key=lambda case: case.labels["map"] == EXACT_MAP)
+        """Scores by case, averaged over the draws; those of ablations last."""
+        return sorted(cases(self.scores, self.cells), key=lambda case: ablation_count(case.labels))
 
     @cached_property
     def shown_cases(self) -> list[Case]:
-        """Cases that have tables and figures of their own: with the map that a train has, if any has it."""
-        return first_maps(self.cases)
+        """Cases that have tables and figures of their own: of what a train has, if any is of that."""
+        return first_cases(self.cases)
 
     @cached_property
     def methods(self) -> list[Method]:

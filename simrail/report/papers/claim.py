@@ -25,8 +25,10 @@ from typing import Any, Literal
 from jinja2 import Environment, StrictUndefined
 
 from simrail.core.toml_files import Part
+from simrail.report.words.ablations import WORDS as ABLATION_WORDS
 from simrail.report.words.sentences import FILTERS
 from simrail.scenario.cells import Method
+from simrail.scoring.ablations import Ablation
 
 Verdict = Literal["reproduced", "not reproduced", "not asked"]
 
@@ -121,7 +123,8 @@ def read_paper(name: str) -> Paper:
 class Claim:
     """A claim with its verdict: what the paper says and printed, our figures, the rule, and the cause.
 
-    ``exact`` is what became of it where the train knows its line exactly, if that was run and differs.
+    ``ablated`` is what became of it in ablations that were run, where that differs: begin of a sentence and
+    figures of each.
     """
 
     key: str
@@ -131,7 +134,7 @@ class Claim:
     rule: str
     verdict: Verdict
     cause: str = ""
-    exact: str = ""
+    ablated: tuple[tuple[str, str], ...] = ()
 
     @property
     def tone(self) -> str:
@@ -180,19 +183,22 @@ def judged(paper: Paper, evidence: object, judges: ModuleType, *, has: Callable[
     return claims
 
 
-def with_exact(claims: Sequence[Claim], of_exact_map: Sequence[Claim]) -> list[Claim]:
-    """Claims that say what became of them with an exact map, an ablation: figures, and verdict if another.
+def with_ablation(claims: Sequence[Claim], of_twins: Sequence[Claim], ablation: Ablation) -> list[Claim]:
+    """Claims that say what became of them in an ablation: figures, and verdict if another.
 
     Parameters
     ----------
     claims : sequence of Claim
-        Judged with the map that a train has.
-    of_exact_map : sequence of Claim
-        The same, judged with an exact one.
+        Judged of what a train has.
+    of_twins : sequence of Claim
+        The same, judged of the ablation.
+    ablation : Ablation
+        What is taken away.
     """
     result = []
-    for own, other in zip(claims, of_exact_map, strict=True):
+    for own, other in zip(claims, of_twins, strict=True):
         is_told = own.ours != other.ours and "not asked" not in (own.verdict, other.verdict)
         verdict = f"{other.words} " if other.verdict != own.verdict else ""
-        result.append(replace(own, exact=f"{verdict}{other.ours}") if is_told else own)
+        told = (f"{ABLATION_WORDS[ablation].phrase} (ablation)", f"{verdict}{other.ours}")
+        result.append(replace(own, ablated=(*own.ablated, told)) if is_told else own)
     return result

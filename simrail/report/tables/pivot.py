@@ -10,26 +10,11 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from simrail.report.words.sentences import EXACT_MAP_AXIS
+from simrail.scoring.ablations import ABLATIONS, AXES, COLUMNS, Ablation
 from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
-from simrail.scoring.table import CURVE_PREFIX, EXACT_MAP, FULL, SCORE_COLUMNS
+from simrail.scoring.table import CURVE_PREFIX, FULL, SCORE_COLUMNS
 
-CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry", "map")
-
-
-def map_words(known: str) -> str:
-    """What the train knows of the line, for titles."""
-    return "an exact map (ablation)" if known == EXACT_MAP else "a map with errors"
-
-
-def has_both_maps(table: pd.DataFrame) -> bool:
-    """Whether some rows of a table, by its column ``map``, have an exact map and others one that errs."""
-    return "map" in table and 0 < int((table["map"] == EXACT_MAP).sum()) < len(table)
-
-
-def without_ablation(table: pd.DataFrame) -> pd.DataFrame:
-    """Rows without those of an exact map, where others have the map that a train has."""
-    return table[table["map"] != EXACT_MAP] if has_both_maps(table) else table
+CASE_COLUMNS = ("ride", "vehicle", "mount", "imu", "odometry", *COLUMNS)
 
 
 class Mean(NamedTuple):
@@ -63,11 +48,11 @@ class Case:
 
     @property
     def axes(self) -> dict[str, str]:
-        """Values of the scenario's lists by dotted name, but those that ``imu`` and ``map`` have.
+        """Values of the scenario's lists by dotted name, but those that ``imu`` and ablations have.
 
         A ride has no value of a list that stands in another ride only.
         """
-        told = ("imu.grade", EXACT_MAP_AXIS)
+        told = ("imu.grade", *AXES)
         named = ((name, value) for name, value in self.labels.items() if "." in name)
         return {n: value for n, value in named if not n.startswith(told) and value != "nan"}
 
@@ -115,22 +100,27 @@ def cases(scores: pd.DataFrame, cell_table: pd.DataFrame) -> list[Case]:
     ]
 
 
-def first_maps(all_cases: Sequence[Case]) -> list[Case]:
-    """Cases without those of an exact map, where others have the map that a train has."""
-    drawn = [case for case in all_cases if case.labels["map"] != EXACT_MAP]
-    return drawn or list(all_cases)
+def first_cases(all_cases: Sequence[Case]) -> list[Case]:
+    """Cases without those of an ablation, where others are of what a train has."""
+    kept = list(all_cases)
+    for one in ABLATIONS:
+        kept = [case for case in kept if case.labels[one.column] != one.ablated] or kept
+    return kept
 
 
-def with_exact_map(case: Case, others: Sequence[Case]) -> Case | None:
-    """The case that differs in an exact map only; None if there is none, or if it is this one."""
-    if case.labels["map"] == EXACT_MAP:
+def ablated(case: Case, others: Sequence[Case], ablation: Ablation) -> Case | None:
+    """The case that differs in an ablation only; None if there is none, or if it is this one."""
+    if case.labels[ablation.column] == ablation.ablated:
         return None
-    return next((o for o in others if o.labels["map"] == EXACT_MAP and _but_map(o) == _but_map(case)), None)
+    own = _beside(case, ablation)
+    twins = (other for other in others if other.labels[ablation.column] == ablation.ablated)
+    return next((other for other in twins if _beside(other, ablation) == own), None)
 
 
-def _but_map(case: Case) -> dict[str, str]:
-    """What a case is, beside its map."""
-    return {name: value for name, value in case.labels.items() if name not in ("map", EXACT_MAP_AXIS, "case")}
+def _beside(case: Case, ablation: Ablation) -> dict[str, str]:
+    """What a case is, beside an ablation."""
+    left_out = (ablation.column, ablation.axis, "case")
+    return {name: value for name, value in case.labels.items() if name not in left_out}
 
 
 def of_cell(all_cases: list[Case], cell: dict[str, object]) -> Case | None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, Mean, map_words
+from simrail.report.tables.pivot import Case, Mean
+from simrail.report.words.ablations import state_words
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def odometry_table(all_cases: Sequence[Case]) -> Table:
             ]
             label = (
                 f"{case.labels['ride']} \u00b7 {case.labels['mount']} ({case.labels['imu']}) \u00b7 "
-                f"{name.removeprefix('odometry:')} \u00b7 {map_words(case.labels['map'])}"
+                f"{name.removeprefix('odometry:')} \u00b7 {state_words(case.labels)}"
             )
             key = (label, *(cell.text for cell in cells))
             if key not in seen:

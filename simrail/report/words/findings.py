@@ -11,8 +11,10 @@ import numpy as np
 
 from simrail.core.jit import FloatArray
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, with_exact_map
+from simrail.report.tables.pivot import Case, ablated
+from simrail.report.words.ablations import WORDS
 from simrail.report.words.sentences import Finding, degrees, interval_verdict, listed, significant
+from simrail.scoring.ablations import ABLATIONS
 
 _QUANTITIES = {"roll": "roll", "pitch": "pitch", "yaw_debiased": "yaw without its initial offset"}
 _WINDOWS = {
@@ -39,7 +41,7 @@ def findings(case: Case, styles: Sequence[MethodStyle], *, others: Sequence[Case
     styles : sequence of MethodStyle
         The methods of the scenario.
     others : sequence of Case
-        All cases of the scenario: those with an ideal IMU and with an exact map are looked for among them.
+        All cases of the scenario: those with an ideal IMU and of ablations are looked for among them.
     """
     groups = alike(case, styles)
     like = {style.name for _, *rest in groups for style in rest}
@@ -50,7 +52,7 @@ def findings(case: Case, styles: Sequence[MethodStyle], *, others: Sequence[Case
         *_design_angles(case, unlike),
         *_general_purpose(case, unlike),
         *_floor(case, unlike, others),
-        *_map(case, unlike, others),
+        *_ablations(case, unlike, others),
         *_consistency(case, unlike),
         *_odometry(case),
         *_failures(case),
@@ -198,25 +200,29 @@ def _floor(case: Case, styles: Sequence[MethodStyle], others: Sequence[Case]) ->
         yield Finding("note", f"With an ideal IMU the roll error over the whole ride would be: {parts}")
 
 
-def _map(case: Case, styles: Sequence[MethodStyle], others: Sequence[Case]) -> Iterator[Finding]:
-    """By angle, the method whose error an exact map would change the most."""
-    exact = with_exact_map(case, others)
-    if exact is None:
-        return
+def _ablations(case: Case, styles: Sequence[MethodStyle], others: Sequence[Case]) -> Iterator[Finding]:
+    """By ablation and angle, the method whose error it would change the most."""
+    for one in ABLATIONS:
+        twin = ablated(case, others, one)
+        if twin is not None:
+            yield from _ablation(case, styles, twin, WORDS[one].phrase)
+
+
+def _ablation(case: Case, styles: Sequence[MethodStyle], twin: Case, phrase: str) -> Iterator[Finding]:
     parts = []
     for quantity, word in _QUANTITIES.items():
         sizes = {
             style.label: (least, own)
             for style in styles
             if (own := _rms(case, style.name, quantity)) > 0.0
-            and (least := _rms(exact, style.name, quantity)) > 0.0
+            and (least := _rms(twin, style.name, quantity)) > 0.0
         }
         if sizes:
             label = max(sizes, key=lambda label: abs(np.log(sizes[label][1] / sizes[label][0])))
             least, own = sizes[label]
             parts.append(f"{word} of {label} ({degrees(least)} instead of {degrees(own)} rms)")
     if parts:
-        text = "With an exact map, an ablation, the errors over the whole ride that would change the most are"
+        text = f"{phrase}, an ablation, the errors over the whole ride that would change the most are"
         yield Finding("note", f"{text} {listed(parts)}.")
 
 

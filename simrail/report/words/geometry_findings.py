@@ -16,8 +16,10 @@ from simrail.report.tables.geometry import (
     waves_words,
 )
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, with_exact_map
+from simrail.report.tables.pivot import Case, ablated
+from simrail.report.words.ablations import WORDS
 from simrail.report.words.sentences import Finding, interval_verdict, listed, significant
+from simrail.scoring.ablations import ABLATIONS, COLUMNS
 from simrail.scoring.table import FULL
 from simrail.track.bands import BANDS, Band
 
@@ -42,7 +44,7 @@ def geometry_findings(
     case, styles : Case, sequence of MethodStyle
         The case and the scenario's methods.
     others : sequence of Case
-        All cases: those with the true position, an exact map and an ideal IMU say what the error is of.
+        All cases: those with the true position, an ideal IMU and the ablations say what the error is of.
     goals_mm : mapping of str to float, optional
         By quantity: what its error in `BAND` is asked to be at most, sd; nothing is asked in other bands.
     known : mapping of str to Band
@@ -54,7 +56,7 @@ def geometry_findings(
     where = waves_words(band, known)
     twins = {
         "with the true position": _twin(case, others, odometry=True),
-        "with an exact map": with_exact_map(case, others),
+        **{WORDS[one].phrase.lower(): ablated(case, others, one) for one in ABLATIONS},
         "with an ideal IMU": _twin(case, others, imu=True),
         "with both, which is the vehicle between IMU and rails, and the method": _twin(
             case, others, odometry=True, imu=True
@@ -137,7 +139,7 @@ def _coverage(case: Case, main: MethodStyle, band: str, known: Mapping[str, Band
 def _twin(case: Case, others: Sequence[Case], *, imu: bool = False, odometry: bool = False) -> Case | None:
     """The case that differs in an ideal IMU, the true odometry, or both; None if there is none.
 
-    The map is the same: what an exact one changes is told by itself.
+    Ablations are the same: what they change is told by itself.
     """
     own = case.labels
     if own["imu"] == "ideal" or own["odometry"] == "truth":
@@ -146,7 +148,7 @@ def _twin(case: Case, others: Sequence[Case], *, imu: bool = False, odometry: bo
         labels = other.labels
         fits = (
             labels["mount"] in (own["mount"], f"{own['mount']}_ideal")
-            and all(labels[name] == own[name] for name in ("ride", "vehicle", "map"))
+            and all(labels[name] == own[name] for name in ("ride", "vehicle", *COLUMNS))
             and labels["imu"] == ("ideal" if imu else own["imu"])
             and labels["odometry"] == ("truth" if odometry else own["odometry"])
         )

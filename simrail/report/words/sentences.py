@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from simrail.recording.recording import Recording
+from simrail.report.words.ablations import value_words
+from simrail.scoring.ablations import ABLATIONS
 
 
 @dataclass(frozen=True)
@@ -70,25 +72,14 @@ UNITS = {
 """Units by the ends of names."""
 
 
-EXACT_MAP_AXIS = "map.exact"
-"""Axis that says whether the train knows the line as it is."""
-
-SILENT_AXIS = "vibration.off"
-"""Axis that says whether short waves shake the vehicle."""
-
-
-def vibration_facts(has_vibration: bool, shaken: Mapping[str, str] | None) -> list[str]:
-    """What shakes a ride and what its forces hold, a line each; nothing without ``[vibration]``.
+def vibration_facts(shaken: Mapping[str, str] | None) -> list[str]:
+    """What shakes a ride and what its forces hold, a line each.
 
     Parameters
     ----------
-    has_vibration : bool
-        Whether the scenario has the table.
     shaken : mapping of str to str, optional
         Names of the sources that shake the ride, with where their figures come from; None if nothing does.
     """
-    if not has_vibration:
-        return []
     if shaken is None:
         return ["no vibration by short waves (an ablation: every vehicle shakes)"]
     named = ", ".join(name.replace("_", " ") for name in shaken)
@@ -108,10 +99,11 @@ def axis_name(name: str) -> tuple[str, str]:
 
 def axis_words(name: str, value: object) -> str:
     """A value of an axis as people say it: ``ride.speed_kmh``, 20.0 becomes ``speed 20 km/h``."""
-    if name == EXACT_MAP_AXIS:
-        return "an exact map" if str(value) == str(True) else "a map with errors"
-    if name == SILENT_AXIS:
-        return "without vibration (ablation)" if str(value) == str(True) else "with vibration"
+    ablation = next((one for one in ABLATIONS if one.axis == name), None)
+    if ablation is not None:
+        return value_words(
+            ablation, ablation.ablated if str(value) == str(True) else ablation.own, title=True
+        )
     words, unit = axis_name(name)
     return f"{words} {_number_or_text(value)} {unit}".rstrip()
 

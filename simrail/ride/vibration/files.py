@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from simrail.ride.mount_motion import give_back
 from simrail.ride.truth import Truth
 from simrail.ride.truth_files import create_array, read_array, read_sealed, seal
 from simrail.ride.vibration.run import Shaker
@@ -58,6 +59,7 @@ def write_short_waves(
     bends = {bending.body: create(f"bending_{i}", rows, 3) for i, bending in enumerate(bendings)}
     kept = -(-rows // every) if truth.contacts else 0
     loads = create("loads", kept, len(model.wheels)) if kept else None
+    written = [*motions.values(), *bends.values(), *([] if loads is None else [loads])]
     least = np.full(len(model.wheels), np.inf)
     static = model.wheel_load_n(truth.gravity_mps2)
     for piece in shaker.run():
@@ -70,7 +72,8 @@ def write_short_waves(
         if loads is not None:
             first = -(-here.start // every)
             loads[first : -(-here.stop // every)] = piece.loads[first * every - here.start :: every]
-    for array in (*motions.values(), *bends.values(), *([] if loads is None else [loads])):
+        give_back((*written, *truth.wheel_angles.values(), truth.reference_position_m))
+    for array in written:
         array.flush()
     plain = {
         "manifest": manifest,

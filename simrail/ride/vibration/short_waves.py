@@ -68,6 +68,11 @@ class ShortWaves:
             "rail, which the linear contact of the vibration does not know"
         ]
 
+    def arrays(self, body: str) -> list[FloatArray]:
+        """Where the motion of a body is kept, and that of its bending."""
+        bent = [self.bendings[body][1]] if body in self.bendings else []
+        return [self.motions[body], *bent]
+
     def of(self, body: str, ahead_m: float, rows: slice = slice(None)) -> FloatArray:
         """Motion (n, 12) of a body at some samples as it is felt ahead of its centre of gravity."""
         motion = np.array(self.motions[body][rows], dtype=np.float64)

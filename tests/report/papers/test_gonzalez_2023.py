@@ -33,8 +33,8 @@ from simrail.report.pages.section import PageData
 from simrail.report.papers.claim import Claim, judged
 from simrail.report.papers.gonzalez_2023 import judges
 from simrail.report.papers.gonzalez_2023.judges import Evidence, Peak, errata_note
-from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, exact_rows, rows_of
-from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, coverage_of, map_paragraph, section
+from simrail.report.papers.gonzalez_2023.parts import COLUMNS, PAPER, Rows, ablated_rows, rows_of
+from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, cost_paragraph, coverage_of, section
 from simrail.report.papers.gonzalez_2023.tunings import by_part, notes, status_table, tunings_of
 from simrail.report.tables.geometry import QUANTITIES, geometry_table, indicator_table, overview_table
 from simrail.report.tables.methods import MethodStyle
@@ -44,6 +44,7 @@ from simrail.report.words.sentences import significant
 from simrail.results import describe
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
+from simrail.scoring.ablations import MAP
 from simrail.track.bands import BANDS
 from simrail.track.quality import Limits
 
@@ -301,7 +302,8 @@ def test_what_misprints_cost_is_computed() -> None:
 def by_map(rows: Rows, known: str) -> Rows:
     """Rows of a train that knows its line so."""
     labels = {"ride": "go", "vehicle": "v", "mount": "axle", "imu": "real", "odometry": "matched"} | {
-        "map": known
+        "map": known,
+        "vibration": "on",
     }
     noisy = None if rows.noisy is None else replace(rows.noisy, labels=labels | {"imu": "real_noise_added"})
     return replace(rows, case=replace(rows.case, labels=labels), noisy=noisy)
@@ -313,9 +315,9 @@ def test_the_map_that_errs_is_judged_and_the_exact_one_found_beside_it() -> None
     every = [exact.case, exact.noisy, erring.case, erring.noisy]
     found = rows_of(every, [], band="paper")
     assert found is None, "no method plays a part"
-    beside = exact_rows(erring, every)
+    beside = ablated_rows(erring, every, MAP)
     assert beside is not None and (beside.case, beside.noisy) == (exact.case, exact.noisy)
-    assert exact_rows(erring, every[2:]) is None and exact_rows(exact, every) is None
+    assert ablated_rows(erring, every[2:], MAP) is None and ablated_rows(exact, every, MAP) is None
 
 
 def test_rows_are_of_the_map_that_errs_whatever_comes_first() -> None:
@@ -335,13 +337,13 @@ def test_rows_are_of_the_map_that_errs_whatever_comes_first() -> None:
 
 def test_what_the_map_costs_is_told_of_the_tuning_that_loses_the_most() -> None:
     erring = by_map(planted({("kom", "alignment"): 2.0, ("cml", "cross_level"): 1.5}), "drawn")
-    told = map_paragraph(erring, by_map(planted(), "exact"))
+    told = cost_paragraph(erring, by_map(planted(), "exact"), MAP)
     assert "as given, by functions of the place along it (abstract, section 2.1)" in told
     assert "in alignment KOM, 1.80 instead of 0.900 mm" in told
     assert "in cross-level CML, 0.178 instead of 0.119 mm" in told
     assert "in vertical profile none loses more than 1 %" in told
-    assert "not told" in map_paragraph(erring, None)
-    assert "not asked" in map_paragraph(by_map(planted(), "exact"), None)
+    assert "not told" in cost_paragraph(erring, None, MAP)
+    assert "not asked" in cost_paragraph(by_map(planted(), "exact"), None, MAP)
 
 
 # ---- tables and sentences ----------------------------------------------------------------------
@@ -374,6 +376,7 @@ def case(change: Change | None = None, **labels: str) -> Case:
         "imu": "real",
         "odometry": "curve_smoothed",
         "map": "exact",
+        "vibration": "off",
     }
     return Case({**said, **labels}, table, found)
 

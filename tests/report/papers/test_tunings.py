@@ -10,7 +10,7 @@ from simrail.estimators.tuning.file import Tuning
 
 from simrail.core.toml_files import shipped
 from simrail.report.papers.gonzalez_2023.parts import Rows
-from simrail.report.papers.gonzalez_2023.tunings import own_ride_note, searched_on
+from simrail.report.papers.gonzalez_2023.tunings import own_ride_note, searched_on, silence_note
 from simrail.report.tables.pivot import Case, Mean
 from simrail.scenario.scenario import Scenario, load_scenario
 
@@ -38,17 +38,28 @@ def test_the_own_ride_is_told_by_the_command(scenario: Scenario) -> None:
     assert not searched_on(shipped_tuning("scale_by_hand"), scenario, FIRST)
 
 
-def test_a_search_with_an_exact_map_was_on_the_ride_with_one() -> None:
-    """Tunings of the metro were searched so; its scenario has another map as well, which is no own ride."""
-    metro = load_scenario("metro_geometry")
+def test_a_search_with_ablations_was_on_the_ride_with_them() -> None:
+    """Tunings of the metro were searched so; what a train has, in its scenario as well, is no own ride."""
+    rails = "vibration.section_gain.on=false"
+    metro = load_scenario("metro_geometry", overrides=[rails])
     assert metro.folder is not None
     tuning = Tuning.from_file(metro.folder / "tunings" / "metro_geometry_cml.toml")
-    own = {"ride": "go70", "mount": "axle", "track_draw": 0, "map_draw": 0, "sensor_draw": 0, "map": "exact"}
+    own = {"ride": "go70", "mount": "axle", "track_draw": 0, "map_draw": 0, "sensor_draw": 0}
+    own |= {"map": "exact", "vibration": "off"}
     assert searched_on(tuning, metro, own)
     assert not searched_on(tuning, metro, own | {"map": "drawn"})
-    assert searched_on(tuning, load_scenario("metro_geometry", overrides=["map.exact=true"]), own)
-    other = load_scenario("metro_geometry", overrides=["map.cant_sd_mm=8.0"])
-    assert not searched_on(tuning, other, own)
+    assert not searched_on(tuning, metro, own | {"vibration": "on"})
+    alone = ["map.exact=true", "vibration.off=true", rails]
+    assert searched_on(tuning, load_scenario("metro_geometry", overrides=alone), own)
+    for others in ([], [rails, "map.cant_sd_mm=8.0"]):
+        assert not searched_on(tuning, load_scenario("metro_geometry", overrides=others), own)
+
+
+def test_a_search_in_silence_is_told() -> None:
+    found = {name: shipped_tuning(name) for name in ("metro_geometry_cml", "scale_track_kom")}
+    still, shaken = found.values()
+    assert "Searched on rides without vibration: CML." in silence_note({"cml": still, "kom": shaken})
+    assert silence_note({"kom": shaken}) == ""
 
 
 def rows(sds: dict[str, float], *, draws: int = 20, tracks: int = 4) -> Rows:

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 
 from simrail.report.papers.claim import read_paper
-from simrail.report.tables.pivot import Case, first_maps, with_exact_map
+from simrail.report.tables.pivot import Case, ablated, first_cases
 from simrail.scenario.cells import Method
+from simrail.scoring.ablations import Ablation
 
 PAPER = read_paper("briales_2021")
 
@@ -82,16 +83,16 @@ def is_fast(labels: dict[str, Any]) -> bool:
 def rides_of(all_cases: Sequence[Case], methods: Sequence[Method]) -> Rides:
     """Gather the first case of every ride, an ideal IMU last, and the parts that the methods play.
 
-    With the map that a train has, where any case has it.
+    Of what a train has, where any case is.
     """
     first: dict[str, Case] = {}
-    for case in sorted(first_maps(all_cases), key=lambda case: case.labels["imu"] == "ideal"):
+    for case in sorted(first_cases(all_cases), key=lambda case: case.labels["imu"] == "ideal"):
         first.setdefault(case.labels["ride"], case)
     return Rides(list(first.values()), PAPER.names(methods))
 
 
-def exact_rides(rides: Rides, all_cases: Sequence[Case]) -> Rides | None:
-    """The same rides of a train that knows its line exactly; None if one of them was not run so."""
-    exact = [with_exact_map(case, all_cases) for case in rides.cases]
-    known = [case for case in exact if case is not None]
-    return Rides(known, rides.names) if known and len(known) == len(exact) else None
+def ablated_rides(rides: Rides, all_cases: Sequence[Case], ablation: Ablation) -> Rides | None:
+    """The same rides with an ablation; None if one of them was not run so."""
+    twins = [ablated(case, all_cases, ablation) for case in rides.cases]
+    known = [case for case in twins if case is not None]
+    return Rides(known, rides.names) if known and len(known) == len(twins) else None

@@ -23,16 +23,16 @@ from simrail.report.papers.briales_2021.rides import (
     PAPER,
     QUANTITIES,
     Rides,
-    exact_rides,
+    ablated_rides,
     is_fast,
     rides_of,
 )
 from simrail.report.papers.briales_2021.terms import SLOW_PART_HZ, TERMS_RIDE, terms_table
-from simrail.report.papers.claim import judged, with_exact
-from simrail.report.tables.maps import HEADS
+from simrail.report.papers.claim import judged, with_ablation
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
-from simrail.scoring.table import EXACT_MAP
+from simrail.report.words.ablations import WORDS
+from simrail.scoring.ablations import ABLATIONS, Ablation
 
 _REPEATED = ("gda_paper", "ekf_per_step", "ekf")
 """Methods whose roll is laid over itself, ride upon ride."""
@@ -54,19 +54,23 @@ def section(data: PageData) -> list[Section]:
         if (name := rides.names.get(part)) and len(drawn) > 1 and all(name in e.estimates for e in drawn)
     }
     evidence = judges.Evidence(rides, spread, _wrong_sign_deg(drawn))
-    claims, exact = judged(PAPER, evidence, judges, has=rides.has), exact_rides(rides, data.cases)
-    if exact is not None:
-        # How roll repeats is of the rides that are drawn, none of which has an exact map.
-        beside = judges.Evidence(exact, {}, evidence.wrong_sign_deg)
-        claims = with_exact(claims, judged(PAPER, beside, judges, has=exact.has))
+    claims = judged(PAPER, evidence, judges, has=rides.has)
+    twins = {one: ablated_rides(rides, data.cases, one) for one in ABLATIONS}
+    for one, twin in twins.items():
+        if twin is not None:
+            # How roll repeats is of the rides that are drawn, none of which is of an ablation.
+            beside = judges.Evidence(twin, {}, evidence.wrong_sign_deg)
+            claims = with_ablation(claims, judged(PAPER, beside, judges, has=twin.has), one)
     shown = {
         "paper": PAPER,
         "design": _table(rides, looks, reference="design"),
         "truth": _table(rides, looks, reference="truth"),
         "draws": max(int(case.table["draws"].max()) for case in rides.cases),
         "all_claims": claims,
-        "map_words": map_paragraph(rides, exact),
-        "map_table": _map_table(rides, exact, looks) if exact is not None else None,
+        "ablations": [
+            (WORDS[one].cost, cost_paragraph(rides, twin, one), _cost_table(rides, twin, looks, one))
+            for one, twin in twins.items()
+        ],
         "notes": _notes(rides),
         **_terms(drawn),
         **_drawings(rides, looks, drawn),
@@ -91,16 +95,16 @@ def _table(rides: Rides, looks: Mapping[str, MethodStyle], *, reference: str) ->
     return Table(groups, list(QUANTITIES) * len(groups), rows)
 
 
-def map_paragraph(rides: Rides, exact: Rides | None) -> str:
-    """What the methods lose by a map that errs, beside what the paper says of its own."""
-    parts = [part for part in PAPER.parts if rides.has(part) and (exact is None or exact.has(part))]
+def cost_paragraph(rides: Rides, twin: Rides | None, ablation: Ablation) -> str:
+    """What the methods lose by what a train has and an ablation has not, beside what the paper says of it."""
+    parts = [part for part in PAPER.parts if rides.has(part) and (twin is None or twin.has(part))]
     costs = {
         quantity: {
-            part: (rides.mean(part, quantity)[0], exact.mean(part, quantity)[0]) for part in parts if exact
+            part: (rides.mean(part, quantity)[0], twin.mean(part, quantity)[0]) for part in parts if twin
         }
         for quantity in QUANTITIES
     }
-    is_exact = {case.labels["map"] == EXACT_MAP for case in rides.cases} == {True}
+    is_ablated = all(case.labels[ablation.column] == ablation.ablated for case in rides.cases)
     design = costs["roll"].pop("design", None)
     for quantity in ("pitch", "yaw"):
         costs[quantity].pop("design", None)
@@ -110,25 +114,29 @@ def map_paragraph(rides: Rides, exact: Rides | None) -> str:
         if own
     }
     return PAPER.written(
-        PAPER.words["map"],
+        PAPER.words[ablation.column],
         costs=costs,
         worst=worst,
         design=design,
-        known=exact is not None,
-        is_exact=is_exact,
+        known=twin is not None,
+        is_ablated=is_ablated,
     )
 
 
-def _map_table(rides: Rides, exact: Rides, looks: Mapping[str, MethodStyle]) -> Table:
-    """Errors against the truth, mean over the rides, with a map that errs and with an exact one."""
+def _cost_table(
+    rides: Rides, twin: Rides | None, looks: Mapping[str, MethodStyle], ablation: Ablation
+) -> Table | None:
+    """Errors against the truth, mean over the rides, as a train has it and with the ablation."""
+    if twin is None:
+        return None
     rows = []
     for part, role in PAPER.parts.items():
-        if rides.has(part) and exact.has(part):
-            both = [one.mean(part, q)[0] for q in QUANTITIES for one in (rides, exact)]
+        if rides.has(part) and twin.has(part):
+            both = [one.mean(part, q)[0] for q in QUANTITIES for one in (rides, twin)]
             colour = looks[part].colour if part in looks else ""
             rows.append(Row(role.label, "", colour, [number_cell(value) for value in both]))
     groups = [(f"{quantity}, \u00b0 rms", 2) for quantity in QUANTITIES]
-    return Table(groups, list(HEADS) * len(groups), rows)
+    return Table(groups, list(WORDS[ablation].heads) * len(groups), rows)
 
 
 def _number(mean: float, sd: float) -> Cell:

@@ -15,13 +15,15 @@ from simrail.report.tables.pivot import (
     NOTHING,
     Case,
     Mean,
+    ablated,
     cases,
-    first_maps,
-    map_words,
-    with_exact_map,
+    first_cases,
 )
+from simrail.report.words.ablations import state_words
 from simrail.scenario.cells import Method, methods
 from simrail.scenario.tables import NOISE
+from simrail.scoring.ablations import COLUMNS as TAKEN_AWAY
+from simrail.scoring.ablations import Ablation
 
 PAPER = read_paper("gonzalez_2023")
 
@@ -97,7 +99,7 @@ class Rows:
         labels = self.case.labels
         return (
             f"ride {labels['ride']}, IMU {labels['mount']} ({labels['imu']}), odometry {labels['odometry']}, "
-            f"{map_words(labels['map'])}"
+            f"{state_words(labels, comma=', ')}"
         )
 
     @property
@@ -109,24 +111,24 @@ class Rows:
 def rows_of(all_cases: Sequence[Case], ran: Sequence[Method], *, band: str) -> Rows | None:
     """Find the first case of a real IMU with rail geometry; None if there is none.
 
-    With the map that a train has, where any case has it.
+    Of what a train has, where any case is.
     """
     names = PAPER.names(ran)
-    all_cases = first_maps(all_cases)
+    all_cases = first_cases(all_cases)
     real = [case for case in all_cases if case.labels["imu"] != "ideal"]
     plain = [case for case in real if not _is_noisy(case)]
     for case in [*plain, *all_cases]:
         if any(case.get(name, "cross_level", "sd").draws for name in names.values()):
-            same = ("ride", "odometry", "map", "vehicle")
+            same = ("ride", "odometry", "vehicle", *TAKEN_AWAY)
             noisy = (c for c in real if _is_noisy(c) and all(c.labels[k] == case.labels[k] for k in same))
             return Rows(case, next(noisy, None), names, band)
     return None
 
 
-def exact_rows(rows: Rows, all_cases: Sequence[Case]) -> Rows | None:
-    """The same of a train that knows its line exactly; None if that was not run."""
-    case = with_exact_map(rows.case, all_cases)
-    noisy = None if rows.noisy is None else with_exact_map(rows.noisy, all_cases)
+def ablated_rows(rows: Rows, all_cases: Sequence[Case], ablation: Ablation) -> Rows | None:
+    """The same with an ablation; None if that was not run."""
+    case = ablated(rows.case, all_cases, ablation)
+    noisy = None if rows.noisy is None else ablated(rows.noisy, all_cases, ablation)
     return None if case is None else replace(rows, case=case, noisy=noisy)
 
 

@@ -11,16 +11,16 @@ import numpy as np
 from simrail.campaign.cell import CellResult
 from simrail.report.figures.geometry import has_rails, lines_of
 from simrail.report.pages.section import PageData, Section
-from simrail.report.papers.claim import judged, with_exact
+from simrail.report.papers.claim import judged, with_ablation
 from simrail.report.papers.gonzalez_2023 import judges, parts, tunings
 from simrail.report.papers.gonzalez_2023.figures import noise_figure, tuning_figures
 from simrail.report.papers.gonzalez_2023.parts import COLUMNS, FILTERED, PAPER, OtherSize, Rows, column_words
 from simrail.report.tables.geometry import QUANTITIES
-from simrail.report.tables.maps import HEADS
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, of_cell
 from simrail.report.tables.tables import Cell, Row, Table, mean_cell, number_cell
-from simrail.scoring.table import EXACT_MAP
+from simrail.report.words.ablations import WORDS
+from simrail.scoring.ablations import ABLATIONS, Ablation
 from simrail.track.bands import Band
 
 SCALED = Band("paper", 0.3, 7.0)
@@ -71,13 +71,16 @@ def section(data: PageData) -> list[Section]:
     }
     peak = peak_of(example, seen[rows.main], band) if example and rows.main in seen else None
     evidence = judges.Evidence(rows, covered.get(rows.main, []), peak, tuned.get("cml"))
-    claims, exact = judged(PAPER, evidence, judges, has=rows.has), parts.exact_rows(rows, data.cases)
-    if exact is not None:
-        # Intervals and peak are of the ride that is drawn, which has no exact map.
-        beside = judged(PAPER, judges.Evidence(exact, tuning=evidence.tuning), judges, has=exact.has)
-        claims = with_exact(claims, beside)
+    claims = judged(PAPER, evidence, judges, has=rows.has)
+    twins = {one: parts.ablated_rows(rows, data.cases, one) for one in ABLATIONS}
+    for one, twin in twins.items():
+        if twin is not None:
+            # Intervals and peak are of the ride that is drawn, which is of no ablation.
+            beside = judged(PAPER, judges.Evidence(twin, tuning=evidence.tuning), judges, has=twin.has)
+            claims = with_ablation(claims, beside, one)
     missing = [PAPER.label(part) for part in PAPER.printed if not rows.has(part)]
-    notes = [*tunings.notes(tuned), tunings.own_ride_note(rows, own), judges.errata_note(rows)]
+    notes = [*tunings.notes(tuned), tunings.silence_note(tuned), tunings.own_ride_note(rows, own)]
+    notes.append(judges.errata_note(rows))
     notes += [f"Not run in this scenario: {', '.join(missing)}."] * bool(missing)
     drawings = tuning_figures(seen, example, band) if example else []
     if example and noisy:
@@ -92,8 +95,10 @@ def section(data: PageData) -> list[Section]:
         "tunings": tunings.status_table(tuned),
         "commands": tunings.commands(tuned),
         "all_claims": claims,
-        "map_words": map_paragraph(rows, exact),
-        "map_table": _map_table(rows, exact, looks) if exact is not None else None,
+        "ablations": [
+            (WORDS[one].cost, cost_paragraph(rows, twin, one), _cost_table(rows, twin, looks, one))
+            for one, twin in twins.items()
+        ],
         "notes": [note for note in notes if note],
         "drawings": drawings,
     }
@@ -143,14 +148,14 @@ def _table(rows: Rows, looks: Mapping[str, MethodStyle], size: str, other: Other
     return Table(groups, ["\u03bc", "\u03c3", "max"] * len(COLUMNS), lines)
 
 
-def map_paragraph(rows: Rows, exact: Rows | None) -> str:
-    """What the smoother loses by a map that errs, beside what the paper says of its own."""
-    played = [part for part in PAPER.parts if exact is not None and rows.has(part) and exact.has(part)]
+def cost_paragraph(rows: Rows, twin: Rows | None, ablation: Ablation) -> str:
+    """What the smoother loses by what a train has and an ablation has not, beside what the paper says."""
+    played = [part for part in PAPER.parts if twin is not None and rows.has(part) and twin.has(part)]
     costs = {
         QUANTITIES[quantity]: {
-            part: [one.get(part, quantity, "sd", filtered=True).value for one in (rows, exact)]
+            part: [one.get(part, quantity, "sd", filtered=True).value for one in (rows, twin)]
             for part in played
-            if exact is not None
+            if twin is not None
         }
         for quantity in FILTERED
     }
@@ -160,24 +165,29 @@ def map_paragraph(rows: Rows, exact: Rows | None) -> str:
         if tested:
             worst = max(tested, key=lambda part: own[part][0] / max(own[part][1], 1e-12))
             by_quantity[words] = worst, *own[worst]
-    is_exact = rows.case.labels["map"] == EXACT_MAP
-    return PAPER.written(PAPER.words["map"], costs=by_quantity, known=exact is not None, is_exact=is_exact)
+    is_ablated = rows.case.labels[ablation.column] == ablation.ablated
+    known = twin is not None
+    return PAPER.written(PAPER.words[ablation.column], costs=by_quantity, known=known, is_ablated=is_ablated)
 
 
-def _map_table(rows: Rows, exact: Rows, looks: Mapping[str, MethodStyle]) -> Table:
-    """Filtered errors of the rails and errors of the attitude, with a map that errs and with an exact one."""
+def _cost_table(
+    rows: Rows, twin: Rows | None, looks: Mapping[str, MethodStyle], ablation: Ablation
+) -> Table | None:
+    """Filtered errors of the rails and errors of the attitude, as a train has it and with the ablation."""
+    if twin is None:
+        return None
     angles = ("roll", "pitch", "yaw_debiased")
     lines = []
     for part, role in PAPER.parts.items():
-        if rows.has(part) and exact.has(part):
-            both = [one.get(part, q, "sd", filtered=True) for q in FILTERED for one in (rows, exact)]
-            both += [one.attitude(part, angle) for angle in angles for one in (rows, exact)]
+        if rows.has(part) and twin.has(part):
+            both = [one.get(part, q, "sd", filtered=True) for q in FILTERED for one in (rows, twin)]
+            both += [one.attitude(part, angle) for angle in angles for one in (rows, twin)]
             style = looks.get(rows.played_by(part))
             cells = [mean_cell(mean._replace(sd=float("nan"))) for mean in both]
             lines.append(Row(role.label, "", style.colour if style else "", cells))
     groups = [(f"{QUANTITIES[quantity]}, sd, mm", 2) for quantity in FILTERED]
     groups += [(f"{angle}, \u00b0 rms", 2) for angle in ("roll", "pitch", "yaw\u00b9")]
-    return Table(groups, list(HEADS) * len(groups), lines)
+    return Table(groups, list(WORDS[ablation].heads) * len(groups), lines)
 
 
 def _numbers(rows: Rows, part: str) -> list[Cell]:

@@ -20,12 +20,14 @@ from simrail.report.tables.tables import Cell, Row, Table
 from simrail.scenario.build_estimator import construct
 from simrail.scenario.cells import Method
 from simrail.scenario.scenario import Scenario
-from simrail.scoring.table import EXACT_MAP
+from simrail.scoring.ablations import ABLATIONS, VIBRATION, Ablation
 
 EDGES = (LOWER, UPPER, CONSTRAINT)
 
-_EXACT = "map.exact=true"
-"""Setting of a search on recordings of trains that know their line exactly."""
+
+def _setting(ablation: Ablation) -> str:
+    """Setting of a search on recordings with an ablation."""
+    return f"{ablation.axis}=true"
 
 
 def tunings_of(methods: Sequence[Method], folder: Path | None) -> dict[str, Tuning]:
@@ -103,16 +105,30 @@ def searched_on(tuning: Tuning, scenario: Scenario, cell: Mapping[str, object]) 
     is_first = not any(cell.get(draw) for draw in ("track_draw", "map_draw", "sensor_draw"))
     if search is None or len(search.fitted_on) != 1 or not is_first:
         return False
-    words = shlex.split(search.command)
-    settings = [words[at + 1] for at, word in enumerate(words) if word == "--set"]
-    # Of a list of maps the cell has one, which the command names.
-    if (_EXACT in settings) != (scenario.spec.map is not None and cell["map"] == EXACT_MAP):
-        return False
-    others, own = ([one for one in said if one != _EXACT] for said in (settings, scenario.overrides))
+    words, settings = shlex.split(search.command), _settings(tuning)
+    # Of a list the cell has one of both, which the command names.
+    for one in ABLATIONS:
+        has_table = getattr(scenario.spec, one.column) is not None
+        if (_setting(one) in settings) != (has_table and cell[one.column] == one.ablated):
+            return False
+    ablations = [_setting(one) for one in ABLATIONS]
+    others, own = ([one for one in said if one not in ablations] for said in (settings, scenario.overrides))
     if words[:3] != ["simrail", "tune", scenario.name] or others != own:
         return False
     ride = f"{scenario.name}: {cell['ride']}, {cell['mount']} on "
     return search.seed == scenario.spec.seed and search.fitted_on[0].startswith(ride)
+
+
+def _settings(tuning: Tuning) -> list[str]:
+    """Settings of the command that made a tuning."""
+    words = shlex.split(tuning.search.command) if tuning.search is not None else []
+    return [words[at + 1] for at, word in enumerate(words) if word == "--set"]
+
+
+def silence_note(tunings: Mapping[str, Tuning]) -> str:
+    """Which tunings were searched on rides without vibration; "" if none was, by their commands."""
+    parts = [part for part, tuning in tunings.items() if _setting(VIBRATION) in _settings(tuning)]
+    return PAPER.written(PAPER.words["silent"], parts=parts) if parts else ""
 
 
 def own_ride_note(rows: Rows, own: Mapping[str, Sequence[float]]) -> str:

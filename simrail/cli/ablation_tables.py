@@ -1,4 +1,4 @@
-"""What a map that errs costs, and odometries over all rides, as the command line shows them."""
+"""What a map that errs and vibration cost, and odometries over all rides, for the command line."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -11,10 +11,12 @@ from rich.table import Table
 from rich.text import Text
 
 from simrail.report.campaign.odometry import COVERAGES, OdometryTable, odometry_tables, row_words
+from simrail.report.tables.ablations import ATTITUDE, Cost, attitude_costs, pairs_of, rails_costs
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, judged_band
-from simrail.report.tables.maps import ATTITUDE, MapCost, attitude_costs, map_groups, rails_costs
 from simrail.report.tables.methods import MethodStyle, attitude_methods
 from simrail.report.tables.pivot import Case
+from simrail.report.words.ablations import WORDS
+from simrail.scoring.ablations import ABLATIONS, Ablation
 
 MOST_GROUPS = 4
 """Mounts, IMUs and odometries whose comparison is printed; the page has all."""
@@ -32,34 +34,44 @@ _HEADS = {
 """Heads of the columns, by their names in the frames."""
 
 
-def print_map_costs(console: Console, all_cases: Sequence[Case], styles: Sequence[MethodStyle]) -> None:
-    """Print each method's errors with a map that errs and with an exact one, mean over all rides."""
-    groups = map_groups(all_cases)
+def print_costs(console: Console, all_cases: Sequence[Case], styles: Sequence[MethodStyle]) -> None:
+    """Print each method's errors as a train has it and with each ablation, mean over all rides."""
+    for one in ABLATIONS:
+        _print_cost(console, all_cases, styles, one)
+
+
+def _print_cost(
+    console: Console, all_cases: Sequence[Case], styles: Sequence[MethodStyle], ablation: Ablation
+) -> None:
+    words, groups = WORDS[ablation], pairs_of(all_cases, ablation)
     for group in groups[:MOST_GROUPS]:
-        console.print(Text(f"What the map costs: {group.title}", style="bold"))
+        console.print(Text(f"{words.cost}: {group.title}", style="bold"))
         rails = rails_costs(group, styles)
         if rails:
             band = judged_band(group.pairs[0][0])
             console.print(Text(f"Rails: sd of the error, {band}, mm; mean over all rides"))
-            console.print(_comparison(rails, styles, [QUANTITIES[quantity] for quantity in JUDGED]))
+            heads = [QUANTITIES[quantity] for quantity in JUDGED]
+            console.print(_comparison(rails, styles, heads, words.short))
         attitude = attitude_methods(styles)
         angles = attitude_costs(group, attitude)
         if angles:
             console.print(Text("Attitude: rms error over whole rides, deg; mean over all rides"))
             heads = [words.replace("\u00b9", " less\nits start") for _, words in ATTITUDE]
-            console.print(_comparison(angles, attitude, heads))
+            console.print(_comparison(angles, attitude, heads, words.short))
     if groups:
-        text = "errs: the map differs from what was laid; exact: it does not, an ablation; * baseline"
         more = f"; {len(groups) - MOST_GROUPS} more are in the report" * (len(groups) > MOST_GROUPS)
-        console.print(Text(text + more, style="dim"))
+        console.print(Text(f"{words.note}; * baseline{more}", style="dim"))
 
 
 def _comparison(
-    costs: Mapping[str, Sequence[MapCost]], styles: Sequence[MethodStyle], heads: Iterable[str]
+    costs: Mapping[str, Sequence[Cost]],
+    styles: Sequence[MethodStyle],
+    heads: Iterable[str],
+    sides: tuple[str, str],
 ) -> Table:
     table = _table("method")
     for head in heads:
-        for which in ("errs", "exact"):
+        for which in sides:
             table.add_column(f"{head}\n{which}", justify="right")
     for style in styles:
         if style.name in costs:

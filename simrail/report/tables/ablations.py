@@ -1,4 +1,4 @@
-"""What a map that errs costs: each method's error with it, and with an exact one beside it."""
+"""What a map that errs, or vibration, costs: each method's error with it, and the ablation beside it."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,90 +7,92 @@ import numpy as np
 
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, judged_band
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.pivot import Case, with_exact_map
+from simrail.report.tables.pivot import Case, ablated, first_cases
 from simrail.report.tables.tables import Row, Table, method_row, number_cell
+from simrail.report.words.ablations import WORDS
+from simrail.scoring.ablations import Ablation
 from simrail.scoring.table import FULL
 
 ATTITUDE = (("roll", "roll"), ("pitch", "pitch"), ("yaw_debiased", "yaw\u00b9"))
 """Angles that are compared, and their words."""
 
-HEADS = ("the map errs", "exact")
-"""Columns of a comparison."""
 
-
-class MapCost(NamedTuple):
+class Cost(NamedTuple):
     """One figure of one method, mean over the same cases.
 
     Attributes
     ----------
-    erring, exact : float
-        With a map that errs, and with an exact one.
+    own, ablated : float
+        As a train has it, and with the ablation.
     """
 
-    erring: float
-    exact: float
+    own: float
+    ablated: float
 
 
-class MapGroup(NamedTuple):
-    """Cases of one mount, IMU and odometry, each with an exact map beside it.
+class Pairs(NamedTuple):
+    """Cases of one mount, IMU and odometry, each with its ablation beside it.
 
     Attributes
     ----------
     title : str
         Mount, IMU and odometry, and vehicle where there are several.
+    ablation : Ablation
+        What is taken away.
     pairs : list of (Case, Case)
-        With a map that errs, and with an exact one.
+        As a train has it, and with the ablation.
     """
 
     title: str
+    ablation: Ablation
     pairs: list[tuple[Case, Case]]
 
-    def cost(self, name: str, quantity: str, metric: str, **where: str) -> MapCost:
+    def cost(self, name: str, quantity: str, metric: str, **where: str) -> Cost:
         """Means of a figure over the pairs that have both; NaN if none has."""
         both = [[case.get(name, quantity, metric, **where).value for case in pair] for pair in self.pairs]
         known = np.array([figures for figures in both if np.isfinite(figures).all()]).reshape(-1, 2)
-        return MapCost(*known.mean(axis=0)) if len(known) else MapCost(float("nan"), float("nan"))
+        return Cost(*known.mean(axis=0)) if len(known) else Cost(float("nan"), float("nan"))
 
 
-def map_groups(all_cases: Sequence[Case]) -> list[MapGroup]:
-    """Cases with a map that errs and their twins with an exact one, by vehicle, mount, IMU and odometry."""
+def pairs_of(all_cases: Sequence[Case], ablation: Ablation) -> list[Pairs]:
+    """First cases and their twins with an ablation, by vehicle, mount, IMU and odometry."""
     several = len({case.labels["vehicle"] for case in all_cases}) > 1
     groups: dict[str, list[tuple[Case, Case]]] = {}
-    for case in all_cases:
-        exact, labels = with_exact_map(case, all_cases), case.labels
-        if exact is not None:
+    for case in first_cases(all_cases):
+        twin, labels = ablated(case, all_cases, ablation), case.labels
+        if twin is not None:
             words = [*[labels["vehicle"]] * several, f"IMU {labels['mount']} ({labels['imu']})"]
             words.append(f"odometry {labels['odometry']}")
-            groups.setdefault(" \u00b7 ".join(words), []).append((case, exact))
-    return [MapGroup(title, pairs) for title, pairs in groups.items()]
+            groups.setdefault(" \u00b7 ".join(words), []).append((case, twin))
+    return [Pairs(title, ablation, pairs) for title, pairs in groups.items()]
 
 
-def attitude_costs(group: MapGroup, styles: Sequence[MethodStyle]) -> dict[str, list[MapCost]]:
+def attitude_costs(group: Pairs, styles: Sequence[MethodStyle]) -> dict[str, list[Cost]]:
     """Rms errors in degrees over whole rides, in the order of `ATTITUDE`, by the name of the method."""
     costs = {s.name: [group.cost(s.name, quantity, "rms") for quantity, _ in ATTITUDE] for s in styles}
     return {name: own for name, own in costs.items() if np.isfinite(own).any()}
 
 
-def rails_costs(group: MapGroup, styles: Sequence[MethodStyle]) -> dict[str, list[MapCost]]:
+def rails_costs(group: Pairs, styles: Sequence[MethodStyle]) -> dict[str, list[Cost]]:
     """Sd of the errors of the rails in the band that a case is judged in, mm, by the name of the method."""
     band = judged_band(group.pairs[0][0])
     costs = {s.name: [group.cost(s.name, quantity, "sd", band=band) for quantity in JUDGED] for s in styles}
     return {name: own for name, own in costs.items() if np.isfinite(own).any()}
 
 
-def map_table(costs: dict[str, list[MapCost]], styles: Sequence[MethodStyle], titles: Sequence[str]) -> Table:
-    """A row per method: each figure with a map that errs and, beside it, with an exact one."""
+def cost_table(
+    costs: dict[str, list[Cost]], styles: Sequence[MethodStyle], titles: Sequence[str], ablation: Ablation
+) -> Table:
+    """A row per method: each figure as a train has it and, beside it, with the ablation."""
     rows: list[Row] = []
     for style in styles:
         if style.name in costs:
             figures = [figure for cost in costs[style.name] for figure in cost]
             rows.append(method_row(style, [number_cell(figure) for figure in figures]))
-    return Table([(title, 2) for title in titles], list(HEADS) * len(titles), rows)
+    return Table([(title, 2) for title in titles], list(WORDS[ablation].heads) * len(titles), rows)
 
 
-def map_tables(
-    group: MapGroup, attitude: Sequence[MethodStyle], styles: Sequence[MethodStyle]
-) -> list[Table]:
+def cost_tables(group: Pairs, attitude: Sequence[MethodStyle], styles: Sequence[MethodStyle]) -> list[Table]:
     """Tables of one group: rails where they are scored, and the attitude."""
     tables = []
     rails, angles = rails_costs(group, styles), attitude_costs(group, attitude)
@@ -98,7 +100,8 @@ def map_tables(
         band = judged_band(group.pairs[0][0])
         where = "unfiltered" if band == FULL else band
         titles = [f"{QUANTITIES[quantity]} sd, {where}, mm" for quantity in JUDGED]
-        tables.append(map_table(rails, styles, titles))
+        tables.append(cost_table(rails, styles, titles, group.ablation))
     if angles:
-        tables.append(map_table(angles, attitude, [f"{words} error, \u00b0 rms" for _, words in ATTITUDE]))
+        titles = [f"{words} error, \u00b0 rms" for _, words in ATTITUDE]
+        tables.append(cost_table(angles, attitude, titles, group.ablation))
     return tables
