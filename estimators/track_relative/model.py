@@ -89,7 +89,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool) -> Steps:
     n = len(time) // block
 
     def mean(values: FloatArray) -> FloatArray:
-        return np.asarray(values[: n * block].reshape(n, block, -1).mean(axis=1))
+        return np.asarray(values[: n * block].reshape(n, block, values.shape[1]).mean(axis=1))
 
     method = CurveMatchedOdometry(smoothed=smoothed)
     trace = method.trace(recording)

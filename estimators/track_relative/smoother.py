@@ -17,11 +17,9 @@ processes over space as states.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
@@ -32,25 +30,13 @@ from simrail.estimators.track_relative.kernel import (
     run_back,
     run_filter,
 )
-from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import deviation_of, duals, pose_of
 from simrail.estimators.track_relative.model import Course, about, course_of, linearised, steps_of
 from simrail.estimators.track_relative.noise import Motion, motion_of
+from simrail.estimators.track_relative.output import Trace, innovations_of, states_of
 from simrail.estimators.track_relative.prior import PARTS
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 
-from simrail.core.columns import (
-    ATTITUDE,
-    ATTITUDE_SD,
-    INNOVATION,
-    ODOMETRY,
-    RATE_INNOVATION,
-    RELATIVE_POSITION,
-    RELATIVE_POSITION_SD,
-)
 from simrail.core.errors import InputError, one_of
-from simrail.core.jit import FloatArray
-from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 
@@ -58,33 +44,7 @@ MOST_PASSES = 4
 """Two are enough: the train is found to a decimetre by the first."""
 
 PIECE = 32 * SEGMENT
-"""Steps that are linearised at a time: a minute's worth, 15 MB."""
-
-SD_COLUMNS = (*ATTITUDE_SD, "position_sd_m", "speed_sd_mps", *RELATIVE_POSITION_SD)
-"""Standard deviations, in the order of the kernel's outputs."""
-
-
-class Trace(NamedTuple):
-    """All that is estimated, at n steps.
-
-    Attributes
-    ----------
-    course : Course
-        About which the last pass was linearised.
-    states : ndarray (n, 51)
-    covariance : ndarray (n, 7, 7)
-        Of roll, pitch, yaw, S, V, y and z.
-    surprises : ndarray (n, 7)
-        Innovations of the filter over their standard deviations; NaN for a measurement that was not made.
-    log_likelihood : float
-        Of all measurements, but for a constant.
-    """
-
-    course: Course
-    states: FloatArray
-    covariance: FloatArray
-    surprises: FloatArray
-    log_likelihood: float
+"""Steps that are linearised at a time: four minutes, 15 MB."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +58,8 @@ class TrackRelativeSmoother:
     passes : int
         How often to linearise and smooth; the filter does it once.
     rate_hz : float
-        Rate of its steps: the IMU is averaged over each.
+        Rate of its steps: the IMU is averaged over each. What shakes a mount is beyond it: at 125 Hz an
+        axle's vibration, which no state is for, spoils pitch and place.
     motion : Motion, optional
         How the body moves in its track; that of the mount's class
         (`simrail.estimators.track_relative.noise`) if not given.
@@ -111,7 +72,7 @@ class TrackRelativeSmoother:
 
     smoothed: bool = True
     passes: int = 2
-    rate_hz: float = 125.0
+    rate_hz: float = 31.25
     motion: Motion | None = None
     without: tuple[str, ...] = ()
     geometry_step_m: float = 0.25
@@ -151,19 +112,14 @@ class TrackRelativeSmoother:
         """
         trace = self.trace(recording)
         estimate = Estimate(
-            states=_states(trace, causal=self.causal),
+            states=states_of(trace, causal=self.causal),
             mount=recording.mount,
-            innovations=_innovations(trace),
+            innovations=innovations_of(trace),
         )
         if not self.geometry_step_m:
             return estimate
-        along = recording.with_odometry(estimate.states[list(ODOMETRY)], "own")
-        return Estimate(
-            **(
-                vars(estimate)
-                | {"geometry": geometry_of(sight_of(estimate, along), step_m=self.geometry_step_m)}
-            )
-        )
+        geometry = geometry_of(sight_of(estimate, recording), step_m=self.geometry_step_m)
+        return replace(estimate, geometry=geometry)
 
     def trace(self, recording: Recording) -> Trace:
         """All states, at the filter's own steps."""
@@ -226,49 +182,3 @@ def _run(course: Course, *, smoothed: bool) -> Trace:
                 lines[1],
             )
     return Trace(course, states, covariance, surprises, -0.5 * total)
-
-
-def _states(trace: Trace, *, causal: bool) -> pd.DataFrame:
-    """Estimate at every IMU sample: between steps, or, if causal, from the last one on."""
-    course, states = trace.course, trace.states
-    recording, steps, track = course.recording, course.steps, course.recording.track
-    around = course.around._replace(states=states)
-    ground, x = ground_at(recording, course.lines, states[:, at.S]), duals(states)
-    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
-    found = [*(angle.value for angle in pose.rho), *states[:, [at.HEADING, at.S, at.V, at.A]].T]
-    values = np.column_stack([*found, pose.y.value, pose.z.value])
-    sd = np.sqrt(np.maximum(np.diagonal(trace.covariance, axis1=1, axis2=2), 0.0))
-    time = recording.imu.index.to_numpy(dtype=np.float64)
-    if causal:
-        none = np.zeros(len(states))
-        rates = [*(rate.value for rate in pose.rho_rate), none, states[:, at.V], states[:, at.A], none]
-        last = np.maximum(np.searchsorted(steps.end_s, time + 1e-9, side="right") - 1, 0)
-        ahead = np.minimum(time - steps.time_s[last], 2.0 * steps.dt)[:, None]
-        moves = np.column_stack([*rates, pose.y_rate.value, pose.z_rate.value])
-        values, sd = values[last] + ahead * moves[last], sd[last]
-    else:
-        values, sd = _between(time, steps.time_s, values), _between(time, steps.time_s, sd)
-    frame = track.frame(np.clip(values[:, 4], track.start_m, track.end_m))
-    heading = frame.yaw_rad + values[:, 3]
-    base = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, heading]))
-    angles = euler_angles(base @ rotation_matrix(values[:, :3]))
-    # Counted as the map counts it, whole turns included.
-    angles[:, 2] += 2.0 * np.pi * np.round((heading - angles[:, 2]) / (2.0 * np.pi))
-    columns = [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
-    return pd.DataFrame(
-        np.column_stack([angles, values[:, 4:], sd]), index=recording.imu.index, columns=columns
-    )
-
-
-def _between(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:
-    return np.column_stack([np.interp(time, at_s, column) for column in values.T])
-
-
-def _innovations(trace: Trace) -> pd.DataFrame:
-    """Innovations of the step that a sample is in, over their sds times those of the measurement alone."""
-    course, steps = trace.course, trace.course.steps
-    time = course.recording.imu.index.to_numpy(dtype=np.float64)
-    last = np.clip(np.searchsorted(steps.end_s, time + 1e-9, side="right") - 1, 0, None)
-    seen = trace.surprises[:, :6]
-    table = np.column_stack([seen, (seen**2).sum(axis=1)])[last]
-    return pd.DataFrame(table, index=course.recording.imu.index, columns=[*RATE_INNOVATION, *INNOVATION])

@@ -13,8 +13,9 @@ from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import SEGMENT
 from simrail.estimators.track_relative.noise import AXLE
+from simrail.estimators.track_relative.output import SD_COLUMNS, Trace
 from simrail.estimators.track_relative.prior import PARTS
-from simrail.estimators.track_relative.smoother import SD_COLUMNS, Trace, TrackRelativeSmoother
+from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
 from simrail.core.columns import (
     ACCEL,
@@ -162,17 +163,23 @@ def test_states_and_innovations_are_those_of_the_trace(rough: Callable) -> None:
             place = np.interp(recording.imu.index, steps.time_s, trace.states[:, at.S])
             np.testing.assert_allclose(estimate.states["position_m"], place, rtol=1e-12)
         else:
-            np.testing.assert_allclose(estimate.states[list(SD_COLUMNS)], sd[np.maximum(last, 0)], rtol=1e-12)
-            age = recording.imu.index.to_numpy()[1:] - steps.time_s[last[1:]]
-            ahead = trace.states[last[1:], at.S] + age * trace.states[last[1:], at.V]
-            np.testing.assert_allclose(estimate.states["position_m"].to_numpy()[1:], ahead, rtol=1e-12)
+            known = last >= 0
+            found, last = estimate.states[known], last[known]
+            np.testing.assert_allclose(found[list(SD_COLUMNS)], sd[last], rtol=1e-12)
+            age = recording.imu.index.to_numpy()[known] - steps.time_s[last]
+            ahead = trace.states[last, at.S] + age * trace.states[last, at.V]
+            np.testing.assert_allclose(found["position_m"].to_numpy(), ahead, rtol=1e-12)
+            before = estimate.states["position_m"].to_numpy()[~known]
+            np.testing.assert_allclose(before, recording.start_position_m, rtol=1e-12)
         innovations = estimate.innovations
         assert innovations is not None
         assert list(innovations) == [*RATE_INNOVATION, *INNOVATION]
         np.testing.assert_allclose(
             innovations["nis"], (innovations.drop(columns="nis") ** 2).sum(axis=1), rtol=1e-12
         )
-        np.testing.assert_array_equal(innovations.to_numpy()[1:, :6], trace.surprises[last[1:], :6])
+        shown = np.vstack([np.zeros(6), trace.surprises[:, :6]])
+        last = np.searchsorted(steps.end_s, recording.imu.index.to_numpy() + 1e-9, side="right")
+        np.testing.assert_array_equal(innovations.to_numpy()[:, :6], shown[last])
 
 
 def test_pieces_do_not_show(rough: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,7 +188,10 @@ def test_pieces_do_not_show(rough: Callable, monkeypatch: pytest.MonkeyPatch) ->
     traces: list[tuple[Trace, Trace]] = []
     for _ in range(2):
         traces.append(
-            tuple(TrackRelativeSmoother(smoothed=s, passes=1).trace(recording) for s in (False, True))  # type: ignore[arg-type]
+            tuple(
+                TrackRelativeSmoother(smoothed=s, passes=1, rate_hz=125.0).trace(recording)
+                for s in (False, True)
+            )  # type: ignore[arg-type]
         )
         monkeypatch.setattr("simrail.estimators.track_relative.smoother.PIECE", 2 * SEGMENT)
     for whole, pieces in zip(*traces, strict=True):

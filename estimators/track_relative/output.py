@@ -1,0 +1,134 @@
+"""From the states of the track-relative smoother, at its steps, to an estimate at every sample of the IMU.
+
+The attitude is that of the map at the place found, turned about the vertical by the heading that the map has
+not, and then by the body's small turn in the map's track. Between its steps the smoother's answer is linear;
+the filter's goes on from the last step with the rates found there. Before its first step the filter knows
+what was known before the ride.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.dual import table_of
+from simrail.estimators.track_relative.line import ground_at
+from simrail.estimators.track_relative.measurement import Around, deviation_of, duals, pose_of, told
+from simrail.estimators.track_relative.model import Course
+
+from simrail.core.columns import (
+    ATTITUDE,
+    ATTITUDE_SD,
+    INNOVATION,
+    ODOMETRY,
+    RATE_INNOVATION,
+    RELATIVE_POSITION,
+    RELATIVE_POSITION_SD,
+)
+from simrail.core.jit import FloatArray, IntArray
+from simrail.core.rotation import euler_angles, rotation_matrix
+
+SD_COLUMNS = (*ATTITUDE_SD, "position_sd_m", "speed_sd_mps", *RELATIVE_POSITION_SD)
+"""Standard deviations, in the order of the kernel's outputs."""
+
+MOST_STEPS_AHEAD = 2.0
+"""The filter does not go on from a step for longer than this: the last one of a ride may be a gap ago."""
+
+
+class Trace(NamedTuple):
+    """All that is estimated, at n steps.
+
+    Attributes
+    ----------
+    course : Course
+        About which the last pass was linearised.
+    states : ndarray (n, 51)
+    covariance : ndarray (n, 7, 7)
+        Of roll, pitch, yaw, S, V, y and z.
+    surprises : ndarray (n, 7)
+        Innovations of the filter over their standard deviations; NaN for a measurement that was not made.
+    log_likelihood : float
+        Of all measurements, but for a constant.
+    """
+
+    course: Course
+    states: FloatArray
+    covariance: FloatArray
+    surprises: FloatArray
+    log_likelihood: float
+
+
+def states_of(trace: Trace, *, causal: bool) -> pd.DataFrame:
+    """Estimate at every IMU sample: between steps, or, if causal, from the last one on."""
+    course, steps = trace.course, trace.course.steps
+    time = course.recording.imu.index.to_numpy(dtype=np.float64)
+    values, rates = _found(course, trace.states, course.around)
+    sd = np.sqrt(np.maximum(np.diagonal(trace.covariance, axis1=1, axis2=2), 0.0))
+    if causal or not len(values):
+        known, known_sd = _before(course)
+        last = _last_step(trace, time) + 1
+        ends = np.concatenate([time[:1] - steps.dt, steps.time_s])
+        ahead = np.minimum(time - ends[last], MOST_STEPS_AHEAD * steps.dt)[:, None]
+        moves = np.vstack([np.zeros_like(known), rates])
+        values = np.vstack([known, values])[last] + ahead * moves[last]
+        sd = np.vstack([known_sd, sd])[last]
+    else:
+        values, sd = _between(time, steps.time_s, values), _between(time, steps.time_s, sd)
+    table = np.column_stack([_attitude(course, values), values[:, 4:], sd])
+    columns = [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
+    return pd.DataFrame(table, index=course.recording.imu.index, columns=columns)
+
+
+def innovations_of(trace: Trace) -> pd.DataFrame:
+    """Innovations over their standard deviations, of the last step before each sample; 0 before the first."""
+    time = trace.course.recording.imu.index.to_numpy(dtype=np.float64)
+    seen = np.vstack([np.zeros(6), trace.surprises[:, :6]])[_last_step(trace, time) + 1]
+    table = np.column_stack([seen, (seen**2).sum(axis=1)])
+    index = trace.course.recording.imu.index
+    return pd.DataFrame(table, index=index, columns=[*RATE_INNOVATION, *INNOVATION])
+
+
+def _last_step(trace: Trace, time: FloatArray) -> IntArray:
+    """Number of the last step that is over at each time; -1 before the first."""
+    return np.searchsorted(trace.course.steps.end_s, time + 1e-9, side="right") - 1
+
+
+def _found(course: Course, states: FloatArray, around: Around) -> tuple[FloatArray, FloatArray]:
+    """Small turn (three), heading, S, V, A, y and z at n steps, and their rates: (n, 9) each."""
+    around = around._replace(states=states)
+    ground, x = ground_at(course.recording, course.lines, states[:, at.S]), duals(states)
+    pose = pose_of(x, ground, around, deviation_of(x, ground, around))
+    none = np.zeros(len(states))
+    turn, turning = (angle.value for angle in pose.rho), (rate.value for rate in pose.rho_rate)
+    values = [*turn, *states[:, [at.HEADING, at.S, at.V, at.A]].T, pose.y.value, pose.z.value]
+    rates = [*turning, none, states[:, at.V], states[:, at.A], none, pose.y_rate.value, pose.z_rate.value]
+    return np.column_stack(values), np.column_stack(rates)
+
+
+def _before(course: Course) -> tuple[FloatArray, FloatArray]:
+    """What is known before the ride, (1, 9), and the standard deviations of the outputs, (1, 7)."""
+    states = course.start[None, :]
+    around = course.around._replace(states=states, jerk=np.zeros(1), sense=np.ones(1))
+    values, _ = _found(course, states, around)
+    ground = ground_at(course.recording, course.lines, states[:, at.S])
+    _, columns, rows = table_of(told(duals(states), ground, around), 1)
+    outputs = np.zeros((len(columns), at.STATES))
+    np.add.at(outputs, (np.arange(len(columns))[:, None], columns), rows[0])
+    covariance = outputs @ course.start_covariance[:, : at.STATES] @ outputs.T
+    return values, np.sqrt(np.diagonal(covariance))[None, :]
+
+
+def _attitude(course: Course, values: FloatArray) -> FloatArray:
+    """Roll, pitch and yaw (n, 3)."""
+    track = course.recording.track
+    frame = track.frame(np.clip(values[:, 4], track.start_m, track.end_m))
+    heading = frame.yaw_rad + values[:, 3]
+    base = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, heading]))
+    angles = euler_angles(base @ rotation_matrix(values[:, :3]))
+    # Counted as the map counts it, whole turns included.
+    angles[:, 2] += 2.0 * np.pi * np.round((heading - angles[:, 2]) / (2.0 * np.pi))
+    return angles
+
+
+def _between(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:
+    return np.column_stack([np.interp(time, at_s, column) for column in values.T])
