@@ -8,8 +8,8 @@ they cost something, with the states of `simrail.estimators.track_relative.state
     q       = V^2 (bend + h_m)/g + lean + cant_m                  cant deficiency over g, over the chord
     cant_m  = CANT share + CANT_ALONG - EVEN even_r - ODD odd_r   roll that the map has not
     rho     = (ROLL + TILT q + TILT_RATE q_dot + TORSION twist + cant_m + askew,
-               PITCH + SQUAT A/g + LEAD dip + SLOPE + askew,
-               YAW - LAG bend + askew)                            body in the map's track
+               PITCH + SQUAT A/g - sense LEAD dip + SLOPE + askew,
+               YAW - sense LAG bend + askew)                      body in the map's track
     w       = V k + V h_m e_v,      e_v upwards in track axes
     gyro    = rho(w) + rho_dot + GYRO_BIAS + GYRO_OF_Z w_z
     a       = g e_v + origin + V^2 h_m (e_v x e_x) + Y of_y + Z of_z + 2 w x r_dot + r_ddot

@@ -245,5 +245,5 @@ def _sense(speed: FloatArray) -> FloatArray:
 def _jerk(acceleration: FloatArray, dt: float) -> FloatArray:
     """Backward difference (n,) over a second; no later value enters."""
     back = max(1, round(JERK_S / dt))
-    longer = np.concatenate([np.full(back, acceleration[:1]), acceleration])
+    longer = np.concatenate([np.repeat(acceleration[:1], back), acceleration])
     return np.asarray((acceleration - longer[: len(acceleration)]) / (back * dt))
