@@ -42,7 +42,7 @@ def export(
     print(f"wrote {number(len(names), 'recording')} into {out}:")
     for name in names:
         print(f"  {name}")
-    print(f"next: simrail estimate {out / names[0]} --estimator AttitudeEkf")
+    print(f"next: simrail estimate {out / names[0]}")
     return DONE
 
 
@@ -52,7 +52,7 @@ def estimate(
     ],
     estimator: Annotated[
         str, typer.Option("--estimator", metavar="NAME", help="A registered estimator, or FILE.py:CLASS.")
-    ],
+    ] = "TrackRelativeSmoother",
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Its folder; results/<ride>_<estimator> if not given."),

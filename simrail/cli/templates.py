@@ -80,7 +80,7 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     if data is not None:
         text, logged = ride_template(name)
         data.write_text(logged, encoding="utf-8")
-        next_step = f"its data: {label(data)}\ntry it: simrail estimate {label(path)} --estimator AttitudeEkf"
+        next_step = f"its data: {label(data)}\ntry it: simrail estimate {label(path)}"
     elif kind in ("estimator", "odometry"):
         text, next_step = _of_class(kind, name, path)
     elif kind == "scenario":
