@@ -88,7 +88,7 @@ def test_two_cells_are_those_of_the_kept_table(made: ModuleType) -> None:
     # Lists of one value are no axes, hence no columns.
     cells = result.cells.assign(**{"irregularity.scale": 1.0, "direction": "backward"})
     found = made.table_of(replace(result, cells=cells))
-    assert len(found) == 2 * 8
+    assert len(found) == 2 * 9
     different = differing(found, kept, made)
     assert different.empty, different.to_string()
     # A method that changed by a thousandth is seen, and so is another draw.

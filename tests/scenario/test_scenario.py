@@ -54,11 +54,16 @@ def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setattr("simrail.vehicle.hunting.critical_below", hunts_above_255)
     name = name or "manchester_cases"
     plan = judge_scenario(load_scenario(name))
-    # A kick is ridden above the critical speed on purpose, and one of the vehicles of the odometry has none.
-    above = {"manchester_cases": "hunts above", "odometry": "irw_car runs unstably above"}
-    expected = (above[name],) if name in above else ()
-    assert len(plan.warnings) == len(expected)
-    assert all(words in warning for words, warning in zip(expected, plan.warnings, strict=True))
+    # A kick is ridden above the critical speed on purpose, one of the vehicles of the odometry has none, and
+    # the fastest rides of the track-relative smoother are faster through the curves than is comfortable.
+    warned = {
+        "manchester_cases": "hunts above",
+        "odometry": "irw_car runs unstably above",
+        "track_relative": "uncompensated lateral acceleration",
+    }
+    assert bool(plan.warnings) == (name in warned)
+    assert name == "track_relative" or len(plan.warnings) <= 1
+    assert all(warned[name] in warning for warning in plan.warnings)
     assert "design_angles" in plan.estimators
     grades = {cell.imu.grade for cell in cells(load_scenario(name))}
     # The floor of every estimator is in every table; a table of odometries alone has none of an estimator.
