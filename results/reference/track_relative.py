@@ -1,0 +1,60 @@
+"""Make ``track_relative.csv`` of the results of ``simrail run track_relative``.
+
+    simrail run track_relative --set monte_carlo.samples=8 --out DIR
+    python results/reference/track_relative.py DIR
+
+One row per vehicle, mount, method and quantity: the root of the mean square error over all rides with its
+95 % interval (whole samples, which have rails, map and device of their own, are resampled), the 95th
+percentile of the rides' rms, and how much of the time the method's own 95 % interval holds.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from simrail.scoring.bootstrap import interval
+
+TABLE = Path(__file__).with_name("track_relative.csv")
+QUANTITIES = ("roll", "pitch", "yaw_debiased", "position", "speed")
+BY = ["vehicle", "mount", "estimator", "quantity"]
+
+
+def table_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
+    """Rows as the module says them, of score table and cells."""
+    whole = scores[(scores["reference"] == "truth") & (scores["window"] == "whole")]
+    whole = whole[whole["quantity"].isin(QUANTITIES)].drop(columns="sample", errors="ignore")
+    whole = whole.merge(cells[["cell", "sample"]], on="cell").astype({"estimator": str})
+    rows = []
+    for key, group in whole.groupby(BY, observed=True):
+        errors = group[group["metric"] == "rms"]
+        if errors.empty:
+            continue
+        square = interval(errors["value"] ** 2, errors["sample"])
+        low, high = np.sqrt(np.maximum([square.low, square.high], 0.0))
+        held = group.loc[group["metric"] == "coverage95", "value"]
+        figures = {
+            "rides": len(errors),
+            "rms": np.sqrt(square.value),
+            "low": low,
+            "high": high,
+            "p95": errors["value"].quantile(0.95),
+            "coverage95": held.mean() if len(held) else np.nan,
+        }
+        rows.append(dict(zip(BY, key, strict=True)) | figures)
+    return pd.DataFrame(rows)
+
+
+def main() -> None:
+    """Read the results named on the command line, and write the table."""
+    folder = Path(sys.argv[1])
+    table = table_of(pd.read_parquet(folder / "scores.parquet"), pd.read_parquet(folder / "cells.parquet"))
+    table.to_csv(TABLE, index=False, float_format="%.4g")
+    print(f"wrote {TABLE}: {len(table)} rows")
+
+
+if __name__ == "__main__":
+    main()
