@@ -1,15 +1,16 @@
 """From the states of the track-relative smoother, at its steps, to an estimate at every sample of the IMU.
 
 The attitude is that of the map at the place found, turned about the vertical by the heading that the map has
-not, and then by the body's small turn in the map's track. Between its steps the smoother's answer is linear;
-the filter's goes on from the last step with the rates found there. Before its first step the filter knows
-what was known before the ride.
+not, and then by the body's small turn in the map's track. Between its steps the smoother's answer is a cubic
+spline; the filter's goes on from the last step with the rates found there. Before its first step the filter
+knows what was known before the ride.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import CubicSpline
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.line import ground_at
@@ -73,7 +74,7 @@ def states_of(trace: Trace, *, causal: bool) -> pd.DataFrame:
         values = np.vstack([known, values])[last] + ahead * moves[last]
         sd = np.vstack([known_sd, sd])[last]
     else:
-        values, sd = _between(time, steps.time_s, values), _between(time, steps.time_s, sd)
+        values, sd = _smoothly(time, steps.time_s, values), _between(time, steps.time_s, sd)
     table = np.column_stack([_attitude(course, values), values[:, 4:], sd])
     columns = [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
     return pd.DataFrame(table, index=course.recording.imu.index, columns=columns)
@@ -128,6 +129,13 @@ def _attitude(course: Course, values: FloatArray) -> FloatArray:
     # Counted as the map counts it, whole turns included.
     angles[:, 2] += 2.0 * np.pi * np.round((heading - angles[:, 2]) / (2.0 * np.pi))
     return angles
+
+
+def _smoothly(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:
+    """By cubic splines: a step is a fifth of the shortest waves. Beyond the ends as there."""
+    if len(at_s) < 2:
+        return values[np.zeros(len(time), dtype=np.int64)]
+    return np.asarray(CubicSpline(at_s, values)(np.clip(time, at_s[0], at_s[-1])))
 
 
 def _between(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:

@@ -58,8 +58,8 @@ class TrackRelativeSmoother:
     passes : int
         How often to linearise and smooth; the filter does it once.
     rate_hz : float
-        Rate of its steps: the IMU is averaged over each. What shakes a mount is beyond it: at 125 Hz an
-        axle's vibration, which no state is for, spoils pitch and place.
+        Rate of its steps: the IMU is averaged over each. Most of what shakes a mount, which no state is for,
+        is beyond 31 Hz. Waves of the rails of 3 to 5 m want 125 Hz on a fast ride.
     motion : Motion, optional
         How the body moves in its track; that of the mount's class
         (`simrail.estimators.track_relative.noise`) if not given.
