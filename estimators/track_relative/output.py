@@ -6,6 +6,7 @@ spline; the filter's goes on from the last step with the rates found there. Befo
 knows what was known before the ride.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,10 @@ MOST_STEPS_AHEAD = 2.0
 """The filter does not go on from a step for longer than this: the last one of a ride may be a gap ago."""
 
 
+SAMPLES = 1 << 15
+"""Of the IMU, answered at a time: rotation matrices of a whole long ride would be most of its memory."""
+
+
 class Trace(NamedTuple):
     """All that is estimated, at n steps.
 
@@ -61,23 +66,59 @@ class Trace(NamedTuple):
 
 def states_of(trace: Trace, *, causal: bool) -> pd.DataFrame:
     """Estimate at every IMU sample: between steps, or, if causal, from the last one on."""
-    course, steps = trace.course, trace.course.steps
-    time = course.recording.imu.index.to_numpy(dtype=np.float64)
-    values, rates = _found(course, trace.states, course.around)
-    sd = np.sqrt(np.maximum(np.diagonal(trace.covariance, axis1=1, axis2=2), 0.0))
-    if causal or not len(values):
-        known, known_sd = _before(course)
-        last = _last_step(trace, time) + 1
-        ends = np.concatenate([time[:1] - steps.dt, steps.time_s])
-        ahead = np.minimum(time - ends[last], MOST_STEPS_AHEAD * steps.dt)[:, None]
-        moves = np.vstack([np.zeros_like(known), rates])
-        values = np.vstack([known, values])[last] + ahead * moves[last]
-        sd = np.vstack([known_sd, sd])[last]
-    else:
-        values, sd = _smoothly(time, steps.time_s, values), _between(time, steps.time_s, sd)
-    table = np.column_stack([_attitude(course, values), values[:, 4:], sd])
+    index = trace.course.recording.imu.index
+    time = index.to_numpy(dtype=np.float64)
     columns = [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
-    return pd.DataFrame(table, index=course.recording.imu.index, columns=columns)
+    table = np.empty((len(time), len(columns)))
+    look = _from_steps(trace) if causal or not len(trace.states) else _between_steps(trace)
+    for first in range(0, len(time), SAMPLES):
+        rows = slice(first, first + SAMPLES)
+        values, sd = look(time[rows])
+        table[rows] = np.column_stack([_attitude(trace.course, values), values[:, 4:], sd])
+    return pd.DataFrame(table, index=index, columns=columns)
+
+
+Look = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""From times (m,) to what is found there, (m, 9) as in `_found`, and standard deviations, (m, 7)."""
+
+
+def _from_steps(trace: Trace) -> Look:
+    """Each time from the last step that is over."""
+    steps = trace.course.steps
+    known, known_sd = _before(trace.course)
+    values, rates = _found(trace.course, trace.states, trace.course.around)
+    values, rates = np.vstack([known, values]), np.vstack([np.zeros_like(known), rates])
+    sd = np.vstack([known_sd, _sds(trace)])
+    start = trace.course.recording.imu.index[0] - steps.dt
+    ends = np.concatenate([[start], steps.time_s])
+
+    def look(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        last = _last_step(trace, time) + 1
+        ahead = np.minimum(time - ends[last], MOST_STEPS_AHEAD * steps.dt)[:, None]
+        return values[last] + ahead * rates[last], sd[last]
+
+    return look
+
+
+def _between_steps(trace: Trace) -> Look:
+    """Cubic splines, since a step is a fifth of the shortest waves of the rails; beyond the ends as there."""
+    at_s = trace.course.steps.time_s
+    values, _ = _found(trace.course, trace.states, trace.course.around)
+    sd = _sds(trace)
+    spline = CubicSpline(at_s, values) if len(at_s) > 1 else None
+
+    def look(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        sure = np.column_stack([np.interp(time, at_s, column) for column in sd.T])
+        if spline is None:
+            return values[np.zeros(len(time), dtype=np.int64)], sure
+        return spline(np.clip(time, at_s[0], at_s[-1])), sure
+
+    return look
+
+
+def _sds(trace: Trace) -> FloatArray:
+    """Standard deviations (n, 7) of the outputs."""
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(trace.covariance, axis1=1, axis2=2), 0.0)))
 
 
 def innovations_of(trace: Trace) -> pd.DataFrame:
@@ -129,14 +170,3 @@ def _attitude(course: Course, values: FloatArray) -> FloatArray:
     # Counted as the map counts it, whole turns included.
     angles[:, 2] += 2.0 * np.pi * np.round((heading - angles[:, 2]) / (2.0 * np.pi))
     return angles
-
-
-def _smoothly(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:
-    """By cubic splines: a step is a fifth of the shortest waves. Beyond the ends as there."""
-    if len(at_s) < 2:
-        return values[np.zeros(len(time), dtype=np.int64)]
-    return np.asarray(CubicSpline(at_s, values)(np.clip(time, at_s[0], at_s[-1])))
-
-
-def _between(time: FloatArray, at_s: FloatArray, values: FloatArray) -> FloatArray:
-    return np.column_stack([np.interp(time, at_s, column) for column in values.T])
