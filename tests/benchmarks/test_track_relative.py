@@ -2,8 +2,8 @@
 
     pytest -n 0 tests/benchmarks/test_track_relative.py --benchmark-only
 
-Times are per sample of an IMU at 250 Hz, which the smoother takes eight at a time; the kernels get arrays that
-are ready, filterpy its matrices. The limits are for one idle core of a machine of 2024.
+Times are per sample of an IMU at 250 Hz, which the smoother takes eight at a time; the kernels get arrays
+that are ready, filterpy its matrices. The limits are for one idle core of a machine of 2024.
 """
 
 from __future__ import annotations
