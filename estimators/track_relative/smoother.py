@@ -43,8 +43,8 @@ from simrail.recording.recording import Recording
 MOST_PASSES = 4
 """Two are enough: the train is found to a decimetre by the first."""
 
-PIECE = 32 * SEGMENT
-"""Steps that are linearised at a time: four minutes, 15 MB."""
+PIECE = 8 * SEGMENT
+"""Steps that are linearised at a time: a minute."""
 
 
 @dataclass(frozen=True)
