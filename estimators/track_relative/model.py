@@ -73,10 +73,11 @@ class Steps(NamedTuple):
     resting: npt.NDArray[np.bool_]
 
 
-def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool) -> Steps:
+def steps_of(recording: Recording, rate_hz: float) -> Steps:
     """Bring a recording to steps; what is left over at its end is dropped.
 
-    A step takes nothing from later than its last sample, unless smoothed.
+    A step takes nothing from later than its last sample. The odometry is the causal one for the smoother too:
+    it linearises anew about what it finds, and the history of a smoothed one would be most of its memory.
     """
     wheel, time = recording.encoder, recording.imu.index.to_numpy(dtype=np.float64)
     if wheel is None or recording.encoder_sheet is None:
@@ -91,7 +92,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool) -> Steps:
     def mean(values: FloatArray) -> FloatArray:
         return np.asarray(values[: n * block].reshape(n, block, values.shape[1]).mean(axis=1))
 
-    method = CurveMatchedOdometry(smoothed=smoothed)
+    method = CurveMatchedOdometry()
     trace = method.trace(recording)
     odometry = mean(method.at_imu_times(trace, recording)[list(ODOMETRY)].to_numpy())
     read = np.searchsorted(wheel.index.to_numpy(), time + 1e-9, side="right") - 1

@@ -124,7 +124,7 @@ class TrackRelativeSmoother:
     def trace(self, recording: Recording) -> Trace:
         """All states, at the filter's own steps."""
         motion = motion_of(recording) if self.motion is None else self.motion
-        steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
+        steps = steps_of(recording, self.rate_hz)
         course = course_of(recording, steps, motion, self.without)
         trace = _run(course, smoothed=self.smoothed)
         for _ in range(self.passes - 1 if self.smoothed else 0):

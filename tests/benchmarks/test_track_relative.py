@@ -76,7 +76,7 @@ def ride() -> Recording:
 @lru_cache
 def problem() -> tuple[Model, FloatArray, FloatArray]:
     """Model of the whole ride, start and its covariance."""
-    steps = steps_of(ride(), TrackRelativeSmoother().rate_hz, smoothed=True)
+    steps = steps_of(ride(), TrackRelativeSmoother().rate_hz)
     course = course_of(ride(), steps, replace(AXLE, torsion_sd=0.15, tilt_rate_sd=0.05), ())
     model = linearised(course, slice(0, len(steps.time_s)))
     return model, course.start, course.start_covariance

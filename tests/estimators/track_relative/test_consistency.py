@@ -68,7 +68,7 @@ def world_of(recording: Recording, motion: Motion) -> World:
         recording.imu_sheet, gyro_scale_error=5e-3, accel_scale_error=5e-3, package_misalignment_rad=4e-3
     )
     recording = replace(recording, imu_sheet=sheet)
-    steps = steps_of(recording, 125.0, smoothed=True)
+    steps = steps_of(recording, 125.0)
     course = course_of(recording, steps, replace(motion, torsion_sd=0.15, tilt_rate_sd=0.05), ())
     first = int(np.searchsorted(steps.odometry[:, 0], 56.0))
     model = linearised(course, slice(first, first + SAMPLES))
@@ -243,7 +243,7 @@ def test_a_noise_wrong_by_a_quarter_is_noticed(
 def test_covariances_stay_such_on_a_long_ride(rough: Callable, hours: float) -> None:
     """One ride after another, with rests: however many steps, no eigenvalue is below zero but by rounding."""
     recording = rough()
-    steps = steps_of(recording, 125.0, smoothed=True)
+    steps = steps_of(recording, 125.0)
     course = course_of(recording, steps, BODY, ())
     model = linearised(course, slice(0, len(steps.time_s)))
     x, p, work = course.start.copy(), course.start_covariance.copy(), room_to_work()
