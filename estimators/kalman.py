@@ -274,6 +274,16 @@ def withdraw(lam: FloatArray, h: FloatArray, gain: FloatArray, error: float) -> 
 
 
 @njit_borrowed
+def information_share(v: FloatArray, h: FloatArray, gain: FloatArray, inverse: float) -> None:
+    """W = v - h (1/s + v K)/2 in place of v = K' Lam, for `withdraw_information`."""
+    square = inverse
+    for i in range(gain.shape[0]):
+        square += gain[i] * v[i]
+    for c in range(v.shape[0]):
+        v[c] -= 0.5 * square * h[c]
+
+
+@njit_borrowed
 def withdraw_information(
     info: FloatArray, h: FloatArray, gain: FloatArray, inverse: float, v: FloatArray
 ) -> None:
@@ -291,11 +301,7 @@ def withdraw_information(
         K' Lam; becomes w.
     """
     n, width = info.shape
-    square = inverse
-    for i in range(n):
-        square += gain[i] * v[i]
-    for c in range(width):
-        v[c] -= 0.5 * square * h[c]
+    information_share(v, h, gain, inverse)
     for i in range(n):
         a, b = h[i], v[i]
         for c in range(width):

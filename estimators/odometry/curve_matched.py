@@ -279,7 +279,7 @@ class CurveMatchedOdometry:
         values = np.column_stack([steps.states[:, [S, V]], calm])
         values[steps.resting, 1:] = 0.0
         sd = np.sqrt(np.diagonal(steps.covariance, axis1=1, axis2=2)[:, [S, V]])
-        sd[:, 0] = np.hypot(sd[:, 0], self._chainage_sd(recording, values[:, 0]))
+        sd[:, 0] = np.hypot(sd[:, 0], chainage_sd(recording, values[:, 0]))
         lines = np.column_stack([values, sd, np.sqrt(ACCELERATION_SD_MPS2**2 + shaking)])
         # Until the filter's first step: standing at the start.
         start = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, STILL_SD_MPS, ACCELERATION_SD_MPS2]
@@ -345,7 +345,7 @@ class CurveMatchedOdometry:
         x[S] = recording.start_position_m
         x[LAG], chord_sd = (0.0, 0.0) if chord is None else lag_of(chord)
         sd = np.zeros(STATES)
-        sd[S] = math.hypot(self.start_sd_m, self._chainage_sd(recording, np.array([x[S]]))[0])
+        sd[S] = math.hypot(self.start_sd_m, float(chainage_sd(recording, x[S])))
         sd[V] = STILL_SD_MPS
         sd[WAY] = pulse / math.sqrt(12.0)
         sd[SCALE] = recording.encoder_sheet.radius_relative_sd
@@ -362,12 +362,13 @@ class CurveMatchedOdometry:
         sd[EVEN] = sd[ODD] = errors.place_sd_m
         return x, np.diag(sd**2)
 
-    def _chainage_sd(self, recording: Recording, place_m: FloatArray) -> FloatArray:
-        """How far the map's chainage may be from the line's at places (n,): what no curve can tell apart."""
-        errors = recording.map_errors
-        return np.hypot(
-            errors.chainage_offset_sd_m, errors.chainage_scale_sd * (place_m - recording.track.start_m)
-        )
+
+def chainage_sd(recording: Recording, place_m: FloatArray | float) -> FloatArray:
+    """How far the map's chainage may be from the line's at places (n,): what no curve can tell apart."""
+    errors = recording.map_errors
+    return np.hypot(
+        errors.chainage_offset_sd_m, errors.chainage_scale_sd * (place_m - recording.track.start_m)
+    )
 
 
 def lag_of(chord: Chord) -> tuple[float, float]:

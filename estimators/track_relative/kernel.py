@@ -23,6 +23,7 @@ from simrail.estimators.kalman import (
     chain_covariance,
     chain_information,
     condition,
+    information_share,
     mirror,
     withdraw,
 )
@@ -161,6 +162,8 @@ class Scratch(NamedTuple):
     ----------
     f, q : ndarray (6, 3, 3)
         Of the pairs and triples, in the order of `Noise.sd`.
+    back : ndarray (3, 3)
+        Transpose of one of ``f``.
     kept : ndarray (6,)
         What is kept of `FORGETS`.
     h, v : ndarray (52,)
@@ -170,6 +173,7 @@ class Scratch(NamedTuple):
 
     f: FloatArray
     q: FloatArray
+    back: FloatArray
     kept: FloatArray
     h: FloatArray
     v: FloatArray
@@ -192,7 +196,7 @@ def room_for_segment(steps: int) -> Segment:
 
 def room_to_work() -> Scratch:
     """Scratch, all zero."""
-    shapes = ((6, 3, 3), (6, 3, 3), (6,), (WIDTH,), (WIDTH,), (STATES,), (3, WIDTH))
+    shapes = ((6, 3, 3), (6, 3, 3), (3, 3), (6,), (WIDTH,), (WIDTH,), (STATES,), (3, WIDTH))
     return Scratch(*(np.zeros(shape) for shape in shapes))
 
 
@@ -280,7 +284,6 @@ def predict(
     x: FloatArray, p: FloatArray, flow: FloatArray, dt: float, noise: Noise, scratch: Scratch
 ) -> None:
     """X <- F x, P <- F P F' + Q, in place; `transition` must have been called."""
-    n = x.shape[0]
     moves = shares(flow, dt)
     chain(x, INTO, ORIGIN, moves)
     chain_covariance(p, INTO, ORIGIN, moves)
@@ -289,16 +292,17 @@ def predict(
         kept = scratch.kept[r]
         if kept != 1.0:
             i = FORGETS[r]
-            x[i] *= kept
-            for c in range(n):
-                p[i, c] *= kept
-            for c in range(n):
-                p[c, i] *= kept
+            shrink(x, p, i, kept)
             sd = noise.tread_sd if r == 0 else noise.forgotten_sd[r - 1]
             p[i, i] += sd * sd * (1.0 - kept * kept)
     for b in range(6):
         if flow[0] > 0.0 or (b == 0 and noise.sway_hz > 0.0):
-            block(x, p, FIRST[b], SIZE[b], scratch.f[b], scratch.q[b], scratch.lines)
+            first, m, q = FIRST[b], SIZE[b], scratch.q[b]
+            block(x, p, first, m, scratch.f[b], scratch.lines)
+            for i in range(m):
+                for j in range(i, m):
+                    p[first + i, first + j] += q[i, j]
+                    p[first + j, first + i] = p[first + i, first + j]
     way = flow[0]
     q = noise.jerk
     p[A, A] += q * dt
@@ -313,10 +317,8 @@ def predict(
 
 
 @njit_borrowed
-def block(
-    x: FloatArray, p: FloatArray, first: int, m: int, f: FloatArray, q: FloatArray, lines: FloatArray
-) -> None:
-    """The m states from ``first`` move by F (m, m) with noise Q; P stays symmetric to the bit."""
+def block(x: FloatArray, p: FloatArray, first: int, m: int, f: FloatArray, lines: FloatArray) -> None:
+    """X <- F x, P <- F P F' for the m states from ``first``; P stays symmetric to the bit."""
     n, width = p.shape
     for i in range(m):
         total = 0.0
@@ -341,40 +343,18 @@ def block(
             total = 0.0
             for k in range(m):
                 total += lines[i, first + k] * f[j, k]
-            total += q[i, j]
             p[first + i, first + j] = p[first + j, first + i] = total
 
 
 @njit_borrowed
-def block_back(
-    lam: FloatArray, info: FloatArray, first: int, m: int, f: FloatArray, lines: FloatArray
-) -> None:
-    """Lam <- F' lam, Lam <- F' Lam F for such a block."""
-    n, width = info.shape
-    for i in range(m):
-        total = 0.0
-        for j in range(m):
-            total += f[j, i] * lam[first + j]
-        lines[i, 0] = total
-    for i in range(m):
-        lam[first + i] = lines[i, 0]
-    for i in range(m):
-        for c in range(width):
-            total = 0.0
-            for j in range(m):
-                total += f[j, i] * info[first + j, c]
-            lines[i, c] = total
-    for i in range(m):
-        for c in range(width):
-            info[first + i, c] = lines[i, c]
-        for c in range(n):
-            info[c, first + i] = lines[i, c]
-    for i in range(m):
-        for j in range(i, m):
-            total = 0.0
-            for k in range(m):
-                total += lines[i, first + k] * f[k, j]
-            info[first + i, first + j] = info[first + j, first + i] = total
+def shrink(x: FloatArray, p: FloatArray, i: int, kept: float) -> None:
+    """X <- F x, P <- F P F' where F keeps a share of state i, and of the others all: its own transpose."""
+    n = x.shape[0]
+    x[i] *= kept
+    for c in range(n):
+        p[i, c] *= kept
+    for c in range(n):
+        p[c, i] *= kept
 
 
 @njit_borrowed
@@ -382,19 +362,17 @@ def predict_back(
     lam: FloatArray, info: FloatArray, flow: FloatArray, dt: float, noise: Noise, scratch: Scratch
 ) -> None:
     """Back through `predict`."""
-    n = lam.shape[0]
     for b in range(6):
         if flow[0] > 0.0 or (b == 0 and noise.sway_hz > 0.0):
-            block_back(lam, info, FIRST[b], SIZE[b], scratch.f[b], scratch.lines)
+            m, f, back = SIZE[b], scratch.f[b], scratch.back
+            for i in range(m):
+                for j in range(m):
+                    back[i, j] = f[j, i]
+            block(lam, info, FIRST[b], m, back, scratch.lines)
     for r in range(len(FORGETS)):
         kept = scratch.kept[r]
         if kept != 1.0:
-            i = FORGETS[r]
-            lam[i] *= kept
-            for c in range(n):
-                info[i, c] *= kept
-            for c in range(n):
-                info[c, i] *= kept
+            shrink(lam, info, FORGETS[r], kept)
     moves = shares(flow, dt)
     chain_back(lam, INTO, ORIGIN, moves)
     chain_information(info, INTO, ORIGIN, moves)
@@ -589,11 +567,7 @@ def unmeasure(
         if share != 0.0:
             for c in range(width):
                 v[c] += share * info[i, c]
-    square = segment.inverses[at, m]
-    for i in range(STATES):
-        square += gain[i] * v[i]
-    for c in range(width):
-        v[c] -= 0.5 * square * h[c]
+    information_share(v, h, gain, segment.inverses[at, m])
     for entry in range(entries):
         i, share = columns[entry], row[entry]
         if share != 0.0:

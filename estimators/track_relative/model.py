@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry
-from simrail.estimators.odometry.kernel import SATURATION_RADIUS_M
+from simrail.estimators.odometry.kernel import DIRECTION_SPEED_MPS, SATURATION_RADIUS_M
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.kernel import FLOWS, Model, Noise
@@ -33,9 +33,6 @@ MOTION_RATE_HZ = 125.0
 
 LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 1e-5, 1e-3
 """Noise that is always added: no mount is stiffer, and a filter of sensors without noise is singular."""
-
-TURNING_MPS = 0.2
-"""Below this a train that comes to rest sways to and fro: that is no change of direction."""
 
 LOST_M = 1.0
 """Of the wheel's way, per step in which it slips: it says nothing, and begins anew after that."""
@@ -239,7 +236,7 @@ def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:
 
 def _sense(speed: FloatArray) -> FloatArray:
     """Direction of travel (n,), 1 or -1: held where the train stands, 1 before it moves."""
-    last = np.maximum.accumulate(np.where(np.abs(speed) > TURNING_MPS, np.arange(len(speed)), -1))
+    last = np.maximum.accumulate(np.where(np.abs(speed) > DIRECTION_SPEED_MPS, np.arange(len(speed)), -1))
     return np.where((last >= 0) & (speed[np.maximum(last, 0)] < 0.0), -1.0, 1.0)
 
 

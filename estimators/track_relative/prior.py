@@ -8,7 +8,14 @@ import math
 from collections.abc import Collection
 
 import numpy as np
-from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, chord_of, lag_of, pointing_of
+from simrail.estimators.odometry.curve_matched import (
+    STILL_SD_MPS,
+    CurveMatchedOdometry,
+    chainage_sd,
+    chord_of,
+    lag_of,
+    pointing_of,
+)
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import Noise
 from simrail.estimators.track_relative.noise import Motion
@@ -22,12 +29,6 @@ JERK_M2PS5 = 0.05
 
 BIAS_TIME_S = 300.0
 """Within which a bias wanders by its instability, where the sheet says nothing else."""
-
-REST_SD_MPS = 1e-3
-"""Of the speed of a train that stands."""
-
-START_SD_M = 0.05
-"""Of the place where the ride begins, besides the map's chainage."""
 
 START_HEADING_SD_RAD = 1e-3
 """Of the map's yaw at its origin."""
@@ -141,9 +142,8 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     chord = chord_of(recording)
     pointing = pointing_of(recording, chord)
     assert wheel is not None
-    start = (recording.start_position_m - recording.track.start_m) * errors.chainage_scale_sd
-    sd[at.S] = math.hypot(START_SD_M, errors.chainage_offset_sd_m, start)
-    sd[at.V], sd[at.A], sd[at.WAY] = REST_SD_MPS, 1e-2, wheel.pulse_m
+    sd[at.S] = math.hypot(method.start_sd_m, chainage_sd(recording, recording.start_position_m))
+    sd[at.V], sd[at.A], sd[at.WAY] = STILL_SD_MPS, 1e-2, wheel.pulse_m
     sd[at.SCALE] = math.hypot(wheel.radius_relative_sd, errors.chainage_scale_sd)
     sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
     sd[at.HEADING] = heading_sd(recording)

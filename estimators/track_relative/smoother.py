@@ -148,7 +148,7 @@ def _run(course: Course, *, smoothed: bool) -> Trace:
     wanted = slice(0, 0) if smoothed else slice(None)
     for rows in _pieces(n):
         model = linearised(course, rows)
-        kept = slice(rows.start // SEGMENT, -(-rows.stop // SEGMENT)) if smoothed else slice(0, 0)
+        kept = slice(rows.start // SEGMENT, -(-rows.stop // SEGMENT))
         total += run_filter(
             model,
             starts[kept],
