@@ -33,8 +33,9 @@ from simrail.estimators.track_relative.kernel import (
     run_filter,
 )
 from simrail.estimators.track_relative.model import Course, about, course_of, linearised, steps_of
+from simrail.estimators.track_relative.monitor import faults_and_widening
 from simrail.estimators.track_relative.noise import Motion, motion_of
-from simrail.estimators.track_relative.output import Trace, innovations_of, states_of
+from simrail.estimators.track_relative.output import Trace, innovations_of, states_of, with_bounds
 from simrail.estimators.track_relative.prior import PARTS
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 
@@ -110,8 +111,9 @@ class TrackRelativeSmoother:
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate attitude, place, speed and the rails at every IMU sample."""
         trace = self.trace(recording)
+        states = with_bounds(states_of(trace, causal=self.causal), trace, *faults_and_widening(trace))
         estimate = Estimate(
-            states=states_of(trace, causal=self.causal),
+            states=states,
             mount=recording.mount,
             innovations=innovations_of(trace),
         )

@@ -21,6 +21,8 @@ from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.core.columns import (
     ACCEL,
     ATTITUDE,
+    BOUND,
+    FAULT,
     GYRO,
     INNOVATION,
     IRREGULARITY,
@@ -155,7 +157,7 @@ def test_states_and_innovations_are_those_of_the_trace(rough: Callable) -> None:
     recording = beginning(drawn(rough()), samples=3000)
     for smoother in (TrackRelativeSmoother(passes=1), TrackRelativeSmoother(smoothed=False)):
         estimate, trace = smoother.estimate(recording), smoother.trace(recording)
-        assert list(estimate.states) == [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
+        assert list(estimate.states) == [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS, *BOUND, FAULT]
         assert smoother.causal is not smoother.smoothed
         steps = trace.course.steps
         last = np.searchsorted(steps.end_s, recording.imu.index.to_numpy() + 1e-9, side="right") - 1
