@@ -481,9 +481,9 @@ def test_a_body_that_stands_askew_is_no_acceleration():
 @pytest.mark.parametrize("way", [1.0, -1.0])
 @pytest.mark.parametrize("radius_m", [500.0, -300.0])
 def test_finds_what_a_body_turns_in_a_curve(way: float, radius_m: float):
-    """A body made by hand, at 20 m/s through an uncanted curve: it points along its track a lag behind, by
-    V^2 / (R g 150) further inward since its wheels carry the lateral force, and by a turn less. With the lag
-    known, the turn is found in the middle of the curve, and the place does not move."""
+    """A body made by hand, at 20 m/s through a curve: it points along its track a lag behind, by
+    (V^2 / R - g sin(cant angle)) / (g 150) further inward since its wheels carry that, and by a turn less.
+    With the lag known, the turn is found in the middle of the curve, and the place does not move."""
     track = TrackDesign("curve", 0.0, one_curve(radius_m))
     grid, table = line_table(track)
     places, lag, turn, speed, dt = grid[0] + np.arange(len(table)) / grid[1], 1.0, 5e-4, 20.0, 0.02
@@ -494,9 +494,13 @@ def test_finds_what_a_body_turns_in_a_curve(way: float, radius_m: float):
     curvature = np.interp(s - way * lag, places, table[:, 1])
     bent = 1000.0 * curvature
     yaw = np.interp(s - way * lag, places, table[:, 0])
-    yaw += way * (v**2 * curvature / (9.81 * 150.0) - turn * bent / np.sqrt(1.0 + bent**2))
+    roll = np.interp(s - way * lag, places, table[:, 4])
+    unbalanced = v**2 * curvature + 9.81 * np.sin(roll)
+    yaw += way * (unbalanced / (9.81 * 150.0) - turn * bent / np.sqrt(1.0 + bent**2))
     signals = np.zeros((n, 4))
-    signals[:, 1], signals[:, 2] = np.diff(yaw) / dt, way * np.diff(v) / dt
+    here = np.interp(s[:-1], places, table[:, 4])
+    signals[:, 0], signals[:, 1] = np.diff(yaw) / dt * np.sin(here), np.diff(yaw) / dt * np.cos(here)
+    signals[:, 2] = way * np.diff(v) / dt
     model = CurveMatchedOdometry()._model(record_fast(0, 0), 2e-3, YAW_OF_AXLE)
     model = model._replace(pulse_m=2e-3, bend_sd=1e-6, shift_sd_m=1e-4)
     x, p = np.zeros(STATES), np.diag(np.full(STATES, 1e-12))
@@ -512,9 +516,9 @@ def test_finds_what_a_body_turns_in_a_curve(way: float, radius_m: float):
 
 
 def one_curve(radius_m: float) -> tuple[Straight | Transition | Curve, ...]:
-    """A curve about 500 m, without cant."""
+    """A curve about 500 m, with a cant of 100 mm."""
     ends = Straight(400.0), Transition(50.0)
-    return (*ends, Curve(100.0, radius_m, 0.0), *ends[::-1])
+    return (*ends, Curve(100.0, radius_m, 0.1), *ends[::-1])
 
 
 def test_wheels_that_carry_a_lateral_force_point_inward():
