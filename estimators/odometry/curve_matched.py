@@ -180,6 +180,10 @@ for steel wheels of 0.3 to 0.5 m in radius under 30 to 60 kN."""
 CUT_LAG_SD = 0.3
 """Of what the longest lag leaves out of the play, so much is the sd of the lag."""
 
+WHEELSET_TREAD = 0.45
+"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: its taper steers it back
+to the middle of the track."""
+
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
 
@@ -196,7 +200,8 @@ class CurveMatchedOdometry:
         How well the start is known.
     tread_sd, tread_length_m : float
         Relative standard deviation of the rolling radius about its mean, and over what distance it
-        changes: 0.1 to 0.35 % are the taper's share on 5 mm of lateral play.
+        changes: 0.1 to 0.35 % are the taper's share on 5 mm of lateral play. Of a free wheel, or where no
+        drawing says; on a wheelset less (`WHEELSET_TREAD`).
     flange_sd : float
         Standard deviation of `left` and `right`. In a curve a wheel rolls on its flange root, some 4 mm
         further out than at its tape circle, or not: 1.5 % of a wheel of 0.29 m, 0.9 % of one of 0.46 m.
@@ -358,6 +363,7 @@ class CurveMatchedOdometry:
             # Of a Markov process that wanders by its bias instability within some 300 s.
             "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
             "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
+            "tread_sd": self.tread_sd * tread_share(recording),
             "sway_sd_rad": _sway_sd_rad(yaw, turn),
             "sway_length_m": yaw.sway_length_m,
             "turn_rad": turn,
@@ -385,7 +391,7 @@ class CurveMatchedOdometry:
         sd[V] = STILL_SD_MPS
         sd[WAY] = pulse / math.sqrt(12.0)
         sd[SCALE] = recording.encoder_sheet.radius_relative_sd
-        sd[TREAD] = self.tread_sd
+        sd[TREAD] = self.tread_sd * tread_share(recording)
         sd[LEFT] = sd[RIGHT] = self.flange_sd
         sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
         sd[SQUAT] = self.squat_sd
@@ -473,6 +479,13 @@ def wheel_ahead(recording: Recording) -> float:
     if axle not in at or recording.mount_body not in at:
         return 0.0
     return at[axle] - at[recording.mount_body] - recording.mount_position_m[0]
+
+
+def tread_share(recording: Recording) -> float:
+    """How much the encoder's wheel wanders off its tape circle, of what a free wheel does."""
+    sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
+    axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
+    return WHEELSET_TREAD if axle is not None and axle.wheelset else 1.0
 
 
 def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:

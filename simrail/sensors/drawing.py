@@ -90,8 +90,16 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
                 primary.get(lower, (0.0, 0.0))[0] + sum(bearing.stiffness_npm for bearing in bearings),
                 primary.get(lower, (0.0, 0.0))[1] + sum(bearing.damping_nspm for bearing in bearings),
             )
+    spins = {name: {wheel.spin for wheel in vehicle.wheels if wheel.axle == name} for name in at}
     bodies = {
-        name: SheetBody(name, x, tuple(supports[name]), None, *primary.get(name, (None, None)))
+        name: SheetBody(
+            name,
+            x,
+            tuple(supports[name]),
+            None,
+            *primary.get(name, (None, None)),
+            wheelset=len(spins[name]) == 1 if spins[name] and not supports[name] else None,
+        )
         for name, x in at.items()
     }
     weights = heading_weights(vehicle)
