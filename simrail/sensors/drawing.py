@@ -90,18 +90,14 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
                 primary.get(lower, (0.0, 0.0))[0] + sum(bearing.stiffness_npm for bearing in bearings),
                 primary.get(lower, (0.0, 0.0))[1] + sum(bearing.damping_nspm for bearing in bearings),
             )
-    spins = {name: {wheel.spin for wheel in vehicle.wheels if wheel.axle == name} for name in at}
     bodies = {
-        name: SheetBody(
-            name,
-            x,
-            tuple(supports[name]),
-            None,
-            *primary.get(name, (None, None)),
-            wheelset=len(spins[name]) == 1 if spins[name] and not supports[name] else None,
-        )
+        name: SheetBody(name, x, tuple(supports[name]), None, *primary.get(name, (None, None)))
         for name, x in at.items()
     }
+    for name in vehicle.axle_names:
+        if not supports[name]:
+            spins = {wheel.spin for wheel in vehicle.wheels if wheel.axle == name}
+            bodies[name] = replace(bodies[name], wheelset=len(spins) == 1)
     weights = heading_weights(vehicle)
     sheet = VehicleSheet(tuple(bodies[name] for name in _from_the_rails_up(supports)), place_sd)
     return replace(sheet, bodies=tuple(_with_turn(sheet, body, weights) for body in sheet.bodies))
