@@ -180,7 +180,7 @@ for steel wheels of 0.3 to 0.5 m in radius under 30 to 60 kN."""
 CUT_LAG_SD = 0.3
 """Of what the longest lag leaves out of the play, so much is the sd of the lag."""
 
-WHEELSET_TREAD = 0.45
+WHEELSET_TREAD = 0.6
 """Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: its taper steers it back
 to the middle of the track."""
 

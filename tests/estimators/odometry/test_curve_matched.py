@@ -592,7 +592,7 @@ def test_where_the_wheel_is():
     assert wheel_ahead(replace(recording, vehicle_sheet=None)) == 0.0
 
 
-@pytest.mark.parametrize(("wheelset", "share"), [(True, 0.45), (False, 1.0), (None, 1.0)])
+@pytest.mark.parametrize(("wheelset", "share"), [(True, 0.6), (False, 1.0), (None, 1.0)])
 def test_a_wheelset_wanders_less(wheelset: bool | None, share: float):
     """By the drawing's word on the encoder's axle; unknown, it may be free."""
     recording = record_fast(0, 0)
