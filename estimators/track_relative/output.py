@@ -82,8 +82,10 @@ def states_of(trace: Trace, *, causal: bool) -> pd.DataFrame:
 
 
 def with_bounds(states: pd.DataFrame, trace: Trace, faults: FloatArray, widening: FloatArray) -> pd.DataFrame:
-    """States with bounds of roll and place, and faults, of which (1 + n,) are given: before the first step, and
-    at the end of each."""
+    """States with bounds of roll and place, and faults.
+
+    Both are given (1 + n,), before the first step and at the end of each.
+    """
     step = _last_step(trace, states.index.to_numpy(dtype=np.float64)) + 1
     sds = ("roll_sd_rad", "position_sd_m")
     bounds = {name: widening[step] * states[sd] for name, sd in zip(BOUND, sds, strict=True)}
