@@ -384,7 +384,7 @@ def running_mean_square(force, rate_hz, averaging_s):
 
 
 def test_rectification_is_the_devices_own_coefficient_times_the_mean_square(coach, line):
-    """An IMU on a shaking axle: each axis moves by its own coefficient times the mean square of its vibration.
+    """An IMU on a shaking axle: an axis moves by its own coefficient times its mean square vibration.
 
     The closed form is g^2 times the coefficient. The device takes a running mean of it, which is known sample
     by sample; over many of its time constants it is the variance of the force, but for vibration slower than
@@ -421,7 +421,10 @@ def test_rectification_is_the_devices_own_coefficient_times_the_mean_square(coac
     assert added == pytest.approx(device.accel.rectification[2] * variance, rel=0.5 / 6.0)
     assert np.all(np.abs(device.accel.rectification) <= 1e-3)
     assert np.all(np.abs(device.gyro.rectification) <= 1e-4)
-    assert device_of(sheet, seed=1, draw=1, name=mount.name).accel.rectification[2] != device.accel.rectification[2]
+    assert (
+        device_of(sheet, seed=1, draw=1, name=mount.name).accel.rectification[2]
+        != device.accel.rectification[2]
+    )
 
 
 @pytest.fixture
