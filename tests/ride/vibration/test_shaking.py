@@ -16,7 +16,7 @@ from simrail.ride.ride import Ride, is_cached, simulate
 from simrail.ride.truth import BodyMotion, Mount, Truth
 from simrail.ride.vibration.files import read_short_waves, write_short_waves
 from simrail.ride.vibration.floor import Floor
-from simrail.ride.vibration.run import Shaker
+from simrail.ride.vibration.run import Shaker, linear_vehicle_of
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.ride.vibration.sources import (
     CarBending,
@@ -249,10 +249,11 @@ def test_perfect_sensors_find_the_pose_of_a_shaking_truth(tmp_path, monkeypatch)
         assert np.degrees(np.abs(off[list(ATTITUDE)].to_numpy()).max()) < 1e-3
 
 
-def test_second_derivative_of_the_position(coach, line):
+@pytest.mark.parametrize("creeps", [False, True])
+def test_second_derivative_of_the_position(coach, line, creeps):
     """Every column is the derivative of the one before, over the whole vibration."""
     truth = gliding(coach, line, 15.0, duration_s=6.0)
-    motions, _ = shaken(ALL, truth, coach)
+    motions, _ = shaken(replace(ALL, lateral_creep=creeps), truth, coach)
     for motion in motions.values():
         for place in range(0, 12, 3):
             if not motion[:, place].any():
@@ -372,6 +373,26 @@ def test_structure_borne_share(coach, line):
     with_it = shaken(replace(rough, structure_borne=0.02), truth, coach)[0]
     frames = 0.5 * (without["frame_front"] + without["frame_rear"])[:, :3]
     np.testing.assert_allclose(with_it["body"][:, :3] - without["body"][:, :3], 0.02 * frames, atol=1e-12)
+
+
+def test_creep_is_that_of_the_speed_over_the_way(coach, line):
+    """At a constant speed it is that; of halves of the way at V and 3 V it is 2 V; at rest contacts hold."""
+    creeps = Vibration(lateral_creep=True)
+
+    def damping(speed_mps):
+        return linear_vehicle_of(creeps, coach, gravity_mps2=9.81, speed_mps=speed_mps).damping
+
+    steady = gliding(coach, line, 12.0, duration_s=4.0)
+    np.testing.assert_allclose(
+        Shaker(creeps, steady, coach, seed=1).vehicle.damping, damping(12.0), rtol=1e-6
+    )
+    t = steady.time_s
+    place = 200.0 + np.where(t < 3.0, 6.0 * t, 18.0 + 18.0 * (t - 3.0))  # 18 m at 6, 18 m at 18 m/s
+    mixed = replace(steady, reference_position_m=place)
+    np.testing.assert_allclose(Shaker(creeps, mixed, coach, seed=1).vehicle.damping, damping(12.0), rtol=1e-6)
+    at_rest = replace(steady, reference_position_m=np.full(len(t), 200.0))
+    held = linear_vehicle_of(Vibration(), coach, gravity_mps2=9.81, speed_mps=12.0)
+    assert Shaker(creeps, at_rest, coach, seed=1).vehicle.coordinates == held.coordinates
 
 
 def running_mean_square(force, rate_hz, averaging_s):
