@@ -51,8 +51,9 @@ class Trace(NamedTuple):
     states : ndarray (n, 51)
     covariance : ndarray (n, 7, 7)
         Of roll, pitch, yaw, S, V, y and z.
-    surprises : ndarray (n, 7)
-        Innovations of the filter over their standard deviations; NaN for a measurement that was not made.
+    surprises : ndarray (n, m)
+        Innovations of the filter over their standard deviations, the IMU's six first;
+        NaN for a measurement that was not made.
     log_likelihood : float
         Of all measurements, but for a constant.
     """

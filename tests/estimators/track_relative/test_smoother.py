@@ -263,12 +263,6 @@ def test_a_scenario_finds_it_by_its_name() -> None:
     assert class_named("TrackRelativeSmoother", None) is TrackRelativeSmoother
 
 
-def test_without_an_encoder_it_is_refused(rough: Callable) -> None:
-    with pytest.raises(InputError, match="encoder") as caught:
-        TrackRelativeSmoother().estimate(replace(rough(), encoder=None, encoder_sheet=None))
-    assert caught.value.remedy
-
-
 def turned_over(recording: Recording, *, about: str) -> Recording:
     """The IMU turned by 180 degrees about an axis of its own."""
     imu = recording.imu.copy()
