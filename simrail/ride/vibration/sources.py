@@ -22,7 +22,7 @@ SOURCES = {
     "flexible_track": "synthetic: stiffness, damping and mass of a slab track's rail under a wheel",
     "bending": "synthetic",
     "structure_borne": "synthetic: the least certain of all",
-    "equipment": "synthetic: louder than the floor of one train at rest, 0.007 and 0.016 m/s2 from 15 to 180 Hz",
+    "equipment": "synthetic: louder than a floor at rest that was measured, 0.007 and 0.016 m/s2",
     "traction": "synthetic",
     "passengers": "synthetic",
 }
