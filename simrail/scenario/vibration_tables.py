@@ -217,7 +217,8 @@ class VibrationPart(Part):
 
     ``off = true`` is an ablation: the same ride in silence. ``join = true`` scales the roughness so that it
     meets the spectrum of ``[irregularity]`` at its shortest wave. ``lateral_creep = true`` lets axles sway
-    and yaw in the creep of their contacts, as at the mean speed of the ride.
+    and yaw in the creep of their contacts, as at the mean speed of the ride; it is refused for a vehicle with
+    independent wheels whose axles nothing holds in yaw, such as ``irw_car``.
     """
 
     off: Listed[bool] = False

@@ -23,7 +23,7 @@ from simrail.vehicle.vibration.linear_model import (
     creep_coefficients_n,
     linear_vehicle,
 )
-from simrail.vehicle.vibration.modal import state_space
+from simrail.vehicle.vibration.modal import modes_of, state_space
 
 CONTACT_NPM, HALF_M = 1.2e9, 0.75
 SUPPORT = TrackSupport(150.0, 7e7, 1e5)
@@ -123,6 +123,15 @@ def test_independent_wheels_go_where_they_point_and_turn_freely():
     assert damping[2, 2] == 0.0
     assert stiffness[0, 2] == pytest.approx(-2e6)
     assert stiffness[2, 0] == 0.0
+
+
+def test_an_axle_that_nothing_holds_in_yaw_is_refused_where_it_goes_where_it_points():
+    axle = lone_axle()
+    free = replace(axle, wheels=tuple(replace(wheel, spin=wheel.name) for wheel in axle.wheels))
+    free = replace(free, spin_inertia_kgm2={wheel.spin: 50.0 for wheel in free.wheels})
+    with pytest.raises(InputError, match="that nothing holds"):
+        modes_of(linear_vehicle(free, SUPPORT, speed_mps=8.0), step_s=5e-4)
+    modes_of(linear_vehicle(free, SUPPORT), step_s=5e-4)
 
 
 def test_contacts_that_hardly_creep_hold():
