@@ -26,7 +26,7 @@ MOST_SDS = 5.0
 WINDOW_S = 5.0
 """Over which innovations are added up."""
 
-MOST_SUM = (7.0, 7.0, 7.0, 5.0, 9.5, 11.0)
+MOST_SUM = (7.0, 6.0, 5.5, 5.0, 9.5, 11.0)
 """Of innovations over their sds and the root of their number, of three gyros and three accelerometers:
 one and a half times the largest of sound rides of simrail's vehicles; shaking is not white. Synthetic."""
 

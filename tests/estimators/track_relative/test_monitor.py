@@ -97,7 +97,7 @@ def test_contradiction_is_the_largest_of_states_and_sums(rough: Callable) -> Non
     biased = quiet.surprises.copy()
     biased[:, 2] = 0.5
     steps = round(WINDOW_S / trace.course.steps.dt)
-    wanted = 0.5 * np.sqrt(steps) / 7.0
+    wanted = 0.5 * np.sqrt(steps) / 5.5
     assert contradiction(quiet._replace(surprises=biased))[-1] == pytest.approx(wanted)
     faults, widening = faults_and_widening(quiet._replace(surprises=4.0 * biased))
     assert faults[-1] == 1.0
