@@ -87,7 +87,7 @@ class Octaves(NamedTuple):
 
 def octaves_of(count: int, step_m: float) -> Octaves:
     """Octaves for lines of so many places, a step apart; the first begins at or below two steps."""
-    frequencies = np.fft.rfftfreq(3 * count, step_m)
+    frequencies = np.asarray(np.fft.rfftfreq(3 * count, step_m), dtype=np.float64)
     first = np.floor(np.log2(2.0 * step_m))
     centres: FloatArray = np.arange(first, np.log2(LONGEST_M) + 0.5, dtype=np.float64)
     with np.errstate(divide="ignore"):

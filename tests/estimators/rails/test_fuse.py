@@ -168,7 +168,7 @@ def test_a_planted_shift_is_found_within_its_sd(planted_m: float) -> None:
     """
     found = [shift_errors(seed, np.full(COUNT, planted_m)) for seed in range(5)]
     sd = np.array([one[1] for one in found])
-    assert ((sd > 0.04) & (sd < 0.08)).all()
+    assert ((sd > 0.025) & (sd < 0.045)).all()
     away = np.concatenate([one[0] / one[1] for one in found])
     # 55 places that are nearly independent: four standard errors of the rms.
     assert abs(np.sqrt(np.square(away).mean()) - 1.0) < 4.0 * np.sqrt(0.5 / 55.0)
