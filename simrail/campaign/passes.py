@@ -1,4 +1,4 @@
-"""Cells of several rides over the same rails: each ride recorded and estimated once, their rails fused and scored.
+"""Cells of several rides over the same rails: each recorded and estimated once, their rails fused and scored.
 
 The rides of all cells of a batch are those of the one with the most passes; the others are the first of them.
 What is kept of a ride while the next is run is what it says of the rails.

@@ -205,7 +205,7 @@ def _of_passes(spec: ScenarioFile, one: Cell, passes: tuple[Cell, ...]) -> Itera
 
 
 def rides_of(cells: Iterable[Cell]) -> list[Cell]:
-    """The cells that stand for the rides of these, which are of one ride, or of passes over the same rails."""
+    """The cells that stand for the rides of these: of one ride, or of passes over the same rails."""
     listed = list(cells)
     return list(max((cell.passes for cell in listed), key=len, default=()) or listed[:1])
 

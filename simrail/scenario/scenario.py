@@ -119,7 +119,7 @@ class ScenarioFile(Part):
                 field="passes",
                 value=most,
                 limit=f"1 to {rides}, the [[ride]]s and the values of their lists",
-                remedy="take fewer passes, or list more speeds in ride.speed_kmh, or both ways in ride.reverse",
+                remedy="take fewer passes, list more ride.speed_kmh, or set ride.reverse = [false, true]",
             )
         return self
 
