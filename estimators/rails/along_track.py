@@ -66,7 +66,7 @@ def shifts_of(waves: FloatArray, claimed_sd_m: FloatArray, step_m: float) -> Shi
     """
     n, _, count = waves.shape
     shift = np.zeros((n, count)) + _constant(waves, step_m)[:, None]
-    place = step_m * np.arange(count)
+    place = step_m * np.arange(count, dtype=np.float64)
     nodes = np.asarray(np.linspace(0.0, place[-1], max(2, round(place[-1] / NODE_M) + 1)), dtype=np.float64)
     splines = [CubicSpline(place, lines, axis=-1) for lines in waves]
     sd = np.zeros((n, count))

@@ -22,7 +22,7 @@ The same goes for where the rails are along the track.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import Recording
 
 WAVES_M = (3.0, 25.0)
 """Waves by which passes are moved onto each other."""
@@ -51,7 +52,7 @@ COMMON = {"alignment_m": 4.0, "vertical_profile_m": 1.0, "cross_level_m": 1.0, "
 COMMON_PLACE = 0.5
 """Of the variance that passes state for their position, what they have in common at least: the map's."""
 
-LEAST_ALIKE, MOST_SDS, MOST_ERROR, MOST_UNFIT = 0.5, 4.0, 3.0, 0.1
+LEAST_ALIKE, MOST_SDS, MOST_ERROR, MOST_UNFIT = 0.5, 4.0, 3.0, 0.25
 """Beyond these a pass is told of: correlation of its waves with the mean of the others; shift over the sd of
 the position; own error over that of the others; share of the line where it does not fit."""
 
@@ -125,6 +126,15 @@ def fuse(estimates: Sequence[Estimate], *, common: Mapping[str, float] = COMMON)
     if passes.n == 1:
         return _alone(estimates[0], passes)
     return _together(passes, common)
+
+
+def rails_and_place_of(estimate: Estimate, recording: Recording) -> Estimate:
+    """What fusing asks of an estimate: its rails, and where it was; by the odometry if it does not say."""
+    states, place = estimate.states, ["position_m", "position_sd_m"]
+    if not set(place) <= set(states.columns) and recording.odometry is not None:
+        states = recording.odometry
+    states = states[[name for name in place if name in states.columns]]
+    return replace(estimate, states=states, innovations=None, covariance=None, covariance_of=())
 
 
 @dataclass(frozen=True)

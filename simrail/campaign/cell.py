@@ -281,7 +281,7 @@ def cell_record(cell: Cell) -> dict[str, object]:
         "map_draw": cell.map_draw,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
-        "speed_kmh": fmean(float(ride.speed_kmh or 0.0) for ride in rides),  # type: ignore[arg-type]
+        "speed_kmh": fmean(float(ride.speed_kmh or 0.0) for ride in rides),
         "direction": _direction(rides),
     }
     return record | {name: value for name, value in cell.settings.items() if name not in record}

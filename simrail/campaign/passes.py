@@ -5,12 +5,11 @@ What is kept of a ride while the next is run is what it says of the rails.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from simrail.campaign.cell import BatchTally, estimates_of, record_cell, wanted_of
 from simrail.core.interrupts import Check
 from simrail.estimation.estimate import Estimate
-from simrail.estimators.rails.fuse import fuse
+from simrail.estimators.rails.fuse import fuse, rails_and_place_of
 from simrail.recording.recording import Recording
 from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts
@@ -48,8 +47,10 @@ def run_passes(
         first = first or recording
         for name, estimator in tally.estimators.items():
             (outcome,) = estimates_of(name, estimator, [recording], tally, check)
-            lost = isinstance(outcome, Exception)
-            found[name].append(outcome if lost else _rails_of(outcome[0], recording))
+            if isinstance(outcome, Exception):
+                found[name].append(outcome)
+            else:
+                found[name].append(rails_and_place_of(outcome[0], recording))
     for cell in cells:
         for name, outcomes in found.items():
             try:
@@ -57,15 +58,6 @@ def run_passes(
             except Exception as error:
                 check()
                 tally.fail(cell, name, error)
-
-
-def _rails_of(estimate: Estimate, recording: Recording) -> Estimate:
-    """What fusing asks of an estimate: its rails, and where it was; by the odometry if it does not say."""
-    states, place = estimate.states, ["position_m", "position_sd_m"]
-    if not set(place) <= set(states.columns) and recording.odometry is not None:
-        states = recording.odometry
-    states = states[[name for name in place if name in states.columns]]
-    return replace(estimate, states=states, innovations=None, covariance=None, covariance_of=())
 
 
 def _score_fused(
