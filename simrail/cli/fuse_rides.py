@@ -1,4 +1,4 @@
-"""One estimator on several recorded rides over the same rails, which are fused: ``simrail estimate --fuse``."""
+"""One estimator on several recorded rides over the same rails, fused: ``simrail estimate --fuse``."""
 
 from collections.abc import Sequence
 from pathlib import Path
