@@ -126,6 +126,17 @@ def test_a_pass_is_the_ride_that_it_would_be_alone() -> None:
     assert rides_of(list(cells(parts.scenario))[:3]) == list(five.passes)
 
 
+def test_what_a_cell_is_resolved_to_is_its_own() -> None:
+    """Cells and their passes are told apart, though both have numbers of cases."""
+    parts = Parts(scenario())
+    for cell in cells(parts.scenario):
+        if cell.track_draw == cell.map_draw == 0:
+            for one in (cell, *cell.passes):
+                resolved = parts.resolve(one)
+                assert resolved.mount.name == one.imu.name and resolved.ride is parts.ride(one)
+                assert (resolved.track_map is None) == (one.map_label == "exact")
+
+
 def test_one_number_is_no_list_and_none_leaves_the_scenario_as_it_was() -> None:
     four = list(cells(scenario(TEXT.replace("[1, 2, 5]", "4"))))
     assert {len(cell.passes) for cell in four} == {4} and four[0].settings["passes"] == 4
