@@ -27,7 +27,8 @@ Lag and lead matter: the leading axle of a bogie points where the bogie points, 
 metre or two behind. They are found along the way because the train knows where it started.
 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
-wheel's way starts anew when both agree on the speed again.
+wheel's way starts anew when both agree on the speed again. Without a wheel it is so all along, and the train
+stands where its IMU is quiet (`simrail.estimators.odometry.standstill`).
 
 Of the three that an attitude filter asks for, position and speed are the filter's. The acceleration is
 made here, since a train's own acceleration changes slowly, and the accelerometer shakes with the body.
@@ -72,6 +73,7 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
+from simrail.estimators.odometry.standstill import quiet_of
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
@@ -199,7 +201,7 @@ class CurveMatchedOdometry:
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
 
-    needs = ("encoder",)
+    needs = ()
     cites = ("Escalona, Urda and Munoz, Sensors 21(3) 683, 2021",)
 
     @property
@@ -219,25 +221,13 @@ class CurveMatchedOdometry:
                 raise InputError("is out of range", field=name, value=value, limit="> 0")
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate position, speed and acceleration along the track at every IMU sample.
-
-        Raises
-        ------
-        InputError
-            If the recording has no encoder.
-        """
+        """Estimate position, speed and acceleration along the track at every IMU sample."""
         states = self.at_imu_times(self.trace(recording), recording)
         return Estimate(states=states, mount=recording.mount)
 
     def trace(self, recording: Recording) -> Steps:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
-        if recording.encoder is None or recording.encoder_sheet is None:
-            raise InputError(
-                "curve-matched odometry needs an encoder",
-                field="encoder",
-                remedy="add an [encoder] to the scenario, or counts to the ride",
-            )
-        sheet, wheel = recording.imu_sheet, recording.encoder_sheet
+        sheet = recording.imu_sheet
         block = max(1, round(sheet.rate_hz / RATE_HZ))
         time = recording.imu.index.to_numpy(dtype=np.float64)
         n = len(time) // block
@@ -245,9 +235,8 @@ class CurveMatchedOdometry:
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
         signals = signals.reshape(n, block, 4).mean(axis=1)
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
-        read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
-        counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
-        pulse = wheel.pulse_m
+        counts, pulse = _counts(recording, ends)
+        quiet = np.full(n, -1.0) if pulse else quiet_of(recording, block).astype(np.float64)
         chord = chord_of(recording)
         grid, table = line_table(
             recording.track,
@@ -264,7 +253,9 @@ class CurveMatchedOdometry:
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
         model = self._model(recording, pulse, pointing)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
-        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
+        curve_matched(
+            dt, signals, counts, quiet, model, gravity, grid, table, x, p, steps, room_to_work(), past
+        )
         if past is not None:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
@@ -291,9 +282,9 @@ class CurveMatchedOdometry:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = lines[last]
             rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
-            values[rolls, 2::3] = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)[
-                rolls
-            ]
+            if recording.encoder is not None:
+                own = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)
+                values[rolls, 2::3] = own[rolls]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
@@ -339,8 +330,7 @@ class CurveMatchedOdometry:
         self, recording: Recording, pulse: float, chord: Chord | None, yaw: Pointing
     ) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand."""
-        assert recording.encoder_sheet is not None
-        sheet, errors = recording.imu_sheet, recording.map_errors
+        sheet, wheel, errors = recording.imu_sheet, recording.encoder_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
         x[LAG], chord_sd = (0.0, 0.0) if chord is None else lag_of(chord)
@@ -348,7 +338,7 @@ class CurveMatchedOdometry:
         sd[S] = math.hypot(self.start_sd_m, float(chainage_sd(recording, x[S])))
         sd[V] = STILL_SD_MPS
         sd[WAY] = pulse / math.sqrt(12.0)
-        sd[SCALE] = recording.encoder_sheet.radius_relative_sd
+        sd[SCALE] = 0.0 if wheel is None else wheel.radius_relative_sd
         sd[TREAD] = self.tread_sd
         sd[LEFT] = sd[RIGHT] = self.flange_sd
         sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
@@ -361,6 +351,15 @@ class CurveMatchedOdometry:
         sd[BEND] = errors.radius_relative_sd
         sd[EVEN] = sd[ODD] = errors.place_sd_m
         return x, np.diag(sd**2)
+
+
+def _counts(recording: Recording, times: FloatArray) -> tuple[FloatArray, float]:
+    """Last reading of the counter at each time (n,), and the way of a count, m; 0 where there is no wheel."""
+    if recording.encoder is None or recording.encoder_sheet is None:
+        return np.zeros(len(times)), 0.0
+    read = np.searchsorted(recording.encoder.index.to_numpy(), times + 1e-9, side="right") - 1
+    counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)
+    return counts[np.maximum(read, 0)], recording.encoder_sheet.pulse_m
 
 
 def chainage_sd(recording: Recording, place_m: FloatArray | float) -> FloatArray:

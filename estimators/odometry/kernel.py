@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
-from simrail.estimators.odometry.line_table import Line, line_at
+from simrail.estimators.odometry.line_table import Line, line_at, line_over, with_pitch
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 
@@ -29,6 +29,14 @@ DIRECTION_SPEED_MPS = 0.2
 
 START_JERK_MPS3 = 0.5
 """Jerk with which a train leaves, as service traction does."""
+
+STILL_MPS2, STILL_MPS, STILL_SDS = 0.15, 0.1, 4.0
+"""A train without a wheel stands where no more force is left over, and its speed may be nothing: least speed
+that is doubted, and standard deviations of the filter's own beside it."""
+
+LOST_M, MOST_DOUBT_S = 1.0, 30.0
+"""Without a wheel: standard deviation of the place above which the map is not taken for its tangent; and for
+how long at most a wrong slope is felt."""
 
 STEADY_S, WHEEL_SPEED_SHARE = 0.5, 0.1
 """Time constant of the steady effort; share of the newest reading in the smoothed speed of the wheel. Chosen
@@ -291,10 +299,66 @@ def start_anew(x: FloatArray, p: FloatArray, f: FloatArray, measured: float, pul
 
 
 @njit_borrowed
+def slope_under(
+    grid: FloatArray, table: FloatArray, x: FloatArray, p: FloatArray, alone: bool, gravity: float
+) -> tuple[Line, float]:
+    """The map where the body leans, and the variance per second of the speed that its slope leaves, m2/s3.
+
+    A train without a wheel (``alone``) may be on another slope than it is held to be: what that leaves
+    lasts while it runs through the places where it may be.
+    """
+    lean, lost = line_at(grid, table, x[S] - x[LEAD]), np.sqrt(p[S, S])
+    if not alone or lost < LOST_M:
+        return lean, 0.0
+    about = line_over(grid, table, x[S] - x[LEAD], lost)
+    lasts = min(lost / max(abs(x[V]), 1.0), MOST_DOUBT_S)
+    doubt = 2.0 * gravity**2 * about.pitch_variance * lasts
+    return with_pitch(lean, about.pitch, about.pitch_slope), doubt
+
+
+@njit_borrowed
+def off_heading(
+    grid: FloatArray,
+    table: FloatArray,
+    x: FloatArray,
+    p: FloatArray,
+    direction: float,
+    alone: bool,
+    h: FloatArray,
+) -> tuple[float, float]:
+    """Innovation of the heading of the design where the body points, and the variance that the map leaves.
+
+    Writes the slopes by place and lag in ``h``.
+    """
+    place, lost = x[S] - direction * x[LAG], np.sqrt(p[S, S])
+    line = line_at(grid, table, place)
+    heading, bend, variance = line.heading, line.bend, 0.0
+    if alone and lost >= LOST_M:
+        about = line_over(grid, table, place, lost)
+        heading, bend, variance = about.heading, about.bend, about.heading_variance
+    h[S], h[LAG] = -bend, direction * bend
+    return heading - x[YAW] + x[SWAY], variance
+
+
+@njit_borrowed
+def stands(quiet: float, push: float, x: FloatArray, p: FloatArray, stood: bool) -> bool:
+    """Whether a train without a wheel stands: all is quiet, no force is left over, and it may be at rest.
+
+    What it may have run before it was heard is added to the variance of its speed.
+    """
+    slow = abs(x[V]) < STILL_MPS + STILL_SDS * np.sqrt(p[V, V])
+    still = quiet > 0.0 and abs(push) < STILL_MPS2 and slow
+    if stood and not still:
+        p[V, V] += STILL_MPS**2
+    return still
+
+
+@njit_borrowed
 def curve_matched(
     dt: float,
     signals: FloatArray,
     count: FloatArray,
+    quiet: FloatArray,
     model: LineModel,
     gravity: float,
     grid: FloatArray,
@@ -316,6 +380,8 @@ def curve_matched(
         that ends here, body axes.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
+    quiet : ndarray (n,)
+        Where there is no wheel: 1 where the IMU shows no motion, 0 where it does. Below 0 there is a wheel.
     model : LineModel
         Noise.
     gravity : float
@@ -339,13 +405,15 @@ def curve_matched(
     resting, slipping = True, False
     before = line_at(grid, table, x[S])
     for k in range(signals.shape[0]):
-        here, lean = line_at(grid, table, x[S]), line_at(grid, table, x[S] - x[LEAD])
+        here = line_at(grid, table, x[S])
+        lean, doubt = slope_under(grid, table, x, p, quiet[k] >= 0.0, gravity)
         # A body askew of the track under the mount feels a share of what pushes it around the curve.
         force = signals[k, 2] * np.cos(here.askew) - signals[k, 3] * np.sin(here.askew)
         steady += dt / STEADY_S * (force - x[PUSH] - steady)
         steps.acceleration[k], rolls = predict(
             x, p, f, work, here, lean, signals[k], force, dt, model, gravity, steady
         )
+        p[V, V] += doubt * dt
         map_ahead(x, p, f, before, here, model)
         before = here
 
@@ -379,6 +447,9 @@ def curve_matched(
         if slipping:
             start_anew(x, p, f, measured, pulse)
         resting = resting or (idle > model.still_s and abs(x[V]) * idle < 2.0 * pulse)
+        if quiet[k] >= 0.0:
+            slipping = True
+            resting = stands(quiet[k], steady + gravity * np.sin(lean.pitch), x, p, resting)
         if past is not None:
             remember_prediction(past, k, x, p, f)
 
@@ -387,10 +458,8 @@ def curve_matched(
                 error, variance = off_way, way_variance
                 wanted = not slipping and (change != 0.0 or off_way != 0.0)
             elif m == HEADING:
-                # That of the design where the body points, and its sway about that.
-                line = line_at(grid, table, x[S] - direction * x[LAG])
-                h[HEADING, S], h[HEADING, LAG] = -line.bend, direction * line.bend
-                error, variance = line.heading - x[YAW] + x[SWAY], model.heading_sd_rad**2
+                error, variance = off_heading(grid, table, x, p, direction, quiet[k] >= 0.0, h[HEADING])
+                variance += model.heading_sd_rad**2
                 wanted = True
             else:
                 error, variance, wanted = -x[V], REST_VARIANCE, resting

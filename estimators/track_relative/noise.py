@@ -86,12 +86,21 @@ AXLE = Motion(
     yaw_length=3.9,
     gyro=3e-4,
     accel_x=0.32,
-    accel_y=0.25,
+    accel_y=0.1,
     accel_z=0.25,
 )
 """What runs on the rails by itself."""
 
-FRAME = Motion(pitch_sd=7.3e-4, yaw_sd=1.2e-3, yaw_length=6.3, gyro=3e-4, accel_x=0.16, torsion_sd=0.15)
+FRAME = Motion(
+    roll_sd=3e-3,
+    roll_length=8.0,
+    pitch_sd=7.3e-4,
+    yaw_sd=1.2e-3,
+    yaw_length=6.3,
+    gyro=3e-4,
+    accel_x=0.16,
+    torsion_sd=0.15,
+)
 """A bogie frame."""
 
 BODY = Motion(
@@ -102,7 +111,7 @@ BODY = Motion(
     yaw_sd=1e-3,
     yaw_length=10.0,
     y_length=8.0,
-    z_sd=2.5e-3,
+    z_sd=8e-3,
     z_length=8.0,
     accel_x=0.3,
     accel_y=0.15,

@@ -141,11 +141,14 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     errors, wheel, method = recording.map_errors, recording.encoder_sheet, CurveMatchedOdometry()
     chord = chord_of(recording)
     pointing = pointing_of(recording, chord)
-    assert wheel is not None
     sd[at.S] = math.hypot(method.start_sd_m, chainage_sd(recording, recording.start_position_m))
-    sd[at.V], sd[at.A], sd[at.WAY] = STILL_SD_MPS, 1e-2, wheel.pulse_m
-    sd[at.SCALE] = math.hypot(wheel.radius_relative_sd, errors.chainage_scale_sd)
-    sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
+    sd[at.V], sd[at.A] = STILL_SD_MPS, 1e-2
+    scaled = recording.odometer_sheet if wheel is None else wheel
+    if wheel is not None:
+        sd[at.WAY] = wheel.pulse_m
+        sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
+    if scaled is not None:
+        sd[at.SCALE] = math.hypot(scaled.radius_relative_sd, errors.chainage_scale_sd)
     sd[at.HEADING] = heading_sd(recording)
     sd[at.TILT], sd[at.SQUAT] = motion.tilt_sd, motion.squat_sd
     sd[at.TORSION], sd[at.TILT_RATE] = motion.torsion_sd, motion.tilt_rate_sd

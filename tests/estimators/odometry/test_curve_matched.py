@@ -283,12 +283,24 @@ def test_claims_something_for_every_sample(smoothed):
     assert (states[["position_sd_m", "speed_sd_mps", "acceleration_sd_mps2"]] > 0.0).all(axis=None)
 
 
-def test_bad_options_and_missing_encoder_are_named():
+def test_bad_options_are_named():
     with pytest.raises(InputError, match="tread_sd"):
         CurveMatchedOdometry(tread_sd=-1.0)
-    recording = record_fast(0, 0)
-    with pytest.raises(InputError, match="encoder"):
-        CurveMatchedOdometry().estimate(replace(recording, encoder=None, encoder_sheet=None))
+
+
+@pytest.mark.parametrize("ride", range(len(FAST)))
+def test_without_a_wheel_the_line_and_the_accelerometer_do(ride: int):
+    """Behind the first curve to metres, smoothed; it stands where it stands, and says how sure it is."""
+    recording = replace(record(truth_of(*FAST[ride]), 0), encoder=None, encoder_sheet=None)
+    truth = truth_of(*FAST[ride]).motion(AXLE).loc[recording.imu.index]
+    states = CurveMatchedOdometry(smoothed=True).estimate(recording).states
+    off = states["position_m"] - truth["position_m"]
+    assert np.sqrt((off**2).mean()) < 3.0
+    assert (off.abs() < 1.96 * states["position_sd_m"]).mean() > 0.7
+    resting = CurveMatchedOdometry().trace(recording).resting
+    fast = np.interp(CurveMatchedOdometry().trace(recording).time_s, truth.index, truth["speed_mps"].abs())
+    assert fast[resting].max() < 0.05
+    assert resting.sum() > 0.5 * (fast < 1e-3).sum()
 
 
 def line(**values: float) -> Line:
@@ -377,7 +389,8 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     out = Steps(time, np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), *flags)
     past = room_for_history(steps, n, UPDATES)
     curve_matched(
-        0.02, imu[:, 1:5].copy(), counts[read], method._model(recording, pulse, YAW_OF_AXLE), 9.81,
+        0.02, imu[:, 1:5].copy(), counts[read], np.full(steps, -1.0),
+        method._model(recording, pulse, YAW_OF_AXLE), 9.81,
         grid, table, x, p, out, room_to_work(), past,
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
