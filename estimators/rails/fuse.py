@@ -287,9 +287,12 @@ def _together(passes: _Passes, common: Mapping[str, float]) -> Fused:
         moved = displaced(place, line.values[:, None], position_sd)[:, 0]
         frame[IRREGULARITY_SD[at]] = np.sqrt(bank.sum_of(line.density) * line.profile + moved)
         draws[:, :, at] = _draws_of(line, (name, passes.mount, passes.n), position_sd, place, bank)
+    # Passes that neither differ nor state an sd, such as a baseline that answers 0, have no interval.
+    unsure = any((frame[IRREGULARITY_SD[at]] > 0.0).all() for at in used)
+    columns = [*IRREGULARITY, *(IRREGULARITY_SD if unsure else ())]
     return Fused(
-        geometry=pd.DataFrame(frame, index=_index(place)),
-        geometry_draws=draws,
+        geometry=pd.DataFrame(frame, index=_index(place))[columns],
+        geometry_draws=draws if unsure else None,
         shifts=pd.DataFrame(shifts.shift_m.T, _index(place), [str(i) for i in range(passes.n)]),
         passes=_table(passes, waves, shifts, lines),
         mount=passes.mount,

@@ -279,6 +279,13 @@ def test_a_place_far_from_what_is_stated_is_told() -> None:
     assert told["shift_m"][0] == pytest.approx(2.4, abs=0.02)
 
 
+def test_a_baseline_that_answers_zero_has_no_interval() -> None:
+    zero = passed(np.zeros((3, COUNT)), sd_m=float("nan"))
+    fused = fuse([zero, zero, zero])
+    assert list(fused.geometry) == list(IRREGULARITY) and fused.geometry_draws is None
+    assert (fused.geometry[list(IRREGULARITY[:3])] == 0.0).all(axis=None)
+
+
 def test_only_the_stretch_that_all_share_is_fused() -> None:
     truth = rails(np.random.default_rng(19))
     whole = passed(truth)
