@@ -7,6 +7,7 @@ The way of the data, and the verbs between the nouns::
     record   = measure(truth, ...)          # what the logger saw              -> Recording
     record   = with_odometry(record, "curve_matched")   # where the train is   -> Recording
     result   = AttitudeEkf().estimate(record)                                # -> Estimate
+    rails    = fuse([result, ...])          # rails of several rides           -> Fused
     table    = score(result, truth, record) # one row per figure               -> DataFrame
     results  = run("go20a")                 # all of it, for every cell        -> Results, results/go20a/
     record   = read_ride(path)              # a ride of a real train, or one that write_ride wrote
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from simrail.estimation.choose_odometry import with_odometry
     from simrail.estimation.estimate import Estimate, Estimator
     from simrail.estimation.recorded_ride import read_ride
+    from simrail.estimators.rails.fuse import Fused, fuse
     from simrail.recording.files.ride_writer import write_ride
     from simrail.recording.recording import Recording
     from simrail.recording.sheets.grades import ImuGrade
@@ -89,6 +91,7 @@ _HOMES = {
     "estimation.choose_odometry": ("with_odometry",),
     "estimation.estimate": ("Estimate", "Estimator"),
     "estimation.recorded_ride": ("read_ride",),
+    "estimators.rails.fuse": ("Fused", "fuse"),
     "recording.files.ride_writer": ("write_ride",),
     "recording.recording": ("Recording",),
     "results": ("Results", "run"),
@@ -120,6 +123,7 @@ __all__ = [
     "EncoderSpec",
     "Estimate",
     "Estimator",
+    "Fused",
     "ImuGrade",
     "InputError",
     "Irregularity",
@@ -137,6 +141,7 @@ __all__ = [
     "Truth",
     "VehicleModel",
     "cells",
+    "fuse",
     "judge_scenario",
     "lay",
     "load_scenario",

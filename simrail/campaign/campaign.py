@@ -32,7 +32,7 @@ from simrail.campaign.worker import BatchResult, fail_batch, forget, pack, run_b
 from simrail.core.interrupts import interruptible
 from simrail.core.source_hash import score_code_hash
 from simrail.ride.ride import is_cached
-from simrail.scenario.cells import Cell
+from simrail.scenario.cells import Cell, rides_of
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import StopState, stop_rule_of
@@ -126,6 +126,11 @@ class _Batch(NamedTuple):
         return (
             f"ride {first.ride.name} is" if self.ride_only else f"cells {first.number} to {last.number} are"
         )
+
+
+def _recordings_of(cell: Cell) -> tuple[int, ...]:
+    """What the cells share that are made of the same recordings of passes."""
+    return cell.passes[0].case, cell.sample, cell.map_draw, cell.sensor_draw
 
 
 class _Loop:
@@ -225,7 +230,7 @@ class _Loop:
             return self.suspects.popleft()
         if not self.ready and (ride := next(rides, None)) is not None:
             self.watcher.ride_begins(ride[0].ride_number + 1, self.plan.rides, ride[0].ride.name)
-            if not is_cached(self.plan.parts.ride(ride[0])):
+            if not all(is_cached(self.plan.parts.ride(cell)) for cell in rides_of(ride)):
                 return _Batch(True, ride)
             self._ride_is_there(ride)
         return self.ready.popleft() if self.ready else None
@@ -235,7 +240,10 @@ class _Loop:
         seconds = max(self.plan.parts.ride(ride[0]).profile.duration_s, 1e-3)
         most = min(_MOST_CELLS, int(_MOST_SECONDS / seconds), self.left // (4 * self.executor.workers()))
         size = self.batch_cells or max(1, most)
-        self.ready.extend(_Batch(False, ride[i : i + size]) for i in range(0, len(ride), size))
+        if ride[0].passes:  # those of all numbers of passes share their rides' estimates
+            self.ready.extend(_Batch(False, tuple(own)) for _, own in groupby(ride, key=_recordings_of))
+        else:
+            self.ready.extend(_Batch(False, ride[i : i + size]) for i in range(0, len(ride), size))
         self.watcher.ride_ends()
 
     def _submit(self, batch: _Batch) -> Future[BatchResult]:

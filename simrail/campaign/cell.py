@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
+from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -188,7 +189,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
     if not recorded:
         return
     for name, estimator in tally.estimators.items():
-        outcomes = _estimates(name, estimator, [one.recording for one in recorded], tally, check)
+        outcomes = estimates_of(name, estimator, [one.recording for one in recorded], tally, check)
         for one, outcome in zip(recorded, outcomes, strict=True):
             try:
                 if isinstance(outcome, Exception):
@@ -259,7 +260,7 @@ def _labels(cell: Cell) -> dict[str, object]:
     """What tells the rows of a cell from those of others."""
     return {
         "cell": cell.number,
-        "ride": cell.ride.name,
+        "ride": "+".join(dict.fromkeys(one.ride.name for one in cell.passes or (cell,))),
         "vehicle": cell.spec.vehicle,
         "mount": cell.imu.name,
         "imu": cell.imu.grade,
@@ -273,22 +274,23 @@ def _labels(cell: Cell) -> dict[str, object]:
 
 def cell_record(cell: Cell) -> dict[str, object]:
     """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
+    rides = [one.ride for one in cell.passes or (cell,)]
     record: dict[str, object] = _labels(cell) | {
         "case": cell.case,
         "sample": cell.sample,
         "map_draw": cell.map_draw,
         "track": cell.spec.track,
         "engine": cell.spec.engine,
-        "speed_kmh": cell.ride.speed_kmh or 0.0,
-        "direction": _direction(cell.ride),
+        "speed_kmh": fmean(float(ride.speed_kmh or 0.0) for ride in rides),
+        "direction": _direction(rides),
     }
     return record | {name: value for name, value in cell.settings.items() if name not in record}
 
 
-def _direction(ride: RidePart) -> str:
-    """Whether a ride runs towards larger s, smaller s, both ways, or not at all."""
-    places = (ride.start_m, *ride.ends_m)
-    ways = {"forward" if after > before else "backward" for before, after in pairwise(places)}
+def _direction(rides: Sequence[RidePart]) -> str:
+    """Whether rides run towards larger s, smaller s, both ways, or not at all."""
+    steps = [step for ride in rides for step in pairwise((ride.start_m, *ride.ends_m))]
+    ways = {"forward" if after > before else "backward" for before, after in steps}
     return "both ways" if len(ways) > 1 else next(iter(ways), "standing")
 
 
@@ -306,12 +308,12 @@ def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> _Recor
     with tally.timed("score"):
         reference = reference_of(truth, recording)
         if recording.odometry is not None:
-            figures = score_odometry(recording, reference, **_wanted(cell))
+            figures = score_odometry(recording, reference, **wanted_of(cell))
             tally.add(cell, f"odometry:{recording.odometry_source}", figures)
     return _Recorded(cell, recording, reference)
 
 
-def _estimates(
+def estimates_of(
     name: str, estimator: Estimator, recordings: list[Recording], tally: BatchTally, check: Check
 ) -> Iterator[tuple[Estimate, float] | Exception]:
     """Each estimate and the microseconds per sample that it took, or what went wrong with it.
@@ -352,7 +354,7 @@ def _score(
 
     One that is not finite has rows that say so, and is a failure of its cell as well.
     """
-    cell, wanted = one.cell, _wanted(one.cell)
+    cell, wanted = one.cell, wanted_of(one.cell)
     with tally.timed("score"):
         tables = [score(estimate, one.reference, one.recording, us_per_sample=us_per_sample, **wanted)]
         if estimate.geometry is not None:
@@ -388,6 +390,6 @@ def _score_ride(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> No
             tally.add(cell, RIDE, score_kick(truth, after_m=cell.ride.kick_end_m))
 
 
-def _wanted(cell: Cell) -> dict[str, Any]:
+def wanted_of(cell: Cell) -> dict[str, Any]:
     """What of the score table the scenario keeps."""
     return {"windows": cell.spec.score.windows, "metrics": cell.spec.score.metrics}

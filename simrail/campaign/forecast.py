@@ -24,6 +24,7 @@ from simrail.core.interrupts import interruptible
 from simrail.ride import cache as ride_cache
 from simrail.ride.ride import Ride, is_cached, simulate
 from simrail.ride.vibration.run import Shaker
+from simrail.scenario.axes import each
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import Plan, judge_scenario
@@ -107,7 +108,11 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     kept = [scale * seconds / cost.duration_s for seconds in _seconds(rides)]
     missing = [ride for ride in rides if not ride.is_cached]
     new = [scale * seconds / cost.duration_s for seconds in _seconds(missing, new=True)]
-    recorded = plan.cells * plan.simulated_s / plan.rides / cost.duration_s
+    numbers = each(scenario.spec.passes) if scenario.spec.passes is not None else (1,)
+    recordings = (
+        plan.cells // len(numbers) * int(max(numbers))
+    )  # cells of fewer passes share those of the most
+    recorded = recordings * plan.simulated_s / plan.rides / cost.duration_s
     simulated = new[0] * cost.engine_s + new[1] * cost.vibration_s
     rows = plan.cells * len(cost.result.scores)
     return Forecast(

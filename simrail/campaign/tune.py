@@ -230,7 +230,8 @@ def chosen_cells(scenario: Scenario, rides: Iterable[str], imu: str | None, *, d
     names = set(rides) or {part.name for part in spec.ride}
     mount = spec.imu[0].name if imu is None else imu
     by_ride: dict[str, list[Cell]] = {}
-    for cell in cells(scenario):
+    one_by_one = replace(scenario, spec=spec.model_copy(update={"passes": None}))
+    for cell in cells(one_by_one):
         if cell.ride.name in names and cell.imu.name == mount:
             of_ride = by_ride.setdefault(cell.ride.name, [])
             if not of_ride or cell.case == of_ride[0].case:

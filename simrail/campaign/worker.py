@@ -21,6 +21,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from simrail.campaign.cell import BatchTally, CellResult, Failure, look_at, run_cells
+from simrail.campaign.passes import run_passes
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
 from simrail.core.source_hash import score_code_hash
@@ -28,7 +29,7 @@ from simrail.estimation.user_modules import install, sources_of
 from simrail.ride.ride import Progress, is_cached, simulate
 from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts
-from simrail.scenario.cells import Cell
+from simrail.scenario.cells import Cell, rides_of
 from simrail.scoring.table import labelled
 
 
@@ -154,6 +155,8 @@ def _run(
         try:
             with tally.timed("simulate"):
                 truth, facts = worker.truth(cells[0], notes, progress)
+                for cell in rides_of(cells)[1:] if ride_only else ():
+                    worker.truth(cell, notes, progress)
         except Exception as error:
             check()
             if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
@@ -162,7 +165,13 @@ def _run(
                 for name in tally.estimators:
                     tally.fail(cell, name, error)
             return _result(cells[0].ride_number, cells, tally, facts, notes)
-        if not ride_only:
+        if not ride_only and cells[0].passes:
+
+            def ride_of(cell: Cell) -> Truth:
+                return worker.truth(cell, notes)[0]
+
+            run_passes(cells, ride_of, worker.parts, tally, check)
+        elif not ride_only:
             run_cells(cells, truth, worker.parts, tally, check)
     return _result(cells[0].ride_number, () if ride_only else cells, tally, facts, notes)
 
@@ -180,6 +189,7 @@ def fail_batch(packed: bytes, cells: tuple[Cell, ...], reason: str) -> BatchResu
 def example_of(packed: bytes, cell: Cell) -> CellResult:
     """Run a cell again to look at it closely."""
     with _at_work_on(packed) as (worker, _):
+        cell = cell.passes[0] if cell.passes else cell
         truth, _ = worker.truth(cell, [])
         return look_at(cell, truth, worker.parts, worker.tally(cell.sample))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from simrail.cli.options import DONE, Form, Scenario, Seed, Settings, number
-from simrail.core.errors import one_of
+from simrail.core.errors import InputError, one_of
 
 if TYPE_CHECKING:
     from simrail.recording.files.ride_writer import Format
@@ -47,8 +47,9 @@ def export(
 
 
 def estimate(
-    ride: Annotated[
-        Path, typer.Argument(metavar="RIDE.toml", help="A ride file, or a folder that holds a ride.toml.")
+    rides: Annotated[
+        list[Path],
+        typer.Argument(metavar="RIDE.toml", help="A ride file, or a folder that holds a ride.toml."),
     ],
     estimator: Annotated[
         str, typer.Option("--estimator", metavar="NAME", help="A registered estimator, or FILE.py:CLASS.")
@@ -62,14 +63,28 @@ def estimate(
         list[str] | None,
         typer.Option("--set", metavar="OPTION=VALUE", help="Option of the estimator. Repeatable."),
     ] = None,
+    fused: Annotated[
+        bool, typer.Option("--fuse", help="Fuse the rails of several rides over the same line.")
+    ] = False,
 ) -> int:
     """Run an estimator on a recorded ride, of a real train or exported; without truth, without scores."""
+    ride = rides[0]
+    stem = ride.stem if ride.suffix == ".toml" and ride.stem != "ride" else ride.absolute().stem
+    stem = ride.absolute().parent.name if stem == "ride" else stem
+    folder = out or Path("results") / f"{stem}_{estimator.rpartition(':')[2]}{'_fused' * fused}"
+    if fused:
+        return _fuse(rides, estimator, folder, settings or [], _format(form))
+    if len(rides) > 1:
+        raise InputError(
+            "are several rides, of which one is estimated at a time",
+            field="RIDE.toml",
+            value=len(rides),
+            limit="1",
+            remedy="give one, or add --fuse to fuse their rails",
+        )
     from simrail.cli.estimate_ride import estimate_ride
     from simrail.report.pages.estimate_page import design_difference_deg, ride_facts
 
-    stem = ride.stem if ride.suffix == ".toml" and ride.stem != "ride" else ride.absolute().stem
-    stem = ride.absolute().parent.name if stem == "ride" else stem
-    folder = out or Path("results") / f"{stem}_{estimator.rpartition(':')[2]}"
     recording, estimated = estimate_ride(
         ride, estimator, folder, settings=settings or [], format=_format(form)
     )
@@ -81,6 +96,22 @@ def estimate(
             print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
     print("there is no truth beside a recording, hence no scores")
     print(f"wrote {folder / f'estimate.{form}'} and {folder / 'estimate.html'}")
+    return DONE
+
+
+def _fuse(rides: list[Path], estimator: str, folder: Path, settings: list[str], form: "Format") -> int:
+    """Fuse the rails of rides, and tell what each was worth."""
+    from simrail.cli.fuse_rides import fuse_rides
+
+    fused = fuse_rides(rides, estimator, folder, settings=settings, format=form)
+    place = fused.geometry.index
+    print(f"{'one pass' if len(rides) == 1 else f'{len(rides)} passes'} over {place[0]:g} to {place[-1]:g} m")
+    for ride, row in zip(rides, fused.passes.to_dict("records"), strict=True):
+        print(f"  {ride}: moved by {row['shift_m']:+.2f} m{': ' if row['told'] else ''}{row['told']}")
+    sd = 1e3 * fused.geometry.filter(like="_sd_m").mean()
+    for name, value in sd.dropna().items():
+        print(f"{str(name).removesuffix('_sd_m').replace('_', ' ')}: sd {value:.2f} mm, unfiltered")
+    print(f"wrote {folder / f'geometry.{form}'} and {folder / 'passes.csv'}")
     return DONE
 
 

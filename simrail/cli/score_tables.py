@@ -108,6 +108,13 @@ def print_warnings(console: Console, campaign: CampaignResult) -> None:
         console.print(f"[yellow]warning:[/yellow] {warning}", highlight=False, soft_wrap=True)
 
 
+def _way(first: pd.Series) -> str:
+    """Speed and direction of a ride, or how many passes there are."""
+    if "passes" not in first:
+        return f"{first['speed_kmh']:g} km/h {first['direction']}"
+    return f"{first['passes']} passes" if first["passes"] > 1 else "one pass"
+
+
 def _case(
     console: Console,
     rows: pd.DataFrame,
@@ -123,7 +130,7 @@ def _case(
     first = members.iloc[0]
     draws = f"mean of {len(members)} draws" if len(members) > 1 else "one draw"
     title = Text(
-        f"{first['ride']}: {first['speed_kmh']:g} km/h {first['direction']}, "
+        f"{first['ride']}: {_way(first)}, "
         f"{first['imu']} on {first['mount']}, odometry: {first['odometry']}, "
         f"{state_words(first.to_dict(), comma=', ')}",
         style="bold",

@@ -155,7 +155,7 @@ class Parts:
             If a file that it names is missing or faulty, or a sensor cannot be as its words say.
         """
         # All but the draw of the sensors is in the case, the sample and the draw of the track.
-        key = (cell.case, cell.sample, cell.track_draw, cell.map_draw)
+        key = (cell.case, cell.sample, cell.track_draw, cell.map_draw, len(cell.passes))
         if key not in self._resolved:
             if len(self._resolved) >= _MOST_RESOLVED:
                 self._resolved.clear()

@@ -10,20 +10,24 @@ A list compares: its values meet the same draws. A distribution is chance: each 
 draws of its own. Of lists that set an ablation beside what a train has, an exact map and silence, one thing
 is taken away at a time: no cell has both.
 
+Of several passes, a cell is so many rides over the same rails, in an order that chance decides, anew for each
+track draw: four passes are the first four of sixteen. Each has a device of its own, and the same map.
+
 Nothing depends on the order: seeds are found by name (`ride_seed`, `sensor_seed`), so a cell gives
 the same scores alone, among others, or in another order.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from math import prod
 from typing import Any
 
+from simrail.core.seeds import stream
 from simrail.scenario.axes import axes_of, drawn, each, expand
 from simrail.scenario.distributions import Value, sample_count, samples_of
-from simrail.scenario.scenario import Scenario, ScenarioFile
+from simrail.scenario.scenario import Scenario, ScenarioFile, ride_count
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
 
@@ -70,6 +74,8 @@ class Cell:
     map_draw: int
     sensor_draw: int
     settings: dict[str, Value]
+    passes: tuple["Cell", ...] = ()
+    """The cells whose rides are fused, this one's the first of them; none of a cell that is one ride."""
 
     @property
     def ride_seed(self) -> int:
@@ -138,6 +144,9 @@ def cells(scenario: Scenario) -> Iterator[Cell]:
     scenario : Scenario
         As read by `simrail.scenario.scenario.load_scenario`.
     """
+    if scenario.spec.passes is not None:
+        yield from _cells_of_passes(scenario.spec)
+        return
     number = ride_number = 0
     for world in _worlds(scenario.spec):
         for track_draw in range(scenario.spec.monte_carlo.track_draws):
@@ -157,8 +166,52 @@ def cells(scenario: Scenario) -> Iterator[Cell]:
             ride_number += 1
 
 
+def _cells_of_passes(spec: ScenarioFile) -> Iterator[Cell]:
+    """Cells of several rides, those over the same rails in a row."""
+    rides, samples, draws = ride_count(spec.ride), sample_count(spec), spec.monte_carlo.track_draws
+    worlds, number = list(_worlds(spec)), 0
+    for first, k, draw in product(range(0, len(worlds), rides * samples), range(samples), range(draws)):
+        order = stream(spec.seed, "passes", k, draw).permutation(rides).tolist()
+        places = [first + ride * samples + k for ride in range(rides)]
+        sensings = zip(*(_sensings(spec, worlds[place]) for place in places), strict=True)
+        for of_rides in sensings:
+            one = of_rides[0]
+            for map_draw, sensor_draw in product(
+                range(map_draws(one.spec)), range(sensor_draws(spec, one.imu))
+            ):
+                passes = tuple(
+                    replace(
+                        of_rides[ride],
+                        ride_number=places[ride] * draws + draw,
+                        track_draw=draw,
+                        map_draw=map_draw,
+                        sensor_draw=sensor_draw * rides + ride,  # a device of its own for each
+                    )
+                    for ride in order
+                )
+                for cell in _of_passes(spec, one, passes):
+                    yield replace(cell, number=number, sensor_draw=sensor_draw)
+                    number += 1
+
+
+def _of_passes(spec: ScenarioFile, one: Cell, passes: tuple[Cell, ...]) -> Iterator[Cell]:
+    """A cell for each number of passes; ``one`` is the first ride's, which names the case."""
+    counts = each(spec.passes)
+    settings = {name: value for name, value in one.settings.items() if not name.startswith("ride.")}
+    for i, count_of_passes in enumerate(counts):
+        n = int(count_of_passes)
+        case = one.case * len(counts) + i
+        yield replace(passes[0], case=case, passes=passes[:n], settings=settings | {"passes": n})
+
+
+def rides_of(cells: Iterable[Cell]) -> list[Cell]:
+    """The cells that stand for the rides of these: of one ride, or of passes over the same rails."""
+    listed = list(cells)
+    return list(max((cell.passes for cell in listed), key=len, default=()) or listed[:1])
+
+
 def first_cells(scenario: Scenario) -> Iterator[Cell]:
-    """Yield one cell of each case and sample, its first draws, numbered as in `cells`."""
+    """Yield one cell of each case and sample, its first draws, numbered as in `cells`: passes one by one."""
     spec = scenario.spec
     draws = spec.monte_carlo.track_draws
     number = 0
@@ -266,14 +319,16 @@ def count(scenario: Scenario) -> tuple[int, int]:
     spec = scenario.spec
     worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * sample_count(spec)
     rides = worlds * spec.monte_carlo.track_draws
-    maps = rides * _size(spec, SENSING)
+    counts = 0 if spec.passes is None else len(each(spec.passes))
+    groups = rides * counts // ride_count(spec.ride) if counts else rides
+    maps = groups * _size(spec, SENSING)
     if spec.map is not None:
         exact = each(spec.map.exact)
         exact_draws = sum(1 for one in exact if one)
         maps = maps // len(exact) * ((len(exact) - exact_draws) * spec.monte_carlo.map_draws + exact_draws)
         if _sets_both(spec):
             off = each(spec.vibration.off) if spec.vibration is not None else []
-            silent = rides * sum(1 for one in off if one) // len(off)
+            silent = groups * sum(1 for one in off if one) // len(off)
             maps -= silent * (_size(spec, SENSING) // len(exact)) * exact_draws
     vehicles = each(spec.vehicle)
     on = [(part, sum(part.is_on(str(vehicle)) for vehicle in vehicles)) for part in spec.imu]

@@ -9,18 +9,25 @@ is judged by `simrail.scenario.check`, and what is run is listed by `simrail.sce
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from simrail.core.errors import InputError
 from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
 from simrail.scenario import tables
-from simrail.scenario.axes import Axis, Listed, each
+from simrail.scenario.axes import Axis, Listed, axes_of, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
 from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart
 from simrail.scenario.vibration_tables import VibrationPart
+
+
+def ride_count(rides: Sequence[tables.RidePart]) -> int:
+    """Number of rides over a track: those of the tables, each for every combination of its lists."""
+    return sum(prod(len(axis) for axis in axes_of(part).values()) for part in rides)
 
 
 class ScenarioFile(Part):
@@ -30,7 +37,8 @@ class ScenarioFile(Part):
     ``odometry`` names that which the estimators work with (`simrail.estimation.choose_odometry`); if it is
     not given, ``"curve_matched"`` with an ``[encoder]`` and ``"none"`` without. ``contact_rate_hz`` is the
     rate at which forces between wheels and rails are kept, ``truth_rate_hz`` over a whole number; 0 keeps
-    none.
+    none. ``passes`` is over how many of the rides the rails are fused
+    (`simrail.estimators.rails.fuse`); a cell is then so many rides, and its scores are of the rails alone.
     """
 
     title: str
@@ -43,6 +51,7 @@ class ScenarioFile(Part):
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=4000.0)]] = 1000.0
     contact_rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
+    passes: Listed[Annotated[int, Field(ge=1, le=1000)]] | None = None
     odometry: Listed[str] = ""
     irregularity: tables.IrregularityPart | None = None
     vibration: VibrationPart | None = None
@@ -90,6 +99,29 @@ class ScenarioFile(Part):
             if names.count((name, vehicle)) > 1 or (vehicle and (name, None) in names):
                 raise ValueError(f"two of them are named {name!r}; give each a name of its own")
         return value
+
+    @model_validator(mode="after")
+    def _has_rides_for_the_passes(self) -> "ScenarioFile":
+        if self.passes is None:
+            return self
+        if isinstance(self.passes, Distribution):
+            raise InputError(
+                "is no number that chance decides",
+                field="passes",
+                value=self.passes.kind,
+                limit="a whole number, or a list of them",
+                remedy="write passes = [1, 2, 4]",
+            )
+        rides, most = ride_count(self.ride), max(each(self.passes))
+        if most > rides:
+            raise InputError(
+                "are more passes than the scenario has rides",
+                field="passes",
+                value=most,
+                limit=f"1 to {rides}, the [[ride]]s and the values of their lists",
+                remedy="take fewer passes, list more ride.speed_kmh, or set ride.reverse = [false, true]",
+            )
+        return self
 
     @model_validator(mode="after")
     def _every_vehicle_has_an_imu(self) -> "ScenarioFile":

@@ -14,6 +14,7 @@ from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
 from simrail.report.campaign.axes import is_campaign
 from simrail.report.campaign.odometry import odometry_frames, page_tables
+from simrail.report.campaign.passes import passes_section
 from simrail.report.campaign.section import campaign_section
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
 from simrail.report.pages.frame import page_text
@@ -216,6 +217,7 @@ SectionMaker = Callable[[PageData], list[Section]]
 SECTIONS: tuple[SectionMaker, ...] = (
     _failures,
     _paper,
+    passes_section,
     campaign_section,
     ride_sections,
     _tracks,

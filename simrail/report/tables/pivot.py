@@ -53,7 +53,7 @@ class Case:
         A ride has no value of a list that stands in another ride only.
         """
         told = ("imu.grade", *AXES)
-        named = ((name, value) for name, value in self.labels.items() if "." in name)
+        named = ((name, value) for name, value in self.labels.items() if "." in name or name == "passes")
         return {n: value for n, value in named if not n.startswith(told) and value != "nan"}
 
     def get(

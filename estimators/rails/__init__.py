@@ -1,0 +1,1 @@
+"""What the rails look like, from more than one ride over them."""
