@@ -71,6 +71,8 @@ class TrackRelativeSmoother:
         each is for.
     geometry_step_m : float
         Distance of the places of the rail geometry; 0 leaves the geometry out.
+    wheel : bool
+        False leaves encoder and odometer aside: an IMU and a map alone.
     aiding : tuple of Aiding
         What is measured beside what the recording has (`simrail.estimators.track_relative.aiding`).
     """
@@ -81,6 +83,7 @@ class TrackRelativeSmoother:
     motion: Motion | None = None
     without: tuple[str, ...] = ()
     geometry_step_m: float = 0.25
+    wheel: bool = True
     aiding: tuple[Aiding, ...] = ()
 
     needs = ()
@@ -124,6 +127,10 @@ class TrackRelativeSmoother:
 
     def trace(self, recording: Recording) -> Trace:
         """All states, at the filter's own steps."""
+        if not self.wheel:
+            recording = replace(
+                recording, encoder=None, encoder_sheet=None, odometer=None, odometer_sheet=None
+            )
         motion = motion_of(recording) if self.motion is None else self.motion
         steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
         aiding = (*aiding_of(recording, smoothed=self.smoothed), *self.aiding)

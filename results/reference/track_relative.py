@@ -5,7 +5,8 @@
 
 One row per vehicle, mount, method and quantity: the root of the mean square error over all rides with its
 95 % interval (whole samples, which have rails, map and device of their own, are resampled), the 95th
-percentile of the rides' rms, and how much of the time the method's own 95 % interval holds.
+percentile of the rides' rms, how much of the time the method's own intervals hold, over how much of the way
+the error is beyond the method's bound, that bound's median, and the share of the way behind a fault.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ from simrail.scoring.bootstrap import interval
 
 TABLE = Path(__file__).with_name("track_relative.csv")
 QUANTITIES = ("roll", "pitch", "yaw_debiased", "position", "speed")
+TOLD = (
+    *("coverage50", "coverage90", "coverage95", "coverage99", "coverage999"),
+    *("bound", "outside", "fault"),
+)
 BY = ["vehicle", "mount", "estimator", "quantity"]
 
 
@@ -35,15 +40,14 @@ def table_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
             continue
         square = interval(errors["value"] ** 2, errors["sample"])
         low, high = np.sqrt(np.maximum([square.low, square.high], 0.0))
-        held = group.loc[group["metric"] == "coverage95", "value"]
+        told = group.groupby("metric", observed=True)["value"].mean()
         figures = {
             "rides": len(errors),
             "rms": np.sqrt(square.value),
             "low": low,
             "high": high,
             "p95": errors["value"].quantile(0.95),
-            "coverage95": held.mean() if len(held) else np.nan,
-        }
+        } | {name: told.get(name, np.nan) for name in TOLD}
         rows.append(dict(zip(BY, key, strict=True)) | figures)
     return pd.DataFrame(rows)
 
