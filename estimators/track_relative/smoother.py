@@ -66,9 +66,9 @@ class TrackRelativeSmoother:
     motion : Motion, optional
         How the body moves in its track; that of the mount's class
         (`simrail.estimators.track_relative.noise`) if not given.
-    without : tuple of str
-        Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), to show what
-        each is for.
+    without : str
+        Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), with blanks
+        between them, to show what each is for.
     geometry_step_m : float
         Distance of the places of the rail geometry; 0 leaves the geometry out.
     wheel : bool
@@ -81,7 +81,7 @@ class TrackRelativeSmoother:
     passes: int = 2
     rate_hz: float = 31.25
     motion: Motion | None = None
-    without: tuple[str, ...] = ()
+    without: str = ""
     geometry_step_m: float = 0.25
     wheel: bool = True
     aiding: tuple[Aiding, ...] = ()
@@ -90,7 +90,7 @@ class TrackRelativeSmoother:
     cites = ("Briales et al. 2021", "Gonzalez-Carbajal et al. 2023", "Hartikainen and Sarkka 2010")
 
     def __post_init__(self) -> None:
-        for name in self.without:
+        for name in self.without.split():
             one_of(name, PARTS, "is no part of the state", field="without")
         out = "is out of range"
         for name, is_good, limit in (
@@ -134,7 +134,7 @@ class TrackRelativeSmoother:
         motion = motion_of(recording) if self.motion is None else self.motion
         steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
         aiding = (*aiding_of(recording, smoothed=self.smoothed), *self.aiding)
-        course = course_of(recording, steps, motion, aiding, self.without)
+        course = course_of(recording, steps, motion, aiding, self.without.split())
         trace = _run(course, smoothed=self.smoothed)
         for _ in range(self.passes - 1 if self.smoothed else 0):
             trace = _run(about(course, trace.states), smoothed=True)

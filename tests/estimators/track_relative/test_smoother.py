@@ -225,7 +225,7 @@ def test_a_second_pass_linearises_about_the_first(rough: Callable) -> None:
 @pytest.mark.parametrize("part", PARTS)
 def test_what_is_left_out_stays_nothing(rough: Callable, part: str) -> None:
     recording = beginning(rough(), samples=3500)
-    found = TrackRelativeSmoother(smoothed=False, without=(part,)).trace(recording).states
+    found = TrackRelativeSmoother(smoothed=False, without=part).trace(recording).states
     left = list(PARTS[part])
     np.testing.assert_array_equal(found[:, left], np.tile(found[0, left], (len(found), 1)))
     if part not in ("tilt", "lag", "drift_in_curves"):  # these have a mean, which is kept
@@ -249,7 +249,7 @@ def test_a_motion_of_ones_own_is_taken(rough: Callable) -> None:
     [
         {"passes": 0}, {"passes": 5}, {"passes": 1.5}, {"rate_hz": 5.0}, {"rate_hz": 2000.0},
         {"rate_hz": float("nan")}, {"geometry_step_m": -0.1}, {"geometry_step_m": float("nan")},
-        {"without": ("tilts",)},
+        {"without": "tilts"},
     ],
     ids=str,
 )  # fmt: skip
