@@ -1,0 +1,150 @@
+"""The rails under a bogie frame, through its primary suspension: inverse dynamics of the frame.
+
+A frame is where its springs put it. What it does is known at every sample, so the force that makes it do so
+is, and so is how far the springs under it are pressed together: the axles are there. All is linear about a
+vehicle that stands, and by frequency (s = i omega) a quotient of polynomials. Of a frame at (y, z) with roll
+phi and pitch theta, its centre of gravity at height z_G, springs above at z_S, below at z_P, in the axes of
+the track that turns and curves (q: cant deficiency over g; phi_t: its roll):
+
+    heave    F_front + F_rear               = m s^2 z + B s^2 (C s + K)/(B s^2 + C s + K) z
+    pitch    -x_front F_front - x_rear F_rear = I_y s^2 theta + K_theta theta
+    axle i   v_i = z - x_i theta + F_i/(k_i + c_i s)
+    roll     w = phi + [I_x s^2 (phi + phi_t) + M - h F_e + W d - e F_p - e W_f phi] / k_phi,   e = z_G - z_P,
+             h = z_S - z_G
+
+with the mass B above, on springs K, C; M and F_e the moment and the lateral force of these, d how far they
+are bent to the side, W and W_f the weight above and below the frame, F_p the lateral force of the axles. The
+body above is a rigid one that sways on its springs, with the roll and the lateral motion of this frame alone
+as its ground. A spring pulls in the axes of the body below at the point on the body above, so that a body
+that leans out loads the outer side.
+
+w is the mean roll of both axles, of which the rails' own follows by `simrail.estimators.track_relative.rails`.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from simrail.core.jit import FloatArray
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Bogie:
+    """A frame on two axles, and what it bears. SI; places along and above the frame's reference point.
+
+    Attributes
+    ----------
+    mass, roll_inertia, pitch_inertia, height : float
+        Of the frame: kg, kg m2, and height of its centre of gravity over the rails, m.
+    front, rear : float
+        Places of the axles, forward.
+    front_stiffness, rear_stiffness, front_damping, rear_damping : float
+        Vertical, of both sides, N/m and N s/m.
+    primary_half, primary_height : float
+        Half the distance of left and right springs as it counts for roll, and their height, m.
+    secondary_vertical, secondary_lateral, secondary_vertical_damping, secondary_lateral_damping : float
+    secondary_half, secondary_height : float
+    load, load_inertia, load_height : float
+        Share of the mass above, kg, and of its roll inertia, kg m2; height of its centre of gravity, m.
+    """
+
+    mass: float
+    roll_inertia: float
+    pitch_inertia: float
+    height: float
+    front: float
+    rear: float
+    front_stiffness: float
+    rear_stiffness: float
+    front_damping: float
+    rear_damping: float
+    primary_half: float
+    primary_height: float
+    secondary_vertical: float
+    secondary_lateral: float
+    secondary_vertical_damping: float
+    secondary_lateral_damping: float
+    secondary_half: float
+    secondary_height: float
+    load: float
+    load_inertia: float
+    load_height: float
+
+
+class Frame(NamedTuple):
+    """Spectra of a frame's motion (f,), at its centre of gravity: m and rad; q as such."""
+
+    y: ComplexArray
+    z: ComplexArray
+    roll: ComplexArray
+    pitch: ComplexArray
+    deficiency: ComplexArray
+    track_roll: ComplexArray
+
+
+def axles_under(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> ComplexArray:
+    """Spectra (3, f): height of the front and of the rear axle, m, and mean roll of both, rad."""
+    front, rear = _heights(bogie, frame, s)
+    return np.stack([front, rear, _roll(bogie, frame, s, gravity)])
+
+
+def _heights(bogie: Bogie, frame: Frame, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    square = s * s
+    above = bogie.secondary_vertical + bogie.secondary_vertical_damping * s
+    swung = bogie.load * square
+    force = bogie.mass * square * frame.z + swung * above / (swung + above) * frame.z
+    moment = bogie.pitch_inertia * square * frame.pitch
+    base = bogie.front - bogie.rear
+    on_front = -(moment + bogie.rear * force) / base
+    on_rear = force - on_front
+    front = frame.z - bogie.front * frame.pitch + on_front / (bogie.front_stiffness + bogie.front_damping * s)
+    rear = frame.z - bogie.rear * frame.pitch + on_rear / (bogie.rear_stiffness + bogie.rear_damping * s)
+    return front, rear
+
+
+def _roll(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> ComplexArray:
+    square, g = s * s, gravity
+    weight, all_weight = bogie.load * g, (bogie.load + bogie.mass) * g
+    lever, h, e = (
+        bogie.load_height - bogie.secondary_height,
+        bogie.secondary_height - bogie.height,
+        bogie.height - bogie.primary_height,
+    )
+    side = bogie.secondary_lateral + bogie.secondary_lateral_damping * s
+    turn = (bogie.secondary_vertical + bogie.secondary_vertical_damping * s) * bogie.secondary_half**2
+    below = (bogie.front_stiffness + bogie.rear_stiffness) + (bogie.front_damping + bogie.rear_damping) * s
+    turned = square * frame.track_roll
+    seat = frame.y - h * frame.roll
+    # The body above: its lateral motion and roll, by Cramer's rule.
+    a11, a12 = bogie.load * square + side, side * lever
+    a22 = bogie.load_inertia * square + turn + lever * lever * side - weight * lever
+    b1 = (
+        side * seat
+        - bogie.load * (g * frame.deficiency - bogie.load_height * turned)
+        - weight * frame.roll
+    )
+    b2 = (
+        turn * frame.roll
+        + lever * side * seat
+        - bogie.load_inertia * turned
+        - lever * weight * frame.roll
+    )
+    over = 1.0 / (a11 * a22 - a12 * a12)
+    body_y, body_roll = (b1 * a22 - a12 * b2) * over, (a11 * b2 - a12 * b1) * over
+    bent = body_y + lever * body_roll - seat
+    force, moment = -side * bent, turn * (frame.roll - body_roll)
+    inertia = bogie.mass * (square * frame.y + g * frame.deficiency - bogie.height * turned)
+    borne = inertia + force - weight * frame.roll
+    torque = (
+        bogie.roll_inertia * (square * frame.roll + turned)
+        + moment
+        - h * force
+        + weight * bent
+        - e * borne
+        - e * all_weight * frame.roll
+    )
+    return frame.roll + torque / (below * bogie.primary_half**2)
