@@ -1,155 +1,252 @@
-"""How a mount moves in its track at the full rate of its IMU, given all that changes slowly.
+"""The rails that the track-relative smoother finds, how sure they are, and draws of what they may be.
 
-The smoother's own steps are so long, and what shakes a mount so far from white, that it takes most of a short
-motion for noise. Attitude and place want that; the rails do not: on an axle the motion is the rails. So what
-the smoother has found of the train, the map and the sensors is held, and what the IMU shows beside it is
-smoothed once more, sample by sample, with the noise of the sheet alone:
+What the mount does at the full rate of its IMU (`simrail.estimators.track_relative.full_rate`) says where the
+rails are:
 
-    gyro x  =  d roll/dt,      accel y  =  d2y/dt2 + g roll,
-    gyro y  =  d pitch/dt,     accel z  =  d2z/dt2
+* on an axle, whose wheels stand on them: at once;
+* on a bogie frame of which the drawing has springs and masses: under them
+  (`simrail.estimators.track_relative.under_frame`);
+* with a rail sensor, and on a mount of any other kind: as by the body itself.
 
-each of roll, pitch, y and z a process over the distance (`simrail.estimators.track_relative.rails_kernel`).
+The alignment is that of the mount, which a wheelset's play between the rails keeps from being theirs: the
+white motion that the mount's class has to the side stands for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy import signal
 from scipy.interpolate import CubicSpline
-from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.dual import Dual
-from simrail.estimators.track_relative.line import ground_at
-from simrail.estimators.track_relative.measurement import deviation_of, pose_of, shown
+from simrail.estimators.track_relative.full_rate import (
+    Chain,
+    Held,
+    Waviness,
+    error_of,
+    found,
+    found_before,
+    heave_of,
+    held_of,
+    nod_of,
+    side_of,
+)
 from simrail.estimators.track_relative.noise import AXLE, FRAME, motion_of
 from simrail.estimators.track_relative.output import Trace
-from simrail.estimators.track_relative.rails_kernel import Waves, simulate, smooth, stationary
+from simrail.estimators.track_relative.suspension import bogie_of
+from simrail.estimators.track_relative.under_frame import Under, draw_under, rails_under
+from simrail.estimators.trajectory.draws import stream_of
+from simrail.estimators.trajectory.track_geometry import (
+    Sight,
+    displaced,
+    geometry_of,
+    over_space,
+    sight_of,
+    slopes,
+)
 
-from simrail.core.columns import ACCEL, GYRO
+from simrail.core.columns import IRREGULARITY, IRREGULARITY_SD, RELATIVE_POSITION_SD
 from simrail.core.jit import FloatArray
+from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 
-FAST = (
-    at.ROLL,
-    at.ROLL_RATE,
-    at.PITCH,
-    at.PITCH_RATE,
-    at.Y,
-    at.Y_1,
-    at.Y_2,
-    at.Z,
-    at.Z_1,
-    at.Z_2,
-)
-"""States that are found anew."""
+LEAST_STEPS = 8
+"""Of the smoother, or places: on a shorter ride there is nothing of the rails to find."""
 
-SENSED = (GYRO[0], GYRO[1], ACCEL[1], ACCEL[2])
-"""Of what the IMU shows; what the others show says nothing of these."""
+WHEELS_M3 = (0.0, 1.5e-9, 1.4e-8, 0.0)
+"""What the wheels of an axle do between the rails: white over the track, m2 per cycle per m, two-sided, in the
+order of the irregularities; what simulated ones leave of waves of 3 to 25 m."""
 
-LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 3e-4, 3e-3
-"""Noise of a sample that is always added: of what the model is short of, and of an IMU that has none."""
+SLOW_LENGTH_M = 15.0
+"""Of the two filters through which white noise becomes the error of a roll that is held."""
 
 
-@dataclass(frozen=True)
-class Waviness:
-    """How a mount follows the rails: a standard deviation, and lengths of its filters, m, of each coordinate.
-
-    The sizes are synthetic, of good rails with waves of up to 100 m.
-    """
-
-    roll_sd: float = 1.3e-3
-    roll_lengths: tuple[float, float] = (2.5, 2.5)
-    pitch_sd: float = 7.3e-4
-    pitch_lengths: tuple[float, float] = (1.0, 1.0)
-    y_sd: float = 4e-3
-    y_lengths: tuple[float, float, float] = (2.2, 2.2, 2.2)
-    z_sd: float = 6e-3
-    z_lengths: tuple[float, float, float] = (48.0, 2.3, 2.3)
+SETTLED = 10
+"""Lengths after which a process has forgotten that it began with nothing."""
 
 
-class Held(NamedTuple):
-    """What is held, at n samples.
+class Motions(NamedTuple):
+    """Motion of a mount at its samples, by chains of coordinates, and their covariances.
 
     Attributes
     ----------
-    rest : ndarray (n, 4)
-        What of `SENSED` it does not explain, rad/s and m/s2.
-    speed, slope : ndarray (n,)
-        |ds/dt| and its slope, m/s and m/s2.
+    chains : dict of str to Chain
+        ``"side"`` (roll, y), ``"across"`` (the same, with what a mount does beside the rails for noise),
+        ``"heave"`` (z), and ``"nod"`` (pitch) where it is wanted.
+    values, covariances : dict of str to ndarray
+        (n, w), (n, w, w).
     """
 
-    rest: FloatArray
-    speed: FloatArray
-    slope: FloatArray
+    chains: dict[str, Chain]
+    values: dict[str, FloatArray]
+    covariances: dict[str, FloatArray]
 
 
-class Found(NamedTuple):
-    """Roll, pitch, y and z beside what is held, (n, 4), rad and m; and their covariance (n, 4, 4)."""
+def rails_of(
+    recording: Recording, trace: Trace, estimate: Estimate, *, step_m: float, draws: int
+) -> Estimate:
+    """An estimate with the geometry of the rails, and draws of its error if wanted.
 
-    motion: FloatArray
-    covariance: FloatArray
+    Parameters
+    ----------
+    recording : Recording
+    trace : Trace
+        Of the smoother, not of the filter.
+    estimate : Estimate
+        The states that were found.
+    step_m : float
+        Distance of the places.
+    draws : int
+        How many (`Estimate.geometry_draws`).
 
-
-def held_of(recording: Recording, trace: Trace) -> Held:
-    """What the smoothed states, but for `FAST`, leave of the signals."""
-    course, steps = trace.course, trace.course.steps
-    states = trace.states.copy()
-    states[:, FAST] = 0.0
-    x = [Dual(column) for column in states.T]
-    ground = ground_at(recording, course.lines, states[:, at.S])
-    around = course.around._replace(states=states)
-    seen = shown(x, ground, around)
-    explained = np.column_stack([seen[i].value for i in (0, 1, 4, 5)])
-    sense = around.sense
-    slow = np.column_stack([explained, states[:, at.V] * sense, states[:, at.A] * sense])
-    time = recording.imu.index.to_numpy(dtype=np.float64)
-    inside = np.clip(time, steps.time_s[0], steps.time_s[-1])
-    told = CubicSpline(steps.time_s, slow)(inside)
-    rest = recording.imu[list(SENSED)].to_numpy(dtype=np.float64) - told[:, :4]
-    return Held(rest, np.maximum(told[:, 4], 0.0), np.ascontiguousarray(told[:, 5]))
-
-
-def waves_of(recording: Recording, held: Held, waviness: Waviness) -> tuple[Waves, Waves, Waves]:
-    """The models of roll and y, of pitch, and of z."""
-    sheet = recording.imu_sheet
-    gyro = sheet.gyro_noise_radpsqrts**2 * sheet.rate_hz + LEAST_GYRO_RADPS**2
-    accel = sheet.accel_noise_mpsqrts**2 * sheet.rate_hz + LEAST_ACCEL_MPS2**2
-
-    def model(parts, rows, variances):
-        sizes = [len(lengths) for _, lengths in parts]
-        rates = np.full((len(parts), 3), np.inf)
-        for rate, (_, lengths) in zip(rates, parts, strict=True):
-            rate[: len(lengths)] = sorted(1.0 / length for length in lengths)
-        rates[np.isinf(rates)] = 0.0
-        shape = (4, len(rows), sum(sizes))
-        table = np.zeros(shape)
-        for m, row in enumerate(rows):
-            for kind, state, value in row:
-                table[kind, m, state] = value
-        return Waves(
-            held.speed, held.slope, 1.0 / sheet.rate_hz, np.array(sizes), rates,
-            np.array([sd for sd, _ in parts]), *table, np.array(variances),
-        )
-
-    g = recording.gravity_mps2
-    w = waviness
-    side = model(
-        [(w.roll_sd, w.roll_lengths), (w.y_sd, w.y_lengths)],
-        [[(1, 1, 1.0)], [(0, 0, g), (2, 4, 1.0), (3, 3, 1.0)]],
-        [gyro, accel],
-    )
-    nod = model([(w.pitch_sd, w.pitch_lengths)], [[(1, 1, 1.0)]], [gyro])
-    heave = model([(w.z_sd, w.z_lengths)], [[(2, 2, 1.0), (3, 1, 1.0)]], [accel])
-    return side, nod, heave
+    Returns
+    -------
+    Estimate
+        On a mount that is neither an axle nor a frame by the drawing, with the geometry as the smoother's
+        own states have it, and no draws.
+    """
+    kind = motion_of(recording)
+    if kind not in (AXLE, FRAME) or len(trace.states) < LEAST_STEPS:
+        return replace(estimate, geometry=geometry_of(sight_of(estimate, recording), step_m=step_m))
+    held, on_frame = held_of(recording, trace), kind is FRAME and recording.rail_displacement is None
+    sheet, bogie = recording.vehicle_sheet, None
+    if on_frame and sheet is not None:
+        bogie = bogie_of(sheet, recording.mount_body)
+    motions = _motions(recording, held, kind.accel_y, pitch=bogie is not None)
+    sight, slow = _seen_from(recording, trace, estimate, motions)
+    geometry, under = geometry_of(sight, step_m=step_m), None
+    wheels = np.array(WHEELS_M3) / step_m
+    if bogie is not None and sheet is not None and len(geometry) >= LEAST_STEPS:
+        motion = _frame_motion(motions.values)
+        at = geometry.index.to_numpy(dtype=np.float64)
+        under = rails_under(recording, held, motion, bogie, sheet.stiffness_relative_sd, at)
+        geometry = _with_rails(geometry, under, sight, slow, motions, step_m)
+        wheels = np.zeros(4)
+    for sd, variance in zip(IRREGULARITY_SD, wheels, strict=True):
+        geometry[sd] = np.hypot(geometry[sd], np.sqrt(variance))
+    drawn = None
+    if draws:
+        drawn = _draws(recording, geometry, sight, slow, motions, under, wheels, step_m, draws)
+    return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
 
-def smoothed(held: Held, models) -> Found:
-    n = len(held.speed)
-    motion, covariance = np.zeros((n, 4)), np.zeros((n, 4, 4))
-    for waves, rows, into, out in zip(models, ([0, 2], [1], [3]), ([0, 2], [1], [3]), ([0, 2], [0], [0]), strict=True):
-        s = waves.constant.shape[1]
-        states, square = np.empty((n, s)), np.empty((n, s, s))
-        smooth(waves, np.ascontiguousarray(held.rest[:, rows]), states, square)
-        motion[:, into] = states[:, out]
-        covariance[np.ix_(range(n), into, into)] = square[:, out][:, :, out]
-    return Found(motion, covariance)
+def _motions(recording: Recording, held: Held, accel_y: float, *, pitch: bool) -> Motions:
+    waviness = Waviness()
+    sensor = recording.rail_displacement is not None
+    chains = {
+        "side": side_of(recording, held, waviness),
+        "heave": heave_of(recording, held, waviness),
+    }
+    if not sensor:
+        chains["across"] = side_of(recording, held, waviness, accel_y)
+    if pitch:
+        chains["nod"] = nod_of(recording, held, waviness)
+    results = {name: found(one, held.rest) for name, one in chains.items()}
+    if sensor:
+        chains["across"], results["across"] = chains["side"], results["side"]
+    values = {name: result[0] for name, result in results.items()}
+    return Motions(chains, values, {name: result[1] for name, result in results.items()})
+
+
+def _seen_from(
+    recording: Recording, trace: Trace, estimate: Estimate, motions: Motions
+) -> tuple[Sight, FloatArray]:
+    """Rails by the body as it moves at full rate, and the variance (n,) of the roll that is held."""
+    states, before = estimate.states.copy(), found_before(recording, trace)
+    for name, values, old in (
+        ("roll_rad", motions.values["side"][:, 0], before[:, 0]),
+        ("lateral_m", motions.values["across"][:, 1], before[:, 1]),
+        ("vertical_m", motions.values["heave"][:, 0], before[:, 2]),
+    ):
+        states[name] += values - old
+    fast = motions.covariances["side"][:, 0, 0]
+    slow = states["roll_sd_rad"].to_numpy(dtype=np.float64) ** 2
+    variances = [motions.covariances["across"][:, 1, 1], motions.covariances["heave"][:, 0, 0]]
+    states["roll_sd_rad"] = np.sqrt(fast + slow)
+    states[list(RELATIVE_POSITION_SD)] = np.sqrt(np.column_stack(variances))
+    return sight_of(replace(estimate, states=states), recording), slow
+
+
+def _frame_motion(values: dict[str, FloatArray]) -> FloatArray:
+    """Roll, y, z and pitch (n, 4)."""
+    return np.column_stack([values["side"], values["heave"], values["nod"]])
+
+
+def _with_rails(
+    geometry: pd.DataFrame, under: Under, sight: Sight, slow: FloatArray, motions: Motions, step_m: float
+) -> pd.DataFrame:
+    """The geometry with profile and cross-level of the rails under a frame, and their sds."""
+    base = float(sight.arms[0, 0, 1] - sight.arms[0, 1, 1])
+    variances = [
+        motions.covariances["heave"][:, 0, 0],
+        base**2 * (motions.covariances["side"][:, 0, 0] + slow),
+        sight.place_sd**2,
+    ]
+    spread = _spread(sight, np.column_stack(variances), step_m)
+    at = geometry.index.to_numpy(dtype=np.float64)
+    moved = displaced(at, under.rails, np.sqrt(spread[:, 2]))
+    out = geometry.copy()
+    for i, name in enumerate(("vertical_profile", "cross_level")):
+        out[f"{name}_m"] = under.rails[:, i]
+        out[f"{name}_sd_m"] = np.sqrt(spread[:, i] + under.variance[:, i] + moved[:, i])
+    return out
+
+
+def _spread(sight: Sight, variances: FloatArray, step_m: float) -> FloatArray:
+    """Variances (n, m) at the samples, at the places (g, m) of the geometry."""
+    used = variances[sight.use]
+    found_there = over_space(sight.place[sight.use], used, step_m=step_m, variance=used).variance
+    assert found_there is not None
+    return found_there
+
+
+def _draws(
+    recording: Recording,
+    geometry: pd.DataFrame,
+    sight: Sight,
+    slow: FloatArray,
+    motions: Motions,
+    under: Under | None,
+    wheels: FloatArray,
+    step_m: float,
+    count: int,
+) -> FloatArray:
+    """Draws (m, g, 4) of true minus estimated irregularities.
+
+    Of one cause each, and independent: the motion, what wheels do between the rails, the roll that is held,
+    a displacement along the track (one normal number for a draw, as in
+    `simrail.estimators.trajectory.draws`), and under a frame the numbers of the drawing.
+    """
+    at = geometry.index.to_numpy(dtype=np.float64)
+    lines = geometry[list(IRREGULARITY)].to_numpy(dtype=np.float64)
+    unknown, known = np.isnan(lines), np.nan_to_num(lines)
+    drawn = np.zeros((count, *lines.shape))
+    if len(at) == 0:
+        return drawn
+    slope, place = slopes(sight.arms)[sight.use], sight.place[sight.use]
+    spread = np.sqrt(_spread(sight, np.column_stack([slow, sight.place_sd**2]), step_m))
+    along, base = CubicSpline(at, known), float(slope[0, 2, 0])
+    for draw in range(count):
+        rng = stream_of(recording, draw, "track_relative")
+        errors = {name: error_of(one, rng) for name, one in motions.chains.items()}
+        felt = np.column_stack([errors["side"][:, 0], errors["across"][:, 1], errors["heave"][:, 0]])
+        rails = np.einsum("nij,nj->ni", slope, felt[sight.use])
+        if sight.noise_sd > 0.0:
+            rails += sight.noise_sd * np.sqrt([0.5, 0.5, 2.0, 2.0]) * rng.standard_normal(rails.shape)
+        drawn[draw] = over_space(place, rails, step_m=step_m).values
+        if under is not None:
+            drawn[draw][:, 1:3] = draw_under(under, _frame_motion(errors), rng)
+        drawn[draw] += np.sqrt(wheels) * rng.standard_normal(lines.shape)
+        drawn[draw][:, 2] += base * spread[:, 0] * _slowly(len(at), step_m, rng)
+        moved = at + stream_of(recording, draw, "position").standard_normal() * spread[:, 1]
+        drawn[draw] += along(np.clip(moved, at[0], at[-1])) - known
+        drawn[draw][unknown] = np.nan
+    return drawn
+
+
+def _slowly(n: int, step_m: float, rng: np.random.Generator) -> FloatArray:
+    """A stationary process (n,) of variance 1, of white noise through two filters of `SLOW_LENGTH_M`."""
+    kept, before = np.exp(-step_m / SLOW_LENGTH_M), round(SETTLED * SLOW_LENGTH_M / step_m)
+    line = signal.lfilter([1.0], [1.0, -2.0 * kept, kept**2], rng.standard_normal(before + n))[before:]
+    # The variance of an autoregressive process of second order with a double root.
+    return np.asarray(line * np.sqrt((1.0 - kept**2) ** 3 / (1.0 + kept**2)))

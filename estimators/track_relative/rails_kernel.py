@@ -62,8 +62,8 @@ class Waves(NamedTuple):
         Stationary standard deviations.
     constant, by_speed, by_square, by_slope : ndarray (m, s)
         Coefficients of the measurements.
-    variances : ndarray (m,)
-        Of their noise.
+    variances, shaking : ndarray (m,)
+        Of their noise: variances + u^3 shaking.
     """
 
     speed: FloatArray
@@ -77,6 +77,7 @@ class Waves(NamedTuple):
     by_square: FloatArray
     by_slope: FloatArray
     variances: FloatArray
+    shaking: FloatArray
 
 
 @njit_borrowed
@@ -252,7 +253,8 @@ def run_segment(
             error = measured[k, m]
             for i in range(s):
                 error -= desk.h[i] * x[i]
-            variance = update(x, p, desk.h, error, waves.variances[m], desk.gain, desk.v)
+            noise = waves.variances[m] + waves.speed[k] ** 3 * waves.shaking[m]
+            variance = update(x, p, desk.h, error, noise, desk.gain, desk.v)
             for i in range(s):
                 for c in range(i + 1, s):
                     p[c, i] = p[i, c]
@@ -260,18 +262,31 @@ def run_segment(
                 remember(past, k - first, m, desk.h, desk.gain, error, variance)
 
 
-def smooth(waves: Waves, measured: FloatArray, states: FloatArray, covariance: FloatArray) -> None:
-    """Smoothed states (n, s) and their covariance (n, s, s); of no rows if it is not wanted."""
-    past = room_for_history(min(SEGMENT, len(states)), states.shape[1], measured.shape[1])
-    there_and_back(waves, measured, states, covariance, past)
+def smooth(
+    waves: Waves, measured: FloatArray, wanted: IntArray, with_covariance: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Smoothed states of which the numbers are wanted, (n, w), and their covariance (n, w, w), or (0, w, w).
+
+    ``measured`` is (n, m).
+    """
+    n, w = len(measured), len(wanted)
+    states, covariance = np.empty((n, w)), np.empty((n if with_covariance else 0, w, w))
+    past = room_for_history(min(SEGMENT, n), waves.constant.shape[1], measured.shape[1])
+    there_and_back(waves, measured, wanted, states, covariance, past)
+    return states, covariance
 
 
 @njit
 def there_and_back(
-    waves: Waves, measured: FloatArray, states: FloatArray, covariance: FloatArray, past: History
+    waves: Waves,
+    measured: FloatArray,
+    wanted: IntArray,
+    states: FloatArray,
+    covariance: FloatArray,
+    past: History,
 ) -> None:
     """`smooth` with room to keep a segment."""
-    n, s = states.shape
+    n, s = measured.shape[0], waves.constant.shape[1]
     segments = (n + SEGMENT - 1) // SEGMENT
     starts, squares = np.zeros((segments, s)), np.zeros((segments, s, s))
     x, p, desk = np.zeros(s), stationary(waves), desk_of(waves)
@@ -284,7 +299,7 @@ def there_and_back(
         first, last = number * SEGMENT, min((number + 1) * SEGMENT, n)
         x[:], p[:] = starts[number], squares[number]
         run_segment(waves, measured, first, last, x, p, desk, past, True)
-        back(past, first, last, lam, info, desk, states, covariance)
+        back(past, first, last, lam, info, desk, wanted, states, covariance)
 
 
 @njit_borrowed
@@ -295,18 +310,19 @@ def back(
     lam: FloatArray,
     info: FloatArray,
     desk: Desk,
+    wanted: IntArray,
     states: FloatArray,
     covariance: FloatArray,
 ) -> None:
     """Back over a segment, as in `simrail.estimators.kalman.fixed_interval`."""
-    s = lam.shape[0]
+    s, sure = lam.shape[0], covariance.shape[0] > 0
     v = desk.v
     for k in range(last - 1, first - 1, -1):
         at = k - first
         for m in range(past.rows.shape[1] - 1, -1, -1):
             h, gain = past.rows[at, m], past.gains[at, m]
             withdraw(lam, h, gain, past.errors[at, m])
-            if covariance.shape[0] > 0:
+            if sure:
                 for c in range(s):
                     total = 0.0
                     for i in range(s):
@@ -314,11 +330,12 @@ def back(
                     v[c] = total
                 withdraw_information(info, h, gain, past.inverses[at, m], v)
         p, f = past.covariances[at], past.transitions[at]
-        for i in range(s):
+        for a in range(wanted.shape[0]):
+            i = wanted[a]
             total = past.states[at, i]
             for c in range(s):
                 total -= p[i, c] * lam[c]
-            states[k, i] = total
+            states[k, a] = total
         for i in range(s):
             total = 0.0
             for c in range(s):
@@ -326,31 +343,29 @@ def back(
             v[i] = total
         for i in range(s):
             lam[i] = v[i]
-        if covariance.shape[0] > 0:
-            sandwich(p, info, desk.work, covariance[k])
+        if sure:
+            speak(p, info, wanted, v, covariance[k])
             for i in range(s):
                 for c in range(s):
-                    covariance[k, i, c] = p[i, c] - covariance[k, i, c]
                     desk.f[c, i] = f[i, c]
             congruence(desk.f, info, desk.work)
 
 
 @njit_borrowed
-def sandwich(p: FloatArray, info: FloatArray, work: FloatArray, out: FloatArray) -> None:
-    """P Lam P into ``out``."""
+def speak(p: FloatArray, info: FloatArray, wanted: IntArray, v: FloatArray, out: FloatArray) -> None:
+    """P - P Lam P for the states that are wanted."""
     s = p.shape[0]
-    for i in range(s):
+    for a in range(wanted.shape[0]):
         for c in range(s):
             total = 0.0
             for j in range(s):
-                total += p[i, j] * info[j, c]
-            work[i, c] = total
-    for i in range(s):
-        for c in range(s):
-            total = 0.0
-            for j in range(s):
-                total += work[i, j] * p[j, c]
-            out[i, c] = total
+                total += p[wanted[a], j] * info[j, c]
+            v[c] = total
+        for b in range(wanted.shape[0]):
+            total = p[wanted[a], wanted[b]]
+            for c in range(s):
+                total -= v[c] * p[c, wanted[b]]
+            out[a, b] = total
 
 
 @njit
@@ -378,7 +393,8 @@ def simulate(
             x[i] = states[k, i] = desk.v[i]
         for m in range(measured.shape[1]):
             row_of(waves, k, m, desk.h)
-            total = math.sqrt(waves.variances[m]) * normals[k, drives + m]
+            noise = waves.variances[m] + waves.speed[k] ** 3 * waves.shaking[m]
+            total = math.sqrt(noise) * normals[k, drives + m]
             for i in range(s):
                 total += desk.h[i] * x[i]
             measured[k, m] = total

@@ -21,13 +21,13 @@ that leans out loads the outer side.
 w is the mean roll of both axles, of which the rails' own follows by `simrail.estimators.track_relative.rails`.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from simrail.core.jit import FloatArray
+from simrail.recording.sheets.vehicle_sheet import SheetBody, VehicleSheet
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -44,10 +44,11 @@ class Bogie:
         Places of the axles, forward.
     front_stiffness, rear_stiffness, front_damping, rear_damping : float
         Vertical, of both sides, N/m and N s/m.
-    primary_half, primary_height : float
-        Half the distance of left and right springs as it counts for roll, and their height, m.
-    secondary_vertical, secondary_lateral, secondary_vertical_damping, secondary_lateral_damping : float
-    secondary_half, secondary_height : float
+    primary_roll, primary_roll_damping, primary_height : float
+        Of both axles against roll, N m/rad and N m s/rad; height of the springs, m.
+    secondary_vertical, secondary_lateral, secondary_roll : float
+    secondary_vertical_damping, secondary_lateral_damping, secondary_roll_damping, secondary_height : float
+        Of the springs above, alike.
     load, load_inertia, load_height : float
         Share of the mass above, kg, and of its roll inertia, kg m2; height of its centre of gravity, m.
     """
@@ -62,17 +63,112 @@ class Bogie:
     rear_stiffness: float
     front_damping: float
     rear_damping: float
-    primary_half: float
+    primary_roll: float
+    primary_roll_damping: float
     primary_height: float
     secondary_vertical: float
     secondary_lateral: float
+    secondary_roll: float
     secondary_vertical_damping: float
     secondary_lateral_damping: float
-    secondary_half: float
+    secondary_roll_damping: float
     secondary_height: float
     load: float
     load_inertia: float
     load_height: float
+
+
+UNCERTAIN = (
+    ("front_stiffness", "rear_stiffness", "primary_roll"),
+    ("front_damping", "rear_damping", "primary_roll_damping"),
+    ("secondary_vertical",),
+    ("secondary_roll",),
+    ("secondary_lateral",),
+    ("secondary_vertical_damping", "secondary_roll_damping"),
+    ("secondary_lateral_damping",),
+    ("mass",),
+    ("roll_inertia",),
+    ("pitch_inertia",),
+    ("load",),
+    ("load_inertia",),
+)
+"""Numbers of a drawing that may be wrong, and which of them by the same factor."""
+
+
+def changed(bogie: Bogie, names: tuple[str, ...], share: float) -> Bogie:
+    """A bogie of which some numbers are larger by a share."""
+    return replace(bogie, **{name: getattr(bogie, name) * (1.0 + share) for name in names})
+
+
+def bogie_of(sheet: VehicleSheet, name: str) -> Bogie | None:
+    """The frame of a name; None if it is not one on two axles under one body, or the drawing lacks a number.
+
+    A body on several supports puts its mass on them as its centre of gravity lies between; what it carries
+    itself is added to it.
+    """
+    frame = sheet.body(name)
+    above = [body for body in sheet.bodies if any(support.on == name for support in body.supports)]
+    if frame is None or len(above) != 1 or len(frame.springs) != 2 or not _is_whole(frame):
+        return None
+    load = above[0]
+    if not load.springs or not _is_whole(load):
+        return None
+    places = [support.x_m for support in load.supports]
+    number = [support.on for support in load.supports].index(name)
+    share, over, under = _share(places, number), load.springs[number], frame.springs
+    order = sorted((0, 1), key=lambda i: -frame.supports[i].x_m)
+    front, rear = (under[i] for i in order)
+    assert frame.mass_kg and frame.roll_inertia_kgm2 and frame.pitch_inertia_kgm2
+    assert load.roll_inertia_kgm2 and frame.height_m is not None and load.height_m is not None
+    return Bogie(
+        mass=frame.mass_kg,
+        roll_inertia=frame.roll_inertia_kgm2,
+        pitch_inertia=frame.pitch_inertia_kgm2,
+        height=frame.height_m,
+        front=frame.supports[order[0]].x_m,
+        rear=frame.supports[order[1]].x_m,
+        front_stiffness=front.vertical_npm,
+        rear_stiffness=rear.vertical_npm,
+        front_damping=front.vertical_nspm,
+        rear_damping=rear.vertical_nspm,
+        primary_roll=front.roll_nmprad + rear.roll_nmprad,
+        primary_roll_damping=front.roll_nmsprad + rear.roll_nmsprad,
+        primary_height=0.5 * (front.height_m + rear.height_m),
+        secondary_vertical=over.vertical_npm,
+        secondary_lateral=over.lateral_npm,
+        secondary_roll=over.roll_nmprad,
+        secondary_vertical_damping=over.vertical_nspm,
+        secondary_lateral_damping=over.lateral_nspm,
+        secondary_roll_damping=over.roll_nmsprad,
+        secondary_height=over.height_m,
+        load=share * _mass_with_load(sheet, load),
+        load_inertia=share * load.roll_inertia_kgm2,
+        load_height=load.height_m,
+    )
+
+
+def _is_whole(body: SheetBody) -> bool:
+    known = (body.mass_kg, body.roll_inertia_kgm2, body.pitch_inertia_kgm2, body.height_m)
+    return None not in known
+
+
+def _share(places: list[float], number: int) -> float:
+    """Share of a body's weight that one of its supports bears, its centre of gravity being at 0."""
+    if len(places) != 2 or places[0] == places[1]:
+        return 1.0 / len(places)
+    other = places[1 - number]
+    return other / (other - places[number])
+
+
+def _mass_with_load(sheet: VehicleSheet, body: SheetBody) -> float:
+    """Mass of a body and of what rests on it."""
+    total = body.mass_kg or 0.0
+    for upper in sheet.bodies:
+        on = [support.on for support in upper.supports]
+        if body.name in on:
+            places = [support.x_m for support in upper.supports]
+            total += _share(places, on.index(body.name)) * _mass_with_load(sheet, upper)
+    return total
 
 
 class Frame(NamedTuple):
@@ -115,8 +211,7 @@ def _roll(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> Comple
         bogie.height - bogie.primary_height,
     )
     side = bogie.secondary_lateral + bogie.secondary_lateral_damping * s
-    turn = (bogie.secondary_vertical + bogie.secondary_vertical_damping * s) * bogie.secondary_half**2
-    below = (bogie.front_stiffness + bogie.rear_stiffness) + (bogie.front_damping + bogie.rear_damping) * s
+    turn = bogie.secondary_roll + bogie.secondary_roll_damping * s
     turned = square * frame.track_roll
     seat = frame.y - h * frame.roll
     # The body above: its lateral motion and roll, by Cramer's rule.
@@ -147,4 +242,4 @@ def _roll(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> Comple
         - e * borne
         - e * all_weight * frame.roll
     )
-    return frame.roll + torque / (below * bogie.primary_half**2)
+    return frame.roll + torque / (bogie.primary_roll + bogie.primary_roll_damping * s)
