@@ -67,7 +67,7 @@ class Waviness:
     pitch_sd: float = 7.3e-4
     pitch_lengths: tuple[float, ...] = (1.0, 1.0)
     y_sd: float = 4e-3
-    y_lengths: tuple[float, ...] = (2.2, 2.2, 2.2)
+    y_lengths: tuple[float, ...] = (6.0, 2.2, 2.2)
     z_sd: float = 6e-3
     z_lengths: tuple[float, ...] = (48.0, 2.3, 2.3)
 
@@ -212,11 +212,11 @@ def chain(
     return Chain(waves, tuple(rows), np.cumsum([0, *sizes[:-1]]))
 
 
-def side_of(recording: Recording, held: Held, waviness: Waviness, accel_y: float = 0.0) -> Chain:
-    """Roll and y; ``accel_y`` is motion to the side that is none of the rails, as in `Motion`, m/s2."""
+def side_of(recording: Recording, held: Held, waviness: Waviness, aside: float = 0.0) -> Chain:
+    """Roll and y; ``aside`` is motion that is none of the rails, per sample of 125 Hz at `AT_MPS`, m/s2."""
     parts = [(waviness.roll_sd, waviness.roll_lengths), (waviness.y_sd, waviness.y_lengths)]
     felt = [(CONSTANT, 0, recording.gravity_mps2), (BY_SQUARE, 4, 1.0), (BY_SLOPE, 3, 1.0)]
-    shaking = accel_y**2 * recording.imu_sheet.rate_hz / MOTION_RATE_HZ / AT_MPS**3
+    shaking = aside**2 * recording.imu_sheet.rate_hz / MOTION_RATE_HZ / AT_MPS**3
     return chain(recording, held, parts, {0: [(BY_SPEED, 1, 1.0)], 2: felt}, shaking)
 
 

@@ -8,8 +8,8 @@ rails are:
   (`simrail.estimators.track_relative.under_frame`);
 * with a rail sensor, and on a mount of any other kind: as by the body itself.
 
-The alignment is that of the mount, which a wheelset's play between the rails keeps from being theirs: the
-white motion that the mount's class has to the side stands for it.
+The alignment is that of the mount, which a wheelset's play between the rails keeps from being theirs: white
+motion to the side (`ASIDE_MPS2`) stands for it.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import signal
+from scipy import ndimage, signal
 from scipy.interpolate import CubicSpline
 from simrail.estimators.track_relative.full_rate import (
     Chain,
@@ -31,6 +31,7 @@ from simrail.estimators.track_relative.full_rate import (
     nod_of,
     side_of,
 )
+from simrail.estimators.track_relative.line import Lines
 from simrail.estimators.track_relative.noise import AXLE, FRAME, motion_of
 from simrail.estimators.track_relative.output import Trace
 from simrail.estimators.track_relative.suspension import bogie_of
@@ -53,13 +54,19 @@ from simrail.recording.recording import Recording
 LEAST_STEPS = 8
 """Of the smoother, or places: on a shorter ride there is nothing of the rails to find."""
 
-WHEELS_M3 = (0.0, 1.5e-9, 1.4e-8, 0.0)
+WHEELS_M3 = (1.2e-8, 1.5e-9, 1.4e-8, 0.0)
 """What the wheels of an axle do between the rails: white over the track, m2 per cycle per m, two-sided, in the
 order of the irregularities; what simulated ones leave of waves of 3 to 25 m."""
+
+ASIDE_MPS2 = {AXLE: 0.18, FRAME: 0.22}
+"""Motion to the side that is none of the rails, as in `side_of`; synthetic, of simulated bogies of a metro."""
 
 SLOW_LENGTH_M = 15.0
 """Of the two filters through which white noise becomes the error of a roll that is held."""
 
+
+LONGEST_M = 48.0
+"""Longest filter of `Waviness`."""
 
 SETTLED = 10
 """Lengths after which a process has forgotten that it began with nothing."""
@@ -112,7 +119,7 @@ def rails_of(
     sheet, bogie = recording.vehicle_sheet, None
     if on_frame and sheet is not None:
         bogie = bogie_of(sheet, recording.mount_body)
-    motions = _motions(recording, held, kind.accel_y, pitch=bogie is not None)
+    motions = _motions(recording, held, ASIDE_MPS2[kind], pitch=bogie is not None)
     sight, slow = _seen_from(recording, trace, estimate, motions)
     geometry, under = geometry_of(sight, step_m=step_m), None
     wheels = np.array(WHEELS_M3) / step_m
@@ -121,16 +128,16 @@ def rails_of(
         at = geometry.index.to_numpy(dtype=np.float64)
         under = rails_under(recording, held, motion, bogie, sheet.stiffness_relative_sd, at)
         geometry = _with_rails(geometry, under, sight, slow, motions, step_m)
-        wheels = np.zeros(4)
+        wheels[1:] = 0.0
     for sd, variance in zip(IRREGULARITY_SD, wheels, strict=True):
         geometry[sd] = np.hypot(geometry[sd], np.sqrt(variance))
     drawn = None
     if draws:
-        drawn = _draws(recording, geometry, sight, slow, motions, under, wheels, step_m, draws)
+        drawn = _draws(recording, trace.course.lines, geometry, sight, slow, motions, under, wheels, step_m, draws)
     return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
 
-def _motions(recording: Recording, held: Held, accel_y: float, *, pitch: bool) -> Motions:
+def _motions(recording: Recording, held: Held, aside: float, *, pitch: bool) -> Motions:
     waviness = Waviness()
     sensor = recording.rail_displacement is not None
     chains = {
@@ -138,7 +145,7 @@ def _motions(recording: Recording, held: Held, accel_y: float, *, pitch: bool) -
         "heave": heave_of(recording, held, waviness),
     }
     if not sensor:
-        chains["across"] = side_of(recording, held, waviness, accel_y)
+        chains["across"] = side_of(recording, held, waviness, aside)
     if pitch:
         chains["nod"] = nod_of(recording, held, waviness)
     results = {name: found(one, held.rest) for name, one in chains.items()}
@@ -202,6 +209,7 @@ def _spread(sight: Sight, variances: FloatArray, step_m: float) -> FloatArray:
 
 def _draws(
     recording: Recording,
+    lines_of_map: Lines,
     geometry: pd.DataFrame,
     sight: Sight,
     slow: FloatArray,
@@ -214,7 +222,7 @@ def _draws(
     """Draws (m, g, 4) of true minus estimated irregularities.
 
     Of one cause each, and independent: the motion, what wheels do between the rails, the roll that is held,
-    a displacement along the track (one normal number for a draw, as in
+    the map's gradients, a displacement along the track (one normal number for a draw, as in
     `simrail.estimators.trajectory.draws`), and under a frame the numbers of the drawing.
     """
     at = geometry.index.to_numpy(dtype=np.float64)
@@ -237,11 +245,30 @@ def _draws(
         if under is not None:
             drawn[draw][:, 1:3] = draw_under(under, _frame_motion(errors), rng)
         drawn[draw] += np.sqrt(wheels) * rng.standard_normal(lines.shape)
+        drawn[draw][:, 1] += _by_gradients(recording, lines_of_map, at, rng)
         drawn[draw][:, 2] += base * spread[:, 0] * _slowly(len(at), step_m, rng)
         moved = at + stream_of(recording, draw, "position").standard_normal() * spread[:, 1]
         drawn[draw] += along(np.clip(moved, at[0], at[-1])) - known
         drawn[draw][unknown] = np.nan
     return drawn
+
+
+def _by_gradients(
+    recording: Recording, lines: Lines, at: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Heights (g,) by which a map whose gradients err passes for an irregularity: a kink in each vertical curve.
+
+    Without waves that the smoother does not follow (`LONGEST_M`).
+    """
+    edges = np.flatnonzero(np.diff(lines.vertical, prepend=0.0, append=0.0) != 0.0)
+    if len(edges) == 0 or len(at) < LEAST_STEPS:
+        return np.zeros(len(at))
+    ends = lines.places[np.minimum(edges, len(lines.places) - 1)]
+    slopes_of = recording.map_errors.gradient_sd * rng.standard_normal(len(edges) // 2 + 1)
+    slope = np.interp(at, ends, np.repeat(slopes_of, 2)[1:-1])
+    step = (at[-1] - at[0]) / (len(at) - 1)
+    height = np.cumsum(slope - slope.mean()) * step
+    return np.asarray(height - ndimage.gaussian_filter1d(height, LONGEST_M / step, mode="nearest"))
 
 
 def _slowly(n: int, step_m: float, rng: np.random.Generator) -> FloatArray:
