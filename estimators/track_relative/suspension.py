@@ -14,8 +14,8 @@ the track that turns and curves (q: cant deficiency over g; phi_t: its roll):
 
 with the mass B above, on springs K, C; M and F_e the moment and the lateral force of these, d how far they
 are bent to the side, W and W_f the weight above and below the frame, F_p the lateral force of the axles. The
-body above is a rigid one that sways on its springs, with the roll and the lateral motion of this frame alone
-as its ground. A spring pulls in the axes of the body below at the point on the body above, so that a body
+body above is a rigid one that sways on its springs; its ground is the mean of the frames that bear it, each
+of which has its share of the body. A spring pulls in the axes of the body below at the point on the body above, so that a body
 that leans out loads the outer side.
 
 w is the mean roll of both axles, of which the rails' own follows by `simrail.estimators.track_relative.rails`.
@@ -51,6 +51,8 @@ class Bogie:
         Of the springs above, alike.
     load, load_inertia, load_height : float
         Share of the mass above, kg, and of its roll inertia, kg m2; height of its centre of gravity, m.
+    bearers : tuple of float
+        Places of the frames that bear it, from this one, m.
     """
 
     mass: float
@@ -76,6 +78,7 @@ class Bogie:
     load: float
     load_inertia: float
     load_height: float
+    bearers: tuple[float, ...] = (0.0,)
 
 
 UNCERTAIN = (
@@ -144,6 +147,7 @@ def bogie_of(sheet: VehicleSheet, name: str) -> Bogie | None:
         load=share * _mass_with_load(sheet, load),
         load_inertia=share * load.roll_inertia_kgm2,
         load_height=load.height_m,
+        bearers=tuple(x - places[number] for x in places),
     )
 
 
@@ -172,7 +176,17 @@ def _mass_with_load(sheet: VehicleSheet, body: SheetBody) -> float:
 
 
 class Frame(NamedTuple):
-    """Spectra of a frame's motion (f,), at its centre of gravity: m and rad; q as such."""
+    """Spectra of a frame's motion, (f,).
+
+    Attributes
+    ----------
+    y, z, roll, pitch : ndarray
+        Of its centre of gravity, m and rad.
+    deficiency, track_roll : ndarray
+        Cant deficiency over g, and roll of the track, rad.
+    ground : ndarray (4, f)
+        Mean of y, roll, deficiency and track roll over all frames that bear the load.
+    """
 
     y: ComplexArray
     z: ComplexArray
@@ -180,6 +194,20 @@ class Frame(NamedTuple):
     pitch: ComplexArray
     deficiency: ComplexArray
     track_roll: ComplexArray
+    ground: ComplexArray
+
+
+def alone(
+    y: ComplexArray,
+    z: ComplexArray,
+    roll: ComplexArray,
+    pitch: ComplexArray,
+    deficiency: ComplexArray,
+    track_roll: ComplexArray,
+) -> Frame:
+    """A frame that bears its load by itself."""
+    ground = np.stack([y, roll, deficiency, track_roll])
+    return Frame(y, z, roll, pitch, deficiency, track_roll, ground)
 
 
 def axles_under(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> ComplexArray:
@@ -214,20 +242,13 @@ def _roll(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> Comple
     turn = bogie.secondary_roll + bogie.secondary_roll_damping * s
     turned = square * frame.track_roll
     seat = frame.y - h * frame.roll
+    y, roll, deficiency, track_roll = frame.ground
+    ground, ground_turned = y - h * roll, square * track_roll
     # The body above: its lateral motion and roll, by Cramer's rule.
     a11, a12 = bogie.load * square + side, side * lever
     a22 = bogie.load_inertia * square + turn + lever * lever * side - weight * lever
-    b1 = (
-        side * seat
-        - bogie.load * (g * frame.deficiency - bogie.load_height * turned)
-        - weight * frame.roll
-    )
-    b2 = (
-        turn * frame.roll
-        + lever * side * seat
-        - bogie.load_inertia * turned
-        - lever * weight * frame.roll
-    )
+    b1 = side * ground - bogie.load * (g * deficiency - bogie.load_height * ground_turned) - weight * roll
+    b2 = turn * roll + lever * (side * ground - weight * roll) - bogie.load_inertia * ground_turned
     over = 1.0 / (a11 * a22 - a12 * a12)
     body_y, body_roll = (b1 * a22 - a12 * b2) * over, (a11 * b2 - a12 * b1) * over
     bent = body_y + lever * body_roll - seat

@@ -32,6 +32,7 @@ from simrail.estimators.track_relative.suspension import (
     Bogie,
     ComplexArray,
     Frame,
+    alone,
     axles_under,
     changed,
 )
@@ -205,10 +206,12 @@ def _axles(ride: Ride, bogies: list[Bogie], motion: FloatArray, forced: FloatArr
     x, y, height = ride.mount
     roll, pitch, up = motion[:, 0], motion[:, 3], height - bogies[0].height
     at_centre = [motion[:, 1] + up * roll, motion[:, 2] + x * pitch - y * roll, roll, pitch, *forced.T]
+    ground = _ground(ride, bogies[0], np.column_stack([at_centre[0], roll, forced]))
     extra, n = round(BLEND_S / ride.dt), len(motion)
     length = next_fast_len(n + extra, real=True)
     top = min(int(TOP_HZ * length * ride.dt), length // 2)
-    spectra = [rfft(_blended(column, length))[:top] for column in at_centre]
+    spectra = [rfft(_blended(column, length))[:top] for column in (*at_centre, *ground.T)]
+    frame = Frame(*spectra[:6], np.array(spectra[6:]))
     s = 2j * np.pi * rfftfreq(length, ride.dt)[:top]
     count = next_fast_len(4 * top, real=True)
     time = np.arange(count) * (length * ride.dt / count)
@@ -217,12 +220,35 @@ def _axles(ride: Ride, bogies: list[Bogie], motion: FloatArray, forced: FloatArr
     scale = np.array([1.0, 1.0, ride.base]) * count / length
     table = np.empty((3, len(time), len(bogies)))
     for number, bogie in enumerate(bogies):
-        found = axles_under(bogie, Frame(*spectra), s, ride.gravity)
+        found = axles_under(bogie, frame, s, ride.gravity)
         for i in range(3):
             table[i, :, number] = irfft(scale[i] * found[i], count)[: len(time)]
     shifts = (bogies[0].front, bogies[0].rear, 0.0)
     over = [_over_places(ride, place + x, each) for x, each in zip(shifts, table, strict=True)]
     return np.stack(over, axis=-1).transpose(1, 0, 2)
+
+
+def _ground(ride: Ride, bogie: Bogie, values: FloatArray) -> FloatArray:
+    """Mean over all frames that bear the load, in the axes of the track under this one.
+
+    ``values`` (n, 4) are y, roll, cant deficiency and track roll of this frame; farther along the track
+    another frame does what this one does there, on a track that may roll by another angle.
+    """
+    found = []
+    for shift in bogie.bearers:
+        y, roll, deficiency, track_roll = _elsewhere(ride, values, shift).T
+        more = track_roll - values[:, 3]
+        found.append([y - bogie.height * more, roll + more, deficiency - more, values[:, 3]])
+    return np.asarray(np.mean(found, axis=0).T)
+
+
+def _elsewhere(ride: Ride, values: FloatArray, shift: float) -> FloatArray:
+    """Values (n, m) of the ride as they are farther along the track."""
+    if shift == 0.0:
+        return values
+    over = over_space(ride.place, values, step_m=ride.step)
+    place = ride.place + shift
+    return np.column_stack([np.interp(place, over.position_m, column) for column in over.values.T])
 
 
 def _over_places(ride: Ride, place: FloatArray, values: FloatArray) -> FloatArray:
@@ -319,6 +345,8 @@ def _log_slopes(ride: Ride, bogie: Bogie, others: list[Bogie], frequency: FloatA
     """Sum over frequencies of the slopes of log |H|^2 by each number, (p,)."""
     s = 2j * np.pi * frequency * ride.speed
     none, one = np.zeros_like(s), np.ones_like(s)
-    turned = Frame((ride.mount[2] - bogie.height) * one, none, one, none, none, none)
+    turned = alone((ride.mount[2] - bogie.height) * one, none, one, none, none, none)
+    share = np.mean([np.exp(2j * np.pi * frequency * shift) for shift in bogie.bearers], axis=0)
+    turned = turned._replace(ground=share * turned.ground)
     logs = [np.log(np.abs(axles_under(each, turned, s, ride.gravity)[2])) for each in (bogie, *others)]
     return np.array([2.0 * (other - logs[0]).sum() / CHANGE for other in logs[1:]])

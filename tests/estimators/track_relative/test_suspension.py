@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from simrail.estimators.track_relative.suspension import UNCERTAIN, Bogie, Frame, axles_under, bogie_of, changed
+from simrail.estimators.track_relative.suspension import UNCERTAIN, Bogie, alone, axles_under, bogie_of, changed
 
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import load
@@ -112,7 +112,7 @@ def test_roll_of_the_axles_is_that_which_moves_the_frame() -> None:
             forces[first + 2] = -inertia * s**2 * track_roll
         free = slice(3, 9)
         found = np.linalg.solve(matrix[free, free], forces[free] - matrix[free, :3] @ given)
-        frame = Frame(*(np.array([v]) for v in (found[0], 0.0, found[2], 0.0, q, track_roll)))
+        frame = alone(*(np.array([v]) for v in (found[0], 0.0, found[2], 0.0, q, track_roll)))
         assert axles_under(b, frame, np.array([s]), G)[2, 0] == pytest.approx(axle_roll, rel=2e-5)
 
 
@@ -135,7 +135,7 @@ def test_heights_of_the_axles_are_those_that_move_the_frame() -> None:
         )
         push = k * np.array([front, rear])
         z, pitch, _ = np.linalg.solve(matrix, np.array([push.sum(), -(push * x).sum(), 0.0]))
-        frame = Frame(*(np.array([v]) for v in (0.0, z, 0.0, pitch, 0.0, 0.0)))
+        frame = alone(*(np.array([v]) for v in (0.0, z, 0.0, pitch, 0.0, 0.0)))
         found = axles_under(b, frame, np.array([s]), G)[:2, 0]
         np.testing.assert_allclose(found, [front, rear], rtol=1e-9)
 
@@ -195,6 +195,6 @@ def test_what_a_drawing_lacks_is_not_made_up() -> None:
 
 
 def test_every_stiffness_damping_mass_and_inertia_may_err() -> None:
-    sure = {"height", "front", "rear", "primary_height", "secondary_height", "load_height"}
+    sure = {"bearers", "height", "front", "rear", "primary_height", "secondary_height", "load_height"}
     assert {name for names in UNCERTAIN for name in names} == {entry.name for entry in fields(Bogie)} - sure
     assert changed(BOGIE, ("load",), 0.1).load == pytest.approx(1.1 * BOGIE.load)
