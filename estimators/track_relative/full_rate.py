@@ -106,8 +106,7 @@ class Held(NamedTuple):
 
 def held_of(recording: Recording, trace: Trace) -> Held:
     """What the smoothed states say without `FAST`, and what they leave of the signals."""
-    course, steps = trace.course, trace.course.steps
-    states = trace.states.copy()
+    course, states = trace.course, trace.states.copy()
     states[:, FAST] = 0.0
     x = [Dual(column) for column in states.T]
     ground, around = ground_at(recording, course.lines, states[:, at.S]), course.around
@@ -227,7 +226,7 @@ def nod_of(recording: Recording, held: Held, waviness: Waviness) -> Chain:
 
 
 def heave_of(recording: Recording, held: Held, waviness: Waviness) -> Chain:
-    """z."""
+    """Height."""
     parts = [(waviness.z_sd, waviness.z_lengths)]
     return chain(recording, held, parts, {3: [(BY_SQUARE, 2, 1.0), (BY_SLOPE, 1, 1.0)]})
 

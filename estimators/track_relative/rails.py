@@ -55,11 +55,11 @@ LEAST_STEPS = 8
 """Of the smoother, or places: on a shorter ride there is nothing of the rails to find."""
 
 WHEELS_M3 = (1.2e-8, 1.5e-9, 1.4e-8, 0.0)
-"""What the wheels of an axle do between the rails: white over the track, m2 per cycle per m, two-sided, in the
-order of the irregularities; what simulated ones leave of waves of 3 to 25 m."""
+"""What the wheels of an axle do between the rails: white over the track, m2 per cycle per m, two-sided, in
+the order of the irregularities; what simulated ones leave of waves of 3 to 25 m."""
 
 ASIDE_MPS2 = {AXLE: 0.18, FRAME: 0.22}
-"""Motion to the side that is none of the rails, as in `side_of`; synthetic, of simulated bogies of a metro."""
+"""Motion to the side that is none of the rails, as in `side_of`; synthetic, of a metro's simulated bogies."""
 
 SLOW_LENGTH_M = 15.0
 """Of the two filters through which white noise becomes the error of a roll that is held."""
@@ -133,7 +133,9 @@ def rails_of(
         geometry[sd] = np.hypot(geometry[sd], np.sqrt(variance))
     drawn = None
     if draws:
-        drawn = _draws(recording, trace.course.lines, geometry, sight, slow, motions, under, wheels, step_m, draws)
+        drawn = _draws(
+            recording, trace.course.lines, geometry, sight, slow, motions, under, wheels, step_m, draws
+        )
     return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
 
@@ -253,10 +255,8 @@ def _draws(
     return drawn
 
 
-def _by_gradients(
-    recording: Recording, lines: Lines, at: FloatArray, rng: np.random.Generator
-) -> FloatArray:
-    """Heights (g,) by which a map whose gradients err passes for an irregularity: a kink in each vertical curve.
+def _by_gradients(recording: Recording, lines: Lines, at: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Heights (g,) by which a map passes for an irregularity whose gradients err: by a kink where they meet.
 
     Without waves that the smoother does not follow (`LONGEST_M`).
     """

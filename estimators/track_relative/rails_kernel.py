@@ -130,8 +130,8 @@ def intensity(size: int, sd: float, rates: FloatArray) -> float:
     """Of the white noise that makes a coordinate of this standard deviation."""
     a, b, c = rates[0], rates[1], rates[2]
     if size == 2:
-        return 2.0 * a * b * (a + b) * sd * sd
-    return 2.0 * a * b * c * (a + b) * (b + c) * (c + a) / (a + b + c) * sd * sd
+        return float(2.0 * a * b * (a + b) * sd * sd)
+    return float(2.0 * a * b * c * (a + b) * (b + c) * (c + a) / (a + b + c) * sd * sd)
 
 
 @njit_borrowed

@@ -96,7 +96,11 @@ class TrackRelativeSmoother:
         for name, is_good, limit in (
             ("passes", self.passes in range(1, MOST_PASSES + 1), f"1 to {MOST_PASSES}"),
             ("rate_hz", 10.0 <= self.rate_hz <= 1000.0, "10 to 1000 Hz"),
-            ("draws", is_whole and 0 <= self.draws <= most, f"0 to {most}; 0 unless smoothed, with a geometry"),
+            (
+                "draws",
+                is_whole and 0 <= self.draws <= most,
+                f"0 to {most}; 0 unless smoothed, with a geometry",
+            ),
             ("geometry_step_m", 0.0 <= self.geometry_step_m < 100.0, "0 (none) or more, m"),
         ):
             if not is_good:

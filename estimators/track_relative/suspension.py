@@ -6,19 +6,20 @@ vehicle that stands, and by frequency (s = i omega) a quotient of polynomials. O
 phi and pitch theta, its centre of gravity at height z_G, springs above at z_S, below at z_P, in the axes of
 the track that turns and curves (q: cant deficiency over g; phi_t: its roll):
 
-    heave    F_front + F_rear               = m s^2 z + B s^2 (C s + K)/(B s^2 + C s + K) z
-    pitch    -x_front F_front - x_rear F_rear = I_y s^2 theta + K_theta theta
+    heave    F_front + F_rear = m s^2 z + B s^2 (C s + K)/(B s^2 + C s + K) z
+    pitch    -x_front F_front - x_rear F_rear = I_y s^2 theta
     axle i   v_i = z - x_i theta + F_i/(k_i + c_i s)
-    roll     w = phi + [I_x s^2 (phi + phi_t) + M - h F_e + W d - e F_p - e W_f phi] / k_phi,   e = z_G - z_P,
-             h = z_S - z_G
+    roll     w = phi + (I_x s^2 (phi + phi_t) + M - h F_e + W d - e F_p - e W_f phi)/k_phi,
+             e = z_G - z_P,   h = z_S - z_G
 
 with the mass B above, on springs K, C; M and F_e the moment and the lateral force of these, d how far they
-are bent to the side, W and W_f the weight above and below the frame, F_p the lateral force of the axles. The
-body above is a rigid one that sways on its springs; its ground is the mean of the frames that bear it, each
-of which has its share of the body. A spring pulls in the axes of the body below at the point on the body above, so that a body
-that leans out loads the outer side.
+are bent to the side, W and W_f the weight above the springs above and below, F_p the lateral force of the
+axles. The body above is a rigid one that sways on its springs; its ground is the mean of the frames that bear
+it, each of which has its share of the body. A spring pulls in the axes of the body below at the point on the
+body above, so that a body that leans out loads the outer side.
 
-w is the mean roll of both axles, of which the rails' own follows by `simrail.estimators.track_relative.rails`.
+w is the mean roll of both axles, of which the rails' own follows by
+`simrail.estimators.track_relative.under_frame`.
 """
 
 from dataclasses import dataclass, replace
@@ -263,4 +264,6 @@ def _roll(bogie: Bogie, frame: Frame, s: ComplexArray, gravity: float) -> Comple
         - e * borne
         - e * all_weight * frame.roll
     )
-    return frame.roll + torque / (bogie.primary_roll + bogie.primary_roll_damping * s)
+    return np.asarray(
+        frame.roll + torque / (bogie.primary_roll + bogie.primary_roll_damping * s), dtype=np.complex128
+    )

@@ -6,8 +6,8 @@ rails' own follows by Wiener's filter,
 
     C(k) = conj(G) S / (|G|^2 S + N) M(k),      G = mean of exp(i k x) over the axles' places x,
 
-with S the spectrum of the rails, of two filters of first order, as large as M is, and N that of what wheels do
-between the rails. Its error has the spectrum S N/(|G|^2 S + N).
+with S the spectrum of the rails, of two filters of first order, as large as M is, and N that of what wheels
+do between the rails. Its error has the spectrum S N/(|G|^2 S + N).
 
 A drawing errs. The share e by which each of its numbers does is normal; to first order M and the heights of
 the axles follow it, by slopes D. The rails do not know where curves begin, and a body sways by them: so the
@@ -31,7 +31,6 @@ from simrail.estimators.track_relative.suspension import (
     UNCERTAIN,
     Bogie,
     ComplexArray,
-    Frame,
     alone,
     axles_under,
     changed,
@@ -155,7 +154,9 @@ def rails_under(
         at=at,
         step=float(at[-1] - at[0]) / (len(at) - 1),
     )
-    whole = motion + np.column_stack([held.roll, held.y - ride.mount[0] * held.yaw, np.zeros((len(motion), 2))])
+    whole = motion + np.column_stack(
+        [held.roll, held.y - ride.mount[0] * held.yaw, np.zeros((len(motion), 2))]
+    )
     forced = np.column_stack([held.deficiency, held.track_roll])
     others = [changed(bogie, names, CHANGE) for names in UNCERTAIN]
     table = _axles(ride, [bogie, *others], whole, forced)
@@ -165,7 +166,8 @@ def rails_under(
     passed, rails = _passed(bogie, k), _spectrum_of_rails(ride, bogie, mean)
     seen = np.abs(passed) ** 2 * rails + MEAN_LEVEL_M3
     share, covariance = _fitted(ride, bogie, others, mean, slopes[:, :, 2], relative_sd)
-    gain, root = np.conj(passed) * rails / seen, np.linalg.cholesky(covariance)
+    gain = np.asarray(np.conj(passed) * rails / seen, dtype=np.complex128)
+    root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
     levels = _filtered(ride, gain, np.column_stack([mean, slopes[:, :, 2].T]))
     by_share = np.stack([slopes[:, :, :2].mean(axis=2), levels[:, 1:].T], axis=-1)
     found = np.column_stack([table[0, :, :2].mean(axis=1), levels[:, 0]])
@@ -211,8 +213,8 @@ def _axles(ride: Ride, bogies: list[Bogie], motion: FloatArray, forced: FloatArr
     length = next_fast_len(n + extra, real=True)
     top = min(int(TOP_HZ * length * ride.dt), length // 2)
     spectra = [rfft(_blended(column, length))[:top] for column in (*at_centre, *ground.T)]
-    frame = Frame(*spectra[:6], np.array(spectra[6:]))
-    s = 2j * np.pi * rfftfreq(length, ride.dt)[:top]
+    frame = alone(*spectra[:6])._replace(ground=np.array(spectra[6:]))
+    s = np.asarray(2j * np.pi * rfftfreq(length, ride.dt)[:top], dtype=np.complex128)
     count = next_fast_len(4 * top, real=True)
     time = np.arange(count) * (length * ride.dt / count)
     time = time[time <= (n - 1) * ride.dt]
@@ -343,9 +345,10 @@ def _fitted(
 
 def _log_slopes(ride: Ride, bogie: Bogie, others: list[Bogie], frequency: FloatArray) -> FloatArray:
     """Sum over frequencies of the slopes of log |H|^2 by each number, (p,)."""
-    s = 2j * np.pi * frequency * ride.speed
+    s = np.asarray(2j * np.pi * frequency * ride.speed, dtype=np.complex128)
     none, one = np.zeros_like(s), np.ones_like(s)
-    turned = alone((ride.mount[2] - bogie.height) * one, none, one, none, none, none)
+    up = complex(ride.mount[2] - bogie.height)
+    turned = alone(up * one, none, one, none, none, none)
     share = np.mean([np.exp(2j * np.pi * frequency * shift) for shift in bogie.bearers], axis=0)
     turned = turned._replace(ground=share * turned.ground)
     logs = [np.log(np.abs(axles_under(each, turned, s, ride.gravity)[2])) for each in (bogie, *others)]

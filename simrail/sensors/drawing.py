@@ -57,8 +57,8 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
         The place is the mean of theirs, weighted by vertical stiffness: springs at four corners bear at the
         pivot in the middle between them. Primary stiffness and damping are the sums of these elements'
         vertical ones, dampers on elastic mounts as if these were rigid; tabled laws (dry friction, bump
-        stops) are left out, and so are, vertically, trailing arms, which carry no weight. Where stiffness turns a body
-        otherwise than its supports do (`simrail.vehicle.guidance`), that is on the drawing.
+        stops) are left out, and so are, vertically, trailing arms, which carry no weight. Where stiffness
+        turns a body otherwise than its supports do (`simrail.vehicle.guidance`), that is on the drawing.
 
     Raises
     ------
@@ -95,8 +95,8 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
             body.name,
             at[body.name],
             tuple(supports[body.name]),
-            None,
-            *primary.get(body.name, (None, None)),
+            primary_stiffness_npm=primary.get(body.name, (None, None))[0],
+            primary_damping_nspm=primary.get(body.name, (None, None))[1],
             mass_kg=body.mass_kg,
             roll_inertia_kgm2=body.inertia_kgm2[0],
             pitch_inertia_kgm2=body.inertia_kgm2[1],
@@ -116,7 +116,7 @@ def _springs_between(vehicle: VehicleModel, upper: str, lower: str) -> Springs:
     Rods and series dampers as in `_bearings`; trailing arms push to the side at their bushings.
     """
     pair = {upper, lower}
-    rows = []  # y, z, stiffness and damping along y and z
+    rows: list[tuple[float, ...]] = []  # y, z, stiffness and damping along y and z
     for spring in vehicle.suspensions:
         if {spring.inner, spring.outer} == pair:
             rows.append((*spring.position_m[1:], *spring.stiffness_npm[1:], *spring.damping_nspm[1:]))

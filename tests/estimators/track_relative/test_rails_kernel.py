@@ -1,4 +1,4 @@
-"""The smoother at full rate against the joint Gaussian of a short ride, and its processes against closed forms."""
+"""The smoother at full rate against the joint Gaussian of a short ride, its processes against theirs."""
 
 from __future__ import annotations
 
@@ -129,7 +129,9 @@ def test_draws_of_the_error_are_of_the_joint_posterior() -> None:
 def test_a_ride_of_several_segments_is_smoothed_as_one() -> None:
     """2500 samples of a process of second order: a Kalman filter and Rauch, Tung and Striebel's smoother."""
     rates, n = RATES["pair"], 2500
-    one = waves_of([rates], [2e-3], np.array([[[0.0, 0.0]], [[0.0, 1.0]], [[0.0, 0.0]], [[0.0, 0.0]]]), [1e-6])
+    one = waves_of(
+        [rates], [2e-3], np.array([[[0.0, 0.0]], [[0.0, 1.0]], [[0.0, 0.0]], [[0.0, 0.0]]]), [1e-6]
+    )
     waves = one._replace(speed=np.full(n, 15.0), slope=np.zeros(n))
     measured = 1e-3 * np.random.default_rng(3).standard_normal((n, 1))
     f, p = expm(companion(rates) * 15.0 * DT), stationary(waves)

@@ -6,7 +6,14 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from simrail.estimators.track_relative.suspension import UNCERTAIN, Bogie, alone, axles_under, bogie_of, changed
+from simrail.estimators.track_relative.suspension import (
+    UNCERTAIN,
+    Bogie,
+    alone,
+    axles_under,
+    bogie_of,
+    changed,
+)
 
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import load
@@ -93,7 +100,9 @@ def test_roll_of_the_axles_is_that_which_moves_the_frame() -> None:
     """Cant deficiency and a rolling track move it as well: forwards by energies, back by the formula."""
     b = BOGIE
     jacobian = np.array([ways(1e-6 * e) - ways(-1e-6 * e) for e in np.eye(9)]).T / 2e-6
-    damping = np.array([0.0, b.primary_roll_damping / (b.primary_roll / (b.front_stiffness + b.rear_stiffness))] * 2)
+    damping = np.array(
+        [0.0, b.primary_roll_damping / (b.primary_roll / (b.front_stiffness + b.rear_stiffness))] * 2
+    )
     above = b.secondary_roll_damping / (b.secondary_roll / b.secondary_vertical)
     damping = np.concatenate([damping, [b.secondary_lateral_damping, above] * 2]) / 2.0
     c, k = jacobian.T @ (damping[:, None] * jacobian), hessian()
@@ -121,8 +130,9 @@ def test_heights_of_the_axles_are_those_that_move_the_frame() -> None:
     b, rng = BOGIE, np.random.default_rng(5)
     for s in S:
         front, rear = rng.standard_normal(2) + 1j * rng.standard_normal(2)
-        k, x = np.array([b.front_stiffness + b.front_damping * s, b.rear_stiffness + b.rear_damping * s]), np.array(
-            [b.front, b.rear]
+        k, x = (
+            np.array([b.front_stiffness + b.front_damping * s, b.rear_stiffness + b.rear_damping * s]),
+            np.array([b.front, b.rear]),
         )
         over = b.secondary_vertical + b.secondary_vertical_damping * s
         # Unknown: z, pitch (nose down), height of the load.

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from simrail.estimators.track_relative.full_rate import Held
-from simrail.estimators.track_relative.suspension import UNCERTAIN, Bogie, alone, axles_under, bogie_of, changed
+from simrail.estimators.track_relative.suspension import (
+    UNCERTAIN,
+    Bogie,
+    alone,
+    axles_under,
+    bogie_of,
+    changed,
+)
 from simrail.estimators.track_relative.under_frame import Under, draw_under, rails_under
 
 from simrail.core.jit import FloatArray
@@ -57,7 +64,9 @@ def forwards(b: Bogie, axles: FloatArray, forced: FloatArray, dt: float, up: flo
     def under(z, roll, pitch, q, track_roll):
         return axles_under(b, alone(none, z, roll, pitch, q, track_roll), s, 9.81)
 
-    columns = np.stack([under(*unit, none, none) for unit in ((one, none, none), (none, one, none), (none, none, one))])
+    columns = np.stack(
+        [under(*unit, none, none) for unit in ((one, none, none), (none, one, none), (none, none, one))]
+    )
     spectra = np.fft.rfft(axles, axis=0).T - under(none, none, none, *np.fft.rfft(forced, axis=0).T)
     z, roll, pitch = np.linalg.solve(columns.transpose(2, 1, 0), spectra.T[:, :, None])[:, :, 0].T
     moved = np.stack([roll, -up * roll, z, pitch])
@@ -65,7 +74,14 @@ def forwards(b: Bogie, axles: FloatArray, forced: FloatArray, dt: float, up: flo
 
 
 def ride(
-    recording: Recording, drawn: Bogie, *, true: Bogie | None = None, sense: int = 1, seed: int = 1, curve: float = 0.0, nod: float = 1.0
+    recording: Recording,
+    drawn: Bogie,
+    *,
+    true: Bogie | None = None,
+    sense: int = 1,
+    seed: int = 1,
+    curve: float = 0.0,
+    nod: float = 1.0,
 ) -> tuple[Under, FloatArray]:
     """What is found of rails (g, 2), and those; the frame is of the ``true`` bogie, the drawing another."""
     dt = 1.0 / recording.imu_sheet.rate_hz
@@ -101,18 +117,18 @@ def recording(rough: Callable[..., Recording]) -> Recording:
 
 @pytest.mark.parametrize("sense", [1, -1])
 def test_the_rails_are_found_again(recording: Recording, sense: int) -> None:
-    """Profile to .02 mm of 1 mm, but for waves that a step of .25 m hardly carries; cross-level as sure as said.
+    """Profile to .04 of 1.4 mm, for what is interpolated between samples; cross-level as sure as is said.
 
     Wheels do nothing here between the rails, of which the filter knows nothing: what it leaves is of the
     waves near twice the wheelbase that a frame does not show.
     """
     under, rails = ride(recording, bogie(), sense=sense)
     error = under.rails - rails
-    assert in_band(rails[:, 0]) > 4e-4
-    assert in_band(error[:, 0]) < 2e-5
+    assert in_band(rails[:, 0]) > 1e-3
+    assert in_band(error[:, 0]) < 4e-5
     said = np.sqrt(2.0 * under.spectrum.sum() * (AT[1] - AT[0]) / len(AT) / STEP_M)
     assert in_band(error[:, 1]) < min(said, 0.3 * in_band(rails[:, 1]))
-    assert in_band(error[:, 1], "D2") < 0.02 * in_band(rails[:, 1], "D2") + 2e-5
+    assert in_band(error[:, 1], "D2") < 0.2 * in_band(rails[:, 1], "D2")
 
 
 FAULTS = {
