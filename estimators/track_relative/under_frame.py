@@ -49,6 +49,9 @@ BLEND_S = 40.0
 BLEND_M = 200.0
 """The same of what lies along the track."""
 
+AT_ONCE = 4
+"""Drawings that are worked out at a time: all of a long ride would be most of its memory."""
+
 CHANGE = 1e-3
 """Relative step of the slopes by a drawing's numbers."""
 
@@ -220,14 +223,18 @@ def _axles(ride: Ride, bogies: list[Bogie], motion: FloatArray, forced: FloatArr
     time = time[time <= (n - 1) * ride.dt]
     place = np.interp(time, np.arange(n) * ride.dt, ride.place)
     scale = np.array([1.0, 1.0, ride.base]) * count / length
-    table = np.empty((3, len(time), len(bogies)))
-    for number, bogie in enumerate(bogies):
-        found = axles_under(bogie, frame, s, ride.gravity)
-        for i in range(3):
-            table[i, :, number] = irfft(scale[i] * found[i], count)[: len(time)]
     shifts = (bogies[0].front, bogies[0].rear, 0.0)
-    over = [_over_places(ride, place + x, each) for x, each in zip(shifts, table, strict=True)]
-    return np.stack(over, axis=-1).transpose(1, 0, 2)
+    out = np.empty((len(bogies), len(ride.at), 3))
+    for first in range(0, len(bogies), AT_ONCE):
+        some = bogies[first : first + AT_ONCE]
+        table = np.empty((3, len(time), len(some)))
+        for number, bogie in enumerate(some):
+            found = axles_under(bogie, frame, s, ride.gravity)
+            for i in range(3):
+                table[i, :, number] = irfft(scale[i] * found[i], count)[: len(time)]
+        for i in range(3):
+            out[first : first + AT_ONCE, :, i] = _over_places(ride, place + shifts[i], table[i]).T
+    return out
 
 
 def _ground(ride: Ride, bogie: Bogie, values: FloatArray) -> FloatArray:
