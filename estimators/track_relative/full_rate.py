@@ -136,6 +136,7 @@ def held_of(recording: Recording, trace: Trace) -> Held:
     table = _at_samples(recording, trace, np.column_stack(slow))
     rest = recording.imu[list(SENSED)].to_numpy(dtype=np.float64) - table[:, :4]
     columns = [np.ascontiguousarray(column) for column in table[:, 4:].T]
+    del table
     return Held(rest, columns[0], np.maximum(columns[1], 0.0), *columns[2:])
 
 

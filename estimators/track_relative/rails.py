@@ -46,7 +46,13 @@ from simrail.estimators.trajectory.track_geometry import (
     slopes,
 )
 
-from simrail.core.columns import IRREGULARITY, IRREGULARITY_SD, RELATIVE_POSITION_SD
+from simrail.core.columns import (
+    ATTITUDE,
+    IRREGULARITY,
+    IRREGULARITY_SD,
+    RELATIVE_POSITION,
+    RELATIVE_POSITION_SD,
+)
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
@@ -73,20 +79,19 @@ SETTLED = 10
 
 
 class Motions(NamedTuple):
-    """Motion of a mount at its samples, by chains of coordinates, and their covariances.
+    """Motion of a mount at its samples, by chains of coordinates, and their variances.
 
     Attributes
     ----------
     chains : dict of str to Chain
         ``"side"`` (roll, y), ``"across"`` (the same, with what a mount does beside the rails for noise),
         ``"heave"`` (z), and ``"nod"`` (pitch) where it is wanted.
-    values, covariances : dict of str to ndarray
-        (n, w), (n, w, w).
+    values, variances : dict of str to ndarray (n, w)
     """
 
     chains: dict[str, Chain]
     values: dict[str, FloatArray]
-    covariances: dict[str, FloatArray]
+    variances: dict[str, FloatArray]
 
 
 def rails_of(
@@ -115,15 +120,16 @@ def rails_of(
     kind = motion_of(recording)
     if kind not in (AXLE, FRAME) or len(trace.states) < LEAST_STEPS:
         return replace(estimate, geometry=geometry_of(sight_of(estimate, recording), step_m=step_m))
-    held, on_frame = held_of(recording, trace), kind is FRAME and recording.rail_displacement is None
     sheet, bogie = recording.vehicle_sheet, None
-    if on_frame and sheet is not None:
+    if kind is FRAME and sheet is not None and recording.rail_displacement is None:
         bogie = bogie_of(sheet, recording.mount_body)
-    motions = _motions(recording, held, ASIDE_MPS2[kind], pitch=bogie is not None)
+    motions, held = _motions(recording, trace, ASIDE_MPS2[kind], borne=bogie is not None, drawn=draws > 0)
     sight, slow = _seen_from(recording, trace, estimate, motions)
     geometry, under = geometry_of(sight, step_m=step_m), None
     wheels = np.array(WHEELS_M3) / step_m
-    if bogie is not None and sheet is not None and len(geometry) >= LEAST_STEPS:
+    if not draws:
+        sight = sight._replace(arms=sight.arms[:1].copy(), rails=sight.rails[:0], covariance=None)
+    if bogie is not None and sheet is not None and held is not None and len(geometry) >= LEAST_STEPS:
         motion = _frame_motion(motions.values)
         at = geometry.index.to_numpy(dtype=np.float64)
         under = rails_under(recording, held, motion, bogie, sheet.stiffness_relative_sd, at)
@@ -139,8 +145,11 @@ def rails_of(
     return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
 
-def _motions(recording: Recording, held: Held, aside: float, *, pitch: bool) -> Motions:
-    waviness = Waviness()
+def _motions(
+    recording: Recording, trace: Trace, aside: float, *, borne: bool, drawn: bool
+) -> tuple[Motions, Held | None]:
+    """The motion, and what is held of a frame that is borne; chains only for draws: they are large."""
+    waviness, held = Waviness(), held_of(recording, trace)
     sensor = recording.rail_displacement is not None
     chains = {
         "side": side_of(recording, held, waviness),
@@ -148,29 +157,33 @@ def _motions(recording: Recording, held: Held, aside: float, *, pitch: bool) -> 
     }
     if not sensor:
         chains["across"] = side_of(recording, held, waviness, aside)
-    if pitch:
+    if borne:
         chains["nod"] = nod_of(recording, held, waviness)
-    results = {name: found(one, held.rest) for name, one in chains.items()}
+    values, variances = {}, {}
+    for name, one in chains.items():
+        values[name], covariance = found(one, held.rest)
+        variances[name] = np.diagonal(covariance, axis1=1, axis2=2).copy()
     if sensor:
-        chains["across"], results["across"] = chains["side"], results["side"]
-    values = {name: result[0] for name, result in results.items()}
-    return Motions(chains, values, {name: result[1] for name, result in results.items()})
+        chains["across"] = chains["side"]
+        values["across"], variances["across"] = values["side"], variances["side"]
+    return Motions(chains if drawn else {}, values, variances), held if borne else None
 
 
 def _seen_from(
     recording: Recording, trace: Trace, estimate: Estimate, motions: Motions
 ) -> tuple[Sight, FloatArray]:
     """Rails by the body as it moves at full rate, and the variance (n,) of the roll that is held."""
-    states, before = estimate.states.copy(), found_before(recording, trace)
+    names = [*ATTITUDE, *RELATIVE_POSITION, "position_m", "position_sd_m", "roll_sd_rad"]
+    states, before = estimate.states[names].copy(), found_before(recording, trace)
     for name, values, old in (
         ("roll_rad", motions.values["side"][:, 0], before[:, 0]),
         ("lateral_m", motions.values["across"][:, 1], before[:, 1]),
         ("vertical_m", motions.values["heave"][:, 0], before[:, 2]),
     ):
         states[name] += values - old
-    fast = motions.covariances["side"][:, 0, 0]
+    fast = motions.variances["side"][:, 0]
     slow = states["roll_sd_rad"].to_numpy(dtype=np.float64) ** 2
-    variances = [motions.covariances["across"][:, 1, 1], motions.covariances["heave"][:, 0, 0]]
+    variances = [motions.variances["across"][:, 1], motions.variances["heave"][:, 0]]
     states["roll_sd_rad"] = np.sqrt(fast + slow)
     states[list(RELATIVE_POSITION_SD)] = np.sqrt(np.column_stack(variances))
     return sight_of(replace(estimate, states=states), recording), slow
@@ -187,8 +200,8 @@ def _with_rails(
     """The geometry with profile and cross-level of the rails under a frame, and their sds."""
     base = float(sight.arms[0, 0, 1] - sight.arms[0, 1, 1])
     variances = [
-        motions.covariances["heave"][:, 0, 0],
-        base**2 * (motions.covariances["side"][:, 0, 0] + slow),
+        motions.variances["heave"][:, 0],
+        base**2 * (motions.variances["side"][:, 0] + slow),
         sight.place_sd**2,
     ]
     spread = _spread(sight, np.column_stack(variances), step_m)
@@ -238,7 +251,10 @@ def _draws(
     along, base = CubicSpline(at, known), float(slope[0, 2, 0])
     for draw in range(count):
         rng = stream_of(recording, draw, "track_relative")
-        errors = {name: error_of(one, rng) for name, one in motions.chains.items()}
+        errors: dict[str, FloatArray] = {}
+        for name, one in motions.chains.items():
+            shared = name == "across" and one is motions.chains["side"]
+            errors[name] = errors["side"] if shared else error_of(one, rng)
         felt = np.column_stack([errors["side"][:, 0], errors["across"][:, 1], errors["heave"][:, 0]])
         rails = np.einsum("nij,nj->ni", slope, felt[sight.use])
         if sight.noise_sd > 0.0:

@@ -49,7 +49,7 @@ BLEND_S = 40.0
 BLEND_M = 200.0
 """The same of what lies along the track."""
 
-AT_ONCE = 4
+AT_ONCE = 2
 """Drawings that are worked out at a time: all of a long ride would be most of its memory."""
 
 CHANGE = 1e-3
@@ -211,12 +211,15 @@ def _axles(ride: Ride, bogies: list[Bogie], motion: FloatArray, forced: FloatArr
     x, y, height = ride.mount
     roll, pitch, up = motion[:, 0], motion[:, 3], height - bogies[0].height
     at_centre = [motion[:, 1] + up * roll, motion[:, 2] + x * pitch - y * roll, roll, pitch, *forced.T]
-    ground = _ground(ride, bogies[0], np.column_stack([at_centre[0], roll, forced]))
     extra, n = round(BLEND_S / ride.dt), len(motion)
     length = next_fast_len(n + extra, real=True)
     top = min(int(TOP_HZ * length * ride.dt), length // 2)
-    spectra = [rfft(_blended(column, length))[:top] for column in (*at_centre, *ground.T)]
-    frame = alone(*spectra[:6])._replace(ground=np.array(spectra[6:]))
+    spectra = [rfft(_blended(column, length))[:top] for column in at_centre]
+    frame = alone(*spectra)
+    if len(bogies[0].bearers) > 1:
+        ground = _ground(ride, bogies[0], np.column_stack([at_centre[0], roll, forced]))
+        frame = frame._replace(ground=np.array([rfft(_blended(each, length))[:top] for each in ground.T]))
+    del at_centre
     s = np.asarray(2j * np.pi * rfftfreq(length, ride.dt)[:top], dtype=np.complex128)
     count = next_fast_len(4 * top, real=True)
     time = np.arange(count) * (length * ride.dt / count)
