@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import signal
-from simrail.estimators.track_relative.full_rate import Held, held_of
+from simrail.estimators.track_relative.full_rate import Held, Waviness, heave_of, held_of, nod_of, side_of
 from simrail.estimators.track_relative.noise import AXLE
 from simrail.estimators.track_relative.rails import rails_of
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
@@ -120,6 +120,38 @@ def test_noise_that_the_sheet_does_not_have_shows(rough: Callable, rails: Callab
         sd = sd_of_draws(np.array([in_band(line, name, "D0") for line in estimate.geometry_draws[:, :, at]]))
         ratios.append(rms(in_band(estimate.geometry[name] - truth[name], name, "D0") / sd))
     assert ratios[0] < 1.3 and ratios[1] > 1.5 * ratios[0]
+
+
+def test_the_noise_is_that_of_the_sheet(rough: Callable) -> None:
+    """White, by its density, per sample; and what no model is without."""
+    recording = drawn(rough())
+    held = held_of(recording, TrackRelativeSmoother(geometry_step_m=0.0, passes=1).trace(recording))
+    sheet = recording.imu_sheet
+    gyro = sheet.gyro_noise_radpsqrts**2 * sheet.rate_hz + 3e-4**2
+    accel = sheet.accel_noise_mpsqrts**2 * sheet.rate_hz + 3e-3**2
+    for one, expected in (
+        (side_of(recording, held, Waviness()), [gyro, accel]),
+        (nod_of(recording, held, Waviness()), [gyro]),
+        (heave_of(recording, held, Waviness()), [accel]),
+    ):
+        np.testing.assert_allclose(one.waves.variances, expected)
+        assert (one.waves.shaking == 0.0).all()
+
+
+def test_draws_are_displaced_as_the_place_is_uncertain(rough: Callable, kept: dict) -> None:
+    """By 5 cm against not at all: the slope of the rails times that, a normal number for each of 24 draws."""
+    recording, estimate, _ = of(kept, rough, 1)
+    trace, drawings = TrackRelativeSmoother(geometry_step_m=0.0, passes=1).trace(recording), []
+    for sd in (0.0, 0.05):
+        states = estimate.states.assign(position_sd_m=sd)
+        found = rails_of(recording, trace, replace(estimate, states=states), step_m=0.25, draws=24)
+        assert found.geometry is not None and found.geometry_draws is not None
+        drawings.append(found.geometry_draws[:, 8:-8])
+    for i, name in enumerate(IRREGULARITY[:3]):
+        slope = np.gradient(found.geometry[name].to_numpy(), 0.25)[8:-8]
+        moved = np.square(drawings[1] - drawings[0])[:, :, i].mean() / (0.05**2 * np.mean(slope**2))
+        assert moved == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 24.0)), name
+        assert moved > 0.3, name
 
 
 def test_the_same_recording_gives_the_same_draws(rough: Callable, kept: dict) -> None:

@@ -191,6 +191,15 @@ def test_a_coach_is_borne_by_both_bogies_and_a_module_by_its_neighbours() -> Non
     coach = bogie_of(sheet_of("manchester_1"), "frame_front")
     assert coach is not None
     assert (coach.load, coach.load_inertia) == (16e3, 28.4e3)
+    assert coach.bearers == (0.0, -19.0)
+    sheet = sheet_of("manchester_1")
+    body = sheet.body("body")
+    assert body is not None
+    # The front bogie 6 m before the centre of gravity, the rear one 13 m behind: 13/19 of the weight.
+    moved = replace(body, supports=tuple(replace(s, x_m=s.x_m - 3.5) for s in body.supports))
+    other = replace(sheet, bodies=tuple(moved if b is body else b for b in sheet.bodies))
+    ahead = bogie_of(other, "frame_front")
+    assert ahead is not None and ahead.load == pytest.approx(32e3 * 13.0 / 19.0)
     end = bogie_of(sheet_of("metro_irw_train"), "frame_front")
     assert end is not None and end.load == 10e3 + 3e3  # half of the module that hangs between
 
