@@ -22,12 +22,20 @@ The accelerometer drives the model, the wheel and the line correct it. States, i
     drift       rad/s, gyro bias (random walk)
     sway        rad, yaw of the body in the track (Markov in distance)
     lag         m, the heading of the body is the design's this far behind, in the direction of travel
+    bend        relative error of the map's curvature, anew in each curve
+    even, odd   m, error of the map's place of the joint of two elements ahead and of that behind
+    turn        rad, by so much less than lag says the body turns in this curve: anew in each
 
 Lag and lead matter: the leading axle of a bogie points where the bogie points, which in a curve is a
-metre or two behind. They are found along the way because the train knows where it started.
+metre or two behind. They are found along the way because the train knows where it started. The lag is that
+of a body whose wheels carry no lateral force. Where cant leaves some of the lateral acceleration a they carry
+it by creep, and point inward of their way by (a / g) / (f22 / N): a lag shorter by .2 m at 60 km/h, whatever
+the radius, than at 20. What an axle's or a frame's own steering does beside that is no length but an angle,
+another one in each curve.
 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
-wheel's way starts anew when both agree on the speed again.
+wheel's way starts anew when both agree on the speed again. Without a wheel it is so all along, and the train
+stands where its IMU is quiet (`simrail.estimators.odometry.standstill`).
 
 Of the three that an attitude filter asks for, position and speed are the filter's. The acceleration is
 made here, since a train's own acceleration changes slowly, and the accelerometer shakes with the body.
@@ -60,6 +68,7 @@ from simrail.estimators.odometry.kernel import (
     STATES,
     SWAY,
     TREAD,
+    TURN,
     UPDATES,
     WAY,
     YAW,
@@ -72,6 +81,7 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
+from simrail.estimators.odometry.standstill import quiet_of
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
@@ -103,52 +113,78 @@ class Pointing(NamedTuple):
 
     Attributes
     ----------
-    lag_sd_m, lag_walk_m : float
+    lag_sd_m : float
         The track that it points along lies behind its chord, in the direction of travel, by the chord's
-        `play_m` and something: the standard deviation of that between vehicles, and its random walk from
-        curve to curve, m2 per m.
+        `play_m` and something: the standard deviation of that between vehicles.
+    turn_sd_rad : float
+        And what it turns beside that in a curve, from curve to curve.
+    lag_walk_m : float
+        The same as a random walk of the lag, m2 per m, for an estimator that has no turn of each curve.
     sway_sd_rad, sway_length_m : float
         What it does beside that: standard deviation, and over what distance it changes.
     lead_sd_m : float
         The slope that it has is the track's so far behind its chord: the standard deviation of that.
+    attacks : bool
+        It turns with the wheels where these carry an unbalanced lateral acceleration by creep.
     """
 
     lag_sd_m: float
+    turn_sd_rad: float
     lag_walk_m: float
     sway_sd_rad: float
     sway_length_m: float
     lead_sd_m: float
+    attacks: bool = False
 
 
-AXLE = Pointing(0.25, 2e-5, 4e-4, 2.0, 1.0)
+AXLE = Pointing(0.1, 6e-4, 2e-5, 4e-4, 2.0, 1.0, attacks=True)
 """It steers against its frame."""
 
-FRAME = Pointing(0.15, 1e-5, 4e-4, 2.0, 1.0)
+FRAME = Pointing(0.1, 3e-4, 1e-5, 4e-4, 2.0, 1.0, attacks=True)
 """And any other body on axles."""
 
-ON_BOGIES = Pointing(0.1, 2e-6, 2.5e-4, 6.5, 1.0)
+ON_BOGIES = Pointing(0.06, 5e-5, 2e-6, 2.5e-4, 6.5, 1.0)
 """A body on two bogies: what they do is the same at both ends, and 15 m apart."""
 
-OTHER_BODY = Pointing(0.3, 5e-5, 1e-3, 8.0, 7.0)
+OTHER_BODY = Pointing(0.6, 4e-4, 5e-5, 1e-3, 8.0, 7.0)
 """A body on one bogie, or between other bodies: its suspension turns with it, and it swings after a
 transition. The joints of a train of such bodies pitch it with its neighbours."""
 
-TURNED = Pointing(0.5, 5e-5, 1.5e-3, 10.0, 1.0)
+TURNED = Pointing(0.5, 7e-4, 5e-5, 1.5e-3, 10.0, 1.0)
 """On a vehicle of which rods let the axles yaw: little brings a frame back to the middle of a straight."""
 
-TURNED_AXLE = Pointing(1.5, 5e-5, 3e-3, 60.0, 1.0)
+TURNED_AXLE = Pointing(1.5, 1e-4, 5e-5, 3e-3, 60.0, 1.0)
 """And its axles: they turn in their rods by as much in a wide curve as in a tight one, for all its length."""
 
-UNKNOWN_BODY = Pointing(3.0, 5e-5, 1e-3, 4.0, 3.0)
+UNKNOWN_BODY = Pointing(3.0, 5e-4, 5e-5, 1e-3, 4.0, 3.0)
 """No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
 
 The sizes of all seven are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
 
+PLAY_M = 0.012
+"""Lateral play of a wheelset in the gauge, from flange to flange: it turns a body by PLAY_M / (2 half_m) at
+most (`simrail.recording.sheets.vehicle_sheet.Chord`)."""
+
+USUAL_RADIUS_M = 400.0
+"""Of the curves that matter."""
+
 MOST_LAG_M = 1.0
-"""Of a long wheelbase: the play in the gauge turns it by no more, in the curves that matter."""
+"""By play, of a body that does not stand on axles."""
+
+TOUCHING_TURN_SD = 0.35
+"""Of the angle by which flanges that touch turn a body, so much is its sd: gauge and flanges wear. And by so
+much the body sways in that play."""
+
+LATERAL_CREEP = 150.0
+"""Lateral creep force of a wheel per creepage and load: f22 / N of Kalker's linear theory (f22 = G a b C22)
+for steel wheels of 0.3 to 0.5 m in radius under 30 to 60 kN."""
 
 CUT_LAG_SD = 0.3
-"""Of what that leaves out of the play, so much is the sd of the lag: nobody says how sharp the curves are."""
+"""Of what the longest lag leaves out of the play, so much is the sd of the lag."""
+
+WHEELSET_TREAD = 0.6
+"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: its taper steers it back
+to the middle of the track."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -166,7 +202,8 @@ class CurveMatchedOdometry:
         How well the start is known.
     tread_sd, tread_length_m : float
         Relative standard deviation of the rolling radius about its mean, and over what distance it
-        changes: 0.1 to 0.35 % are the taper's share on 5 mm of lateral play.
+        changes: 0.1 to 0.35 % are the taper's share on 5 mm of lateral play. Of a free wheel, or where no
+        drawing says; on a wheelset less (`WHEELSET_TREAD`).
     flange_sd : float
         Standard deviation of `left` and `right`. In a curve a wheel rolls on its flange root, some 4 mm
         further out than at its tape circle, or not: 1.5 % of a wheel of 0.29 m, 0.9 % of one of 0.46 m.
@@ -199,7 +236,7 @@ class CurveMatchedOdometry:
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
 
-    needs = ("encoder",)
+    needs = ()
     cites = ("Escalona, Urda and Munoz, Sensors 21(3) 683, 2021",)
 
     @property
@@ -219,25 +256,13 @@ class CurveMatchedOdometry:
                 raise InputError("is out of range", field=name, value=value, limit="> 0")
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate position, speed and acceleration along the track at every IMU sample.
-
-        Raises
-        ------
-        InputError
-            If the recording has no encoder.
-        """
+        """Estimate position, speed and acceleration along the track at every IMU sample."""
         states = self.at_imu_times(self.trace(recording), recording)
         return Estimate(states=states, mount=recording.mount)
 
     def trace(self, recording: Recording) -> Steps:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
-        if recording.encoder is None or recording.encoder_sheet is None:
-            raise InputError(
-                "curve-matched odometry needs an encoder",
-                field="encoder",
-                remedy="add an [encoder] to the scenario, or counts to the ride",
-            )
-        sheet, wheel = recording.imu_sheet, recording.encoder_sheet
+        sheet = recording.imu_sheet
         block = max(1, round(sheet.rate_hz / RATE_HZ))
         time = recording.imu.index.to_numpy(dtype=np.float64)
         n = len(time) // block
@@ -245,9 +270,8 @@ class CurveMatchedOdometry:
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
         signals = signals.reshape(n, block, 4).mean(axis=1)
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
-        read = np.searchsorted(recording.encoder.index.to_numpy(), ends + 1e-9, side="right") - 1
-        counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)[np.maximum(read, 0)]
-        pulse = wheel.pulse_m
+        counts, pulse = _counts(recording, ends)
+        quiet = np.full(n, -1.0) if pulse else quiet_of(recording, block).astype(np.float64)
         chord = chord_of(recording)
         grid, table = line_table(
             recording.track,
@@ -264,7 +288,9 @@ class CurveMatchedOdometry:
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
         model = self._model(recording, pulse, pointing)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
-        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
+        curve_matched(
+            dt, signals, counts, quiet, model, gravity, grid, table, x, p, steps, room_to_work(), past
+        )
         if past is not None:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
@@ -291,9 +317,9 @@ class CurveMatchedOdometry:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = lines[last]
             rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
-            values[rolls, 2::3] = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)[
-                rolls
-            ]
+            if recording.encoder is not None:
+                own = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)
+                values[rolls, 2::3] = own[rolls]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
@@ -318,6 +344,7 @@ class CurveMatchedOdometry:
     def _model(self, recording: Recording, pulse: float, yaw: Pointing) -> LineModel:
         """Noise and constants: those of the method under their own names, with what the data sheet adds."""
         sheet = recording.imu_sheet
+        turn, turn_sd = turn_of(chord_of(recording), yaw)
         own = {name: value for name, value in vars(self).items() if name in LineModel._fields}
         sheets = {
             "pulse_m": pulse,
@@ -327,9 +354,12 @@ class CurveMatchedOdometry:
             # Of a Markov process that wanders by its bias instability within some 300 s.
             "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
             "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
-            "sway_sd_rad": yaw.sway_sd_rad,
+            "tread_sd": self.tread_sd * tread_share(recording),
+            "sway_sd_rad": _sway_sd_rad(yaw, turn),
             "sway_length_m": yaw.sway_length_m,
-            "lag_walk_m": yaw.lag_walk_m,
+            "turn_rad": turn,
+            "turn_sd_rad": turn_sd,
+            "attack_s2pm": 0.0 if turn or not yaw.attacks else 1.0 / (recording.gravity_mps2 * LATERAL_CREEP),
             "bend_sd": recording.map_errors.radius_relative_sd,
             "shift_sd_m": recording.map_errors.place_sd_m,
         }
@@ -339,28 +369,40 @@ class CurveMatchedOdometry:
         self, recording: Recording, pulse: float, chord: Chord | None, yaw: Pointing
     ) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand."""
-        assert recording.encoder_sheet is not None
-        sheet, errors = recording.imu_sheet, recording.map_errors
+        sheet, wheel, errors = recording.imu_sheet, recording.encoder_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
         x[LAG], chord_sd = (0.0, 0.0) if chord is None else lag_of(chord)
+        x[TURN], turn_sd = turn_of(chord, yaw)
+        if chord is not None and x[TURN] > 0.0:
+            x[LAG], chord_sd = 0.0, _place_sd_m(chord)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, float(chainage_sd(recording, x[S])))
         sd[V] = STILL_SD_MPS
         sd[WAY] = pulse / math.sqrt(12.0)
-        sd[SCALE] = recording.encoder_sheet.radius_relative_sd
-        sd[TREAD] = self.tread_sd
+        sd[SCALE] = 0.0 if wheel is None else wheel.radius_relative_sd
+        sd[TREAD] = self.tread_sd * tread_share(recording)
         sd[LEFT] = sd[RIGHT] = self.flange_sd
         sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
         sd[SQUAT] = self.squat_sd
         sd[LEAD] = yaw.lead_sd_m
         sd[YAW] = 5e-3
         sd[DRIFT] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
-        sd[SWAY] = yaw.sway_sd_rad
+        sd[SWAY] = _sway_sd_rad(yaw, x[TURN])
         sd[LAG] = math.hypot(yaw.lag_sd_m, chord_sd)
+        sd[TURN] = turn_sd
         sd[BEND] = errors.radius_relative_sd
         sd[EVEN] = sd[ODD] = errors.place_sd_m
         return x, np.diag(sd**2)
+
+
+def _counts(recording: Recording, times: FloatArray) -> tuple[FloatArray, float]:
+    """Last reading of the counter at each time (n,), and the way of a count, m; 0 where there is no wheel."""
+    if recording.encoder is None or recording.encoder_sheet is None:
+        return np.zeros(len(times)), 0.0
+    read = np.searchsorted(recording.encoder.index.to_numpy(), times + 1e-9, side="right") - 1
+    counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)
+    return counts[np.maximum(read, 0)], recording.encoder_sheet.pulse_m
 
 
 def chainage_sd(recording: Recording, place_m: FloatArray | float) -> FloatArray:
@@ -373,9 +415,36 @@ def chainage_sd(recording: Recording, place_m: FloatArray | float) -> FloatArray
 
 def lag_of(chord: Chord) -> tuple[float, float]:
     """By how much the tangent lies behind the chord, m, and the sd of that by the drawing."""
-    lag = min(max(chord.play_m, -MOST_LAG_M), MOST_LAG_M)
-    sd = math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m, CUT_LAG_SD * (chord.play_m - lag))
-    return lag, sd
+    most = _most_lag_m(chord)
+    lag = min(max(chord.play_m, -most), most)
+    return lag, math.hypot(_place_sd_m(chord), CUT_LAG_SD * (chord.play_m - lag))
+
+
+def turn_of(chord: Chord | None, yaw: Pointing) -> tuple[float, float]:
+    """What a body turns in a curve beside its lag, rad, and the sd of that.
+
+    Where flanges touch, that is all: an angle, whatever the radius, in place of a lag.
+    """
+    if chord is None or not yaw.attacks or chord.play_m <= _most_lag_m(chord):
+        return 0.0, yaw.turn_sd_rad
+    turn = 0.5 * PLAY_M / chord.half_m
+    return turn, math.hypot(yaw.turn_sd_rad, TOUCHING_TURN_SD * turn)
+
+
+def _sway_sd_rad(yaw: Pointing, turn: float) -> float:
+    """Standard deviation of the sway, of a body that flanges turn by ``turn`` in a curve."""
+    return math.hypot(yaw.sway_sd_rad, TOUCHING_TURN_SD * turn)
+
+
+def _most_lag_m(chord: Chord) -> float:
+    """Most lag that play makes, m: where a body on axles turns further, flanges touch in the usual curve."""
+    on_axles = chord.half_m > 0.0 and math.isclose(chord.play_m, chord.half_m)
+    return 0.5 * PLAY_M * USUAL_RADIUS_M / chord.half_m if on_axles else MOST_LAG_M
+
+
+def _place_sd_m(chord: Chord) -> float:
+    """Standard deviation of the middle of a chord, m."""
+    return math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m)
 
 
 def chord_of(recording: Recording) -> Chord | None:
@@ -409,6 +478,13 @@ def wheel_ahead(recording: Recording) -> float:
     if axle not in at or recording.mount_body not in at:
         return 0.0
     return at[axle] - at[recording.mount_body] - recording.mount_position_m[0]
+
+
+def tread_share(recording: Recording) -> float:
+    """How much the encoder's wheel wanders off its tape circle, of what a free wheel does."""
+    sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
+    axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
+    return WHEELSET_TREAD if axle is not None and axle.wheelset else 1.0
 
 
 def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:

@@ -9,16 +9,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
-from simrail.estimators.odometry.line_table import Line, line_at
+from simrail.estimators.odometry.line_table import Line, line_at, line_over, with_pitch
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 
 BoolArray = npt.NDArray[np.bool_]
 
-STATES = 17
-S, V, WAY, SCALE, TREAD, LEFT, RIGHT, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG, BEND, EVEN, ODD = range(
-    STATES
-)
+STATES = 18
+S, V, WAY, SCALE, TREAD, LEFT, RIGHT, PUSH, SQUAT, LEAD, YAW, DRIFT, SWAY, LAG = range(14)
+BEND, EVEN, ODD, TURN = range(14, STATES)
 
 UPDATES = 3
 WHEEL, HEADING, REST = range(UPDATES)
@@ -29,6 +28,14 @@ DIRECTION_SPEED_MPS = 0.2
 
 START_JERK_MPS3 = 0.5
 """Jerk with which a train leaves, as service traction does."""
+
+STILL_MPS2, STILL_MPS, STILL_SDS = 0.15, 0.1, 4.0
+"""A train without a wheel stands where no more force is left over, and its speed may be nothing: least speed
+that is doubted, and standard deviations of the filter's own beside it."""
+
+LOST_M, MOST_DOUBT_S = 1.0, 30.0
+"""Without a wheel: standard deviation of the place above which the map is not taken for its tangent; and for
+how long at most a wrong slope is felt."""
 
 STEADY_S, WHEEL_SPEED_SHARE = 0.5, 0.1
 """Time constant of the steady effort; share of the newest reading in the smoothed speed of the wheel. Chosen
@@ -68,8 +75,12 @@ class LineModel(NamedTuple):
         Intensity of what disturbs the accelerometer, and its density per effort, per sqrt(Hz).
     push_walk_m2ps5, gyro_rad2ps, drift_walk_rad2ps3, gyro_scale : float
         Random walk of `push`; white noise, drift and relative scale error of the gyro.
-    sway_sd_rad, sway_length_m, lag_walk_m, heading_sd_rad : float
-        Markov process `sway` in distance; random walk of `lag` (m2 per m); white part of the heading.
+    sway_sd_rad, sway_length_m, heading_sd_rad : float
+        Markov process `sway` in distance; white part of the heading.
+    turn_rad, turn_sd_rad : float
+        Of `turn`, anew in each curve: mean and standard deviation.
+    attack_s2pm : float
+        Yaw with which the wheels carry an unbalanced lateral acceleration, rad per m/s2.
     bend_sd, shift_sd_m : float
         How wrong the map is: relative error of a curve's curvature, and of the place of a joint.
     """
@@ -88,8 +99,10 @@ class LineModel(NamedTuple):
     gyro_scale: float
     sway_sd_rad: float
     sway_length_m: float
-    lag_walk_m: float
     heading_sd_rad: float
+    turn_rad: float
+    turn_sd_rad: float
+    attack_s2pm: float
     bend_sd: float
     shift_sd_m: float
 
@@ -101,7 +114,7 @@ class Steps(NamedTuple):
     ----------
     time_s : ndarray (n,)
         Ends of the steps; given.
-    states, covariance : ndarray (n, 17), (n, m, m)
+    states, covariance : ndarray (n, 18), (n, m, m)
         See `simrail.estimators.odometry.curve_matched`; the covariance is of the first m states. A smoother
         needs all, an odometry place and speed: of 90 minutes, 9 MB in place of 620.
     acceleration : ndarray (n,)
@@ -123,11 +136,11 @@ class Scratch(NamedTuple):
 
     Attributes
     ----------
-    f, work : ndarray (17, 17)
+    f, work : ndarray (18, 18)
         F, and what `simrail.estimators.kalman.congruence` needs.
-    rows : ndarray (3, 17)
+    rows : ndarray (3, 18)
         h of each update.
-    gain, v : ndarray (17,)
+    gain, v : ndarray (18,)
         What `simrail.estimators.kalman.update` writes.
     """
 
@@ -145,35 +158,44 @@ def room_to_work() -> Scratch:
 
 
 @njit_borrowed
-def forget(x: FloatArray, p: FloatArray, f: FloatArray, state: int, sd: float) -> None:
-    """Put a constant of the map that is behind in place of one that is ahead: known only to `sd`.
+def forget(x: FloatArray, p: FloatArray, f: FloatArray, state: int, mean: float, sd: float) -> None:
+    """Put a constant of what is ahead in place of one that is behind: known only to `sd` about its mean.
 
     It is a prediction with a zero in F, so that the smoother knows of it too.
     """
     for i in range(x.shape[0]):
         p[i, state] = p[state, i] = f[state, i] = 0.0
     p[state, state] = sd * sd
-    x[state] = 0.0
+    x[state] = mean
 
 
 @njit_borrowed
 def map_ahead(
     x: FloatArray, p: FloatArray, f: FloatArray, before: Line, here: Line, model: LineModel
 ) -> None:
-    """Errors of curve and joints, where the train comes from the one to the next.
+    """Turn and errors of curve and joints, where the train comes from the one to the next.
 
     Element i lies between joints i and i + 1. A train that comes from the element below keeps joint i, which
     was ahead and now is behind, and meets i + 1; one from above keeps i + 1. The states differ by parity.
     """
     if here.curve != before.curve:
-        forget(x, p, f, BEND, model.bend_sd)
+        forget(x, p, f, BEND, 0.0, model.bend_sd)
+        forget(x, p, f, TURN, model.turn_rad, model.turn_sd_rad)
     step = here.element - before.element
     if step != 0.0:
         odd_below = here.element % 2.0 == 1.0
         if step > 0.0 or abs(step) > 1.0:
-            forget(x, p, f, EVEN if odd_below else ODD, model.shift_sd_m)
+            forget(x, p, f, EVEN if odd_below else ODD, 0.0, model.shift_sd_m)
         if step < 0.0 or abs(step) > 1.0:
-            forget(x, p, f, ODD if odd_below else EVEN, model.shift_sd_m)
+            forget(x, p, f, ODD if odd_below else EVEN, 0.0, model.shift_sd_m)
+
+
+@njit_inner
+def flank(curvature: float) -> float:
+    """How sharp a curve is for wheelsets, below 1, with the sign of its curvature."""
+    bent = SATURATION_RADIUS_M * curvature
+    sharpness: float = bent / np.sqrt(1.0 + bent * bent)
+    return sharpness
 
 
 @njit_borrowed
@@ -208,9 +230,8 @@ def predict(
     half = 0.5 * dt * dt
     way = dt * x[V] + half * acceleration
     run = abs(way)
-    bent = SATURATION_RADIUS_M * here.curvature
-    flank = bent / np.sqrt(1.0 + bent * bent)
-    left, right = max(flank, 0.0), max(-flank, 0.0)
+    out = flank(here.curvature)
+    left, right = max(out, 0.0), max(-out, 0.0)
     rolls = 1.0 + x[SCALE] + x[TREAD] + left * x[LEFT] + right * x[RIGHT]
     wears, sways = np.exp(-run / model.tread_length_m), np.exp(-run / model.sway_length_m)
     # The map has a curvature that is not there (`simrail.estimators.odometry.line_table`): the heading counts
@@ -259,7 +280,6 @@ def predict(
     p[YAW, YAW] += model.gyro_rad2ps * dt + (model.gyro_scale * turn) ** 2 * dt * SCALE_FACTOR_S
     p[DRIFT, DRIFT] += model.drift_walk_rad2ps3 * dt
     p[SWAY, SWAY] += model.sway_sd_rad**2 * (1.0 - sways * sways)
-    p[LAG, LAG] += model.lag_walk_m * run
     return acceleration, rolls
 
 
@@ -291,10 +311,73 @@ def start_anew(x: FloatArray, p: FloatArray, f: FloatArray, measured: float, pul
 
 
 @njit_borrowed
+def slope_under(
+    grid: FloatArray, table: FloatArray, x: FloatArray, p: FloatArray, alone: bool, gravity: float
+) -> tuple[Line, float]:
+    """The map where the body leans, and the variance per second of the speed that its slope leaves, m2/s3.
+
+    A train without a wheel (``alone``) may be on another slope than it is held to be: what that leaves
+    lasts while it runs through the places where it may be.
+    """
+    lean, lost = line_at(grid, table, x[S] - x[LEAD]), np.sqrt(p[S, S])
+    if not alone or lost < LOST_M:
+        return lean, 0.0
+    about = line_over(grid, table, x[S] - x[LEAD], lost)
+    lasts = min(lost / max(abs(x[V]), 1.0), MOST_DOUBT_S)
+    doubt = 2.0 * gravity**2 * about.pitch_variance * lasts
+    return with_pitch(lean, about.pitch, about.pitch_slope), doubt
+
+
+@njit_borrowed
+def off_heading(
+    grid: FloatArray,
+    table: FloatArray,
+    x: FloatArray,
+    p: FloatArray,
+    direction: float,
+    alone: bool,
+    model: LineModel,
+    gravity: float,
+    h: FloatArray,
+) -> tuple[float, float]:
+    """Innovation of the heading, and its variance; writes the slopes by place, lag and turn in ``h``.
+
+    The heading is that of the design where the body points; by how much less it turns in this curve, and by
+    how much more since the wheels carry what cant leaves of the lateral acceleration (that hardly changes
+    with place and speed); and its sway.
+    """
+    place, lost = x[S] - direction * x[LAG], np.sqrt(p[S, S])
+    line = line_at(grid, table, place)
+    heading, bend, variance = line.heading, line.bend, model.heading_sd_rad**2
+    if alone and lost >= LOST_M:
+        about = line_over(grid, table, place, lost)
+        heading, bend, variance = about.heading, about.bend, variance + about.heading_variance
+    out = direction * flank(line.bend)
+    h[S], h[LAG], h[TURN] = -bend, direction * bend, out
+    unbalanced = x[V] * x[V] * line.bend + gravity * np.sin(line.roll)
+    attack = direction * model.attack_s2pm * unbalanced
+    return heading + attack - out * x[TURN] - x[YAW] + x[SWAY], variance
+
+
+@njit_borrowed
+def stands(quiet: float, push: float, x: FloatArray, p: FloatArray, stood: bool) -> bool:
+    """Whether a train without a wheel stands: all is quiet, no force is left over, and it may be at rest.
+
+    What it may have run before it was heard is added to the variance of its speed.
+    """
+    slow = abs(x[V]) < STILL_MPS + STILL_SDS * np.sqrt(p[V, V])
+    still = quiet > 0.0 and abs(push) < STILL_MPS2 and slow
+    if stood and not still:
+        p[V, V] += STILL_MPS**2
+    return still
+
+
+@njit_borrowed
 def curve_matched(
     dt: float,
     signals: FloatArray,
     count: FloatArray,
+    quiet: FloatArray,
     model: LineModel,
     gravity: float,
     grid: FloatArray,
@@ -316,13 +399,15 @@ def curve_matched(
         that ends here, body axes.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
+    quiet : ndarray (n,)
+        Where there is no wheel: 1 where the IMU shows no motion, 0 where it does. Below 0 there is a wheel.
     model : LineModel
         Noise.
     gravity : float
         m/s2.
     grid, table : ndarray (2,), (m, 10)
         The map (`simrail.estimators.odometry.line_table`).
-    x, p : ndarray (17,), (17, 17)
+    x, p : ndarray (18,), (18, 18)
         State and covariance at the start; replaced by the last ones.
     steps : Steps, output
         Of n rows.
@@ -339,13 +424,15 @@ def curve_matched(
     resting, slipping = True, False
     before = line_at(grid, table, x[S])
     for k in range(signals.shape[0]):
-        here, lean = line_at(grid, table, x[S]), line_at(grid, table, x[S] - x[LEAD])
+        here = line_at(grid, table, x[S])
+        lean, doubt = slope_under(grid, table, x, p, quiet[k] >= 0.0, gravity)
         # A body askew of the track under the mount feels a share of what pushes it around the curve.
         force = signals[k, 2] * np.cos(here.askew) - signals[k, 3] * np.sin(here.askew)
         steady += dt / STEADY_S * (force - x[PUSH] - steady)
         steps.acceleration[k], rolls = predict(
             x, p, f, work, here, lean, signals[k], force, dt, model, gravity, steady
         )
+        p[V, V] += doubt * dt
         map_ahead(x, p, f, before, here, model)
         before = here
 
@@ -379,6 +466,9 @@ def curve_matched(
         if slipping:
             start_anew(x, p, f, measured, pulse)
         resting = resting or (idle > model.still_s and abs(x[V]) * idle < 2.0 * pulse)
+        if quiet[k] >= 0.0:
+            slipping = True
+            resting = stands(quiet[k], steady + gravity * np.sin(lean.pitch), x, p, resting)
         if past is not None:
             remember_prediction(past, k, x, p, f)
 
@@ -387,10 +477,9 @@ def curve_matched(
                 error, variance = off_way, way_variance
                 wanted = not slipping and (change != 0.0 or off_way != 0.0)
             elif m == HEADING:
-                # That of the design where the body points, and its sway about that.
-                line = line_at(grid, table, x[S] - direction * x[LAG])
-                h[HEADING, S], h[HEADING, LAG] = -line.bend, direction * line.bend
-                error, variance = line.heading - x[YAW] + x[SWAY], model.heading_sd_rad**2
+                error, variance = off_heading(
+                    grid, table, x, p, direction, quiet[k] >= 0.0, model, gravity, h[HEADING]
+                )
                 wanted = True
             else:
                 error, variance, wanted = -x[V], REST_VARIANCE, resting

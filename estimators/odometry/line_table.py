@@ -88,6 +88,76 @@ def line_at(grid: FloatArray, table: FloatArray, s: float) -> Line:
     )
 
 
+@njit_borrowed
+def with_pitch(line: Line, pitch: float, slope: float) -> Line:
+    """A line with another pitch."""
+    return Line(
+        line.heading,
+        line.bend,
+        line.ramp_even,
+        line.ramp_odd,
+        line.roll,
+        pitch,
+        slope,
+        line.curvature,
+        line.askew,
+        line.element,
+        line.curve,
+    )
+
+
+ROOTS, WEIGHTS = (
+    (-2.8569700138728056, -1.355626179974266, 0.0, 1.355626179974266, 2.8569700138728056),
+    (
+        0.011257411327720686,
+        0.22207592200561266,
+        0.5333333333333333,
+        0.22207592200561266,
+        0.011257411327720686,
+    ),
+)
+"""Of Gauss and Hermite's quadrature over a standard normal law."""
+
+
+class Spread(NamedTuple):
+    """Heading and pitch where the place is only known to a standard deviation: the lines that fit them best.
+
+    Attributes
+    ----------
+    heading, bend, heading_variance : float
+        Mean, slope and what is left of the heading: rad, 1/m, rad2.
+    pitch, pitch_slope, pitch_variance : float
+        The same of the pitch.
+    """
+
+    heading: float
+    bend: float
+    heading_variance: float
+    pitch: float
+    pitch_slope: float
+    pitch_variance: float
+
+
+@njit_borrowed
+def line_over(grid: FloatArray, table: FloatArray, s: float, sd: float) -> Spread:
+    """The map about s: regression over a normal law of the place (Sarkka 2013, section 5.2).
+
+    A tangent would be that of the place where the train is held to be, a straight as well as a curve.
+    """
+    h = hh = ht = p = pp = pt = 0.0
+    for i in range(5):
+        line, t, weight = line_at(grid, table, s + ROOTS[i] * sd), ROOTS[i], WEIGHTS[i]
+        h += weight * line.heading
+        ht += weight * line.heading * t
+        p += weight * line.pitch
+        pt += weight * line.pitch * t
+    for i in range(5):
+        line, t, weight = line_at(grid, table, s + ROOTS[i] * sd), ROOTS[i], WEIGHTS[i]
+        hh += weight * (line.heading - h - ht * t) ** 2
+        pp += weight * (line.pitch - p - pt * t) ** 2
+    return Spread(h, ht / sd, hh, p, pt / sd, pp)
+
+
 def line_table(
     track: TrackDesign, *, chord: Chord | None = None, mount_x_m: float = 0.0, wheel_ahead_m: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:

@@ -71,6 +71,19 @@ class Waviness:
     z_sd: float = 6e-3
     z_lengths: tuple[float, ...] = (48.0, 2.3, 2.3)
 
+    def at_scale(self, scale: float) -> "Waviness":
+        """That of a model of another scale, with the same angles."""
+        return Waviness(
+            roll_sd=self.roll_sd,
+            roll_lengths=tuple(scale * length for length in self.roll_lengths),
+            pitch_sd=self.pitch_sd,
+            pitch_lengths=tuple(scale * length for length in self.pitch_lengths),
+            y_sd=scale * self.y_sd,
+            y_lengths=tuple(scale * length for length in self.y_lengths),
+            z_sd=scale * self.z_sd,
+            z_lengths=tuple(scale * length for length in self.z_lengths),
+        )
+
 
 class Held(NamedTuple):
     """What is held, at n samples.

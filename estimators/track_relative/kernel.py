@@ -57,9 +57,6 @@ from simrail.estimators.track_relative.states import (
 
 from simrail.core.jit import FloatArray, IntArray, njit, njit_borrowed
 
-ROWS = 7
-"""Scalar measurements of a step: three gyros, three accelerometers, the wheel."""
-
 SEGMENT = 256
 """Steps between two that the filter keeps."""
 
@@ -119,11 +116,11 @@ class Model(NamedTuple):
 
     Attributes
     ----------
-    columns, coefficients : ndarray of int (7, w), ndarray (n, 7, w)
-        Rows of the measurements.
-    measured : ndarray (n, 7)
+    columns, coefficients : ndarray of int (m, w), ndarray (n, m, w)
+        Rows of the measurements: three gyros, three accelerometers, and what else there is.
+    measured : ndarray (n, m)
         z less what the linearised model has as its constant: e = measured - H x.
-    variances : ndarray (n, 7)
+    variances : ndarray (n, m)
         Of each; not finite for one that is not made.
     flows : ndarray (n, 13)
         `FLOWS` of the step that leads there.
@@ -188,9 +185,9 @@ SIZE = np.array([2, 2, 2, 2, 3, 3])
 """And how many there are of each."""
 
 
-def room_for_segment(steps: int) -> Segment:
-    """Room for as many steps."""
-    shapes = (steps, STATES), (steps, STATES, WIDTH), (steps, ROWS, STATES), (steps, ROWS), (steps, ROWS)
+def room_for_segment(steps: int, rows: int) -> Segment:
+    """Room for as many steps, of as many measurements."""
+    shapes = (steps, STATES), (steps, STATES, WIDTH), (steps, rows, STATES), (steps, rows), (steps, rows)
     return Segment(*(np.zeros(shape) for shape in shapes))
 
 
@@ -417,7 +414,7 @@ def run_segment(
 ) -> float:
     """Steps ``first`` to ``last`` of the filter, in place; returns -2 log-likelihood but for a constant.
 
-    ``kept``, ``filtered`` (n, 51) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, 7), the
+    ``kept``, ``filtered`` (n, 51) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, m), the
     innovations over their sds, are written where there is room.
     """
     total = 0.0
@@ -430,7 +427,7 @@ def run_segment(
                 kept.states[at, i] = x[i]
                 for c in range(WIDTH):
                     kept.covariances[at, i, c] = p[i, c]
-        for m in range(ROWS):
+        for m in range(model.columns.shape[0]):
             if kept is not None:
                 kept.inverses[at, m] = 0.0
             if math.isfinite(model.variances[k, m]):
@@ -524,7 +521,7 @@ def run_back(
         run_segment(x, p, model, first, last, segment, scratch, none, none3, none)
         for k in range(last - 1, first - 1, -1):
             at = k - first
-            for m in range(ROWS - 1, -1, -1):
+            for m in range(model.columns.shape[0] - 1, -1, -1):
                 if segment.inverses[at, m] > 0.0:
                     unmeasure(lam, info, model, k, m, segment, at, scratch)
             smooth(segment, at, lam, smoothed[k])

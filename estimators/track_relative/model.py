@@ -13,6 +13,7 @@ import numpy.typing as npt
 from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry
 from simrail.estimators.odometry.kernel import DIRECTION_SPEED_MPS, SATURATION_RADIUS_M
 from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.aiding import Aiding, Rows
 from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.kernel import FLOWS, Model, Noise
 from simrail.estimators.track_relative.line import Ground, Lines, ground_at, lines_of, numbers_at
@@ -20,8 +21,7 @@ from simrail.estimators.track_relative.measurement import Around, duals, shown, 
 from simrail.estimators.track_relative.noise import AT_MPS, Motion
 from simrail.estimators.track_relative.prior import first_state, noise_of, start_of
 
-from simrail.core.columns import ACCEL, GYRO, ODOMETRY
-from simrail.core.errors import InputError
+from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording
 
@@ -53,9 +53,9 @@ class Steps(NamedTuple):
     signals : ndarray (n, 6)
         Mean rates and forces, rad/s and m/s2.
     way : ndarray (n,)
-        That the wheel shows, m.
-    odometry : ndarray (n, 3)
-        Mean place, speed and acceleration by the odometry, m, m/s, m/s2.
+        That the wheel shows, m; 0 where there is none.
+    odometry : ndarray (n, 4)
+        Mean place, speed, acceleration and sd of the place by the odometry, m, m/s, m/s2, m.
     slipping, resting : ndarray (n,) of bool
         Where the wheel is not believed, and where the train stands.
     """
@@ -70,46 +70,49 @@ class Steps(NamedTuple):
     resting: npt.NDArray[np.bool_]
 
 
-def steps_of(recording: Recording, rate_hz: float) -> Steps:
+def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) -> Steps:
     """Bring a recording to steps; what is left over at its end is dropped.
 
     A step takes nothing from later than its last sample. The odometry is the causal one for the smoother too:
     it linearises anew about what it finds, and the history of a smoothed one would be most of its memory.
+    Without a wheel it is tens of metres off before the first curve, and no smoother is linear so far.
     """
-    wheel, time = recording.encoder, recording.imu.index.to_numpy(dtype=np.float64)
-    if wheel is None or recording.encoder_sheet is None:
-        raise InputError(
-            "the track-relative smoother needs an encoder",
-            field="encoder",
-            remedy="add an [encoder] to the scenario, or counts to the ride",
-        )
+    time = recording.imu.index.to_numpy(dtype=np.float64)
+    has_wheel = recording.encoder is not None and recording.encoder_sheet is not None
     block = max(1, round(recording.imu_sheet.rate_hz / rate_hz))
     n = len(time) // block
 
     def mean(values: FloatArray) -> FloatArray:
         return np.asarray(values[: n * block].reshape(n, block, values.shape[1]).mean(axis=1))
 
-    method = CurveMatchedOdometry()
+    method = CurveMatchedOdometry(smoothed=smoothed and not has_wheel)
     trace = method.trace(recording)
-    odometry = mean(method.at_imu_times(trace, recording)[list(ODOMETRY)].to_numpy())
-    read = np.searchsorted(wheel.index.to_numpy(), time + 1e-9, side="right") - 1
-    counts = wheel["pulse_count"].to_numpy(dtype=np.float64)
-    way = (counts[np.maximum(read, 0)] - counts[0]) * recording.encoder_sheet.pulse_m
+    odometry = mean(method.at_imu_times(trace, recording)[[*ODOMETRY, ODOMETRY_SD[0]]].to_numpy())
     ends = time[block - 1 :: block][:n]
     # Before the odometry's first step, which a short ride does not have, the train stands.
     known = np.searchsorted(trace.time_s, ends + 1e-9, side="right")
     resting = np.concatenate([[True], trace.resting])[known]
-    odometry[resting, 1:] = 0.0
+    odometry[resting, 1:3] = 0.0
     return Steps(
         time_s=mean(time[:, None])[:, 0],
         end_s=ends,
         dt=block / recording.imu_sheet.rate_hz,
         signals=mean(recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)),
-        way=mean(way[:, None])[:, 0],
+        way=mean(_way(recording, time)[:, None])[:, 0],
         odometry=odometry,
         slipping=np.concatenate([[False], trace.slipping])[known],
         resting=resting,
     )
+
+
+def _way(recording: Recording, time: FloatArray) -> FloatArray:
+    """Way (n,) that the wheel has shown by each time; 0 without one."""
+    wheel, sheet = recording.encoder, recording.encoder_sheet
+    if wheel is None or sheet is None:
+        return np.zeros(len(time))
+    read = np.searchsorted(wheel.index.to_numpy(), time + 1e-9, side="right") - 1
+    counts = wheel["pulse_count"].to_numpy(dtype=np.float64)
+    return np.asarray((counts[np.maximum(read, 0)] - counts[0]) * sheet.pulse_m)
 
 
 class Course(NamedTuple):
@@ -127,6 +130,10 @@ class Course(NamedTuple):
         Of all n steps.
     way : ndarray (n,)
         From the step before, m.
+    aiding : tuple of Aiding
+        What is measured beside the IMU.
+    aided : Rows
+        Of all of it, at n steps.
     """
 
     recording: Recording
@@ -138,18 +145,38 @@ class Course(NamedTuple):
     steps: Steps
     around: Around
     way: FloatArray
+    aiding: tuple[Aiding, ...]
+    aided: Rows
+
+    @property
+    def rows(self) -> int:
+        """Measurements of a step."""
+        return 6 + int(self.aided.values.shape[1])
 
 
-def course_of(recording: Recording, steps: Steps, motion: Motion, without: Collection[str]) -> Course:
+def course_of(
+    recording: Recording,
+    steps: Steps,
+    motion: Motion,
+    aiding: tuple[Aiding, ...],
+    without: Collection[str],
+) -> Course:
     """The course of the odometry, with the body at rest in the map's track."""
     noise = noise_of(recording, motion, without)
     start, covariance = start_of(recording, motion, noise, without)
     states = np.tile(first_state(recording, motion), (len(steps.time_s), 1))
-    states[:, [at.S, at.V, at.A]] = steps.odometry
+    states[:, [at.S, at.V, at.A]] = steps.odometry[:, :3]
     empty = np.empty(0)
     _, lateral, height = recording.mount_position_m
     around = Around(states, empty, empty, (lateral, height), recording.gravity_mps2, motion.sway_hz > 0.0)
-    course = Course(recording, lines_of(recording), motion, noise, start, covariance, steps, around, empty)
+    each = [kind.rows(recording, steps) for kind in aiding]
+    none = np.empty((len(steps.time_s), 0))
+    aided = Rows(
+        *(np.hstack([none, *part]) for part in ([r.values for r in each], [r.variances for r in each]))
+    )
+    course = Course(
+        recording, lines_of(recording), motion, noise, start, covariance, steps, around, empty, aiding, aided
+    )
     return about(course, states)
 
 
@@ -176,11 +203,12 @@ def linearised(course: Course, rows: slice) -> Model:
     around = whole._replace(states=whole.states[rows], jerk=whole.jerk[rows], sense=whole.sense[rows])
     ground, n = ground_at(course.recording, course.lines, around.states[:, at.S]), len(around.jerk)
     x = duals(around.states)
-    values, columns, coefficients = table_of([*shown(x, ground, around), x[at.WAY]], n)
+    beside = [row for kind in course.aiding for row in kind.shown(x)]
+    values, columns, coefficients = table_of([*shown(x, ground, around), *beside], n)
     _, said_columns, said = table_of(told(x, ground, around), n)
     # z - h(x0) - H (x - x0) = (z - h(x0) + H x0) - H x
     constant = np.einsum("nmw,nmw->nm", coefficients, around.states[:, columns])
-    measured = np.column_stack([steps.signals[rows], steps.way[rows]])
+    measured = np.hstack([steps.signals[rows], course.aided.values[rows]])
     return Model(
         columns=columns,
         coefficients=coefficients,
@@ -195,18 +223,15 @@ def linearised(course: Course, rows: slice) -> Model:
 
 
 def _variances(course: Course, rows: slice) -> FloatArray:
-    """Of the measurements (n, 7); infinite where one is not made."""
+    """Of the measurements (n, m); infinite where one is not made."""
     sheet, steps, motion = course.recording.imu_sheet, course.steps, course.motion
-    assert course.recording.encoder_sheet is not None
     rate = 1.0 / steps.dt
     moves = (np.abs(course.around.states[rows, at.V]) / AT_MPS) ** 3 * (rate / MOTION_RATE_HZ)
     gyro = sheet.gyro_noise_radpsqrts**2 * rate + LEAST_GYRO_RADPS**2
     accel = sheet.accel_noise_mpsqrts**2 * rate + LEAST_ACCEL_MPS2**2
     own = (motion.accel_x, motion.accel_y, motion.accel_z)
-    pulse = course.recording.encoder_sheet.pulse_m
-    wheel = np.where(steps.slipping[rows], np.inf, pulse**2 / 12.0)
     columns = [gyro + motion.gyro**2 * moves] * 3 + [accel + sd**2 * moves for sd in own]
-    return np.ascontiguousarray(np.column_stack([*columns, wheel]))
+    return np.ascontiguousarray(np.column_stack([*columns, course.aided.variances[rows]]))
 
 
 def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:

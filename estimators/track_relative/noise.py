@@ -5,7 +5,8 @@ chosen by hand near the largest likelihood of rides that are not those of any sh
 alone drives the processes of y and z to nothing where a mount shakes, and the rails with them.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from simrail.core.errors import InputError
 from simrail.recording.recording import Recording
@@ -86,12 +87,21 @@ AXLE = Motion(
     yaw_length=3.9,
     gyro=3e-4,
     accel_x=0.32,
-    accel_y=0.25,
+    accel_y=0.1,
     accel_z=0.25,
 )
 """What runs on the rails by itself."""
 
-FRAME = Motion(pitch_sd=7.3e-4, yaw_sd=1.2e-3, yaw_length=6.3, gyro=3e-4, accel_x=0.16, torsion_sd=0.15)
+FRAME = Motion(
+    roll_sd=3e-3,
+    roll_length=8.0,
+    pitch_sd=7.3e-4,
+    yaw_sd=1.2e-3,
+    yaw_length=6.3,
+    gyro=3e-4,
+    accel_x=0.16,
+    torsion_sd=0.15,
+)
 """A bogie frame."""
 
 BODY = Motion(
@@ -102,7 +112,7 @@ BODY = Motion(
     yaw_sd=1e-3,
     yaw_length=10.0,
     y_length=8.0,
-    z_sd=2.5e-3,
+    z_sd=8e-3,
     z_length=8.0,
     accel_x=0.3,
     accel_y=0.15,
@@ -117,8 +127,31 @@ BODY = Motion(
 """What rests on bogies, or on axles with nothing upon it; and a body of which there is no drawing."""
 
 
+STANDARD_BASE_M = 1.5
+"""Distance of the rails' heads where the gauge is 1.435 m, of which all that is in metres above speaks."""
+
+SAME_SCALE = 0.3
+"""Relative difference of gauges that makes no other scale: 1.0 to 1.676 m are all of full size."""
+
+
 def motion_of(recording: Recording) -> Motion:
-    """That of the mount's class, by the vehicle's drawing."""
+    """That of the mount's class, by the vehicle's drawing; lengths by the gauge of a model track."""
+    motion, scale = class_of(recording), recording.track.rail_base_m / STANDARD_BASE_M
+    return motion if abs(scale - 1.0) < SAME_SCALE else at_scale(motion, scale)
+
+
+def at_scale(motion: Motion, scale: float) -> Motion:
+    """The motion of a model of another scale, with the same angles."""
+    longer: dict[str, Any] = {}
+    for entry in fields(motion):
+        value = getattr(motion, entry.name)
+        if entry.name.endswith("_length") or entry.name in ("y_sd", "z_sd", "y_tilt_sd"):
+            longer[entry.name] = scale * value
+    return replace(motion, y_bend_sd=scale**2 * motion.y_bend_sd, **longer)
+
+
+def class_of(recording: Recording) -> Motion:
+    """That of the mount's class at full size."""
     sheet = recording.vehicle_sheet
     here = None if sheet is None else sheet.body(recording.mount_body)
     if sheet is None or here is None:

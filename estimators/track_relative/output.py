@@ -21,6 +21,8 @@ from simrail.estimators.track_relative.model import Course
 from simrail.core.columns import (
     ATTITUDE,
     ATTITUDE_SD,
+    BOUND,
+    FAULT,
     INNOVATION,
     ODOMETRY,
     RATE_INNOVATION,
@@ -51,8 +53,9 @@ class Trace(NamedTuple):
     states : ndarray (n, 51)
     covariance : ndarray (n, 7, 7)
         Of roll, pitch, yaw, S, V, y and z.
-    surprises : ndarray (n, 7)
-        Innovations of the filter over their standard deviations; NaN for a measurement that was not made.
+    surprises : ndarray (n, m)
+        Innovations of the filter over their standard deviations, the IMU's six first;
+        NaN for a measurement that was not made.
     log_likelihood : float
         Of all measurements, but for a constant.
     """
@@ -76,6 +79,17 @@ def states_of(trace: Trace, *, causal: bool) -> pd.DataFrame:
         values, sd = look(time[rows])
         table[rows] = np.column_stack([_attitude(trace.course, values), values[:, 4:], sd])
     return pd.DataFrame(table, index=index, columns=columns)
+
+
+def with_bounds(states: pd.DataFrame, trace: Trace, faults: FloatArray, widening: FloatArray) -> pd.DataFrame:
+    """States with bounds of roll and place, and faults.
+
+    Both are given (1 + n,), before the first step and at the end of each.
+    """
+    step = _last_step(trace, states.index.to_numpy(dtype=np.float64)) + 1
+    sds = ("roll_sd_rad", "position_sd_m")
+    bounds = {name: widening[step] * states[sd] for name, sd in zip(BOUND, sds, strict=True)}
+    return states.assign(**bounds, **{FAULT: faults[step]})
 
 
 Look = Callable[[FloatArray], tuple[FloatArray, FloatArray]]

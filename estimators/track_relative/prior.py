@@ -33,6 +33,10 @@ BIAS_TIME_S = 300.0
 START_HEADING_SD_RAD = 1e-3
 """Of the map's yaw at its origin."""
 
+LAG_RADIUS_M, ATTACK_LAG_M = 400.0, 0.1
+"""A lag stands here for what the odometry knows apart: in a curve of this radius, what a body turns beside
+its lag, and the angle of attack by which its wheels carry a lateral force, at 20 to 60 km/h."""
+
 PARTS = {
     "tilt": (at.TILT, at.TILT_RATE),
     "squat": (at.SQUAT,),
@@ -141,16 +145,24 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     errors, wheel, method = recording.map_errors, recording.encoder_sheet, CurveMatchedOdometry()
     chord = chord_of(recording)
     pointing = pointing_of(recording, chord)
-    assert wheel is not None
     sd[at.S] = math.hypot(method.start_sd_m, chainage_sd(recording, recording.start_position_m))
-    sd[at.V], sd[at.A], sd[at.WAY] = STILL_SD_MPS, 1e-2, wheel.pulse_m
-    sd[at.SCALE] = math.hypot(wheel.radius_relative_sd, errors.chainage_scale_sd)
-    sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
+    sd[at.V], sd[at.A] = STILL_SD_MPS, 1e-2
+    scaled = recording.odometer_sheet if wheel is None else wheel
+    if wheel is not None:
+        sd[at.WAY] = wheel.pulse_m
+        sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
+    if scaled is not None:
+        sd[at.SCALE] = math.hypot(scaled.radius_relative_sd, errors.chainage_scale_sd)
     sd[at.HEADING] = heading_sd(recording)
     sd[at.TILT], sd[at.SQUAT] = motion.tilt_sd, motion.squat_sd
     sd[at.TORSION], sd[at.TILT_RATE] = motion.torsion_sd, motion.tilt_rate_sd
     sd[at.Y_TILT], sd[at.Y_BEND] = motion.y_tilt_sd, motion.y_bend_sd
-    sd[at.LAG] = math.hypot(pointing.lag_sd_m, 0.0 if chord is None else lag_of(chord)[1])
+    sd[at.LAG] = math.hypot(
+        pointing.lag_sd_m,
+        LAG_RADIUS_M * pointing.turn_sd_rad,
+        ATTACK_LAG_M if pointing.attacks else 0.0,
+        0.0 if chord is None else lag_of(chord)[1],
+    )
     sd[at.LEAD] = pointing.lead_sd_m
 
 

@@ -4,7 +4,7 @@ What the mount does at the full rate of its IMU (`simrail.estimators.track_relat
 rails are:
 
 * on an axle, whose wheels stand on them: at once;
-* on a bogie frame of which the drawing has springs and masses: under them
+* on a bogie frame of full size of which the drawing has springs and masses: under them
   (`simrail.estimators.track_relative.under_frame`);
 * with a rail sensor, and on a mount of any other kind: as by the body itself.
 
@@ -32,7 +32,7 @@ from simrail.estimators.track_relative.full_rate import (
     side_of,
 )
 from simrail.estimators.track_relative.line import Lines
-from simrail.estimators.track_relative.noise import AXLE, FRAME, motion_of
+from simrail.estimators.track_relative.noise import AXLE, FRAME, SAME_SCALE, STANDARD_BASE_M, class_of
 from simrail.estimators.track_relative.output import Trace
 from simrail.estimators.track_relative.suspension import bogie_of
 from simrail.estimators.track_relative.under_frame import Under, draw_under, rails_under
@@ -117,16 +117,16 @@ def rails_of(
         On a mount that is neither an axle nor a frame by the drawing, with the geometry as the smoother's
         own states have it, and no draws.
     """
-    kind = motion_of(recording)
+    kind, scale = class_of(recording), _scale(recording)
     if kind not in (AXLE, FRAME) or len(trace.states) < LEAST_STEPS:
         return replace(estimate, geometry=geometry_of(sight_of(estimate, recording), step_m=step_m))
     sheet, bogie = recording.vehicle_sheet, None
-    if kind is FRAME and sheet is not None and recording.rail_displacement is None:
+    if kind is FRAME and scale == 1.0 and sheet is not None and recording.rail_displacement is None:
         bogie = bogie_of(sheet, recording.mount_body)
     motions, held = _motions(recording, trace, ASIDE_MPS2[kind], borne=bogie is not None, drawn=draws > 0)
     sight, slow = _seen_from(recording, trace, estimate, motions)
     geometry, under = geometry_of(sight, step_m=step_m), None
-    wheels = np.array(WHEELS_M3) / step_m
+    wheels = scale**3 * np.array(WHEELS_M3) / step_m
     if not draws:
         sight = sight._replace(arms=sight.arms[:1].copy(), rails=sight.rails[:0], covariance=None)
     if bogie is not None and sheet is not None and held is not None and len(geometry) >= LEAST_STEPS:
@@ -145,11 +145,17 @@ def rails_of(
     return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
 
+def _scale(recording: Recording) -> float:
+    """Of a model track; 1 for every gauge of full size."""
+    scale = recording.track.rail_base_m / STANDARD_BASE_M
+    return 1.0 if abs(scale - 1.0) < SAME_SCALE else scale
+
+
 def _motions(
     recording: Recording, trace: Trace, aside: float, *, borne: bool, drawn: bool
 ) -> tuple[Motions, Held | None]:
     """The motion, and what is held of a frame that is borne; chains only for draws: they are large."""
-    waviness, held = Waviness(), held_of(recording, trace)
+    waviness, held = Waviness().at_scale(_scale(recording)), held_of(recording, trace)
     sensor = recording.rail_displacement is not None
     chains = {
         "side": side_of(recording, held, waviness),

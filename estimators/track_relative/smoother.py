@@ -9,7 +9,9 @@ and place, known as well as the map's sheet says.
 
 Forwards it is a Kalman filter, which is to be had as a causal estimate; backwards a fixed-interval smoother.
 All is linear about the odometry (`simrail.estimators.track_relative.model`), of which nothing else is taken:
-the wheel is a measurement. The smoother linearises a second time, about what it has found of the train.
+the wheel is a measurement, as is anything else that a ride may have beside its IMU
+(`simrail.estimators.track_relative.aiding`). The smoother linearises a second time, about what it has found
+of the train.
 
 The formulation is ours. It owes to Briales et al. 2021 the compensation by the design track, to
 Gonzalez-Carbajal et al. 2023 the state of a body in the track frame, and to Hartikainen and Sarkka 2010
@@ -21,9 +23,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.aiding import Aiding, aiding_of
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
-    ROWS,
     SEGMENT,
     room_for_segment,
     room_to_work,
@@ -31,8 +33,9 @@ from simrail.estimators.track_relative.kernel import (
     run_filter,
 )
 from simrail.estimators.track_relative.model import Course, about, course_of, linearised, steps_of
+from simrail.estimators.track_relative.monitor import faults_and_widening
 from simrail.estimators.track_relative.noise import Motion, motion_of
-from simrail.estimators.track_relative.output import Trace, innovations_of, states_of
+from simrail.estimators.track_relative.output import Trace, innovations_of, states_of, with_bounds
 from simrail.estimators.track_relative.prior import PARTS
 from simrail.estimators.track_relative.rails import rails_of
 from simrail.estimators.trajectory.smoother import MOST_DRAWS
@@ -74,6 +77,8 @@ class TrackRelativeSmoother:
     draws : int
         How often to draw what the rails may be: their standard deviation in a band of wavelengths follows
         from that alone. 0 for none; only smoothed and with a geometry.
+    aiding : tuple of Aiding
+        What is measured beside what the recording has (`simrail.estimators.track_relative.aiding`).
     """
 
     smoothed: bool = True
@@ -83,8 +88,9 @@ class TrackRelativeSmoother:
     without: tuple[str, ...] = ()
     geometry_step_m: float = 0.25
     draws: int = 0
+    aiding: tuple[Aiding, ...] = ()
 
-    needs = ("encoder",)
+    needs = ()
     cites = ("Briales et al. 2021", "Gonzalez-Carbajal et al. 2023", "Hartikainen and Sarkka 2010")
 
     def __post_init__(self) -> None:
@@ -117,16 +123,11 @@ class TrackRelativeSmoother:
         return "track-relative smoother" if self.smoothed else "track-relative filter"
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate attitude, place, speed and the rails at every IMU sample.
-
-        Raises
-        ------
-        InputError
-            If the recording has no encoder.
-        """
+        """Estimate attitude, place, speed and the rails at every IMU sample."""
         trace = self.trace(recording)
+        states = with_bounds(states_of(trace, causal=self.causal), trace, *faults_and_widening(trace))
         estimate = Estimate(
-            states=states_of(trace, causal=self.causal),
+            states=states,
             mount=recording.mount,
             innovations=innovations_of(trace),
         )
@@ -140,8 +141,9 @@ class TrackRelativeSmoother:
     def trace(self, recording: Recording) -> Trace:
         """All states, at the filter's own steps."""
         motion = motion_of(recording) if self.motion is None else self.motion
-        steps = steps_of(recording, self.rate_hz)
-        course = course_of(recording, steps, motion, self.without)
+        steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
+        aiding = (*aiding_of(recording, smoothed=self.smoothed), *self.aiding)
+        course = course_of(recording, steps, motion, aiding, self.without)
         trace = _run(course, smoothed=self.smoothed)
         for _ in range(self.passes - 1 if self.smoothed else 0):
             trace = _run(about(course, trace.states), smoothed=True)
@@ -159,7 +161,7 @@ def _run(course: Course, *, smoothed: bool) -> Trace:
     count = -(-n // SEGMENT) if smoothed else 0
     starts, squares = np.empty((count, at.STATES)), np.empty((count, at.STATES, at.WIDTH))
     states, covariance = np.empty((n, at.STATES)), np.empty((n, OUTPUTS, OUTPUTS))
-    surprises, work = np.full((n, ROWS), np.nan), room_to_work()
+    surprises, work = np.full((n, course.rows), np.nan), room_to_work()
     x, p, total = course.start.copy(), course.start_covariance.copy(), 0.0
     wanted = slice(0, 0) if smoothed else slice(None)
     for rows in _pieces(n):
@@ -178,7 +180,7 @@ def _run(course: Course, *, smoothed: bool) -> Trace:
         )
     if smoothed:
         lam, info = np.zeros(at.STATES), np.zeros((at.STATES, at.WIDTH))
-        segment, lines = room_for_segment(SEGMENT), np.zeros((2, OUTPUTS, at.WIDTH))
+        segment, lines = room_for_segment(SEGMENT, course.rows), np.zeros((2, OUTPUTS, at.WIDTH))
         for rows in reversed(list(_pieces(n))):
             kept = slice(rows.start // SEGMENT, -(-rows.stop // SEGMENT))
             model = linearised(course, rows)

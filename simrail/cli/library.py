@@ -15,12 +15,18 @@ import typer
 
 from simrail.cli.options import DONE, number
 
-FOLDERS = {"scenarios": "", "tracks": "tracks", "vehicles": "vehicles", "imus": "imus"}
+FOLDERS = {
+    "scenarios": "",
+    "tracks": "tracks",
+    "vehicles": "vehicles",
+    "imus": "imus",
+    "spectra": "spectra",
+}
 """Where the shipped files of each kind lie among the scenarios."""
 
 
 def list_parts() -> int:
-    """Show the scenarios, tracks, vehicles, IMUs and estimators that are there."""
+    """Show the scenarios, tracks, vehicles, IMUs, published spectra and estimators that are there."""
     from rich.console import Console
 
     console = Console(highlight=False)
@@ -34,7 +40,7 @@ def list_parts() -> int:
 
 
 def catalogue() -> dict[str, dict[str, str]]:
-    """Return name -> title for each kind: scenarios, tracks, vehicles, imus, estimators."""
+    """Return name -> title for each kind: scenarios, tracks, vehicles, imus, spectra, estimators."""
     home = Path(str(files("simrail.scenarios")))
     titles = {
         kind: {path.stem: _toml_title(path) for path in sorted((home / folder).glob("*.toml"))}

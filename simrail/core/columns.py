@@ -37,6 +37,8 @@ ODOMETRY = ("position_m", "speed_mps", "acceleration_mps2")
 ODOMETRY_SD = ("position_sd_m", "speed_sd_mps", "acceleration_sd_mps2")
 RELATIVE_POSITION = ("lateral_m", "vertical_m")
 RELATIVE_POSITION_SD = ("lateral_sd_m", "vertical_sd_m")
+BOUND = ("roll_bound_rad", "position_bound_m")
+FAULT = "fault"
 ENCODER = ("pulse_count",)
 EDGE_TIME = "edge_time_s"
 RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
@@ -93,6 +95,11 @@ _TABLE = [
     Column(
         "rail_contact_m", "m", "rail", "contact on the rail, from the middle of its head to the field side"
     ),
+    Column("roll_bound_rad", "rad", "-", "what the error of roll_rad exceeds in one of a thousand cases"),
+    Column(
+        "position_bound_m", "m", "track", "what the error of position_m exceeds in one of a thousand metres"
+    ),
+    Column("fault", "1", "-", "1 once a ride has contradicted its sheets: no bound holds from there on"),
     Column("contact_angle_rad", "rad", "rail", "angle of the contact, positive where the flange touches"),
     Column("flange_contact", "1", "rail", "1 where the flange touches its rail, else 0"),
 ]

@@ -25,7 +25,7 @@ from simrail.core.errors import InputError, did_you_mean
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imus"}
+FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imus", "spectrum": "spectra"}
 
 
 class Part(BaseModel):
@@ -48,7 +48,7 @@ def shipped_folder() -> Path:
 
 
 def shipped(kind: str) -> dict[str, Path]:
-    """Shipped files of a kind (``scenario``, ``track``, ``vehicle``, ``imu``), by name."""
+    """Shipped files of a kind, a key of `FOLDERS`, by name."""
     folder = shipped_folder() / FOLDERS[kind]
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 

@@ -21,7 +21,7 @@ from simrail.scenario.distributions import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import judge_stop_rule
 from simrail.scoring.ride_figures import RIDE
-from simrail.scoring.table import CURVE_PREFIX, METRICS, WINDOWS
+from simrail.scoring.table import CURVE_PREFIX, METRICS, ON_REQUEST, WINDOWS
 from simrail.track.laid_track import LaidTrack
 
 MOST_CELLS = 1_000_000
@@ -155,7 +155,7 @@ def _judge_score(scenario: Scenario) -> None:
     score = scenario.spec.score
     for name, words, possible in (
         ("windows", score.windows, (*WINDOWS, CURVE_PREFIX + "*")),
-        ("metrics", score.metrics, METRICS),
+        ("metrics", score.metrics, (*METRICS, *ON_REQUEST)),
     ):
         for i, word in enumerate(words or ()):
             if name == "metrics" or not word.startswith(CURVE_PREFIX):

@@ -216,12 +216,15 @@ class VibrationPart(Part):
     """``[vibration]``: what shakes the vehicle beyond what its multibody ride sees. Without it, nothing does.
 
     ``off = true`` is an ablation: the same ride in silence. ``join = true`` scales the roughness so that it
-    meets the spectrum of ``[irregularity]`` at its shortest wave.
+    meets the spectrum of ``[irregularity]`` at its shortest wave. ``lateral_creep = true`` lets axles sway
+    and yaw in the creep of their contacts, as at the mean speed of the ride; it is refused for a vehicle with
+    independent wheels whose axles nothing holds in yaw, such as ``irw_car``.
     """
 
     off: Listed[bool] = False
     rate_hz: Listed[Annotated[float, Field(ge=500.0, le=8000.0)]] = 2000.0
     join: Listed[bool] = False
+    lateral_creep: Listed[bool] = False
     roughness: RoughnessPart = RoughnessPart()
     section_gain: SectionGainPart = SectionGainPart()
     welds: DipsPart = DipsPart()
@@ -289,6 +292,7 @@ class VibrationPart(Part):
             if self.passengers.on
             else None,
             rate_hz=self.rate_hz,
+            lateral_creep=self.lateral_creep,
         )
 
     def _rails(self, longest_m: float, offset_db: float) -> RailSources:

@@ -5,7 +5,10 @@ With e = estimate - reference over the samples of a window:
 * ``rms``, ``mean`` (signed), ``sd`` (about the mean, so rms^2 = mean^2 + sd^2);
 * ``p95`` and ``max``: 95th percentile and maximum of abs(e); ``final``: e at the last sample;
 * ``nees``: mean of (e / sd)^2, 1 for a consistent method; ``coverage95``: share of the samples with
-  abs(e) <= 1.96 sd. Only where the method gives a standard deviation;
+  abs(e) <= 1.96 sd, and likewise ``coverage50``, ``90``, ``99`` and ``999`` (99.9 %). Only where the method
+  gives a standard deviation;
+* ``bound``: median of the method's own bound over the way travelled; ``outside``: share of that way on which
+  abs(e) is larger; ``fault``: share of it behind a fault that the method has told. Only where it has bounds;
 * ``nis``: mean normalised innovation squared divided by the number of innovations, again 1.
 
 What cannot be computed is a row without a value whose status says why. This module does not know
@@ -29,7 +32,31 @@ Row = tuple[str, str, str, str, str, float, str, int, str]
 """One row of the score table, in the order of `simrail.scoring.table.FIGURE_COLUMNS`."""
 
 _DEVIATION_METRICS = ("rms", "mean", "sd", "p95", "max", "final")
-_QUANTILE_95 = float(ndtri(0.975))
+_QUANTILES = {
+    f"coverage{name}": float(ndtri(0.5 + 0.5 * share))
+    for name, share in (("50", 0.5), ("90", 0.9), ("95", 0.95), ("99", 0.99), ("999", 0.999))
+}
+_CONSISTENCY_METRICS = ("nees", *_QUANTILES)
+_BOUND_METRICS = ("bound", "outside", "fault")
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What a method says that its errors stay within.
+
+    Attributes
+    ----------
+    bound : ndarray (n,)
+        In the unit of the score table.
+    fault : ndarray (n,)
+        1 once the method has found that it is not to be relied on, before 0.
+    way : ndarray (n,)
+        Run by the train in each sample, m.
+    """
+
+    bound: FloatArray
+    fault: FloatArray
+    way: FloatArray
 
 
 @dataclass(frozen=True)
@@ -42,12 +69,14 @@ class Series:
     sd: FloatArray | None
     reason: str = ""
     band: str = "full"
+    bounds: Bounds | None = None
 
 
 def figures(series: Series, windows: Mapping[str, IntArray], keep: Sequence[str]) -> list[Row]:
     """All figures of one series, window by window."""
     deviations = [name for name in _DEVIATION_METRICS if name in keep]
-    consistency = [name for name in ("nees", "coverage95") if name in keep and series.sd is not None]
+    consistency = [name for name in _CONSISTENCY_METRICS if name in keep and series.sd is not None]
+    bounds = [name for name in _BOUND_METRICS if name in keep and series.bounds is not None]
     rows: list[Row] = []
     for window, samples in windows.items():
         whole = len(samples) == len(series.error)
@@ -62,6 +91,10 @@ def figures(series: Series, windows: Mapping[str, IntArray], keep: Sequence[str]
             rows += _rows(
                 series, window, consistency, values, len(samples), status if status != OK else sd_status
             )
+        if bounds:
+            assert series.bounds is not None
+            values, status = _held(error, series.bounds, samples, bounds)
+            rows += _rows(series, window, bounds, values, len(samples), series.reason or status)
     return rows
 
 
@@ -110,8 +143,28 @@ def _consistency(error: FloatArray, sd: FloatArray, metrics: list[str]) -> tuple
     if good < n:
         return [np.nan] * len(metrics), f"standard deviation not positive in {n - good} of {n} samples"
     ratio = error / sd
-    inside = np.count_nonzero(np.abs(ratio) <= _QUANTILE_95)
-    values = {"nees": float(np.square(ratio).sum()) / n, "coverage95": inside / n}
+    values: dict[str, float] = {
+        name: np.count_nonzero(np.abs(ratio) <= at) / n for name, at in _QUANTILES.items() if name in metrics
+    }
+    values["nees"] = float(np.square(ratio).sum()) / n
+    return [values[name] for name in metrics], OK
+
+
+def _held(
+    error: FloatArray, bounds: Bounds, samples: IntArray, metrics: list[str]
+) -> tuple[list[float], str]:
+    """Figures of the bounds, by the way that was run; behind a fault nothing is outside."""
+    way, bound, fault = bounds.way[samples], bounds.bound[samples], bounds.fault[samples] > 0.0
+    total = float(way.sum())
+    if total <= 0.0:
+        return [np.nan] * len(metrics), NO_SAMPLES
+    order = np.argsort(bound)
+    middle = int(np.searchsorted(np.cumsum(way[order]), 0.5 * total))
+    values = {
+        "bound": float(bound[order][min(middle, len(order) - 1)]),
+        "outside": float(way[(np.abs(error) > bound) & ~fault].sum()) / total,
+        "fault": float(way[fault].sum()) / total,
+    }
     return [values[name] for name in metrics], OK
 
 

@@ -15,13 +15,13 @@ from itertools import chain
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import ATTITUDE, MOTION, ODOMETRY, RELATIVE_POSITION, require
+from simrail.core.columns import ATTITUDE, FAULT, MOTION, ODOMETRY, RELATIVE_POSITION, require
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 from simrail.ride.truth import Mount, Truth
-from simrail.scoring.metrics import IntArray, Row, Series, figures, nis_figures
+from simrail.scoring.metrics import Bounds, IntArray, Row, Series, figures, nis_figures
 from simrail.scoring.table import OK, table_of
 from simrail.scoring.windows import chosen_metrics, chosen_windows, windows_of
 
@@ -208,11 +208,23 @@ def _attitude_series(states: pd.DataFrame, against: Reference) -> Iterator[Serie
             ("design", against.design[:, column]),
         ):
             error = _wrap(angle - values)
-            yield Series(quantity, reference, np.rad2deg(error), sd if reference == "truth" else None)
+            true = reference == "truth"
+            bounds = _bounds(states, against.motion, f"{quantity}_bound_rad", 180.0 / np.pi) if true else None
+            yield Series(quantity, reference, np.rad2deg(error), sd if true else None, bounds=bounds)
             if quantity == "yaw":
                 # The initial heading is given to the methods, not found by them.
                 reason = "" if np.isfinite(error[0]) else "estimate not finite at the first sample"
                 yield Series("yaw_debiased", reference, np.rad2deg(_wrap(error - error[0])), None, reason)
+
+
+def _bounds(states: pd.DataFrame, motion: pd.DataFrame, name: str, scale: float) -> Bounds | None:
+    """The bounds of a quantity, where the estimate has some."""
+    if name not in states.columns:
+        return None
+    time = states.index.to_numpy(dtype=np.float64)
+    way = np.abs(motion["speed_mps"].to_numpy()) * np.gradient(time) if len(time) > 1 else np.zeros(len(time))
+    fault = states[FAULT].to_numpy(dtype=np.float64) if FAULT in states.columns else np.zeros(len(time))
+    return Bounds(scale * states[name].to_numpy(dtype=np.float64), fault, way)
 
 
 _LINEAR = (
@@ -229,7 +241,8 @@ def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[Series
             continue
         error = scale * (states[name].to_numpy(dtype=np.float64) - motion[name].to_numpy())
         sd = scale * states[sd_name].to_numpy(dtype=np.float64) if sd_name in states.columns else None
-        yield Series(quantity, "truth", error, sd)
+        bounds = _bounds(states, motion, f"{quantity}_bound_m", scale)
+        yield Series(quantity, "truth", error, sd, bounds=bounds)
         if quantity == "position":
             run = float(np.abs(np.diff(motion[name].to_numpy())).sum())
             reason = "" if run > 1.0 else "less than 1 m run"

@@ -83,7 +83,11 @@ QUANTITY_UNITS = {
 }
 """Every quantity that can be scored, with the unit of its error; the last ten are of the ride itself."""
 
-METRIC_UNITS = {"nees": "1", "nis": "1", "coverage95": "1", "us_per_sample": "us"}
+METRIC_UNITS = {
+    **dict.fromkeys(("nees", "nis", "outside", "fault"), "1"),
+    **dict.fromkeys(("coverage50", "coverage90", "coverage95", "coverage99", "coverage999"), "1"),
+    "us_per_sample": "us",
+}
 """Metrics whose unit is not the quantity's."""
 
 FULL = "full"
@@ -92,6 +96,8 @@ BANDS = (FULL, *_STANDARD_BANDS)
 REFERENCES = ("truth", "design")
 WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "p9985", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
+ON_REQUEST = ("coverage50", "coverage90", "coverage99", "coverage999", "bound", "outside", "fault")
+"""Metrics that are made only where they are named."""
 EXACT_MAP, DRAWN_MAP = "exact", "drawn"
 """What the train knows of the line: all of it, an ablation, or a map with errors."""
 SHAKEN, SILENT = "on", "off"
@@ -114,7 +120,7 @@ _CLOSED = {
     "band": BANDS,
     "reference": REFERENCES,
     "window": WINDOWS,
-    "metric": METRICS,
+    "metric": (*METRICS, *ON_REQUEST),
     "unit": tuple(dict.fromkeys((*QUANTITY_UNITS.values(), *METRIC_UNITS.values()))),
     "status": (OK,),
 }

@@ -7,7 +7,7 @@ import numpy as np
 from simrail.core.errors import one_of
 from simrail.core.jit import FloatArray
 from simrail.scoring.metrics import IntArray
-from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, METRICS, WINDOWS
+from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, METRICS, ON_REQUEST, WINDOWS
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, TrackDesign
 
 STANDSTILL_MPS = 0.01
@@ -61,6 +61,7 @@ def chosen_metrics(wanted: Collection[str] | None) -> tuple[str, ...]:
     """The metrics that are wanted; all if nothing is said."""
     if wanted is None:
         return METRICS
+    known = (*METRICS, *ON_REQUEST)
     for name in wanted:
-        one_of(name, METRICS, "no such metric")
-    return tuple(name for name in METRICS if name in wanted)
+        one_of(name, known, "no such metric")
+    return tuple(name for name in known if name in wanted)

@@ -105,6 +105,10 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
         )
         for body in vehicle.bodies
     }
+    for name in vehicle.axle_names:
+        if not supports[name]:
+            spins = {wheel.spin for wheel in vehicle.wheels if wheel.axle == name}
+            bodies[name] = replace(bodies[name], wheelset=len(spins) == 1)
     weights = heading_weights(vehicle)
     sheet = VehicleSheet(tuple(bodies[name] for name in _from_the_rails_up(supports)), place_sd)
     return replace(sheet, bodies=tuple(_with_turn(sheet, body, weights) for body in sheet.bodies))

@@ -15,6 +15,7 @@ vehicle nor track.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,7 @@ from simrail.sensors.decimation import sample_on_time, sampling_of, second_order
 from simrail.sensors.imu_noise import Streams, add_noise
 from simrail.sensors.imu_response import (
     Temperature,
+    TriadResponse,
     digitise,
     draw_response,
     mean_square_vibration,
@@ -57,6 +59,25 @@ class EarthRate:
 def streams_of(seed: int, draw: int, name: str) -> Streams:
     """Random streams of one device, by the name of the term."""
     return lambda term: stream(seed, "sensor", draw, "imu", name, term)
+
+
+class Device(NamedTuple):
+    """The coefficients of one device: what its sheet bounds, as this one has it."""
+
+    gyro: TriadResponse
+    accel: TriadResponse
+
+
+def device_of(grade: ImuGrade, *, seed: int, draw: int, name: str) -> Device:
+    """Return the device that `sample_imu` samples with.
+
+    Parameters
+    ----------
+    grade, seed, draw, name
+        As of `sample_imu`; `simrail.sensors.measure.measure` names an IMU after its mount.
+    """
+    streams = streams_of(seed, draw, name)
+    return Device(*(draw_response(grade, kind, streams) for kind in ("gyro", "accel")))
 
 
 def sample_imu(
@@ -107,7 +128,7 @@ def sample_imu(
     truth_rate = float(round((len(time) - 1) / (time[-1] - time[0]), 6))
     sampling = sampling_of(truth_rate, grade.rate_hz, grade.oversampling)
     streams = streams_of(seed, draw, name)
-    gyro, accel = (draw_response(grade, kind, streams) for kind in ("gyro", "accel"))
+    gyro, accel = device_of(grade, seed=seed, draw=draw, name=name)
     rectifies = errors and bool(np.any(gyro.rectification) or np.any(accel.rectification))
     of_imu = motion if tuple(motion.columns) == IMU else motion[list(IMU)]
     felt = of_imu.to_numpy(dtype=np.float64)

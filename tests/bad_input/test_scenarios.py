@@ -429,8 +429,8 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     ),
     "an estimator of the odometry without a wheel": (
         '[encoder]\nwheel = "front.left"\npulses_per_revolution = 1024\nradius_error_sd = 0.001\n',
-        '[[estimator]]\nname = "way"\nmethod = "CurveMatchedOdometry"\n',
-        ["estimator[0].method", "no encoder", "'CurveMatchedOdometry'", "add a [encoder]", "remove this"],
+        '[[estimator]]\nname = "way"\nmethod = "EncoderOdometry"\n',
+        ["estimator[0].method", "no encoder", "'EncoderOdometry'", "add a [encoder]", "remove this"],
     ),
     "a window that is none": (
         "[encoder]",

@@ -17,9 +17,9 @@ from functools import lru_cache
 import numpy as np
 import twins.track_relative as twin
 from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.aiding import WheelWay
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
-    ROWS,
     SEGMENT,
     Model,
     room_for_segment,
@@ -77,7 +77,7 @@ def ride() -> Recording:
 def problem() -> tuple[Model, FloatArray, FloatArray]:
     """Model of the whole ride, start and its covariance."""
     steps = steps_of(ride(), TrackRelativeSmoother().rate_hz)
-    course = course_of(ride(), steps, replace(AXLE, torsion_sd=0.15, tilt_rate_sd=0.05), ())
+    course = course_of(ride(), steps, replace(AXLE, torsion_sd=0.15, tilt_rate_sd=0.05), (WheelWay(),), ())
     model = linearised(course, slice(0, len(steps.time_s)))
     return model, course.start, course.start_covariance
 
@@ -89,8 +89,12 @@ def run(*, smoothed: bool) -> Callable[[], None]:
     count = -(-n // SEGMENT) if smoothed else 0
     starts, squares = np.empty((count, at.STATES)), np.empty((count, at.STATES, at.WIDTH))
     states, said = np.empty((n, at.STATES)), np.empty((n, OUTPUTS, OUTPUTS))
-    surprises, none, none3 = np.empty((n, ROWS)), np.empty((0, at.STATES)), np.empty((0, OUTPUTS, OUTPUTS))
-    segment, lines = room_for_segment(SEGMENT), np.zeros((2, OUTPUTS, at.WIDTH))
+    surprises, none, none3 = (
+        np.empty((n, model.measured.shape[1])),
+        np.empty((0, at.STATES)),
+        np.empty((0, OUTPUTS, OUTPUTS)),
+    )
+    segment, lines = room_for_segment(SEGMENT, model.measured.shape[1]), np.zeros((2, OUTPUTS, at.WIDTH))
 
     def once() -> None:
         x, p = start.copy(), covariance.copy()

@@ -23,6 +23,7 @@ from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
 RATE_HZ = 1000.0
+HELD, CREEPING = Vibration(), Vibration(lateral_creep=True)
 CENTRES_HZ = 10.0 ** (np.arange(7, 19) / 10.0)
 """Centres of the one-third octave bands from 5 to 63 Hz; the last one ends at 71 Hz."""
 
@@ -51,7 +52,7 @@ def band_levels_db(values):
     return 10.0 * np.log10([power[band].sum() for band in bands])
 
 
-def superposed_and_whole(name, speed_mps):
+def superposed_and_whole(name, speed_mps, vibration=HELD):
     """Accelerations of every body at constant speed: superposed, by the engine, by long waves alone."""
     vehicle = load(VehicleFile, "vehicle", name).model(name)
     track = load(TrackFile, "track", "level_straight").design("level_straight")
@@ -62,7 +63,7 @@ def superposed_and_whole(name, speed_mps):
     # Phases do not depend on the band: the difference is the short waves.
     short = (rails_of(whole_ride).rails(s) - rails_of(long_ride).rails(s))[:, [1, 3]].T
     surface = RailSurface(track.start_m, np.ascontiguousarray(spline_filter1d(short, 3, axis=1)))
-    pieces = list(Shaker(Vibration(), long_waves, vehicle, seed=1, surface=surface).run())
+    pieces = list(Shaker(vibration, long_waves, vehicle, seed=1, surface=surface).run())
     speed = np.gradient(long_waves.reference_position_m, long_waves.time_s)
     steady = np.flatnonzero(speed > 0.999 * speed_mps)
     there = slice(steady[0] + 500, steady[-1] - 500)
@@ -92,12 +93,29 @@ def own_cache(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [10.0, 20.0])
 @pytest.mark.parametrize("name", ["manchester_1", "metro_car_gz18", "metro_irw_bogie"])
+def test_band_levels_agree_in_all_motions_where_contacts_creep(name, speed_mps):
+    """Every band from 5 to 63 Hz within 1.5 dB: heave, roll and sway of axles, frames and body.
+
+    But the body's roll, within 2.5 dB: a thousandth of the axles', it is also turned by what preloads do,
+    which the linear model leaves out.
+    """
+    for body, motion, superposed, whole, _ in superposed_and_whole(name, speed_mps, CREEPING):
+        reached = speed_mps / 0.25 > CENTRES_HZ * 10.0**0.05
+        off = (band_levels_db(superposed) - band_levels_db(whole))[reached]
+        limit = 2.5 if (body, motion) == ("body", "roll") else 1.5
+        assert np.abs(off).max() < limit, (body, motion, np.round(off, 2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed_mps", [10.0, 20.0])
+@pytest.mark.parametrize("name", ["manchester_1", "metro_car_gz18", "metro_irw_bogie"])
 def test_band_levels_agree(name, speed_mps):
     """Bands from 5 to 63 Hz agree within 1.5 dB: heave of axles, frames and body, roll of axles.
 
     Roll of frames, and sway, which follows from the axles' roll by creep that the linear model takes to hold,
-    agree over all bands together, within 1.5 and 2.5 dB. The body's roll and sway are left out: at these
-    frequencies they are a thousandth of the axles'.
+    agree over all bands together, within 1.5 and 2.5 dB; single bands do not, where both axles of a bogie
+    move against each other. The body's roll and sway are left out: at these frequencies they are a thousandth
+    of the axles'. With `lateral_creep` all of them agree, see above.
     """
     longest = 0.0
     for body, motion, superposed, whole, long_waves in superposed_and_whole(name, speed_mps):

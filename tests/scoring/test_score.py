@@ -288,6 +288,39 @@ def test_halved_standard_deviation_quadruples_nees() -> None:
     assert coverage == pytest.approx(stats.norm.cdf(0.98) * 2 - 1, abs=4.0 * np.sqrt(0.25 / n))
 
 
+@pytest.mark.parametrize("name", ["50", "90", "95", "99", "999"])
+def test_every_coverage_is_that_of_its_normal_law(name: str) -> None:
+    """Independent normal errors with the sd that is claimed: a binomial share, within 99.9 %."""
+    motion = ride(20000)
+    n = len(motion)
+    error = np.deg2rad(np.random.default_rng(6).normal(size=n))
+    states = estimated(motion, {"roll_rad": error}, roll_sd_rad=np.full(n, np.deg2rad(1.0)))
+    table = score(states, motion, recorded(motion), metrics=[f"coverage{name}"])
+    low, high = stats.binom.interval(0.999, n, 0.999 if name == "999" else float(name) / 100.0) / np.float64(
+        n
+    )
+    assert low <= value(table, quantity="roll", metric=f"coverage{name}") <= high
+
+
+def test_bounds_are_judged_by_the_way_and_until_a_fault() -> None:
+    """Outside over a fifth of the way, of which half is behind the fault; the bound doubles halfway."""
+    motion = ride()
+    n, time = len(motion), motion.index.to_numpy()
+    way = np.abs(motion["speed_mps"].to_numpy()) * np.gradient(time)
+    run = np.cumsum(way) / way.sum()
+    bound = np.where(run < 0.4, 2.0, 4.0)
+    error = np.where((run > 0.7) & (run < 0.9), 5.0, 1.0)
+    fault = (run > 0.8).astype(float)
+    place = motion["position_m"].to_numpy() + error
+    found = estimated(motion, {}, position_m=place, position_bound_m=bound, fault=fault)
+    table = score(found, motion, recorded(motion), metrics=["bound", "outside", "fault"])
+    kept = {name: value(table, quantity="position", metric=name) for name in ("bound", "outside", "fault")}
+    assert kept["bound"] == 4.0
+    assert kept["outside"] == pytest.approx(0.1, abs=3.0 / n)
+    assert kept["fault"] == pytest.approx(0.2, abs=3.0 / n)
+    assert not set(score(found, motion, recorded(motion))["metric"]) & {"bound", "outside", "fault"}
+
+
 def test_consistency_stands_only_beside_the_truth_and_only_with_a_standard_deviation() -> None:
     motion = ride()
     table = score(estimated(motion, {}, roll_sd_rad=np.full(len(motion), 0.1)), motion, recorded(motion))

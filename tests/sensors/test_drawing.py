@@ -124,6 +124,14 @@ def test_primary_stiffness_and_damping_are_those_of_an_axle(name: str) -> None:
         assert (body.primary_stiffness_npm, body.primary_damping_nspm) == pytest.approx(expected), body.name
 
 
+def test_which_axles_are_wheelsets() -> None:
+    """By the vehicle files: fixed wheels on both cars and on the wagon, independent ones on the others."""
+    for name, fixed in (("manchester_1", True), ("metro_car_gz18", True), ("metro_irw_train", False)):
+        axles = [body for body in drawing(model_of(name)).bodies if not body.supports]
+        assert {axle.wheelset for axle in axles} == {fixed}
+        assert {body.wheelset for body in drawing(model_of(name)).bodies if body.supports} == {None}
+
+
 def test_bodies_stand_after_those_that_they_rest_on() -> None:
     """Whatever the order of the model: here the body that hangs between its neighbours comes first."""
     model = model_of("metro_irw_train")

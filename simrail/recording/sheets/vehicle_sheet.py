@@ -78,6 +78,9 @@ class SheetBody:
     turned_by : tuple of (str, float), optional
         Where it does not point from support to support: by how much its heading follows the lateral offset
         of each axle, in 1/m (rad per m). They sum to 0, times the places of the axles to 1.
+    wheelset : bool, optional
+        Of an axle: whether its wheels turn as one, so that their taper keeps it near the middle of the track;
+        None where the drawing does not say.
     mass_kg, roll_inertia_kgm2, pitch_inertia_kgm2, height_m : float, optional
         Mass, inertia about the centre of gravity, and its height over the rails; its place along the vehicle
         is ``x_m``. None where the drawing does not say.
@@ -92,6 +95,7 @@ class SheetBody:
     primary_stiffness_npm: float | None = None
     primary_damping_nspm: float | None = None
     turned_by: tuple[tuple[str, float], ...] = ()
+    wheelset: bool | None = None
     mass_kg: float | None = None
     roll_inertia_kgm2: float | None = None
     pitch_inertia_kgm2: float | None = None

@@ -69,6 +69,8 @@ class SheetBodyPart(Part):
         As in `SheetBody`.
     turned_by, turned_by_1pm : tuple of str, tuple of float
         As `SheetBody.turned_by`: names of axles, and the weight of each.
+    wheelset : bool, optional
+        Of an axle, as in `SheetBody`.
     mass_kg, roll_inertia_kgm2, pitch_inertia_kgm2, height_m : float, optional
         As in `SheetBody`.
     springs : tuple of SpringsPart
@@ -84,6 +86,7 @@ class SheetBodyPart(Part):
     primary_damping_nspm: Annotated[float, Field(ge=0.0)] | None = None
     turned_by: tuple[Name, ...] = ()
     turned_by_1pm: tuple[Annotated[float, Field(ge=-100.0, le=100.0)], ...] = ()
+    wheelset: bool | None = None
     mass_kg: Mass | None = None
     roll_inertia_kgm2: Inertia | None = None
     pitch_inertia_kgm2: Inertia | None = None
@@ -120,6 +123,14 @@ class SheetBodyPart(Part):
                 value=self.rests_on,
                 remedy="give one place, the middle of them",
             )
+        if self.wheelset is not None and self.rests_on:
+            raise InputError(
+                "is of an axle",
+                field="wheelset",
+                value=self.wheelset,
+                limit="none for a body that rests on others",
+                remedy="give it in the [[vehicle_sheet.body]] of its axles",
+            )
         _check_ends(self.ends_m, "ends_m")
         _check_places(self.pivots_m, "pivots_m", self.ends_m)
         return self
@@ -134,6 +145,7 @@ class SheetBodyPart(Part):
             primary_stiffness_npm=self.primary_stiffness_npm,
             primary_damping_nspm=self.primary_damping_nspm,
             turned_by=tuple(zip(self.turned_by, self.turned_by_1pm, strict=True)),
+            wheelset=self.wheelset,
             mass_kg=self.mass_kg,
             roll_inertia_kgm2=self.roll_inertia_kgm2,
             pitch_inertia_kgm2=self.pitch_inertia_kgm2,
@@ -383,6 +395,7 @@ def vehicle_sheet_table(sheet: VehicleSheet) -> dict[str, Any]:
                 "primary_damping_nspm": body.primary_damping_nspm,
                 "turned_by": [axle for axle, _ in body.turned_by] or None,
                 "turned_by_1pm": [weight for _, weight in body.turned_by] or None,
+                "wheelset": body.wheelset,
                 "mass_kg": body.mass_kg,
                 "roll_inertia_kgm2": body.roll_inertia_kgm2,
                 "pitch_inertia_kgm2": body.pitch_inertia_kgm2,

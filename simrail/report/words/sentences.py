@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from simrail.recording.recording import Recording
 from simrail.report.words.ablations import value_words
 from simrail.scoring.ablations import ABLATIONS
+from simrail.scoring.published_spectra import known, shipped_spectra
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,8 @@ def vibration_facts(shaken: Mapping[str, str] | None) -> list[str]:
         return ["no vibration by short waves (an ablation: every vehicle shakes)"]
     named = ", ".join(name.replace("_", " ") for name in shaken)
     return [
-        f"shaken by {named}; unverified at axle boxes, frames and floors: no published spectrum was had",
+        f"shaken by {named}",
+        f"{'; '.join(known(shipped_spectra()).values())} (simrail spectra compares)",
         "forces between wheels and rails hold the long waves only; short ones are superposed on the motion",
     ]
 

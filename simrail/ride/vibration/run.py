@@ -73,10 +73,16 @@ def bendings_of(vibration: Vibration, model: VehicleModel) -> tuple[Bending, ...
     return tuple(bending for bending in bent if bending is not None)
 
 
-def linear_vehicle_of(vibration: Vibration, model: VehicleModel, *, gravity_mps2: float) -> LinearVehicle:
-    """The linear model that a vibration shakes."""
+def linear_vehicle_of(
+    vibration: Vibration, model: VehicleModel, *, gravity_mps2: float, speed_mps: float = 0.0
+) -> LinearVehicle:
+    """The linear model that a vibration shakes, at the speed of a ride; contacts hold if that is 0."""
     return linear_vehicle(
-        model, vibration.support, bending=bendings_of(vibration, model), gravity_mps2=gravity_mps2
+        model,
+        vibration.support,
+        bending=bendings_of(vibration, model),
+        gravity_mps2=gravity_mps2,
+        speed_mps=speed_mps if vibration.lateral_creep and speed_mps > 0.0 else None,
     )
 
 
@@ -121,7 +127,8 @@ class Shaker:
                 remedy=f"try {truth.rate_hz * max(self.every, 1):g}",
             )
         self._vibration, self._truth, self._model, self._seed = vibration, truth, model, seed
-        self.vehicle = linear_vehicle_of(vibration, model, gravity_mps2=truth.gravity_mps2)
+        speed = _shaken_speed_mps(truth) if vibration.lateral_creep else 0.0
+        self.vehicle = linear_vehicle_of(vibration, model, gravity_mps2=truth.gravity_mps2, speed_mps=speed)
         self.modes = modes_of(self.vehicle, step_s=1.0 / vibration.rate_hz)
         self.bendings = bendings_of(vibration, model)
         self._surface = surface or lay_surface(vibration.rails, truth.track, seed=seed)
@@ -214,6 +221,14 @@ class Shaker:
             )
             for car in car_bodies(self._model)
         }
+
+
+def _shaken_speed_mps(truth: Truth) -> float:
+    """Speed of a ride where most shakes: the mean of the speed over the way, ``sum v^2 / sum v``."""
+    skip = max(1, round(_COARSE_S * truth.rate_hz))
+    steps = np.abs(np.diff(np.asarray(truth.reference_position_m[::skip], dtype=np.float64)))
+    way = float(steps.sum())
+    return float(np.sum(steps**2)) / (way * skip / truth.rate_hz) if way > 0.0 else 0.0
 
 
 def _low_pass(every: int) -> FloatArray:

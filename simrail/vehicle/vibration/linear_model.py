@@ -1,8 +1,14 @@
 """The linear vertical model of a vehicle on a flexible track: mass, damping and stiffness matrices.
 
 Built from the same `VehicleModel` that a ride is integrated with, about its place at rest on level track.
-A sprung body has all six small motions; a body that carries wheels has heave, pitch, and roll about where its
-wheels touch the rails, since creep holds these points (up to some ``f22 / (pi V m)``, 80 Hz at 20 m/s).
+A sprung body has all six small motions; a body that carries wheels has heave, pitch, and roll about where
+its wheels touch the rails, as if creep held these points. It gives way: at a speed V the contact of a wheel
+is a damper f22 / V across and, where both wheels of an axle turn as one, f11 / V along (Kalker's
+coefficients). With a speed given, an axle has sway and yaw of its own on these dampers, and one with
+independent wheels goes where it points, ``F_y = -f22 (y' / V - psi)``; a fixed one is held in yaw by its
+wheels. Without, axles roll as well and everything heaves as well, but frames roll and sway by up to 4 dB,
+bodies by up to 12 dB, too much or too little: where both axles of a bogie move against each other, and the
+body above 20 Hz.
 Under each wheel a rail mass goes along with it, on a spring and a damper. Wheel and rail meet in Hertz's
 contact, linear about the static load. Each element is one generalised deflection ``d = g q`` with a stiffness
 and a damping, so that
@@ -29,7 +35,7 @@ from simrail.vehicle.contact.contact import static_height
 from simrail.vehicle.contact.contact_tables import contacts_of
 from simrail.vehicle.model import Suspension, VehicleModel
 
-SWAY, HEAVE, ROLL, PITCH = 1, 2, 3, 4
+SWAY, HEAVE, ROLL, PITCH, YAW = 1, 2, 3, 4, 5
 """Numbers of some motions among the six of a body: x, y, z, roll, pitch, yaw."""
 BENDING = -1
 """Number of the coordinate of a body's bending."""
@@ -115,7 +121,7 @@ class LinearVehicle:
     contact_npm : ndarray (w,)
         Stiffness of each wheel's contact.
     axle_heights_m : dict of str to float
-        Height of each axle above the points that it rolls about.
+        Height of each axle above the points that it rolls about; empty where axles sway by themselves.
     """
 
     coordinates: tuple[tuple[str, int], ...]
@@ -164,12 +170,28 @@ def contact_stiffness_npm(model: VehicleModel, *, gravity_mps2: float = 9.81) ->
     return np.array(stiffness)[list(contacts.of_wheel)]
 
 
+def creep_coefficients_n(model: VehicleModel, *, gravity_mps2: float = 9.81) -> tuple[FloatArray, FloatArray]:
+    """Kalker's coefficients f11 and f22 (w,) of each wheel at its static load, N."""
+    pair = model.wheel_rail
+    if pair.linear is not None:
+        even = np.ones(len(model.wheels))
+        return even * float(pair.linear.f11_n), even * float(pair.linear.f22_n)
+    contacts = contacts_of(model, gravity_mps2=gravity_mps2)
+    found = []
+    for table in contacts.tables:
+        approach = float(np.polyval(*table.piece("penetration", 0.0))) - static_height(table)
+        found.append([approach * float(np.polyval(*table.piece(name, 0.0))) for name in ("f11", "f22")])
+    along, across = np.array(found)[list(contacts.of_wheel)].T
+    return along, across
+
+
 def linear_vehicle(
     model: VehicleModel,
     support: TrackSupport | None,
     *,
     bending: Sequence[Bending] = (),
     gravity_mps2: float = 9.81,
+    speed_mps: float | None = None,
 ) -> LinearVehicle:
     """Build the linear model of a vehicle.
 
@@ -183,13 +205,15 @@ def linear_vehicle(
         Bodies that bend.
     gravity_mps2 : float
         Gravity, for the loads of the contacts.
+    speed_mps : float, optional
+        Speed at which contacts creep, > 0; None for contacts that hold.
 
     Raises
     ------
     InputError
         If the body that is to bend is not one of the vehicle's sprung bodies.
     """
-    builder = _Builder(model, bending)
+    builder = _Builder(model, bending, creeps=speed_mps is not None)
     for stiffness, damping, row in builder.elements():
         builder.add(stiffness, damping, row)
     contact = contact_stiffness_npm(model, gravity_mps2=gravity_mps2)
@@ -205,14 +229,16 @@ def linear_vehicle(
             builder.add(support.stiffness_npm, support.damping_nspm, rail)
             builder.mass += support.mass_kg * np.outer(rail, rail)
         loads.append(k * closer)
+    if speed_mps is not None:
+        builder.add_creep(*creep_coefficients_n(model, gravity_mps2=gravity_mps2), speed_mps)
     return builder.finished(np.array(loads), contact)
 
 
 class _Builder:
     """Coordinates of a vehicle on its track, and matrices that grow element by element."""
 
-    def __init__(self, model: VehicleModel, bending: Sequence[Bending]) -> None:
-        self.model = model
+    def __init__(self, model: VehicleModel, bending: Sequence[Bending], *, creeps: bool) -> None:
+        self.model, self.creeps = model, creeps
         self.bending = {bent.body: bent for bent in bending}
         self.axles = axles = set(model.axle_names)
         for bent in bending:
@@ -224,7 +250,8 @@ class _Builder:
                     limit=", ".join(name for name in model.body_names if name not in axles),
                     remedy="name a body above the axles",
                 )
-        listed = [(b.name, k) for b in model.bodies for k in (_OF_AXLE if b.name in axles else range(6))]
+        of_axle = (*_OF_AXLE, SWAY, YAW) if creeps else _OF_AXLE
+        listed = [(b.name, k) for b in model.bodies for k in (of_axle if b.name in axles else range(6))]
         listed += [(bent.body, BENDING) for bent in bending]
         listed += [(wheel.name, HEAVE) for wheel in model.wheels]
         self.coordinates = tuple(listed)
@@ -235,7 +262,7 @@ class _Builder:
                 if (body.name, k) in self.coordinates:
                     at = self.coordinates.index((body.name, k))
                     self.mass[at, at] = inertia
-                    if k == ROLL and body.name in axles:
+                    if k == ROLL and body.name in axles and not creeps:
                         self.mass[at, at] += body.mass_kg * body.position_m[2] ** 2
         for bent in bending:
             at, mass = self.coordinates.index((bent.body, BENDING)), model.body(bent.body).mass_kg
@@ -258,7 +285,7 @@ class _Builder:
         """Rows (3, n) of the displacement of a point of a body: ``t + theta x r``, and its bending."""
         x, y, z = np.subtract(place_m, self.model.body(name).position_m)
         cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-        if name in self.axles:
+        if name in self.axles and not self.creeps:
             cross[1, 0] = -place_m[2]  # an axle rolls about where its wheels touch the rails
         rows: FloatArray = np.array([self.unit(name, k) for k in range(3)]) + cross @ self.turn(name)
         if name in self.bending:
@@ -271,6 +298,21 @@ class _Builder:
         """Add an element by its deflection ``row q``."""
         self.stiffness += stiffness * np.outer(row, row)
         self.damping += damping * np.outer(row, row)
+
+    def add_creep(self, along_n: FloatArray, across_n: FloatArray, speed_mps: float) -> None:
+        """Add the creep of all contacts, by f11 and f22 (w,), at a speed."""
+        wheels = self.model.wheels
+        for wheel, f11, f22 in zip(wheels, along_n, across_n, strict=True):
+            place = np.array(self.model.body(wheel.axle).position_m)
+            place[1:] = wheel.side * self.model.wheel_rail.tape_circle_half_m, 0.0
+            slip_x, slip_y, _ = self.point(wheel.axle, place)
+            self.add(0.0, f22 / speed_mps, slip_y)
+            if sum(other.spin == wheel.spin for other in wheels) > 1:
+                # What an axle turns about itself, its wheels do as well: only its yaw makes them slip.
+                yaw = slip_x * np.abs(self.unit(wheel.axle, YAW))
+                self.add(0.0, f11 / speed_mps, yaw)
+            else:
+                self.stiffness -= f22 * np.outer(slip_y, self.unit(wheel.axle, YAW))
 
     def elements(self) -> Iterator[tuple[float, float, FloatArray]]:
         """Stiffness, damping and row of every element that is not a contact nor in series."""
@@ -346,5 +388,7 @@ class _Builder:
             input=-loads[:, at].T,
             load=loads[:, at],
             contact_npm=contact_npm,
-            axle_heights_m={name: self.model.body(name).position_m[2] for name in self.axles},
+            axle_heights_m={}
+            if self.creeps
+            else {name: self.model.body(name).position_m[2] for name in self.axles},
         )

@@ -18,6 +18,7 @@ quarter of f_s, passes some of it: 3 % of the acceleration of an axle, and all o
 it is ``(f/f_s)^2`` of that.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from math import factorial
 
@@ -104,8 +105,10 @@ def modes_of(vehicle: LinearVehicle, *, step_s: float) -> Modes:
     scale[2 * n :] = 1.0 / np.maximum(vehicle.series_stiffness_npm, 1.0)
     a, b = scale[:, None] * a / scale, scale[:, None] * b
     eigenvalues, vectors = (part.astype(np.complex128) for part in np.linalg.eig(a))
-    inverse: ComplexArray = np.linalg.inv(vectors)
-    off = np.abs((vectors * eigenvalues) @ inverse - a).max() / np.abs(a).max()
+    inverse, off = np.zeros_like(vectors), np.inf
+    with suppress(np.linalg.LinAlgError):
+        inverse = np.linalg.inv(vectors)
+        off = np.abs((vectors * eigenvalues) @ inverse - a).max() / np.abs(a).max()
     if not off < _RESOLVED or eigenvalues.real.max() > _RESOLVED * np.abs(eigenvalues).max():
         raise InputError(
             "has no modal form: two of its modes are one, or one of them grows",

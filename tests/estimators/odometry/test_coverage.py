@@ -10,7 +10,7 @@ from simrail.campaign.campaign import run_campaign
 from simrail.scenario.scenario import load_scenario
 from simrail.scoring.bootstrap import interval
 
-CALM_RUN = ["map.exact=false", "monte_carlo.track_draws=2", "monte_carlo.map_draws=1"]
+CALM_RUN = ["map.exact=false", "vibration.off=true", "monte_carlo.track_draws=2", "monte_carlo.map_draws=1"]
 
 
 @pytest.fixture(scope="module")

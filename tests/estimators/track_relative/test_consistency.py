@@ -18,9 +18,9 @@ import pytest
 import twins.track_relative as twin
 from scipy.stats import chi2
 from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.aiding import WheelWay
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
-    ROWS,
     SEGMENT,
     Model,
     room_for_segment,
@@ -51,6 +51,9 @@ GROUPS = {
 }
 """All states."""
 
+ROWS = 7
+"""Measurements of a step: six of the IMU, and the wheel."""
+
 
 def test_the_groups_are_all_states() -> None:
     assert sorted(state for group in GROUPS.values() for state in group) == list(range(at.STATES))
@@ -69,7 +72,9 @@ def world_of(recording: Recording, motion: Motion) -> World:
     )
     recording = replace(recording, imu_sheet=sheet)
     steps = steps_of(recording, 125.0)
-    course = course_of(recording, steps, replace(motion, torsion_sd=0.15, tilt_rate_sd=0.05), ())
+    course = course_of(
+        recording, steps, replace(motion, torsion_sd=0.15, tilt_rate_sd=0.05), (WheelWay(),), ()
+    )
     first = int(np.searchsorted(steps.odometry[:, 0], 56.0))
     model = linearised(course, slice(first, first + SAMPLES))
     return World(model, course.start, course.start_covariance)
@@ -120,7 +125,7 @@ def run(world: World, model: Model, *, with_covariance: bool) -> Found:
     run_filter(model, starts[:count], squares[:count], filtered, none, surprises, work, x, p)
     last = p[:, : at.STATES].copy()
     lam, info, lines = np.zeros(at.STATES), np.zeros((at.STATES, at.WIDTH)), np.zeros((2, OUTPUTS, at.WIDTH))
-    segment = room_for_segment(SEGMENT)
+    segment = room_for_segment(SEGMENT, ROWS)
     run_back(
         model, starts[:count], squares[:count], smoothed, covariance, segment, work, x, p, lam, info,
         lines[0], lines[1],
@@ -244,7 +249,7 @@ def test_covariances_stay_such_on_a_long_ride(rough: Callable, hours: float) -> 
     """One ride after another, with rests: however many steps, no eigenvalue is below zero but by rounding."""
     recording = rough()
     steps = steps_of(recording, 125.0)
-    course = course_of(recording, steps, BODY, ())
+    course = course_of(recording, steps, BODY, (WheelWay(),), ())
     model = linearised(course, slice(0, len(steps.time_s)))
     x, p, work = course.start.copy(), course.start_covariance.copy(), room_to_work()
     none, none3, said = (

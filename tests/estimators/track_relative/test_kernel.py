@@ -13,7 +13,6 @@ from simrail.estimators.track_relative.kernel import (
     FLOWS,
     FORGETS,
     OUTPUTS,
-    ROWS,
     SEGMENT,
     Model,
     Noise,
@@ -30,6 +29,9 @@ from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 
 DT = 0.008
+
+ROWS = 7
+"""Measurements of a step."""
 
 RUNS = [0.0, 1e-3, 0.15, 3.0, 40.0]
 """m; lengths are of metres."""
@@ -172,7 +174,7 @@ def run(model: Model, start: FloatArray, covariance: FloatArray) -> Run:
     smoothed, out = np.empty((n, at.STATES)), np.empty((n, OUTPUTS, OUTPUTS))
     lam, info = np.zeros(at.STATES), np.zeros((at.STATES, at.WIDTH))
     lines = np.zeros((2, OUTPUTS, at.WIDTH))
-    segment = room_for_segment(SEGMENT)
+    segment = room_for_segment(SEGMENT, ROWS)
     run_back(model, starts, squares, smoothed, out, segment, work, x, p, lam, info, lines[0], lines[1])
     return Run(filtered, said, surprises, total, smoothed, out, last, last_covariance)
 

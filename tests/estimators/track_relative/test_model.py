@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.aiding import WheelWay
 from simrail.estimators.track_relative.line import ground_at
 from simrail.estimators.track_relative.measurement import duals, shown
 from simrail.estimators.track_relative.model import _jerk, _sense, about, course_of, linearised, steps_of
@@ -15,7 +16,6 @@ from simrail.estimators.track_relative.noise import AXLE, BODY
 from twins.track_relative import whole_rows
 
 from simrail.core.columns import ACCEL, GYRO
-from simrail.core.errors import InputError
 from simrail.recording.recording import Recording, beginning
 from simrail.track.alignment import element_starts
 
@@ -57,17 +57,19 @@ def test_a_step_takes_nothing_from_later(rough: Callable) -> None:
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[:2000], err_msg=name)
 
 
-def test_no_encoder_is_said(rough: Callable) -> None:
-    for missing in ({"encoder": None}, {"encoder_sheet": None}):
-        with pytest.raises(InputError, match="encoder"):
-            steps_of(replace(rough(), **missing), 125.0)
+def test_without_an_encoder_it_rests_where_the_imu_is_quiet(rough: Callable) -> None:
+    recording: Recording = rough()
+    wheeled, alone = steps_of(recording, 125.0), steps_of(replace(recording, encoder=None), 125.0)
+    assert not alone.way.any() and alone.slipping[3:].all()
+    assert (alone.resting & ~wheeled.resting).sum() < 25  # until the second count of the wheel
+    assert alone.resting[:375].all()
 
 
 def test_the_linear_model_is_the_measurement_where_it_is_linearised(rough: Callable) -> None:
     """There its innovation is z - h(x), whatever the states; its rows are the slopes."""
     recording: Recording = rough()
     steps = steps_of(recording, 125.0)
-    course = course_of(recording, steps, BODY, ())
+    course = course_of(recording, steps, BODY, (WheelWay(),), ())
     moved = course.around.states.copy()
     moved[:, at.TILT], moved[:, at.LAG], moved[:, at.Y_BEND], moved[:, at.S] = (
         0.3,
@@ -94,7 +96,7 @@ def test_a_joint_is_forgotten_once_it_is_behind(rough: Callable, direction: int)
     """EVEN and ODD are of the joints at the ends of the element: one changes just where its joint does."""
     recording: Recording = rough(0, direction)
     steps = steps_of(recording, 125.0)
-    course = course_of(recording, steps, AXLE, ())
+    course = course_of(recording, steps, AXLE, (WheelWay(),), ())
     flows = linearised(course, slice(0, len(steps.time_s))).flows
     starts = element_starts(recording.track.elements, recording.track.start_m)
     nearest = np.round(course.around.states[:, at.S] * 4.0) / 4.0  # as the map is tabled
@@ -123,7 +125,7 @@ def test_flows_add_up_over_a_ride(rough: Callable, bend: Callable, direction: in
     middle = speed - 0.5 * np.diff(speed, prepend=speed[0])
     way = recording.start_position_m + steps.dt * np.cumsum(middle)
     steps = steps._replace(odometry=np.column_stack([way, steps.odometry[:, 1:]]))
-    course = course_of(recording, steps, AXLE, ())
+    course = course_of(recording, steps, AXLE, (WheelWay(),), ())
     flows, track = linearised(course, slice(0, len(steps.time_s))).flows, recording.track
     place = course.around.states[[0, -1], at.S]
     assert flows[:, 1].sum() == pytest.approx(place[1] - place[0], abs=0.05)
@@ -149,7 +151,9 @@ def test_a_wheel_that_slips_is_not_measured(rough: Callable) -> None:
     steps = steps_of(recording, 125.0)
     slips = steps.slipping.copy()
     slips[2000:2010] = True
-    model = linearised(course_of(recording, steps._replace(slipping=slips), AXLE, ()), slice(1990, 2020))
+    model = linearised(
+        course_of(recording, steps._replace(slipping=slips), AXLE, (WheelWay(),), ()), slice(1990, 2020)
+    )
     assert np.isinf(model.variances[10:20, 6]).all()
     assert np.isfinite(model.variances[:10]).all() and np.isfinite(model.variances[:, :6]).all()
     assert (model.flows[10:20, 12] == 1.0).all() and model.flows[:10, 12].max() < 1e-2
@@ -159,7 +163,7 @@ def test_white_motion_grows_with_the_speed(rough: Callable) -> None:
     """Variance by the third power of V; at 70 km/h and 125 Hz it is the class's own, beside the sensor's."""
     recording: Recording = rough()
     steps = steps_of(recording, 125.0)
-    course = course_of(recording, steps, AXLE, ())
+    course = course_of(recording, steps, AXLE, (WheelWay(),), ())
     states = course.around.states.copy()
     states[:, at.V] = 70.0 / 3.6
     fast = linearised(about(course, states), slice(0, 1)).variances[0]

@@ -21,6 +21,8 @@ from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.core.columns import (
     ACCEL,
     ATTITUDE,
+    BOUND,
+    FAULT,
     GYRO,
     INNOVATION,
     IRREGULARITY,
@@ -155,7 +157,7 @@ def test_states_and_innovations_are_those_of_the_trace(rough: Callable) -> None:
     recording = beginning(drawn(rough()), samples=3000)
     for smoother in (TrackRelativeSmoother(passes=1), TrackRelativeSmoother(smoothed=False)):
         estimate, trace = smoother.estimate(recording), smoother.trace(recording)
-        assert list(estimate.states) == [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS]
+        assert list(estimate.states) == [*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION, *SD_COLUMNS, *BOUND, FAULT]
         assert smoother.causal is not smoother.smoothed
         steps = trace.course.steps
         last = np.searchsorted(steps.end_s, recording.imu.index.to_numpy() + 1e-9, side="right") - 1
@@ -261,12 +263,6 @@ def test_an_option_out_of_range_is_refused(options: dict[str, Any]) -> None:
 
 def test_a_scenario_finds_it_by_its_name() -> None:
     assert class_named("TrackRelativeSmoother", None) is TrackRelativeSmoother
-
-
-def test_without_an_encoder_it_is_refused(rough: Callable) -> None:
-    with pytest.raises(InputError, match="encoder") as caught:
-        TrackRelativeSmoother().estimate(replace(rough(), encoder=None, encoder_sheet=None))
-    assert caught.value.remedy
 
 
 def turned_over(recording: Recording, *, about: str) -> Recording:

@@ -13,7 +13,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter, rts_smoother
 from scipy.linalg import expm, solve_continuous_lyapunov
 from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.kernel import ROWS, Model, Noise
+from simrail.estimators.track_relative.kernel import Model, Noise
 
 from simrail.core.jit import FloatArray
 
@@ -138,10 +138,11 @@ def filterpy_filter(model: Model, steps: list[Step], x: FloatArray, p: FloatArra
     Innovations one after another are those of the block in the axes of its covariance's Cholesky factor.
     """
     n = len(model.measured)
-    kalman = KalmanFilter(dim_x=at.STATES, dim_z=ROWS)
+    rows_made = model.measured.shape[1]
+    kalman = KalmanFilter(dim_x=at.STATES, dim_z=rows_made)
     kalman.x, kalman.P = x.copy(), p[:, : at.STATES].copy()
     states, covariances = np.empty((n, at.STATES)), np.empty((n, at.STATES, at.STATES))
-    surprises, total = np.full((n, ROWS), np.nan), 0.0
+    surprises, total = np.full((n, rows_made), np.nan), 0.0
     for k, (f, q) in enumerate(steps):
         kalman.predict(F=f, Q=q)
         made = np.isfinite(model.variances[k])

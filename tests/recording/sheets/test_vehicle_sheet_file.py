@@ -81,6 +81,7 @@ FAULTS: dict[str, tuple[str, list[str]]] = {
     "negative_place_sd": (PIVOTS + "place_sd_m = -0.02", ["place_sd_m", "-0.02", ">= 0"]),
     "negative_stiffness_sd": (PIVOTS + "stiffness_relative_sd = -0.2", ["stiffness_relative_sd", ">= 0"]),
     "sd_in_mm": (PIVOTS + "place_sd_m = 20.0", ["place_sd_m", "20", "<= 1", "unit"]),
+    "wheelset_of_a_frame": (FRAME + "wheelset = true", ["wheelset", "axle"]),
     "sd_in_percent": (PIVOTS + "stiffness_relative_sd = 20.0", ["stiffness_relative_sd", "<= 1"]),
     "equal_pivots": ("pivots_m = [9.5, 9.5]", ["pivots_m", "two places in one", "(9.5, 9.5)"]),
     "equal_axles": ("axles_m = [1.0, 1.0]", ["axles_m", "two places in one"]),

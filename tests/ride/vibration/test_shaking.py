@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from dead_reckoning import dead_reckon
+from scipy.signal import lfilter
 
-from simrail.core.columns import ACCEL, ATTITUDE, POSITION
+from simrail.core.columns import ACCEL, ATTITUDE, GYRO, POSITION
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.recording.sheets.imu_file import ImuFile
@@ -15,7 +16,7 @@ from simrail.ride.ride import Ride, is_cached, simulate
 from simrail.ride.truth import BodyMotion, Mount, Truth
 from simrail.ride.vibration.files import read_short_waves, write_short_waves
 from simrail.ride.vibration.floor import Floor
-from simrail.ride.vibration.run import Shaker
+from simrail.ride.vibration.run import Shaker, linear_vehicle_of
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
 from simrail.ride.vibration.sources import (
     CarBending,
@@ -24,6 +25,7 @@ from simrail.ride.vibration.sources import (
     Traction,
     Vibration,
 )
+from simrail.sensors.imu import device_of
 from simrail.sensors.measure import measure
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
@@ -247,10 +249,11 @@ def test_perfect_sensors_find_the_pose_of_a_shaking_truth(tmp_path, monkeypatch)
         assert np.degrees(np.abs(off[list(ATTITUDE)].to_numpy()).max()) < 1e-3
 
 
-def test_second_derivative_of_the_position(coach, line):
+@pytest.mark.parametrize("creeps", [False, True])
+def test_second_derivative_of_the_position(coach, line, creeps):
     """Every column is the derivative of the one before, over the whole vibration."""
     truth = gliding(coach, line, 15.0, duration_s=6.0)
-    motions, _ = shaken(ALL, truth, coach)
+    motions, _ = shaken(replace(ALL, lateral_creep=creeps), truth, coach)
     for motion in motions.values():
         for place in range(0, 12, 3):
             if not motion[:, place].any():
@@ -372,33 +375,77 @@ def test_structure_borne_share(coach, line):
     np.testing.assert_allclose(with_it["body"][:, :3] - without["body"][:, :3], 0.02 * frames, atol=1e-12)
 
 
-def test_rectification_is_the_coefficient_times_the_mean_square(coach, line):
-    """An IMU on a shaking axle: the mean of its signal moves by its coefficient times the mean square."""
+def test_creep_is_that_of_the_speed_over_the_way(coach, line):
+    """At a constant speed it is that; of halves of the way at V and 3 V it is 2 V; at rest contacts hold."""
+    creeps = Vibration(lateral_creep=True)
+
+    def damping(speed_mps):
+        return linear_vehicle_of(creeps, coach, gravity_mps2=9.81, speed_mps=speed_mps).damping
+
+    steady = gliding(coach, line, 12.0, duration_s=4.0)
+    np.testing.assert_allclose(
+        Shaker(creeps, steady, coach, seed=1).vehicle.damping, damping(12.0), rtol=1e-6
+    )
+    t = steady.time_s
+    place = 200.0 + np.where(t < 3.0, 6.0 * t, 18.0 + 18.0 * (t - 3.0))  # 18 m at 6, 18 m at 18 m/s
+    mixed = replace(steady, reference_position_m=place)
+    np.testing.assert_allclose(Shaker(creeps, mixed, coach, seed=1).vehicle.damping, damping(12.0), rtol=1e-6)
+    at_rest = replace(steady, reference_position_m=np.full(len(t), 200.0))
+    held = linear_vehicle_of(Vibration(), coach, gravity_mps2=9.81, speed_mps=12.0)
+    assert Shaker(creeps, at_rest, coach, seed=1).vehicle.coordinates == held.coordinates
+
+
+def running_mean_square(force, rate_hz, averaging_s):
+    """Running means of a force (n,) and of the square of what it has beside them, as linear filters."""
+    kept = np.exp(-1.0 / (rate_hz * averaging_s))
+    smooth = ([1.0 - kept], [1.0, -kept])
+    mean = force[0] + lfilter(*smooth, force - force[0])
+    before = np.append(force[0], mean[:-1])
+    return lfilter(*smooth, (force - before) * (force - mean))
+
+
+def test_rectification_is_the_devices_own_coefficient_times_the_mean_square(coach, line):
+    """An IMU on a shaking axle: an axis moves by its own coefficient times its mean square vibration.
+
+    The closed form is g^2 times the coefficient. The device takes a running mean of it, which is known sample
+    by sample; over many of its time constants it is the variance of the force, but for vibration slower than
+    those, and but for a time constant at either end of 6 s: within 0.5 s / 6 s.
+    """
     truth = gliding(coach, line, 15.0, duration_s=8.0)
     motions, _ = shaken(replace(ALL, bending=None), truth, coach)
     truth = replace(truth, short_waves=ShortWaves({}, 1.5, motions))
     ideal = load(ImuFile, "imu", "ideal").grade("ideal")
-    coefficient = 1e-3  # s2/m
-    sheet = replace(ideal, accel_vibration_rectification_s2pm=coefficient, vibration_averaging_s=0.5)
-    mount = Mount("axle", "axle_f1", (0.0, 1.0, 0.46))
-    means = []
-    for grade in (ideal, sheet):
-        imu = measure(truth, name="r", mount=mount, grade=grade, seed=1, draw=0).imu
-        means.append(imu["accel_z_mps2"].to_numpy()[len(imu) // 4 :].mean())
-    felt = truth.motion(mount)[ACCEL[2]].to_numpy()[4000:]
-    drawn = abs(means[1] - means[0]) / (coefficient * felt.var())
-    # The device's own coefficient is drawn within the sheet's bound; see the tests of the response.
-    assert 0.0 < drawn <= 1.02
-    # Twice the acceleration, four times the rectification.
-    loud = replace(
-        truth, short_waves=ShortWaves({}, 1.5, {name: 2.0 * values for name, values in motions.items()})
+    sheet = replace(
+        ideal,
+        accel_vibration_rectification_s2pm=1e-3,
+        gyro_vibration_rectification_rads3pm2=1e-4,
+        vibration_averaging_s=0.5,
     )
-    pair = [
-        measure(loud, name="r", mount=mount, grade=grade, seed=1, draw=0).imu["accel_z_mps2"]
-        for grade in (ideal, sheet)
-    ]
-    louder = abs((pair[1] - pair[0]).to_numpy()[len(pair[0]) // 4 :].mean())
-    assert louder / abs(means[1] - means[0]) == pytest.approx(4.0, rel=1e-3)
+    mount = Mount("axle", "axle_f1", (0.0, 1.0, 0.46))
+    device = device_of(sheet, seed=1, draw=0, name=mount.name)
+    perfect, rectifying = (
+        measure(truth, name="r", mount=mount, grade=grade, seed=1, draw=0).imu for grade in (ideal, sheet)
+    )
+    felt, rate_hz = truth.motion(mount), truth.rate_hz
+    at = np.searchsorted(felt.index.to_numpy(), perfect.index.to_numpy() - 0.25 / rate_hz)
+    for i, (force, gyro) in enumerate(zip(ACCEL, GYRO, strict=True)):
+        square = running_mean_square(felt[force].to_numpy(), rate_hz, 0.5)[at]
+        for column, triad in ((force, device.accel), (gyro, device.gyro)):
+            added = (rectifying[column] - perfect[column]).to_numpy()
+            np.testing.assert_allclose(
+                added, triad.rectification[i] * square, rtol=1e-6, atol=1e-9 * abs(added).max() + 1e-13
+            )
+    late = len(perfect) // 4
+    added = (rectifying[ACCEL[2]] - perfect[ACCEL[2]]).to_numpy()[late:].mean()
+    variance = felt[ACCEL[2]].to_numpy()[at[late] :].var()
+    assert variance > 1.0
+    assert added == pytest.approx(device.accel.rectification[2] * variance, rel=0.5 / 6.0)
+    assert np.all(np.abs(device.accel.rectification) <= 1e-3)
+    assert np.all(np.abs(device.gyro.rectification) <= 1e-4)
+    assert (
+        device_of(sheet, seed=1, draw=1, name=mount.name).accel.rectification[2]
+        != device.accel.rectification[2]
+    )
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """The linear vertical model against closed forms, and against the equations that the engines ride."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,12 +15,15 @@ from simrail.vehicle.vibration.linear_model import (
     HEAVE,
     PITCH,
     ROLL,
+    SWAY,
+    YAW,
     Bending,
     TrackSupport,
     contact_stiffness_npm,
+    creep_coefficients_n,
     linear_vehicle,
 )
-from simrail.vehicle.vibration.modal import state_space
+from simrail.vehicle.vibration.modal import modes_of, state_space
 
 CONTACT_NPM, HALF_M = 1.2e9, 0.75
 SUPPORT = TrackSupport(150.0, 7e7, 1e5)
@@ -89,6 +94,68 @@ def test_each_wheel_has_its_own_rail():
     rise = linear.response(0.01)[:, 0].real * 1e-3
     assert linear.row("axle", HEAVE) @ rise == pytest.approx(0.5e-3, rel=1e-6)
     assert linear.row("axle", ROLL) @ rise == pytest.approx(1e-3 / (2.0 * HALF_M), rel=1e-6)
+
+
+def creeping(model, speed_mps):
+    """Coordinates of the lone axle across, C and K, at a speed."""
+    linear = linear_vehicle(model, None, speed_mps=speed_mps)
+    at = [linear.coordinates.index(("axle", motion)) for motion in (SWAY, ROLL, YAW)]
+    square = np.ix_(at, at)
+    return linear.damping[square], linear.stiffness[square]
+
+
+def test_a_wheelset_creeps_as_in_the_textbooks():
+    """De Pater, Wickens: 2 f22/V across at the rails, 0.46 m below, and 2 f11 b^2/V about the vertical."""
+    f11, f22, height, speed = 1e6, 1e6, 0.46, 8.0
+    damping, stiffness = creeping(lone_axle(), speed)
+    across = 2.0 * f22 / speed * np.outer([1.0, height, 0.0], [1.0, height, 0.0])
+    about = 2.0 * f11 * HALF_M**2 / speed * np.outer([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(damping, across + about, rtol=1e-12, atol=1e-6)
+    assert stiffness[0, 2] == 0.0
+
+
+def test_independent_wheels_go_where_they_point_and_turn_freely():
+    """F_y = -2 f22 (y'/V - psi): a force across for a yaw, none the other way, and no damping of the yaw."""
+    axle = lone_axle()
+    free = replace(axle, wheels=tuple(replace(wheel, spin=wheel.name) for wheel in axle.wheels))
+    free = replace(free, spin_inertia_kgm2={wheel.spin: 50.0 for wheel in free.wheels})
+    damping, stiffness = creeping(free, 8.0)
+    assert damping[2, 2] == 0.0
+    assert stiffness[0, 2] == pytest.approx(-2e6)
+    assert stiffness[2, 0] == 0.0
+
+
+def test_an_axle_that_nothing_holds_in_yaw_is_refused_where_it_goes_where_it_points():
+    axle = lone_axle()
+    free = replace(axle, wheels=tuple(replace(wheel, spin=wheel.name) for wheel in axle.wheels))
+    free = replace(free, spin_inertia_kgm2={wheel.spin: 50.0 for wheel in free.wheels})
+    with pytest.raises(InputError, match="that nothing holds"):
+        modes_of(linear_vehicle(free, SUPPORT, speed_mps=8.0), step_s=5e-4)
+    modes_of(linear_vehicle(free, SUPPORT), step_s=5e-4)
+
+
+def test_contacts_that_hardly_creep_hold():
+    """At a speed that goes to 0 the axles roll about the rails, and sway with it, as without creep."""
+    model = vehicle("manchester_1")
+    held, slow = linear_vehicle(model, SUPPORT), linear_vehicle(model, SUPPORT, speed_mps=1e-4)
+    for frequency in (6.0, 20.0, 60.0):
+        expected, found = held.response(frequency), slow.response(frequency)
+        for body, motion in (("axle_f1", ROLL), ("axle_f1", SWAY), ("frame_front", ROLL), ("body", HEAVE)):
+            rows = held.row(body, motion) @ expected, slow.row(body, motion) @ found
+            np.testing.assert_allclose(rows[1], rows[0], rtol=2e-3, atol=1e-3 * np.abs(rows[0]).max())
+
+
+def test_creep_coefficients_go_with_the_area_of_the_contact():
+    """f = G a b C(a/b) (Kalker): with the load to the power 2/3, and f11 over f22 as C11 over C22, 1 to 1.3.
+
+    How much the profiles are smoothed goes with the load, too: some percent of the coefficients.
+    """
+    model = vehicle("manchester_1")
+    whole, half = creep_coefficients_n(model), creep_coefficients_n(model, gravity_mps2=9.81 / 2.0)
+    for one, other in zip(whole, half, strict=True):
+        np.testing.assert_allclose(other / one, 0.5 ** (2.0 / 3.0), rtol=0.05)
+    assert np.all((whole[0] / whole[1] > 1.0) & (whole[0] / whole[1] < 1.32))
+    assert creep_coefficients_n(lone_axle())[1].tolist() == [1e6, 1e6]
 
 
 def held_frequencies(model):

@@ -1,0 +1,196 @@
+"""What the track-relative smoother takes beside its IMU: one small class for each kind of measurement.
+
+An aiding measurement is z = h(x) + v with v of a known variance R. A class says z and R at the steps of the
+filter (`Aiding.rows`) and h as a function of the states, written with `Dual` (`Aiding.shown`): its Jacobian H
+follows. The wheel is one of them, so that the filter runs without it; a ride may have any number of each.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.dual import Dual
+
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from simrail.estimators.track_relative.model import Steps
+
+STANDS_MPS = 0.01
+"""Standard deviation of the speed of a train that stands by its IMU: some millimetres are rolled unseen."""
+
+ODOMETRY_S = 10.0
+"""Over which the errors of an odometry hang together: so much longer than a step, it says nothing new."""
+
+
+class Rows(NamedTuple):
+    """Values and variances, (n, m) each, of m measurements at n steps; infinite where one is not made."""
+
+    values: FloatArray
+    variances: FloatArray
+
+
+class Aiding(Protocol):
+    """A kind of measurement."""
+
+    def rows(self, recording: Recording, steps: "Steps", /) -> Rows:
+        """What was measured, and how well."""
+        ...
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """What the states say of it."""
+        ...
+
+
+@dataclass(frozen=True)
+class WheelWay:
+    """The way of an encoder's wheel, to a count."""
+
+    def rows(self, recording: Recording, steps: "Steps") -> Rows:
+        """Made wherever the wheel does not slip."""
+        assert recording.encoder_sheet is not None
+        variance = np.where(steps.slipping, np.inf, recording.encoder_sheet.pulse_m**2 / 12.0)
+        return Rows(steps.way[:, None], variance[:, None])
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """`WAY`, m."""
+        return [x[at.WAY]]
+
+
+@dataclass(frozen=True)
+class Standstill:
+    """A speed of zero where an IMU shows that the train stands: in place of a wheel that does not turn."""
+
+    def rows(self, _recording: Recording, steps: "Steps") -> Rows:
+        """Made at rest."""
+        variance = np.where(steps.resting, STANDS_MPS**2, np.inf)
+        return Rows(np.zeros((len(variance), 1)), variance[:, None])
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """`V`, m/s."""
+        return [x[at.V]]
+
+
+@dataclass(frozen=True)
+class OdometryPlace:
+    """The place that an odometry found, where the filter has no wheel and linearises about it.
+
+    It is made of the same signals, so that it is believed as much as one that is new every `ODOMETRY_S`.
+    """
+
+    def rows(self, _recording: Recording, steps: "Steps") -> Rows:
+        """Made at every step."""
+        sd = steps.odometry[:, 3]
+        return Rows(steps.odometry[:, :1], (sd**2 * ODOMETRY_S / steps.dt)[:, None])
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """`S`, m."""
+        return [x[at.S]]
+
+
+@dataclass(frozen=True)
+class Odometer:
+    """The speed that an odometer shows, with one scale for the whole ride."""
+
+    def rows(self, recording: Recording, steps: "Steps") -> Rows:
+        """Each reading is that of the step that ends next."""
+        assert recording.odometer is not None and recording.odometer_sheet is not None
+        speed = recording.odometer["speed_mps"]
+        number = _steps_after(speed.index.to_numpy(dtype=np.float64), steps)
+        return _at_steps(
+            number, speed.to_numpy(dtype=np.float64), recording.odometer_sheet.speed_sd_mps, steps
+        )
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """V (1 + `SCALE`), m/s."""
+        return [x[at.V] + x[at.V] * x[at.SCALE]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fixes:
+    """Places along the map: of a satellite receiver, brought to the line, or of balises.
+
+    Attributes
+    ----------
+    time_s : ndarray (k,)
+        Ascending, in the recording's time.
+    position_m : ndarray (k,)
+        Along the map. The map's own chainage may be off: a fix is of where the train is by the map.
+    sd_m : ndarray (k,) or float
+        Standard deviation of each.
+
+    Raises
+    ------
+    InputError
+        If the three are not alike long and finite, the times not ascending, or an sd not positive.
+    """
+
+    time_s: FloatArray
+    position_m: FloatArray
+    sd_m: FloatArray | float
+
+    def __post_init__(self) -> None:
+        time = np.asarray(self.time_s, dtype=np.float64)
+        for name, values in (
+            ("position_m", self.position_m),
+            ("sd_m", np.broadcast_to(self.sd_m, time.shape)),
+        ):
+            values = np.asarray(values, dtype=np.float64)
+            if values.shape != time.shape or not np.isfinite(values).all():
+                raise InputError(
+                    "is not one finite value for each time",
+                    field=name,
+                    value=values.shape,
+                    limit=str(time.shape),
+                )
+        if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+            raise InputError(
+                "is not ascending", field="time_s", limit="finite, each later than the one before"
+            )
+        if not (np.asarray(self.sd_m) > 0.0).all():
+            raise InputError("is not positive", field="sd_m", value=float(np.min(self.sd_m)), limit="> 0 m")
+
+    def rows(self, _recording: Recording, steps: "Steps") -> Rows:
+        """Each is brought forward to the step that ends next; of several in one step the last counts."""
+        time = np.asarray(self.time_s, dtype=np.float64)
+        number = _steps_after(time, steps)
+        last = np.minimum(number, len(steps.time_s) - 1)
+        # A step of 32 ms at 80 km/h is 0.7 m.
+        run = (steps.time_s[last] - time) * steps.odometry[last, 1]
+        return _at_steps(number, np.asarray(self.position_m, dtype=np.float64) + run, self.sd_m, steps)
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """`S`, m."""
+        return [x[at.S]]
+
+
+def _steps_after(time: FloatArray, steps: "Steps") -> npt.NDArray[np.int64]:
+    """Number of the step that ends at each time or next after it; that of none beyond the last."""
+    return np.searchsorted(steps.end_s, time - 1e-9)
+
+
+def _at_steps(
+    number: npt.NDArray[np.int64], values: FloatArray, sd: FloatArray | float, steps: "Steps"
+) -> Rows:
+    """Rows of values that belong to steps of these numbers."""
+    n = len(steps.end_s)
+    out = Rows(np.zeros((n, 1)), np.full((n, 1), math.inf))
+    made = (number < n) & np.isfinite(values)
+    out.values[number[made], 0] = values[made]
+    out.variances[number[made], 0] = np.broadcast_to(np.square(sd), values.shape)[made]
+    return out
+
+
+def aiding_of(recording: Recording, *, smoothed: bool) -> tuple[Aiding, ...]:
+    """What a recording has beside its IMU."""
+    if recording.encoder is not None and recording.encoder_sheet is not None:
+        return (WheelWay(),)
+    speed: tuple[Aiding, ...] = ()
+    if recording.odometer is not None and recording.odometer_sheet is not None:
+        speed = (Odometer(),)
+    return (Standstill(), *speed) if smoothed else (Standstill(), OdometryPlace(), *speed)

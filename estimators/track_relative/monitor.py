@@ -1,0 +1,74 @@
+"""Whether a ride contradicts its sheets, and bounds of the error for where it does not.
+
+A sheet that is wrong does not show in every innovation: a filter explains what it sees by the states that it
+has. It shows in these states, which leave what was known of them before the ride; and in innovations that go
+on having one sign. Both are judged here, from nothing that is later.
+
+A bound is what the error stays within 99.9 % of the time where all is as the sheets say. It grows with what
+speaks against them; once that is too much (`contradiction` above 1) it is a fault, and none holds any more.
+"""
+
+import numpy as np
+from simrail.estimators.track_relative import states as at
+from simrail.estimators.track_relative.output import Trace
+
+from simrail.core.jit import FloatArray
+
+CONSTANTS = (
+    *(at.SCALE, at.CURVE, at.EVEN, at.ODD, at.CANT, at.SLOPE),
+    *(*at.GYRO_BIAS, *at.ACCEL_BIAS, *at.GYRO_OF_Z, *at.ACCEL_OF_X, *at.ACCEL_OF_Y),
+)
+"""States of which a sheet says how large they are: of wheel, map and IMU. What the body does has none."""
+
+MOST_SDS = 5.0
+"""Of these, from what was known before. A map has some thirty errors: 4 in one of a thousand rides."""
+
+WINDOW_S = 5.0
+"""Over which innovations are added up."""
+
+MOST_SUM = (7.0, 7.0, 7.0, 5.0, 9.5, 11.0)
+"""Of innovations over their sds and the root of their number, of three gyros and three accelerometers:
+one and a half times the largest of sound rides of simrail's vehicles; shaking is not white. Synthetic."""
+
+MOST_OTHER_SUM = 6.5
+"""The same of every measurement beside the IMU's."""
+
+BOUND_SDS = 3.29
+"""Standard deviations that a normal error exceeds in one of a thousand cases."""
+
+ALLOWED = 2.0
+"""Times that, since an sd is of a class of vehicles and lines, and not of this one; synthetic."""
+
+
+def contradiction(trace: Trace) -> FloatArray:
+    """How much speaks against the sheets at each step, over what is still borne (n,)."""
+    sd = np.sqrt(np.diag(trace.course.start_covariance)[: at.STATES])
+    known = [i for i in CONSTANTS if sd[i] > 0.0]
+    off = np.abs(trace.states[:, known] - trace.course.start[known]) / sd[known]
+    off = off.max(axis=1, initial=0.0) / MOST_SDS
+    sums = np.abs(_sums(trace)) / np.array([*MOST_SUM, *[MOST_OTHER_SUM] * (trace.surprises.shape[1] - 6)])
+    return np.asarray(np.maximum(off, sums.max(axis=1, initial=0.0)))
+
+
+def _sums(trace: Trace) -> FloatArray:
+    """Sums (n, m) of the innovations of the last `WINDOW_S`, over the root of their number."""
+    window = max(1, round(WINDOW_S / trace.course.steps.dt))
+    made = np.isfinite(trace.surprises)
+    first = np.maximum(np.arange(1, len(made) + 1) - window, 0)
+
+    def total(values: FloatArray) -> FloatArray:
+        whole = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+        return whole[1:] - whole[first]
+
+    number = total(made.astype(np.float64))
+    return np.asarray(total(np.where(made, trace.surprises, 0.0)) / np.sqrt(np.maximum(number, window)))
+
+
+def faults_and_widening(trace: Trace) -> tuple[FloatArray, FloatArray]:
+    """Whether there has been a fault, 0 or 1, and what an sd is widened by, (1 + n,).
+
+    The first is of before the ride, the others of the end of each step.
+    """
+    against = np.concatenate([[0.0], contradiction(trace)])
+    faults = np.maximum.accumulate(against > 1.0)
+    return faults.astype(np.float64), ALLOWED * BOUND_SDS * np.maximum(1.0, against)
