@@ -37,6 +37,8 @@ from simrail.estimators.track_relative.monitor import faults_and_widening
 from simrail.estimators.track_relative.noise import Motion, motion_of
 from simrail.estimators.track_relative.output import Trace, innovations_of, states_of, with_bounds
 from simrail.estimators.track_relative.prior import PARTS
+from simrail.estimators.track_relative.rails import rails_of
+from simrail.estimators.trajectory.smoother import MOST_DRAWS
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 
 from simrail.core.errors import InputError, one_of
@@ -62,7 +64,7 @@ class TrackRelativeSmoother:
         How often to linearise and smooth; the filter does it once.
     rate_hz : float
         Rate of its steps: the IMU is averaged over each. Most of what shakes a mount, which no state is for,
-        is beyond 31 Hz. Waves of the rails of 3 to 5 m want 125 Hz on a fast ride.
+        is beyond 31 Hz.
     motion : Motion, optional
         How the body moves in its track; that of the mount's class
         (`simrail.estimators.track_relative.noise`) if not given.
@@ -70,7 +72,11 @@ class TrackRelativeSmoother:
         Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), with blanks
         between them, to show what each is for.
     geometry_step_m : float
-        Distance of the places of the rail geometry; 0 leaves the geometry out.
+        Distance of the places of the rail geometry; 0 leaves the geometry out. The smoother's is made at the
+        IMU's full rate (`simrail.estimators.track_relative.rails`).
+    draws : int
+        How often to draw what the rails may be: their standard deviation in a band of wavelengths follows
+        from that alone. 0 for none; only smoothed and with a geometry.
     wheel : bool
         False leaves encoder and odometer aside: an IMU and a map alone.
     aiding : tuple of Aiding
@@ -83,6 +89,7 @@ class TrackRelativeSmoother:
     motion: Motion | None = None
     without: str = ""
     geometry_step_m: float = 0.25
+    draws: int = 0
     wheel: bool = True
     aiding: tuple[Aiding, ...] = ()
 
@@ -93,9 +100,16 @@ class TrackRelativeSmoother:
         for name in self.without.split():
             one_of(name, PARTS, "is no part of the state", field="without")
         out = "is out of range"
+        is_whole = isinstance(self.draws, int) and not isinstance(self.draws, bool)
+        most = MOST_DRAWS if self.smoothed and self.geometry_step_m > 0.0 else 0
         for name, is_good, limit in (
             ("passes", self.passes in range(1, MOST_PASSES + 1), f"1 to {MOST_PASSES}"),
             ("rate_hz", 10.0 <= self.rate_hz <= 1000.0, "10 to 1000 Hz"),
+            (
+                "draws",
+                is_whole and 0 <= self.draws <= most,
+                f"0 to {most}; 0 unless smoothed, with a geometry",
+            ),
             ("geometry_step_m", 0.0 <= self.geometry_step_m < 100.0, "0 (none) or more, m"),
         ):
             if not is_good:
@@ -122,6 +136,8 @@ class TrackRelativeSmoother:
         )
         if not self.geometry_step_m:
             return estimate
+        if self.smoothed:
+            return rails_of(recording, trace, estimate, step_m=self.geometry_step_m, draws=self.draws)
         geometry = geometry_of(sight_of(estimate, recording), step_m=self.geometry_step_m)
         return replace(estimate, geometry=geometry)
 

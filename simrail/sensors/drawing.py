@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simrail.recording.sheets.vehicle_sheet import PLACE_SD_M, SheetBody, Support, VehicleSheet
+from simrail.recording.sheets.vehicle_sheet import PLACE_SD_M, SheetBody, Springs, Support, VehicleSheet
 from simrail.vehicle.guidance import heading_weights
 from simrail.vehicle.model import VehicleModel
 
@@ -57,8 +57,8 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
         The place is the mean of theirs, weighted by vertical stiffness: springs at four corners bear at the
         pivot in the middle between them. Primary stiffness and damping are the sums of these elements'
         vertical ones, dampers on elastic mounts as if these were rigid; tabled laws (dry friction, bump
-        stops) are left out, and so are trailing arms, which carry no weight. Where stiffness turns a body
-        otherwise than its supports do (`simrail.vehicle.guidance`), that is on the drawing.
+        stops) are left out, and so are, vertically, trailing arms, which carry no weight. Where stiffness
+        turns a body otherwise than its supports do (`simrail.vehicle.guidance`), that is on the drawing.
 
     Raises
     ------
@@ -91,8 +91,19 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
                 primary.get(lower, (0.0, 0.0))[1] + sum(bearing.damping_nspm for bearing in bearings),
             )
     bodies = {
-        name: SheetBody(name, x, tuple(supports[name]), None, *primary.get(name, (None, None)))
-        for name, x in at.items()
+        body.name: SheetBody(
+            body.name,
+            at[body.name],
+            tuple(supports[body.name]),
+            primary_stiffness_npm=primary.get(body.name, (None, None))[0],
+            primary_damping_nspm=primary.get(body.name, (None, None))[1],
+            mass_kg=body.mass_kg,
+            roll_inertia_kgm2=body.inertia_kgm2[0],
+            pitch_inertia_kgm2=body.inertia_kgm2[1],
+            height_m=body.position_m[2],
+            springs=tuple(_springs_between(vehicle, body.name, s.on) for s in supports[body.name]),
+        )
+        for body in vehicle.bodies
     }
     for name in vehicle.axle_names:
         if not supports[name]:
@@ -101,6 +112,46 @@ def drawing(vehicle: VehicleModel, *, each_by_itself: bool = False) -> VehicleSh
     weights = heading_weights(vehicle)
     sheet = VehicleSheet(tuple(bodies[name] for name in _from_the_rails_up(supports)), place_sd)
     return replace(sheet, bodies=tuple(_with_turn(sheet, body, weights) for body in sheet.bodies))
+
+
+def _springs_between(vehicle: VehicleModel, upper: str, lower: str) -> Springs:
+    """All that pushes the upper of two bodies to the side, up and against roll, as the lower one stands.
+
+    Rods and series dampers as in `_bearings`; trailing arms push to the side at their bushings.
+    """
+    pair = {upper, lower}
+    rows: list[tuple[float, ...]] = []  # y, z, stiffness and damping along y and z
+    for spring in vehicle.suspensions:
+        if {spring.inner, spring.outer} == pair:
+            rows.append((*spring.position_m[1:], *spring.stiffness_npm[1:], *spring.damping_nspm[1:]))
+    for damper in vehicle.series:
+        if {damper.inner, damper.outer} == pair:
+            along = [damper.damping_nspm * (damper.axis == axis) for axis in (1, 2)]
+            rows.append((*damper.position_m[1:], 0.0, 0.0, *along))
+    for rod in vehicle.rods:
+        if {rod.inner, rod.outer} == pair:
+            share = (np.subtract(rod.outer_position_m, rod.inner_position_m)[1:] / rod.length_m) ** 2
+            rows.append((*rod.inner_position_m[1:], *rod.stiffness_npm * share, *rod.damping_nspm * share))
+    for arm in vehicle.arms:
+        if {arm.axle, arm.frame} == pair:
+            for place in arm.bushings_m:
+                rows.append((*place[1:], arm.stiffness_npm[1], 0.0, arm.damping_nspm[1], 0.0))
+    y, z, side, up, side_damping, up_damping = np.array(rows, dtype=np.float64).reshape(-1, 6).T
+    height = float(np.average(z, weights=side if side.any() else np.ones_like(z)))
+    roll, roll_damping = (
+        float((vertical * y**2 + lateral * (z - height) ** 2).sum())
+        for vertical, lateral in ((up, side), (up_damping, side_damping))
+    )
+    bars = [bar for bar in vehicle.rotations if {bar.inner, bar.outer} == pair]
+    return Springs(
+        lateral_npm=float(side.sum()),
+        vertical_npm=float(up.sum()),
+        roll_nmprad=roll + sum(bar.stiffness_nmprad[0] for bar in bars),
+        lateral_nspm=float(side_damping.sum()),
+        vertical_nspm=float(up_damping.sum()),
+        roll_nmsprad=roll_damping + sum(bar.damping_nmsprad[0] for bar in bars),
+        height_m=height,
+    )
 
 
 def _with_turn(sheet: VehicleSheet, body: SheetBody, weights: dict[str, dict[str, float]]) -> SheetBody:

@@ -13,7 +13,7 @@ PLACE_SD_M = 0.02
 """Standard deviation of a place along the vehicle where nobody has said it; synthetic."""
 
 STIFFNESS_RELATIVE_SD = 0.2
-"""Relative standard deviation of primary stiffness and damping where nobody has said it; synthetic."""
+"""Relative standard deviation of stiffness, damping and inertia where nobody has said it; synthetic."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,30 @@ class Support:
 
     on: str
     x_m: float
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Springs and dampers between a body and one that it rests on, of both sides together.
+
+    Attributes
+    ----------
+    lateral_npm, vertical_npm, roll_nmprad : float
+        Stiffness, N/m and N m/rad; that against roll has what the vertical springs give by their distance
+        and what an anti-roll bar adds.
+    lateral_nspm, vertical_nspm, roll_nmsprad : float
+        Damping alike, N s/m and N m s/rad.
+    height_m : float
+        Of the line along which they push to the side, over the rails.
+    """
+
+    lateral_npm: float
+    vertical_npm: float
+    roll_nmprad: float
+    lateral_nspm: float
+    vertical_nspm: float
+    roll_nmsprad: float
+    height_m: float
 
 
 @dataclass(frozen=True)
@@ -57,6 +81,11 @@ class SheetBody:
     wheelset : bool, optional
         Of an axle: whether its wheels turn as one, so that their taper keeps it near the middle of the track;
         None where the drawing does not say.
+    mass_kg, roll_inertia_kgm2, pitch_inertia_kgm2, height_m : float, optional
+        Mass, inertia about the centre of gravity, and its height over the rails; its place along the vehicle
+        is ``x_m``. None where the drawing does not say.
+    springs : tuple of Springs
+        One for each of ``supports``; none where the drawing does not say.
     """
 
     name: str
@@ -67,6 +96,11 @@ class SheetBody:
     primary_damping_nspm: float | None = None
     turned_by: tuple[tuple[str, float], ...] = ()
     wheelset: bool | None = None
+    mass_kg: float | None = None
+    roll_inertia_kgm2: float | None = None
+    pitch_inertia_kgm2: float | None = None
+    height_m: float | None = None
+    springs: tuple[Springs, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -144,7 +178,7 @@ class VehicleSheet:
         Standard deviation of each place along the vehicle (`Support.x_m`), independent of the others; the
         default is synthetic.
     stiffness_relative_sd : float
-        Relative standard deviation of each primary stiffness and damping; the default is synthetic.
+        Relative standard deviation of each stiffness, damping, mass and inertia; the default is synthetic.
     """
 
     bodies: tuple[SheetBody, ...]

@@ -4,7 +4,7 @@ For the body that carries the IMU a few places suffice (``pivots_m``, ``axles_m`
 whole vehicle has a ``[[vehicle_sheet.body]]`` for each axle, frame and body, which is what simrail writes.
 """
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
@@ -15,6 +15,7 @@ from simrail.recording.sheets.vehicle_sheet import (
     PLACE_SD_M,
     STIFFNESS_RELATIVE_SD,
     SheetBody,
+    Springs,
     Support,
     VehicleSheet,
 )
@@ -33,6 +34,22 @@ Wheelbase = Annotated[float, Field(gt=0.0, le=10.0)]
 # A scale vehicle has some 1e4 N/m; smaller numbers are those of kN/mm or N/mm.
 PrimaryStiffness = Annotated[float, Field(ge=1e4, le=1e9)]
 PrimaryDamping = Annotated[float, Field(ge=0.0, le=1e7)]
+Stiffness = Annotated[float, Field(ge=0.0, le=1e10)]
+Height = Annotated[float, Field(ge=0.0, le=6.0)]
+Mass = Annotated[float, Field(gt=0.0, le=2e5)]
+Inertia = Annotated[float, Field(gt=0.0, le=2e7)]
+
+
+class SpringsPart(Part):
+    """``[[vehicle_sheet.body.springs]]``: between a body and one of those that it rests on, as `Springs`."""
+
+    lateral_npm: Stiffness
+    vertical_npm: Annotated[float, Field(ge=1e3, le=1e10)]
+    roll_nmprad: Stiffness
+    lateral_nspm: PrimaryDamping
+    vertical_nspm: PrimaryDamping
+    roll_nmsprad: PrimaryDamping
+    height_m: Height
 
 
 class SheetBodyPart(Part):
@@ -54,6 +71,10 @@ class SheetBodyPart(Part):
         As `SheetBody.turned_by`: names of axles, and the weight of each.
     wheelset : bool, optional
         Of an axle, as in `SheetBody`.
+    mass_kg, roll_inertia_kgm2, pitch_inertia_kgm2, height_m : float, optional
+        As in `SheetBody`.
+    springs : tuple of SpringsPart
+        One for each of rests_on, or none.
     """
 
     name: Name
@@ -66,6 +87,11 @@ class SheetBodyPart(Part):
     turned_by: tuple[Name, ...] = ()
     turned_by_1pm: tuple[Annotated[float, Field(ge=-100.0, le=100.0)], ...] = ()
     wheelset: bool | None = None
+    mass_kg: Mass | None = None
+    roll_inertia_kgm2: Inertia | None = None
+    pitch_inertia_kgm2: Inertia | None = None
+    height_m: Height | None = None
+    springs: tuple[SpringsPart, ...] = ()
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -82,6 +108,13 @@ class SheetBodyPart(Part):
                 field="pivots_m",
                 value=self.pivots_m,
                 limit=f"{len(self.rests_on)} places, one for each of rests_on",
+            )
+        if self.springs and len(self.springs) != len(self.rests_on):
+            raise InputError(
+                "has another number of springs than of bodies below",
+                field="springs",
+                value=len(self.springs),
+                limit=f"{len(self.rests_on)}, one for each of rests_on, or none",
             )
         if len(set(self.rests_on)) < len(self.rests_on):
             raise InputError(
@@ -113,6 +146,11 @@ class SheetBodyPart(Part):
             primary_damping_nspm=self.primary_damping_nspm,
             turned_by=tuple(zip(self.turned_by, self.turned_by_1pm, strict=True)),
             wheelset=self.wheelset,
+            mass_kg=self.mass_kg,
+            roll_inertia_kgm2=self.roll_inertia_kgm2,
+            pitch_inertia_kgm2=self.pitch_inertia_kgm2,
+            height_m=self.height_m,
+            springs=tuple(Springs(**part.model_dump()) for part in self.springs),
         )
 
 
@@ -140,7 +178,7 @@ class VehicleSheetPart(Part):
     place_sd_m : float
         Standard deviation of each place.
     stiffness_relative_sd : float
-        Relative standard deviation of stiffness and damping.
+        Relative standard deviation of stiffness, damping, masses and inertia.
     """
 
     pivots_m: Places | None = None
@@ -358,6 +396,11 @@ def vehicle_sheet_table(sheet: VehicleSheet) -> dict[str, Any]:
                 "turned_by": [axle for axle, _ in body.turned_by] or None,
                 "turned_by_1pm": [weight for _, weight in body.turned_by] or None,
                 "wheelset": body.wheelset,
+                "mass_kg": body.mass_kg,
+                "roll_inertia_kgm2": body.roll_inertia_kgm2,
+                "pitch_inertia_kgm2": body.pitch_inertia_kgm2,
+                "height_m": body.height_m,
+                "springs": [asdict(springs) for springs in body.springs] or None,
             }
             for body in sheet.bodies
         ],
