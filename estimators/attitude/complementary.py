@@ -30,14 +30,14 @@ what a gyro of 0.005 deg/sqrt(s) needs to wander by 0.1 degrees."""
 
 @dataclass(frozen=True)
 class ComplementaryFilter:
-    """Complementary filter of roll and pitch (paper 003, Eqs. 3 and 4); yaw by the gyro alone, which it has not.
+    """Complementary filter of roll and pitch (paper 003, Eqs. 3 and 4); yaw is the gyro's.
 
     Attributes
     ----------
     time_constant_s : float
         T: the accelerometer counts below 1 / (2 pi T).
     compensated : bool
-        Take the odometry's motion off the accelerometer first, w_z V of Y and A of X: not the paper's.
+        Take the odometry's motion off the accelerometer first, A of X and w x V of Y and Z: not the paper's.
     printed : bool
         Give the roll of the accelerometer the sign that Eq. 4 prints.
     rest_bias : bool
@@ -84,9 +84,9 @@ class ComplementaryFilter:
         gravity = recording.gravity_mps2
         if self.compensated:
             motion = odometry_of(recording)
+            speed = motion["speed_mps"].to_numpy(dtype=np.float64)
             x = x - motion["acceleration_mps2"].to_numpy(dtype=np.float64)
-            y = y - rates[:, 2] * motion["speed_mps"].to_numpy(dtype=np.float64)
-            roll = np.arctan2(y, z)
+            roll = np.arctan2(y - rates[:, 2] * speed, z + rates[:, 1] * speed)
         else:
             roll = np.arctan(y / gravity)
         if self.printed:

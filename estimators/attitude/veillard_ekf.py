@@ -5,10 +5,10 @@ and the speed that the spectrum of the vertical accelerometer tells. It needs no
 calibration of that speed from other rides.
 
 Not given by the paper, and chosen here: Q, R, the time constant, the step, how the direction of running is
-known. Weak by design (EQUATIONS 4), and left as it is: the complementary filter uses the same signals again,
-as if its errors were new; the lateral acceleration is a free random walk although it is yaw rate times speed;
-Z of the gyro has no bias; and the error of a frame's speed, which lasts as long as a rough section, counts as
-white, raised by how many frames share it.
+known. Weak by design (EQUATIONS 4), and left as it is: the complementary filter uses the same signals again;
+the lateral acceleration is a free random walk although it is yaw rate times speed; Z of the gyro has no bias.
+The errors of the inclination and of a frame's speed last, the one for a time constant, the other for as long
+as a section is rough: R holds white noise of the same density, else the filter would believe them by far.
 """
 
 import math
@@ -60,7 +60,7 @@ class Noise(NamedTuple):
     vibration_radps, vibration_mps2 : float
         Standard deviation that shaking adds to a sample.
     inclination_rad : float
-        Of roll and pitch by the complementary filter, as if each sample's were new.
+        Standard deviation of roll and pitch by the complementary filter, which lasts its time constant.
     """
 
     rate_walk_rad2ps3: float = 4e-4
@@ -69,7 +69,7 @@ class Noise(NamedTuple):
     bias_rad2ps3: float = 4e-12
     vibration_radps: float = 0.01
     vibration_mps2: float = 0.3
-    inclination_rad: float = math.radians(1.0)
+    inclination_rad: float = math.radians(0.5)
 
 
 NOISE = Noise()
@@ -168,12 +168,13 @@ class VeillardEkf:
     def _states(self, recording: Recording, told: FrameSpeeds, found: Found) -> pd.DataFrame:
         """States in columns, and the way as the sum of the speed.
 
-        The error of the speed lasts for `ROUGH_S`, so that the variance of the way grows by twice that time the
-        speed's variance, and one constant factor is the calibration's.
+        What rough sections do to the speed lasts for `ROUGH_S`, so that the variance of the way grows by
+        twice that time its variance; one constant factor of speed and way is the calibration's.
         """
         step = 1.0 / recording.imu_sheet.rate_hz
-        speed, variance = found.states[:, V], np.maximum(found.variances[:, V], told.rough_sd_mps**2)
+        speed, n = found.states[:, V], len(found.states)
         way = np.cumsum(step * speed)
+        rough = 2.0 * ROUGH_S * told.rough_sd_mps**2 * step * np.arange(n)
         factor = self.calibration_relative_sd
         sd = {name: np.sqrt(found.variances[:, i]) for name, i in (("roll", ROLL), ("pitch", PITCH))}
         values = {
@@ -184,8 +185,8 @@ class VeillardEkf:
             ODOMETRY[0]: recording.start_position_m + way,
             ODOMETRY[1]: speed,
             ODOMETRY[2]: found.states[:, AX],
-            ODOMETRY_SD[0]: np.sqrt(np.cumsum(2.0 * ROUGH_S * step * variance) + (factor * way) ** 2),
-            ODOMETRY_SD[1]: np.sqrt(variance + (factor * speed) ** 2),
+            ODOMETRY_SD[0]: np.sqrt(rough + (factor * way) ** 2),
+            ODOMETRY_SD[1]: np.sqrt(found.variances[:, V] + (factor * speed) ** 2),
             ODOMETRY_SD[2]: np.sqrt(found.variances[:, AX]),
         }
         return pd.DataFrame(values, index=recording.imu.index)
@@ -204,10 +205,9 @@ class VeillardEkf:
         q[BIAS_X:] = NOISE.bias_rad2ps3
         r[:3] = sheet.gyro_noise_radpsqrts**2 * sheet.rate_hz + NOISE.vibration_radps**2
         r[3:6] = sheet.accel_noise_mpsqrts**2 * sheet.rate_hz + NOISE.vibration_mps2**2
-        r[6:8] = NOISE.inclination_rad**2
-        # So many frames share the error of a rough section, or each other's samples, and count as one.
-        shared = max(2.0 * ROUGH_S, self.frame * step) / (self.hop * step)
-        r[8] = told.rough_sd_mps**2 * max(1.0, shared)
+        # An error of the correlation time T counts as one new one in 2 T: white noise of the same density.
+        r[6:8] = NOISE.inclination_rad**2 * max(1.0, 2.0 * self.time_constant_s / step)
+        r[8] = told.rough_sd_mps**2 * max(1.0, 2.0 * ROUGH_S / (self.hop * step))
         bias = sheet.gyro_turn_on_bias_radps**2 / 3.0
         variance = np.array([1e-4] * 3 + [0.1**2] * 2 + [0.1**2] * 3 + [0.1**2] + [bias] * 2)
         return Model(

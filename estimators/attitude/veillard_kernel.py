@@ -1,4 +1,4 @@
-"""Compiled loops of Veillard et al. 2016 (paper 003): complementary filter, and Kalman filter of eleven states.
+"""Compiled loops of Veillard et al. 2016 (paper 003): complementary filter, Kalman filter of eleven states.
 
 Equations are those of EQUATIONS 4. Nothing here knows of recordings or data frames.
 """
@@ -63,6 +63,10 @@ class Model(NamedTuple):
     gravity: float
 
 
+Turns = tuple[float, float, float, float]
+"""Sine and cosine of roll, then of pitch."""
+
+
 class Found(NamedTuple):
     """States and their variances, both (n, 11), innovations (n, 7): of gyro and accelerometer, then NIS."""
 
@@ -99,8 +103,8 @@ def complementary(
 
         inc <- c (inc + step rate) + (1 - c) level,      c = T / (T + step)
 
-    Until a time constant has passed, (1 - c) is one over the number of samples: the filter then has no start to
-    forget.
+    Until a time constant has passed, (1 - c) is one over the number of samples: the filter then has no start
+    to forget.
 
     Parameters
     ----------
@@ -147,7 +151,8 @@ def _correct(
     e = error - ha * dx[a] - hb * dx[b] - hc * dx[c] - hd * dx[d] - hf * dx[f]
     inverse = 1.0 / (ha * v[a] + hb * v[b] + hc * v[c] + hd * v[d] + hf * v[f] + variance)
     condition(dx, p, v, e, inverse, gain)
-    return e * e * inverse
+    nis: float = e * e * inverse
+    return nis
 
 
 @njit_inline
@@ -160,15 +165,27 @@ def _correct_one(
     e = error - dx[state]
     inverse = 1.0 / (v[state] + variance)
     condition(dx, p, v, e, inverse, gain)
-    return e * e * inverse
+    nis: float = e * e * inverse
+    return nis
 
 
 @njit_inline
-def _level(signals: FloatArray, k: int, x: FloatArray, model: Model) -> tuple[float, float]:
-    """Roll and pitch by the accelerometer (paper 003, Eq. 4, its sign mended), or less the motion known."""
-    fx, fy, fz = signals[k, 3], signals[k, 4], signals[k, 5]
+def _turns(x: FloatArray) -> Turns:
+    return math.sin(x[ROLL]), math.cos(x[ROLL]), math.sin(x[PITCH]), math.cos(x[PITCH])
+
+
+@njit_inline
+def _level(model: Model, k: int, x: FloatArray, turns: Turns) -> tuple[float, float]:
+    """Roll and pitch by the accelerometer (paper 003, Eq. 4, its sign mended), or less the motion known.
+
+    The motion is x'' along X and w x v, of which a curve is most.
+    """
+    fx, fy, fz = model.signals[k, 3], model.signals[k, 4], model.signals[k, 5]
     if model.compensated:
-        roll, along = math.atan2(fy - x[YAW_RATE] * x[V], fz), fx - x[AX]
+        sr, cr, _, cp = turns
+        wy = cr * x[PITCH_RATE] + sr * cp * x[YAW_RATE]
+        wz = cr * cp * x[YAW_RATE] - sr * x[PITCH_RATE]
+        roll, along = math.atan2(fy - wz * x[V], fz + wy * x[V]), fx - x[AX]
     else:
         roll, along = math.atan(fy / model.gravity), fx
     return roll, -math.asin(min(1.0, max(-1.0, along / model.gravity)))
@@ -183,13 +200,13 @@ def _correct_all(
     gain: FloatArray,
     model: Model,
     k: int,
+    turns: Turns,
     inclination: tuple[float, float],
     innovations: FloatArray,
 ) -> float:
     """Gyro, accelerometer and inclination (Eq. 7; Jacobian as EQUATIONS 4); returns their NIS."""
     signals, r, g = model.signals, model.noise, model.gravity
-    sr, cr = math.sin(x[ROLL]), math.cos(x[ROLL])
-    sp, cp = math.sin(x[PITCH]), math.cos(x[PITCH])
+    sr, cr, sp, cp = turns
     thd, psd = x[PITCH_RATE], x[YAW_RATE]
     turn = cr * cp * psd - sr * thd  # what the gyro should show on Z
     e = innovations[k]
@@ -232,7 +249,8 @@ def eleven_states(model: Model, out: Found) -> None:
     v, dx, gain = np.zeros(WIDTH), np.zeros(STATES), np.zeros(STATES)
     ring, steps = model.late + 1, (dt, dt, dt)
     added, total = np.zeros(ring), 0.0  # to the speed so far, at each of the last samples
-    roll, pitch = _level(signals, 0, x, model)
+    turns = _turns(x)
+    roll, pitch = _level(model, 0, x, turns)
     for i in range(STATES):
         p[i, i] = model.start_variance[i]
     for k in range(signals.shape[0]):
@@ -246,14 +264,14 @@ def eleven_states(model: Model, out: Found) -> None:
             fed_x, fed_y = (x[BIAS_X], x[BIAS_Y]) if model.compensated else (0.0, 0.0)
             y, z = signals[k, 1] - fed_y, signals[k, 2]
             roll, pitch = complementary_step(roll, pitch, signals[k, 0] - fed_x, y, z, dt)
-            share = max(lasting, 1.0 / (k + 1))
-            roll_m, pitch_m = _level(signals, k, x, model)
+            share, turns = max(lasting, 1.0 / (k + 1)), _turns(x)
+            roll_m, pitch_m = _level(model, k, x, turns)
             roll += share * (roll_m - roll)
             pitch += share * (pitch_m - pitch)
         added[k % ring] = total
         for i in range(STATES):
             dx[i] = 0.0
-        nis = _correct_all(x, p, dx, v, gain, model, k, (roll, pitch), out.innovations)
+        nis = _correct_all(x, p, dx, v, gain, model, k, turns, (roll, pitch), out.innovations)
         if not math.isnan(model.speed[k]):
             error = model.speed[k] - x[V] + total - added[(k + 1) % ring]
             nis += _correct_one(dx, p, v, gain, V, error, model.noise[8])

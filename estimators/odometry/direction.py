@@ -1,7 +1,8 @@
-"""Which way a train runs, for methods whose sensor tells no sign: given, by the encoder, or by how it sets off.
+"""Which way a train runs, for methods whose sensor tells no sign: given, by the encoder, or by the IMU.
 
 Vibration tells how fast a train runs, not which way. A train that is not turned at the end of its line runs
-back backwards, so the direction belongs to each departure: the first acceleration after a rest points along it.
+back backwards, so the direction belongs to each departure: the first acceleration after a rest points along
+it.
 """
 
 import numpy as np

@@ -10,11 +10,11 @@ and, for its sign, the direction of running (`simrail.estimators.odometry.direct
 
 What of the paper is mended or added (EQUATIONS 4):
 
-* The sum as printed begins with k = 0. Gravity alone makes |H_0| = 5.4e3 m/s2 and, by Hamming's window,
-  |H_1| = 2.3e3 of 1024 samples, where all that a floor shakes at rest makes some 200: the sum begins at k = 2,
-  and each frame's mean is taken off. ``printed = true`` leaves both in.
-* A frame of 1024 samples at 250 Hz is 4.1 s long: its speed is dated at its centre, and known at its end. What
-  is said of the present is led on from there.
+* The sum as printed begins with k = 0. Of 1024 samples gravity alone makes |H_0| = 5.4e3 m/s2 and, by
+  Hamming's window, |H_1| = 2.3e3, where all that a floor shakes at rest makes some 200: the sum begins at
+  k = 2, and each frame's mean is taken off. ``printed = true`` leaves both in.
+* A frame of 1024 samples at 250 Hz is 4.1 s long: its speed is dated at its centre, and known at its end.
+  What is said of the present is led on from there.
 * sqrt(S) is linear in the speed on average only: rough and smooth sections differ by metres per second, over
   hundreds of metres, and a calibration of other rails is wrong for the whole ride. Standard deviations have
   both, the latter as one constant factor of speed and way.
@@ -45,14 +45,16 @@ HOP = 128
 """Samples from frame to frame: seven eighths overlap. The paper does not give it."""
 
 LONGEST_FRAME_S = 10.24
-"""A train that gains 1 m/s2 is 10 m/s faster at the end of such a frame; 1024 samples at 100 Hz are as long."""
+"""A train that gains 1 m/s2 is 10 m/s faster at the end of such a frame; 1024 samples at 100 Hz last as
+long."""
 
 CALIBRATIONS = ("given", "standstill", "encoder")
-"""Slope and intercept given; slope given, intercept from the first rest, as the paper; both from the ride's own
-encoder, over the whole ride: an ablation."""
+"""Slope and intercept given; slope given, intercept from the first rest, as the paper; both from the ride's
+own encoder, over the whole ride: an ablation."""
 
-ACCELERATION_MPS2, ACCELERATION_S = 0.5, 10.0
-"""Standard deviation and correlation time of a stopping train's acceleration."""
+ACCELERATION_MPS2, ACCELERATION_S = 0.7, 10.0
+"""Standard deviation and correlation time of the acceleration of a train that stops every kilometre: 1 m/s2
+for half of its time, some ten seconds each."""
 
 ROUGH_S = 10.0
 """Correlation time of the error that rough and smooth sections make: 200 m at 20 m/s."""
@@ -112,7 +114,9 @@ def spectral_sums(vertical: FloatArray, *, frame: int, hop: int, printed: bool =
     if len(vertical) < frame:
         return np.zeros(0)
     cut = np.lib.stride_tricks.sliding_window_view(vertical, frame)[::hop]
-    window, first = np.hamming(frame), 0 if printed else 2
+    first = 0 if printed else 2
+    # Periodic: a constant then shows at k = 0 and 1 and nowhere else.
+    window = 0.54 - 0.46 * np.cos(2.0 * np.pi / frame * np.arange(frame))
     sums = np.empty(len(cut))
     for begin in range(0, len(cut), _CHUNK):
         part = cut[begin : begin + _CHUNK]
@@ -172,7 +176,8 @@ def calibrate(
     recordings : sequence of Recording
         The rides, their IMUs at the place that is to be calibrated.
     speeds : sequence of ndarray (n,)
-        Known speed of each at its IMU samples, m/s, of either sign: its magnitude at each frame's centre is taken.
+        Known speed of each at its IMU samples, m/s, of either sign: its magnitude at each frame's centre is
+        taken.
     frame, hop, printed
         As in `frames_of`.
 
@@ -251,8 +256,8 @@ class SpectralOdometry:
     speed_sd_mps : float
         Standard deviation of a frame's speed: 2.5 m/s is paper 003's error; by the encoder, that of its fit.
     calibration_relative_sd : float
-        Of the whole ride's speed: what rougher or smoother rails than those of the calibration do. 0.17 is the
-        one distance of paper 003.
+        Of the whole ride's speed: what rougher or smoother rails than those of the calibration do. 0.17 is
+        the error of the one distance of paper 003.
     printed : bool
         Sum the spectrum as printed, gravity with it.
     """
@@ -307,8 +312,8 @@ class SpectralOdometry:
         Raises
         ------
         InputError
-            If there is no vertical signal, the rate is too low for the frames, the calibration is not given, or
-            the ride has no rest to find it in.
+            If there is no vertical signal, the rate is too low for the frames, the calibration is not given,
+            or the ride has no rest to find it in.
         """
         told, half = self.frame_speeds(recording), self.frame // 2
         led = led_on(
@@ -357,7 +362,7 @@ class SpectralOdometry:
                 field="slope" if self.slope is None else "intercept_mps",
                 value="none",
                 limit="(m/s) per sqrt(m/s2)" if self.slope is None else "m/s",
-                remedy='take that of simrail.estimators.odometry.spectral.calibrate, or calibration = "encoder"',
+                remedy='see simrail.estimators.odometry.spectral.calibrate, or set calibration = "encoder"',
             )
         if self.calibration == "given" and self.intercept_mps is not None:
             return self.slope, self.intercept_mps, self.speed_sd_mps

@@ -35,7 +35,7 @@ def led_on(
 ) -> Led:
     """F and Q over 0 to ``samples`` samples; sd and correlation time of acceleration and of the error.
 
-    The first step is C. F. Van Loan's (IEEE Trans. Autom. Control AC-23 (1978) 395-404), the others repeat it.
+    The first step is by C. F. Van Loan (IEEE Trans. Autom. Control AC-23 (1978) 395-404).
     """
     generator, drive = np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
     generator[S, V] = generator[V, A] = 1.0
@@ -70,8 +70,8 @@ def spectral_filter(
     Parameters
     ----------
     speed, variance : ndarray (m,)
-        Signed speed that each frame tells, m/s, and the variance of its white part u, (m/s)^2; NaN for a frame
-        that tells none.
+        Signed speed that each frame tells, m/s, and the variance of its white part u, (m/s)^2; NaN for a
+        frame that tells none.
     direction : ndarray (m,)
         sigma of each frame.
     ends : ndarray of int (m,)
