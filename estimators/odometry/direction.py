@@ -27,9 +27,9 @@ than a body's pitch under passengers (1 mrad is 0.01 m/s2)."""
 LOOK_S = 0.5
 """Over which the force is averaged for that: half a second outlasts a cycle of anything that shakes."""
 
-REST_S = 10.0
-"""Shortest rest after which a train may leave the other way. A driver who changes ends takes minutes; steady
-traction, which is as quiet as a rest, lasts some seconds."""
+REST_S = 60.0
+"""Shortest rest after which a train may leave the other way. A driver who changes ends takes minutes; a train
+that runs smoothly on good rails is as quiet as a rest for some tens of seconds at most."""
 
 
 def running_direction(recording: Recording, how: str) -> FloatArray:

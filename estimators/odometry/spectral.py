@@ -65,8 +65,9 @@ LEAST_MPS = 0.1
 RAYLEIGH = math.sqrt(4.0 / math.pi - 1.0)
 """Standard deviation over mean of one amplitude of the spectrum of noise."""
 
-HAMMING_BINS = 1.36
-"""Bins that share their noise through Hamming's window (its equivalent noise bandwidth)."""
+HAMMING_BINS = 1.82
+"""Bins that count as one, since Hamming's window makes neighbours share their noise: 1 + 2 (r1^2 + r2^2) with
+r1 = .625 and r2 = .133, the correlations of bins one and two apart."""
 
 _CHUNK = 256
 

@@ -12,10 +12,13 @@ import pandas as pd
 import pytest
 from channels import harmonic
 from simrail.estimators.ahrs import Imufusion, Vqf
+from simrail.estimators.attitude.complementary import ComplementaryFilter
 from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
+from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.odometry.encoder import EncoderOdometry
+from simrail.estimators.odometry.spectral import SpectralOdometry
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
@@ -68,6 +71,9 @@ OURS = [
     AttitudeGda(tuning="paper", rest_bias=False),
     AttitudeGda(printed=True),
     AttitudeGda(compensated=False, tuning="paper"),
+    ComplementaryFilter(),
+    ComplementaryFilter(compensated=True, rest_bias=False),
+    ComplementaryFilter(printed=True),
     DesignAngles(),
     Vqf(),
     Vqf(compensated=True),
@@ -90,6 +96,7 @@ def test_ours_pass(estimator: Estimator) -> None:
 BACKWARDS = {
     "ekf": AttitudeEkf(),
     "gda": AttitudeGda(),
+    "complementary": ComplementaryFilter(compensated=True),
     "vqf": Vqf(),
     "imufusion": Imufusion(),
     "trajectory": TrajectorySmoother(draws=2),
@@ -380,6 +387,26 @@ def test_odometries_pass_and_their_faults_are_caught() -> None:
             check_odometry(Wheel(fault=fault), ride())
     with pytest.raises(AssertionError, match="an odometry needs an odometry"):
         check_odometry(AttitudeEkf(), ride())
+
+
+SHAKEN: dict[str, Estimator] = {
+    "spectral": SpectralOdometry(0.9, -16.0, "given"),
+    "spectral_at_rest": SpectralOdometry(0.9, frame=128, hop=32),
+    "spectral_own": SpectralOdometry(calibration="encoder", direction="encoder", printed=True),
+    "veillard": VeillardEkf(0.9, -16.0, "given", direction="backwards"),
+    "veillard_compensated": VeillardEkf(0.9, frame=128, hop=32, compensated=True, dated="end"),
+    "veillard_own": VeillardEkf(calibration="encoder", start_bias=False),
+}
+
+
+@pytest.mark.parametrize("method", SHAKEN.values(), ids=list(SHAKEN))
+def test_odometries_of_an_imu_pass(method: Estimator) -> None:
+    check_odometry(method, ride())
+
+
+def test_odometries_of_an_imu_pass_backwards_and_with_a_perfect_imu() -> None:
+    for method in (SHAKEN["spectral"], SHAKEN["veillard_compensated"]):
+        check_odometry(method, ride(-1, "ideal"))
 
 
 def test_the_template_of_an_odometry_passes(tmp_path: Path) -> None:

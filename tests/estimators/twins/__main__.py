@@ -2,8 +2,8 @@
 
     python tests/estimators/twins
 
-filterpy's filters are a few lines of matrices: `attitude.py` and `trajectory.py` here. The kernels make the
-same numbers; this prints how far apart they are, and the time that each takes for a sample.
+filterpy's filters are a few lines of matrices: `attitude.py`, `veillard.py` and `trajectory.py` here. The
+kernels make the same numbers; this prints how far apart they are, and the time that each takes for a sample.
 """
 
 from __future__ import annotations
@@ -15,8 +15,11 @@ import numpy as np
 from attitude import filterpy_ekf
 from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.kernel import attitude_ekf
+from simrail.estimators.attitude.veillard_ekf import VeillardEkf
+from simrail.estimators.attitude.veillard_kernel import Found, Model, eleven_states, room
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from trajectory import trace
+from veillard import filterpy_eleven_states
 
 from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import with_odometry
@@ -68,7 +71,16 @@ def main() -> None:
         run(*arrays, states, covariance, np.empty((SAMPLES, 4)))
         return states
 
+    eleven = VeillardEkf(calibration="encoder")
+    model = eleven.model(recording, eleven.spectral.frame_speeds(recording))
+
+    def states_of(run: Callable[[Model, Found], None]) -> FloatArray:
+        found = room(SAMPLES)
+        run(model, found)
+        return found.states
+
     beside("attitude EKF", lambda: attitude(attitude_ekf), lambda: attitude(filterpy_ekf))
+    beside("EKF of 11 states", lambda: states_of(eleven_states), lambda: states_of(filterpy_eleven_states))
     for name, smoothed in (("trajectory filter", False), ("trajectory smoother", True)):
         method = TrajectorySmoother(smoothed=smoothed)
         beside(name, lambda m=method: m.trace(recording).states, lambda m=method: trace(m, recording).states)

@@ -11,6 +11,7 @@ def test_the_lesson_runs(capsys: pytest.CaptureFixture[str]) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert [line[:20].strip() for line in lines] == [
         "attitude EKF",
+        "EKF of 11 states",
         "trajectory filter",
         "trajectory smoother",
     ]
