@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from simrail.estimators.attitude.compensation import start_frame
 from simrail.estimators.attitude.complementary import TIME_CONSTANT_S
 from simrail.estimators.attitude.veillard_kernel import (
     AX,
@@ -24,6 +25,7 @@ from simrail.estimators.attitude.veillard_kernel import (
     PITCH,
     ROLL,
     STATES,
+    YAW_RATE,
     Found,
     Model,
     V,
@@ -79,8 +81,8 @@ NOISE = Noise()
 class VeillardEkf:
     """Eleven-state extended Kalman filter of Veillard et al. 2016, section II.C: an IMU and nothing else.
 
-    Roll, pitch, and way, speed and acceleration along the track, which makes it an odometry as well. Yaw it
-    does not estimate.
+    Roll, pitch, and way, speed and acceleration along the track, which makes it an odometry as well. Way and
+    yaw are no states: they are the sums of speed and of yaw rate, from where the ride begins on the map.
 
     Attributes
     ----------
@@ -150,7 +152,7 @@ class VeillardEkf:
         return self.spectral.role
 
     def estimate(self, recording: Recording) -> Estimate:
-        """Estimate roll, pitch, position, speed and acceleration, with variances and innovations.
+        """Estimate roll, pitch, yaw, position, speed and acceleration, with sds and innovations.
 
         Raises
         ------
@@ -180,6 +182,7 @@ class VeillardEkf:
         values = {
             "roll_rad": found.states[:, ROLL],
             "pitch_rad": found.states[:, PITCH],
+            "yaw_rad": float(start_frame(recording).yaw_rad[0]) + np.cumsum(step * found.states[:, YAW_RATE]),
             "roll_sd_rad": sd["roll"],
             "pitch_sd_rad": sd["pitch"],
             ODOMETRY[0]: recording.start_position_m + way,

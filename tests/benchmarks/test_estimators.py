@@ -22,6 +22,10 @@ from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.gda import AttitudeGda
 from simrail.estimators.attitude.kernel import attitude_ekf, attitude_gda
 from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
+from simrail.estimators.attitude.veillard_ekf import VeillardEkf
+from simrail.estimators.attitude.veillard_kernel import Model as ElevenStates
+from simrail.estimators.attitude.veillard_kernel import eleven_states, room
+from simrail.estimators.odometry.spectral import FRAME, HOP, spectral_sums
 from simrail.estimators.trajectory.kernel import (
     Model,
     room_for_filtered,
@@ -32,6 +36,7 @@ from simrail.estimators.trajectory.kernel import (
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likelihood, run_model
 from twins.attitude import filterpy_ekf
 from twins.trajectory import filterpy_smoother
+from twins.veillard import filterpy_eleven_states
 from vqf import VQF
 
 from simrail.estimation.choose_odometry import with_odometry
@@ -170,6 +175,24 @@ def test_gda_kernel(benchmark: Callable) -> None:
     )
     assert us <= 0.08
     assert benchmark.extra_info["ratio_to_vqf"] >= 3.0
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+def test_eleven_states_kernel(benchmark: Callable, compensated: bool) -> None:
+    method = VeillardEkf(calibration="encoder", compensated=compensated)
+    model: ElevenStates = method.model(ride(), method.spectral.frame_speeds(ride()))
+    few, n = model._replace(signals=model.signals[:SLOW]), len(model.signals)
+    theirs = best_us(lambda: filterpy_eleven_states(few, room(SLOW)), SLOW, rounds=2)
+    found = room(n)
+    us = report(benchmark, lambda: eleven_states(model, found), n, ratio_to_filterpy=theirs)
+    assert us <= 0.4
+    assert benchmark.extra_info["ratio_to_filterpy"] >= 250.0
+
+
+def test_spectral_sums(benchmark: Callable) -> None:
+    vertical = ride().imu["accel_z_mps2"].to_numpy()
+    us = report(benchmark, lambda: spectral_sums(vertical, frame=FRAME, hop=HOP), len(vertical))
+    assert us <= 0.1
 
 
 def test_gda_beside_ahrs_madgwick(benchmark: Callable) -> None:

@@ -150,6 +150,20 @@ def test_without_an_encoder_an_estimator_that_needs_no_odometry_runs(tmp_path: P
     assert "no odometry: where the train is, no method knows" in page and 'id="odometry"' not in page
 
 
+def test_an_imu_alone_gives_attitude_speed_and_distance(tmp_path: Path) -> None:
+    """Veillard's methods without an encoder; of the one without attitude the page draws none."""
+    given = 'slope = 0.9\nintercept_mps = -5.0\ncalibration = "given"'
+    done = run(
+        scenario_of(f"SpectralOdometry {given}", f"VeillardEkf {given}", sensors=""), out=tmp_path / "out"
+    )
+    assert not done.campaign.failures
+    for quantity in ("position", "speed"):
+        assert value(done.campaign, "e0", quantity) > 0.0
+    for quantity in ("position", "speed", "acceleration_x", "roll", "pitch"):
+        assert value(done.campaign, "e1", quantity) > 0.0
+    assert (tmp_path / "out" / "report.html").exists()
+
+
 def test_a_recording_without_odometry_rests_unknown() -> None:
     """With `rest_bias` on, nothing tells of rest, and nothing is taken off: the same as without."""
     assert value(run_campaign(scenario_of("Vqf", sensors="")), "e0", "roll") == value(

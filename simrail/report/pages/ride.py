@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from simrail.campaign.cell import CellResult
-from simrail.core.columns import IRREGULARITY
+from simrail.core.columns import ATTITUDE, IRREGULARITY
 from simrail.estimation.choose_odometry import TRUTH
 from simrail.report.figures.attitude import attitude_figure, error_figure
 from simrail.report.figures.contact import contact_figure
@@ -65,7 +65,7 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
     spec, styles, name = data.scenario.spec, data.attitude_styles, example.recording.name
     case = of_cell(data.cases, example.cell)
     geometry = geometry_view(example, case, data.styles, limits=limits_of(spec), known=data.bands)
-    drawn = [style for style in styles if style.name in example.estimates]
+    drawn = [style for style in styles if has_attitude(example, style.name)]
     drawn = one_of_each(case, drawn) if case else drawn
     left_out = [style for style in drawn if not style.baseline][MOST_DRAWN:] if geometry else []
     drawn = [style for style in drawn if style not in left_out]
@@ -108,6 +108,12 @@ def ride_data(data: PageData, example: CellResult) -> dict[str, Any]:
         "rides_left_out": 0,
         "asks_of_ride": data.asks_of_ride,
     }
+
+
+def has_attitude(example: CellResult, name: str) -> bool:
+    """Whether a method estimated roll, pitch and yaw; one that is an odometry and nothing else did not."""
+    found = example.estimates.get(name)
+    return found is not None and all(angle in found.states for angle in ATTITUDE)
 
 
 def ride_title(example: CellResult) -> str:

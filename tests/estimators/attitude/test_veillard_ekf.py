@@ -166,7 +166,7 @@ def test_a_gyros_bias_is_found() -> None:
 
 
 def test_the_first_rest_gives_the_gyro_its_zero(noisy: Recording) -> None:
-    """The mean of the samples so far, in whole blocks of 0.04 s, until the train leaves; and then it stays."""
+    """The mean of the samples so far, in whole blocks of 0.04 s, until the train leaves; then it stays."""
     noisy.imu.iloc[:, 1] += 0.004
     found, gyro = first_rest_mean(noisy), noisy.imu.iloc[:, :3].to_numpy()
     np.testing.assert_allclose(found[250], gyro[:250].mean(axis=0), rtol=1e-9)
