@@ -54,6 +54,12 @@ def test_a_sine_shows_its_amplitude_and_gravity_nothing() -> None:
     np.testing.assert_allclose(found, 0.3 * FRAME / 2.0, rtol=1e-10)
 
 
+def test_what_is_as_slow_as_a_frame_hardly_counts() -> None:
+    """Of one cycle in a frame the line at 1, .54 N A / 2, is left out; that at 2 stays."""
+    found = spectral_sums(tone(0.3, FRAME, cycles=1), frame=FRAME, hop=HOP)
+    np.testing.assert_allclose(found, 0.23 * 0.3 * FRAME / 2.0, rtol=1e-10)
+
+
 def test_as_printed_gravity_outweighs_what_shakes() -> None:
     """|H_0| + |H_1| = (.54 + .23) g N: 7.7e3 m/s2."""
     found = spectral_sums(tone(0.3, FRAME), frame=FRAME, hop=HOP, printed=True)
