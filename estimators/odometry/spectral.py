@@ -12,9 +12,11 @@ What of the paper is mended or added (EQUATIONS 4):
 
 * The sum as printed begins with k = 0. Of 1024 samples gravity alone makes |H_0| = 5.4e3 m/s2 and, by
   Hamming's window, |H_1| = 2.3e3, where all that a floor shakes at rest makes some 200: the sum begins at
-  k = 2, and each frame's mean is taken off. ``printed = true`` leaves both in.
+  k = 2, and each frame's mean is taken off. ``printed = true`` leaves both in: fitted to the ride's own
+  speed, on the bogie frame of a metro over 3 km and back (three draws of the rails), that leaves 1.5 to
+  3.7 m/s rms in place of 1.4 to 2.7.
 * A frame of 1024 samples at 250 Hz is 4.1 s long: its speed is dated at its centre, and known at its end.
-  What is said of the present is led on from there.
+  What is said of the present is led on from there. Dated at its end: 1.9 to 3.0 m/s on those rides.
 * sqrt(S) is linear in the speed on average only: rough and smooth sections differ by metres per second, over
   hundreds of metres, and a calibration of other rails is wrong for the whole ride. Standard deviations have
   both, the latter as one constant factor of speed and way.
