@@ -71,7 +71,7 @@ def test_the_body_begins_as_it_stays(rough: Callable, motion: Motion) -> None:
 def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:
     """A bound b of a sheet is taken for uniform: b/sqrt(3). The map's cant is over the rails' distance.
 
-    A bias has wandered before the ride as it does in it. A cubic that leaves its chord by p at most has a slope
+    A bias has wandered before the ride as it does in it. A cubic that leaves its chord by p has a slope
     of 1.5 sqrt(3) p at zero. Local gravity is known to 1 mm/s2.
     """
     recording = rough()
