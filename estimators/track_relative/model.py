@@ -31,7 +31,7 @@ VERTICAL_LENGTH_M = 7.0
 MOTION_RATE_HZ = 125.0
 """Rate to which `simrail.estimators.track_relative.noise.Motion` speaks of white motion."""
 
-LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 1e-5, 1e-3
+LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 1e-5, 3e-3
 """Noise that is always added: no mount is stiffer, and a filter of sensors without noise is singular."""
 
 LOST_M = 1.0
@@ -230,7 +230,9 @@ def _variances(course: Course, rows: slice) -> FloatArray:
     gyro = sheet.gyro_noise_radpsqrts**2 * rate + LEAST_GYRO_RADPS**2
     accel = sheet.accel_noise_mpsqrts**2 * rate + LEAST_ACCEL_MPS2**2
     own = (motion.accel_x, motion.accel_y, motion.accel_z)
-    columns = [gyro + motion.gyro**2 * moves] * 3 + [accel + sd**2 * moves for sd in own]
+    rocks = motion.rocking**2
+    rates = [gyro + rest + motion.gyro**2 * moves for rest in (rocks, rocks, 0.0)]
+    columns = [*rates, *(accel + sd**2 * moves for sd in own)]
     return np.ascontiguousarray(np.column_stack([*columns, course.aided.variances[rows]]))
 
 

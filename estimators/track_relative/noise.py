@@ -31,6 +31,9 @@ class Motion:
         Natural frequency and damping ratio of a roll that sways in time; 0 Hz: it is over the distance.
     gyro, accel_x, accel_y, accel_z : float
         White motion that the model lacks, per sample of 125 Hz at `AT_MPS`, rad/s and m/s2.
+    rocking : float
+        White rates of roll and pitch per step, rad/s: at a stop a body rocks on, where what goes by the
+        distance cannot.
     tilt, tilt_sd : float
         Roll flexibility: rad of roll per rad of cant deficiency, its mean and standard deviation.
     tilt_rate_sd : float
@@ -62,6 +65,7 @@ class Motion:
     accel_x: float = 0.14
     accel_y: float = 0.11
     accel_z: float = 0.08
+    rocking: float = 1e-4
     tilt: float = 0.0
     tilt_sd: float = 0.1
     tilt_rate_sd: float = 0.0
@@ -117,6 +121,7 @@ BODY = Motion(
     accel_x=0.3,
     accel_y=0.15,
     accel_z=0.05,
+    rocking=4e-4,
     tilt=0.2,
     tilt_sd=0.3,
     tilt_rate_sd=0.05,

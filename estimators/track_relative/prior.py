@@ -30,6 +30,13 @@ JERK_M2PS5 = 0.05
 BIAS_TIME_S = 300.0
 """Within which a bias wanders by its instability, where the sheet says nothing else."""
 
+GRAVITY_SD_MPS2 = 1e-3
+"""Of the local gravity: by latitude and height it is known to some 0.1 permil."""
+
+STEEPEST = 1.5 * math.sqrt(3.0)
+"""Slope at zero of a cubic that leaves the line between its ends by 1 at most, over its range: a train moves
+near the zero of its gyros and accelerometers, where a nonlinearity is an error of scale."""
+
 START_HEADING_SD_RAD = 1e-3
 """Of the map's yaw at its origin."""
 
@@ -170,11 +177,15 @@ def _sensor_sds(sd: FloatArray, recording: Recording) -> None:
     """Biases, scales and axes of the IMU, of its sheet's bounds."""
     sheet, g, uniform = recording.imu_sheet, recording.gravity_mps2, 1.0 / math.sqrt(3.0)
     turn = sheet.package_misalignment_rad * uniform
+    gyro = math.hypot(sheet.gyro_scale_error, STEEPEST * sheet.gyro_nonlinearity) * uniform
+    accel = math.hypot(sheet.accel_scale_error, STEEPEST * sheet.accel_nonlinearity) * uniform
+    # A bias that wanders has wandered before the ride as well.
+    gyro_bias = math.hypot(sheet.gyro_turn_on_bias_radps * uniform, sheet.gyro_bias_instability_radps)
+    accel_bias = math.hypot(sheet.accel_turn_on_bias_mps2 * uniform, sheet.accel_bias_instability_mps2)
     for i in range(3):
-        gyro, accel = sheet.gyro_scale_error * uniform, sheet.accel_scale_error * uniform
-        sd[at.GYRO_BIAS[i]] = sheet.gyro_turn_on_bias_radps * uniform
-        sd[at.ACCEL_BIAS[i]] = math.hypot(
-            sheet.accel_turn_on_bias_mps2 * uniform, g * (accel if i == 2 else turn)
+        sd[at.GYRO_BIAS[i]] = gyro_bias
+        sd[at.ACCEL_BIAS[i]] = (
+            math.hypot(accel_bias, g * accel, GRAVITY_SD_MPS2) if i == 2 else math.hypot(accel_bias, g * turn)
         )
         sd[at.GYRO_OF_Z[i]] = gyro if i == 2 else turn
         sd[at.ACCEL_OF_X[i]] = accel if i == 0 else turn

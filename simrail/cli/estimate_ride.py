@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from simrail.core.atomic_files import draft_of
+from simrail.core.columns import ODOMETRY
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame, label
 from simrail.estimation.estimate import Estimate, description_of
@@ -68,6 +69,9 @@ def estimate_ride(
     if not len(estimate.states.columns):
         raise InputError("concludes nothing", field="--estimator", value=method)
     states = estimate.states
+    if {*ODOMETRY} <= {*states.columns}:
+        # A method that finds the place itself says where its figures belong.
+        recording = recording.with_odometry(states[[*ODOMETRY]], method)
     if recording.odometry is not None:
         # Where each state belongs on the track stands beside it, as the odometry has it.
         place = [name for name in ("position_m", "speed_mps") if name not in states]

@@ -62,6 +62,8 @@ class ImuSheet:
         Largest magnitude that is measured; None for no limit.
     clock_drift : float
         Bound of the relative error of the device's second.
+    gyro_nonlinearity, accel_nonlinearity : float
+        Bound of the deviation from a straight line, as a share of the range.
     """
 
     grade: str
@@ -87,6 +89,8 @@ class ImuSheet:
     gyro_range_radps: float | None = None
     accel_range_mps2: float | None = None
     clock_drift: float = 0.0
+    gyro_nonlinearity: float = 0.0
+    accel_nonlinearity: float = 0.0
 
 
 @dataclass(frozen=True)

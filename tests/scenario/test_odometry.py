@@ -147,7 +147,10 @@ def test_without_an_encoder_an_estimator_that_needs_no_odometry_runs(tmp_path: P
     pd.testing.assert_series_equal(a, b, check_exact=True)
     assert value(without, "e0", "roll") > 0.0
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "no odometry: where the train is, no method knows" in page and 'id="odometry"' not in page
+    assert (
+        "no odometry: only a method that finds the place itself says where the train is" in page
+        and 'id="odometry"' not in page
+    )
 
 
 def test_an_imu_alone_gives_attitude_speed_and_distance(tmp_path: Path) -> None:

@@ -262,7 +262,7 @@ def _odometry(case: Case) -> Iterator[Finding]:
             if sizes:
                 yield Finding(
                     "note",
-                    f"All methods take position and speed from the odometry '{source}'{note}; "
+                    f"Methods that find neither take position and speed from the odometry '{source}'{note}; "
                     f"its position error is {listed(sizes)}.",
                 )
 

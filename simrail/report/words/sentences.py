@@ -123,7 +123,7 @@ def _number_or_text(value: object) -> str:
 def recording_facts(recording: Recording) -> list[str]:
     """IMU and odometry of a recording, a line each."""
     x, y, z = recording.mount_position_m
-    odometry = "no odometry: where the train is, no method knows"
+    odometry = "no odometry: only a method that finds the place itself says where the train is"
     if recording.odometry is not None:
         ablation = " (an ablation: a train has no such thing)" if recording.odometry_source == "truth" else ""
         odometry = f"position and speed from the odometry '{recording.odometry_source}'{ablation}"
