@@ -21,6 +21,10 @@ ROWS = 9
 WIDTH = 12
 """Length of a covariance's row in the loop: the last entry is always zero, and fills the vector registers."""
 
+MIRRORED = 16
+"""Steps from one time to the next that the covariance is made symmetric: what rounding adds in so many is some
+1e-15 of it."""
+
 INTO = (ROLL, PITCH, V)
 ORIGIN = (ROLL_RATE, PITCH_RATE, AX)
 """Where F is not the identity (Eq. 6), as `simrail.estimators.kalman.chain` takes it."""
@@ -258,7 +262,8 @@ def eleven_states(model: Model, out: Found) -> None:
             total += dt * x[AX]
             chain(x, INTO, ORIGIN, steps)
             chain_covariance(p, INTO, ORIGIN, steps)
-            mirror(p)
+            if k % MIRRORED == 0:
+                mirror(p)
             for i in range(STATES):
                 p[i, i] += model.process[i]
             fed_x, fed_y = (x[BIAS_X], x[BIAS_Y]) if model.compensated else (0.0, 0.0)
