@@ -22,8 +22,8 @@ WIDTH = 12
 """Length of a covariance's row in the loop: the last entry is always zero, and fills the vector registers."""
 
 MIRRORED = 16
-"""Steps from one time to the next that the covariance is made symmetric: what rounding adds in so many is some
-1e-15 of it."""
+"""Steps from one time that the covariance is made symmetric to the next: what rounding adds in so many is
+some 1e-15 of it."""
 
 INTO = (ROLL, PITCH, V)
 ORIGIN = (ROLL_RATE, PITCH_RATE, AX)
