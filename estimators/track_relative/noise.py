@@ -5,10 +5,11 @@ chosen by hand near the largest likelihood of rides that are not those of any sh
 alone drives the processes of y and z to nothing where a mount shakes, and the rails with them.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 from simrail.recording.recording import Recording
 
 AT_MPS = 70.0 / 3.6
@@ -46,7 +47,7 @@ class Motion:
     Raises
     ------
     InputError
-        If a value is negative, or a length or damping 0.
+        If a value is negative, a length or damping 0, or a damping 1 or more.
     """
 
     roll_sd: float = 1.3e-3
@@ -78,10 +79,10 @@ class Motion:
         for entry in fields(self):
             value = getattr(self, entry.name)
             divides = entry.name == "damping" or entry.name.endswith("_length")
-            if not 0.0 <= value < 1e6 or (divides and value == 0.0):
-                raise InputError(
-                    "is out of range", field=entry.name, value=value, limit="> 0" if divides else ">= 0"
-                )
+            most = 1.0 if entry.name == "damping" else 1e6
+            if not 0.0 <= value < most or (divides and value == 0.0):
+                limit = f"{'>' if divides else '>='} 0, < {most:g}"
+                raise InputError("is out of range", field=entry.name, value=value, limit=limit)
 
 
 AXLE = Motion(
@@ -131,6 +132,8 @@ BODY = Motion(
 )
 """What rests on bogies, or on axles with nothing upon it; and a body of which there is no drawing."""
 
+CLASSES = {"axle": AXLE, "frame": FRAME, "body": BODY}
+"""Classes of mounts, by the word that a tuned size begins with, e.g. ``axle_yaw_sd``."""
 
 STANDARD_BASE_M = 1.5
 """Distance of the rails' heads where the gauge is 1.435 m, of which all that is in metres above speaks."""
@@ -139,10 +142,48 @@ SAME_SCALE = 0.3
 """Relative difference of gauges that makes no other scale: 1.0 to 1.676 m are all of full size."""
 
 
-def motion_of(recording: Recording) -> Motion:
-    """That of the mount's class, by the vehicle's drawing; lengths by the gauge of a model track."""
+def motion_of(recording: Recording, tuned: Mapping[Motion, Motion] | None = None) -> Motion:
+    """That of the mount's class, by the vehicle's drawing; lengths by the gauge of a model track.
+
+    ``tuned`` has, by the motion of a class, what is to be taken in its place.
+    """
     motion, scale = class_of(recording), recording.track.rail_base_m / STANDARD_BASE_M
+    motion = (tuned or {}).get(motion, motion)
     return motion if abs(scale - 1.0) < SAME_SCALE else at_scale(motion, scale)
+
+
+def tuned_motions(sizes: Mapping[str, float]) -> dict[Motion, Motion]:
+    """Motion of each of `CLASSES`, by that, with some sizes that differ.
+
+    Parameters
+    ----------
+    sizes : mapping of str to float
+        By a word of `CLASSES`, ``_`` and a name of `Motion`, e.g. ``axle_yaw_sd``; at full size.
+
+    Raises
+    ------
+    InputError
+        If there is no such class or size, or a value is out of range.
+    """
+    names = [entry.name for entry in fields(Motion)]
+    tuned = dict(CLASSES)
+    for name, value in sizes.items():
+        kind, _, size = name.partition("_")
+        if kind not in CLASSES or size not in names:
+            every = [f"{word}_{entry}" for word in CLASSES for entry in names]
+            raise InputError(
+                "is no size of a class of mounts",
+                field=name,
+                value=value,
+                limit=f"{'_, '.join(CLASSES)}_ and behind that one of {', '.join(names)}",
+                remedy=did_you_mean(name, every) or "remove it",
+            )
+        try:
+            tuned[kind] = replace(tuned[kind], **{size: value})
+        except InputError as error:
+            error.field = name
+            raise
+    return {CLASSES[kind]: motion for kind, motion in tuned.items()}
 
 
 def at_scale(motion: Motion, scale: float) -> Motion:

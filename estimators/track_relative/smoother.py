@@ -18,8 +18,9 @@ Gonzalez-Carbajal et al. 2023 the state of a body in the track frame, and to Har
 processes over space as states.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from simrail.estimators.track_relative import states as at
@@ -32,9 +33,9 @@ from simrail.estimators.track_relative.kernel import (
     run_back,
     run_filter,
 )
-from simrail.estimators.track_relative.model import Course, about, course_of, linearised, steps_of
+from simrail.estimators.track_relative.model import Course, Steps, about, course_of, linearised, steps_of
 from simrail.estimators.track_relative.monitor import faults_and_widening
-from simrail.estimators.track_relative.noise import Motion, motion_of
+from simrail.estimators.track_relative.noise import Motion, motion_of, tuned_motions
 from simrail.estimators.track_relative.output import Trace, innovations_of, states_of, with_bounds
 from simrail.estimators.track_relative.prior import PARTS
 from simrail.estimators.track_relative.rails import rails_of
@@ -42,7 +43,9 @@ from simrail.estimators.trajectory.smoother import MOST_DRAWS
 from simrail.estimators.trajectory.track_geometry import geometry_of, sight_of
 
 from simrail.core.errors import InputError, one_of
+from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimate
+from simrail.estimation.tunable import Tunable, TunedValues
 from simrail.recording.recording import Recording
 
 MOST_PASSES = 4
@@ -68,6 +71,9 @@ class TrackRelativeSmoother:
     motion : Motion, optional
         How the body moves in its track; that of the mount's class
         (`simrail.estimators.track_relative.noise`) if not given.
+    tuning : TunedValues, optional
+        Sizes of these motions from a file, by class of mount, as ``simrail tune`` finds them
+        (`simrail.estimators.track_relative.tuning`); what it has not stays. In a scenario, its path.
     without : str
         Parts of the state that are left out (`simrail.estimators.track_relative.prior.PARTS`), with blanks
         between them, to show what each is for.
@@ -87,6 +93,7 @@ class TrackRelativeSmoother:
     passes: int = 2
     rate_hz: float = 31.25
     motion: Motion | None = None
+    tuning: TunedValues | None = None
     without: str = ""
     geometry_step_m: float = 0.25
     draws: int = 0
@@ -114,6 +121,10 @@ class TrackRelativeSmoother:
         ):
             if not is_good:
                 raise InputError(out, field=name, value=getattr(self, name), limit=limit)
+        if self.tuning is not None and self.motion is not None:
+            raise InputError("a file and a motion cannot both be given", field="tuning")
+        with blame(None, "tuning"):
+            self.motions()
 
     @property
     def causal(self) -> bool:
@@ -141,20 +152,41 @@ class TrackRelativeSmoother:
         geometry = geometry_of(sight_of(estimate, recording), step_m=self.geometry_step_m)
         return replace(estimate, geometry=geometry)
 
-    def trace(self, recording: Recording) -> Trace:
-        """All states, at the filter's own steps."""
+    def motions(self) -> dict[Motion, Motion]:
+        """Motion that is taken for each class of mounts, by the class's own."""
+        return tuned_motions({} if self.tuning is None else self.tuning.values)
+
+    def tunables(self, settings: Mapping[str, Any]) -> Mapping[str, Tunable]:
+        """What `simrail tune` searches; see `simrail.estimators.track_relative.tuning`."""
+        # Which is made of this module.
+        from simrail.estimators.track_relative.tuning import tunables_of_motion
+
+        return tunables_of_motion(self, settings)
+
+    def course(self, recording: Recording, steps: Steps | None = None) -> Course:
+        """What the first pass linearises about; ``steps`` are those of the recording, if they are at hand."""
         if not self.wheel:
             recording = replace(
                 recording, encoder=None, encoder_sheet=None, odometer=None, odometer_sheet=None
             )
-        motion = motion_of(recording) if self.motion is None else self.motion
-        steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
+        motion = motion_of(recording, self.motions()) if self.motion is None else self.motion
+        if steps is None:
+            steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
         aiding = (*aiding_of(recording, smoothed=self.smoothed), *self.aiding)
-        course = course_of(recording, steps, motion, aiding, self.without.split())
+        return course_of(recording, steps, motion, aiding, self.without.split())
+
+    def trace(self, recording: Recording) -> Trace:
+        """All states, at the filter's own steps."""
+        course = self.course(recording)
         trace = _run(course, smoothed=self.smoothed)
         for _ in range(self.passes - 1 if self.smoothed else 0):
             trace = _run(about(course, trace.states), smoothed=True)
         return trace
+
+
+def log_likelihood(course: Course) -> float:
+    """Log-likelihood of a course's measurements by the filter, but for a constant."""
+    return _run(course, smoothed=False).log_likelihood
 
 
 def _pieces(n: int) -> Iterator[slice]:

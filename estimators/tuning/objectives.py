@@ -16,7 +16,7 @@ Not here: the search (`simrail.estimators.tuning.tune`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ from simrail.core.columns import ATTITUDE, IRREGULARITY, RELATIVE_POSITION, requ
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
-from simrail.estimation.tunable import Parameter
+from simrail.estimation.tunable import Parameter, refuse_settings
 from simrail.recording.recording import Recording
 from simrail.track.bands import Band, band_pass, why_not
 from simrail.track.design import STRAIGHT
@@ -45,6 +45,9 @@ TUNED = IRREGULARITY[:3]
 
 STEP_M = 0.25
 """Distance of the places at which the rails are compared, unless another is given."""
+
+SETTINGS = (*(entry.name for entry in fields(SearchSpace)), "by_kind", "band", "step_m")
+"""Settings of a search."""
 
 
 @dataclass(frozen=True)
@@ -242,6 +245,7 @@ def tunables_of_smoother(
         Of the search: ``box``, ``constrained``, ``position_m2`` (see `SearchSpace`), ``by_kind``, ``band``,
         ``step_m``; those that differ from the defaults.
     """
+    refuse_settings(smoother, settings, known=SETTINGS)
     settings = dict(settings)
     by_kind = settings.pop("by_kind", False)
     compared = {name: settings.pop(name) for name in ("band", "step_m") if name in settings}

@@ -55,7 +55,17 @@ def tune(
         typer.Option(
             "--box",
             metavar="LEAST GREATEST",
-            help="Smoother: range of every hyper-parameter, SI; 1e-4 to 1e4 if not given.",
+            help="Range of every parameter. Trajectory smoother: SI; 1e-4 to 1e4 if not given. "
+            "Track-relative: times what it is now; 0.1 to 10.",
+        ),
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--parameter",
+            metavar="NAME",
+            help="Track-relative smoother: what to search, a class of mount and a size, e.g. axle_yaw_sd. "
+            "Repeatable.",
         ),
     ] = None,
     constrain: Annotated[
@@ -118,6 +128,7 @@ def tune(
     # Settings of an estimator's own search: the option of each, and its value if it was given.
     own: dict[str | None, tuple[str, Any]] = {
         "box": ("--box", box),
+        "parameters": ("--parameter", parameters and tuple(parameters)),
         "constrained": ("--constrain", constrain and CONSTRAINED[constrain]),
         "position_m2": ("--position", position),
         "by_kind": ("--by-kind", by_kind or None),

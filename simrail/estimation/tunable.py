@@ -148,12 +148,7 @@ def tunables_of(estimator: object, settings: Mapping[str, Any], *, method: str) 
     if hasattr(estimator, "tunables"):
         tunables: dict[str, Tunable] = estimator.tunables(settings)
     elif isinstance(estimator, Tunable):
-        for name in settings:
-            raise InputError(
-                f"{type(estimator).__name__} has no such setting of its search",
-                field=name,
-                remedy="leave it out",
-            )
+        refuse_settings(estimator, settings)
         tunables = {"all": estimator}
     else:
         raise InputError(
@@ -173,6 +168,23 @@ def tunables_of(estimator: object, settings: Mapping[str, Any], *, method: str) 
                 limit=" or ".join(offered) or "none: it has neither likelihood() nor reference_error()",
             )
     return tunables
+
+
+def refuse_settings(estimator: object, settings: Mapping[str, Any], *, known: Sequence[str] = ()) -> None:
+    """Refuse settings of a search, given by name, that are none of those that an estimator has.
+
+    Raises
+    ------
+    InputError
+        Naming the setting.
+    """
+    for name in settings:
+        if name not in known:
+            raise InputError(
+                f"{type(estimator).__name__} has no such setting of its search",
+                field=name,
+                remedy="leave it out",
+            )
 
 
 @dataclass(frozen=True)

@@ -216,6 +216,36 @@ def test_fits_on_several_draws_of_new_tracks_first(
     assert one is not None and one.fitted_on == both.fitted_on[:1] and one.objective != both.objective
 
 
+def test_sizes_of_the_track_relative_smoother_are_searched_by_name(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On an axle; the scenario that names the file estimates with them."""
+    entry = '[[estimator]]\nname = "ours"\nmethod = "TrackRelativeSmoother"\n'
+    options = '[estimator.options]\ntuning = "mine_cml.toml"\n'
+    (place / "mine.toml").write_text(f"{SHORT}\n{entry}{options}", encoding="utf-8")
+    words = ["tune", "mine.toml", "--estimator", "ours", "--method", "cml"]
+    words += ["--evaluations", "0", "--at-most", "8"]
+    assert call(words) == call([*words, "--parameter", "axle_yaw"]) == BAD_INPUT
+    nothing, unknown = capsys.readouterr().err.splitlines()
+    assert "--parameter: nothing is to be searched" in nothing and "axle_yaw_sd" in nothing
+    assert "--parameter: there is no such size" in unknown and "found 'axle_yaw'" in unknown
+    searched = ["--parameter", "axle_yaw_sd", "--parameter", "axle_gyro"]
+    assert call([*words, *searched]) == DONE
+    said = capsys.readouterr().out
+    assert "negative log-likelihood per step" in said and "axle_yaw_sd" in said
+    text = (place / "mine_cml.toml").read_text(encoding="utf-8")
+    assert all(f"--parameter {name}" in text.splitlines()[0] for name in ("axle_yaw_sd", "axle_gyro"))
+    values = TunedValues.from_file(place / "mine_cml.toml").values
+    assert list(values) == ["axle_yaw_sd", "axle_gyro"]
+    made = judge_scenario(load_scenario("mine.toml")).estimators["ours"]
+    assert made.tuning.values == values  # type: ignore[attr-defined]
+    (place / "mine_cml.toml").write_text(text.replace("axle_gyro = ", "axle_giro = "), encoding="utf-8")
+    assert call(["check", "mine.toml"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    for part in ("mine.toml: estimator", "tuning.axle_giro", "did you mean axle_gyro?"):
+        assert part in line
+
+
 def test_a_folder_that_cannot_be_written_is_refused_before_anything_runs(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -80,28 +80,10 @@ def world_of(recording: Recording, motion: Motion) -> World:
     return World(model, course.start, course.start_covariance)
 
 
-def square_root(covariance: FloatArray) -> FloatArray:
-    """Of a covariance that may be singular."""
-    sd = np.sqrt(np.diag(covariance))
-    sd[sd == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
-    return np.asarray(sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
 def drawn(world: World, draws: int, scale: float) -> tuple[FloatArray, FloatArray]:
     """States (n, draws, m) and measurements (draws, n, 7); ``scale`` spoils the noise of both."""
-    model, rng = world.model, stream(9, "track-relative consistency", draws)
-    x = (
-        world.start
-        + rng.standard_normal((draws, at.STATES)) @ square_root(world.covariance[:, : at.STATES]).T
-    )
-    states, measured = np.empty((SAMPLES, draws, at.STATES)), np.empty((draws, SAMPLES, ROWS))
-    for k, (f, q) in enumerate(twin.steps_of(model)):
-        x = x @ f.T + scale * rng.standard_normal((draws, at.STATES)) @ square_root(q).T
-        states[k] = x
-        noise = np.sqrt(model.variances[k]) * rng.standard_normal((draws, ROWS))
-        measured[:, k] = x @ twin.whole_rows(model.columns, model.coefficients[k]).T + scale * noise
-    return states, measured
+    rng = stream(9, "track-relative consistency", draws)
+    return twin.draw(world.model, world.start, world.covariance, rng, draws=draws, scale=scale)
 
 
 class Found(NamedTuple):

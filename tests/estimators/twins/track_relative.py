@@ -160,3 +160,35 @@ def filterpy_smoother(steps: list[Step], found: Found) -> tuple[FloatArray, Floa
     ahead = [*steps[1:], steps[-1]]  # filterpy's k-th is that from k to k + 1; the last is not used
     smoothed = rts_smoother(found.states, found.covariances, [s.f for s in ahead], [s.q for s in ahead])
     return smoothed[0], smoothed[1]
+
+
+def square_root(covariance: FloatArray) -> FloatArray:
+    """Of a covariance that may be singular, and below zero by rounding."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    sd[sd == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
+    return np.asarray(sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def draw(
+    model: Model,
+    start: FloatArray,
+    covariance: FloatArray,
+    rng: np.random.Generator,
+    *,
+    draws: int,
+    scale: float = 1.0,
+) -> tuple[FloatArray, FloatArray]:
+    """States (n, draws, m) and measurements (draws, n, rows) of the model's world.
+
+    ``scale`` spoils the noise of both.
+    """
+    n, rows = model.measured.shape
+    x = start + rng.standard_normal((draws, at.STATES)) @ square_root(covariance[:, : at.STATES]).T
+    states, measured = np.empty((n, draws, at.STATES)), np.empty((draws, n, rows))
+    for k, (f, q) in enumerate(steps_of(model)):
+        x = x @ f.T + scale * rng.standard_normal((draws, at.STATES)) @ square_root(q).T
+        states[k] = x
+        noise = np.sqrt(model.variances[k]) * rng.standard_normal((draws, rows))
+        measured[:, k] = x @ whole_rows(model.columns, model.coefficients[k]).T + scale * noise
+    return states, measured
