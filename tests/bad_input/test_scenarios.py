@@ -382,7 +382,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         [
             "estimator[2].method",
             "'DesignAngle'",
-            "AttitudeEkf, AttitudeGda, CurveMatchedOdometry, DesignAngles",
+            "AttitudeEkf, AttitudeGda, ComplementaryFilter, CurveMatchedOdometry",
         ],
     ),
     "an estimator file that is missing": (

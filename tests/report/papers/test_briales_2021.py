@@ -200,10 +200,11 @@ def test_the_figures_of_a_sentence_are_looked_up() -> None:
 
 
 def some_rides(names: tuple[str, ...], draws: int) -> Scenario:
-    """The scenario with some of its rides, fewer draws, and without the ideal IMU."""
+    """The scenario with some of its rides, fewer draws, without the ideal IMU and without our own method."""
     text = load_scenario("metro_table3").text
-    head, *parts = re.split(r"(?m)^(?=\[\[ride\]\]|\[\[imu\]\]|\[magnetometer)", text)
-    others = ("[[imu]]", "[magnetometer")
+    head, *parts = re.split(r"(?m)^(?=\[\[ride\]\]|\[\[imu\]\]|\[magnetometer|\[\[estimator\]\])", text)
+    parts = [part for part in parts if "TrackRelativeSmoother" not in part]
+    others = ("[[imu]]", "[magnetometer", "[[estimator]]")
     wanted = [f'name = "{name}"' for name in names]
     kept = [part for part in parts if part.startswith(others) or any(name in part for name in wanted)]
     kept = [part for part in kept if '"ideal"' not in part]
