@@ -1,6 +1,6 @@
 """Make ``track_relative.csv`` of the results of ``simrail run track_relative``.
 
-    simrail run track_relative --set monte_carlo.samples=8 --out DIR
+    simrail run track_relative --out DIR
     python results/reference/track_relative.py DIR
 
 One row per vehicle, mount, method and quantity: the root of the mean square error over all rides with its
