@@ -56,7 +56,7 @@ def assert_same(a: Recording, b: Recording) -> None:
     assert repr(bare[0]) == repr(bare[1])
 
 
-@pytest.mark.parametrize("form", [pytest.param("csv", marks=pytest.mark.slow), "parquet"])
+@pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_exported_rides_read_back_bit_by_bit(
     here: Path, form: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
