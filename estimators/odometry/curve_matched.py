@@ -270,7 +270,7 @@ class CurveMatchedOdometry:
         signals = recording.imu[names].to_numpy(dtype=np.float64)[: n * block]
         signals = signals.reshape(n, block, 4).mean(axis=1)
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
-        counts, pulse = _counts(recording, ends)
+        counts, pulse = counts_at(recording, ends)
         quiet = np.full(n, -1.0) if pulse else quiet_of(recording, block).astype(np.float64)
         chord = chord_of(recording)
         grid, table = line_table(
@@ -317,7 +317,7 @@ class CurveMatchedOdometry:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = lines[last]
             rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
-            if recording.encoder is not None:
+            if recording.has_wheel:
                 own = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)
                 values[rolls, 2::3] = own[rolls]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
@@ -396,13 +396,16 @@ class CurveMatchedOdometry:
         return x, np.diag(sd**2)
 
 
-def _counts(recording: Recording, times: FloatArray) -> tuple[FloatArray, float]:
-    """Last reading of the counter at each time (n,), and the way of a count, m; 0 where there is no wheel."""
+def counts_at(recording: Recording, times: FloatArray) -> tuple[FloatArray, float]:
+    """Counts since the first reading, by the last one at each time (n,), and the way of a count, m.
+
+    Both are 0 where there is no wheel.
+    """
     if recording.encoder is None or recording.encoder_sheet is None:
         return np.zeros(len(times)), 0.0
     read = np.searchsorted(recording.encoder.index.to_numpy(), times + 1e-9, side="right") - 1
     counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)
-    return counts[np.maximum(read, 0)], recording.encoder_sheet.pulse_m
+    return counts[np.maximum(read, 0)] - counts[0], recording.encoder_sheet.pulse_m
 
 
 def chainage_sd(recording: Recording, place_m: FloatArray | float) -> FloatArray:

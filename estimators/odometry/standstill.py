@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
+from simrail.core.trailing import trailing_sum
 from simrail.recording.recording import Recording
 
 WINDOW_S = 2.0
@@ -57,10 +58,8 @@ def quiet_of(recording: Recording, block: int) -> npt.NDArray[np.bool_]:
 
 def _trailing(values: FloatArray, window: int) -> FloatArray:
     """Mean (n, m) over the last so many rows, over fewer at the start."""
-    total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-    last = np.arange(1, len(values) + 1)
-    first = np.maximum(last - window, 0)
-    return np.asarray((total[last] - total[first]) / (last - first)[:, None])
+    rows = np.minimum(np.arange(1, len(values) + 1), window)
+    return np.asarray(trailing_sum(values, window) / rows[:, None])
 
 
 def _floor(recording: Recording) -> FloatArray:

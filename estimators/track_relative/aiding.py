@@ -188,7 +188,7 @@ def _at_steps(
 
 def aiding_of(recording: Recording, *, smoothed: bool) -> tuple[Aiding, ...]:
     """What a recording has beside its IMU."""
-    if recording.encoder is not None and recording.encoder_sheet is not None:
+    if recording.has_wheel:
         return (WheelWay(),)
     speed: tuple[Aiding, ...] = ()
     if recording.odometer is not None and recording.odometer_sheet is not None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry
+from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, counts_at
 from simrail.estimators.odometry.kernel import DIRECTION_SPEED_MPS, SATURATION_RADIUS_M
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import Aiding, Rows
@@ -78,14 +78,13 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
     Without a wheel it is tens of metres off before the first curve, and no smoother is linear so far.
     """
     time = recording.imu.index.to_numpy(dtype=np.float64)
-    has_wheel = recording.encoder is not None and recording.encoder_sheet is not None
     block = max(1, round(recording.imu_sheet.rate_hz / rate_hz))
     n = len(time) // block
 
     def mean(values: FloatArray) -> FloatArray:
         return np.asarray(values[: n * block].reshape(n, block, values.shape[1]).mean(axis=1))
 
-    method = CurveMatchedOdometry(smoothed=smoothed and not has_wheel)
+    method = CurveMatchedOdometry(smoothed=smoothed and not recording.has_wheel)
     trace = method.trace(recording)
     odometry = mean(method.at_imu_times(trace, recording)[[*ODOMETRY, ODOMETRY_SD[0]]].to_numpy())
     ends = time[block - 1 :: block][:n]
@@ -93,26 +92,17 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
     known = np.searchsorted(trace.time_s, ends + 1e-9, side="right")
     resting = np.concatenate([[True], trace.resting])[known]
     odometry[resting, 1:3] = 0.0
+    counts, pulse_m = counts_at(recording, time)
     return Steps(
         time_s=mean(time[:, None])[:, 0],
         end_s=ends,
         dt=block / recording.imu_sheet.rate_hz,
         signals=mean(recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)),
-        way=mean(_way(recording, time)[:, None])[:, 0],
+        way=mean((counts * pulse_m)[:, None])[:, 0],
         odometry=odometry,
         slipping=np.concatenate([[False], trace.slipping])[known],
         resting=resting,
     )
-
-
-def _way(recording: Recording, time: FloatArray) -> FloatArray:
-    """Way (n,) that the wheel has shown by each time; 0 without one."""
-    wheel, sheet = recording.encoder, recording.encoder_sheet
-    if wheel is None or sheet is None:
-        return np.zeros(len(time))
-    read = np.searchsorted(wheel.index.to_numpy(), time + 1e-9, side="right") - 1
-    counts = wheel["pulse_count"].to_numpy(dtype=np.float64)
-    return np.asarray((counts[np.maximum(read, 0)] - counts[0]) * sheet.pulse_m)
 
 
 class Course(NamedTuple):

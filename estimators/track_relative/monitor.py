@@ -13,6 +13,7 @@ from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.output import Trace
 
 from simrail.core.jit import FloatArray
+from simrail.core.trailing import trailing_sum
 
 CONSTANTS = (
     *(at.SCALE, at.CURVE, at.EVEN, at.ODD, at.CANT, at.SLOPE),
@@ -54,14 +55,9 @@ def _sums(trace: Trace) -> FloatArray:
     """Sums (n, m) of the innovations of the last `WINDOW_S`, over the root of their number."""
     window = max(1, round(WINDOW_S / trace.course.steps.dt))
     made = np.isfinite(trace.surprises)
-    first = np.maximum(np.arange(1, len(made) + 1) - window, 0)
-
-    def total(values: FloatArray) -> FloatArray:
-        whole = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-        return whole[1:] - whole[first]
-
-    number = total(made.astype(np.float64))
-    return np.asarray(total(np.where(made, trace.surprises, 0.0)) / np.sqrt(np.maximum(number, window)))
+    number = trailing_sum(made.astype(np.float64), window)
+    added = trailing_sum(np.where(made, trace.surprises, 0.0), window)
+    return np.asarray(added / np.sqrt(np.maximum(number, window)))
 
 
 def faults_and_widening(trace: Trace) -> tuple[FloatArray, FloatArray]:

@@ -147,9 +147,15 @@ def motion_of(recording: Recording, tuned: Mapping[Motion, Motion] | None = None
 
     ``tuned`` has, by the motion of a class, what is to be taken in its place.
     """
-    motion, scale = class_of(recording), recording.track.rail_base_m / STANDARD_BASE_M
+    motion, scale = class_of(recording), scale_of(recording)
     motion = (tuned or {}).get(motion, motion)
-    return motion if abs(scale - 1.0) < SAME_SCALE else at_scale(motion, scale)
+    return motion if scale == 1.0 else at_scale(motion, scale)
+
+
+def scale_of(recording: Recording) -> float:
+    """Of a model track; 1 for every gauge of full size."""
+    scale = recording.track.rail_base_m / STANDARD_BASE_M
+    return 1.0 if abs(scale - 1.0) < SAME_SCALE else scale
 
 
 def tuned_motions(sizes: Mapping[str, float]) -> dict[Motion, Motion]:

@@ -32,7 +32,7 @@ from simrail.estimators.track_relative.full_rate import (
     side_of,
 )
 from simrail.estimators.track_relative.line import Lines
-from simrail.estimators.track_relative.noise import AXLE, FRAME, SAME_SCALE, STANDARD_BASE_M, class_of
+from simrail.estimators.track_relative.noise import AXLE, FRAME, class_of, scale_of
 from simrail.estimators.track_relative.output import Trace
 from simrail.estimators.track_relative.suspension import bogie_of
 from simrail.estimators.track_relative.under_frame import Under, draw_under, rails_under
@@ -117,7 +117,7 @@ def rails_of(
         On a mount that is neither an axle nor a frame by the drawing, with the geometry as the smoother's
         own states have it, and no draws.
     """
-    kind, scale = class_of(recording), _scale(recording)
+    kind, scale = class_of(recording), scale_of(recording)
     if kind not in (AXLE, FRAME) or len(trace.states) < LEAST_STEPS:
         return replace(estimate, geometry=geometry_of(sight_of(estimate, recording), step_m=step_m))
     sheet, bogie = recording.vehicle_sheet, None
@@ -145,17 +145,11 @@ def rails_of(
     return replace(estimate, geometry=geometry, geometry_draws=drawn)
 
 
-def _scale(recording: Recording) -> float:
-    """Of a model track; 1 for every gauge of full size."""
-    scale = recording.track.rail_base_m / STANDARD_BASE_M
-    return 1.0 if abs(scale - 1.0) < SAME_SCALE else scale
-
-
 def _motions(
     recording: Recording, trace: Trace, aside: float, *, borne: bool, drawn: bool
 ) -> tuple[Motions, Held | None]:
     """The motion, and what is held of a frame that is borne; chains only for draws: they are large."""
-    waviness, held = Waviness().at_scale(_scale(recording)), held_of(recording, trace)
+    waviness, held = Waviness().at_scale(scale_of(recording)), held_of(recording, trace)
     sensor = recording.rail_displacement is not None
     chains = {
         "side": side_of(recording, held, waviness),

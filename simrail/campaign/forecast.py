@@ -109,9 +109,8 @@ def forecast(scenario: Scenario, *, many: bool = False) -> Forecast:
     missing = [ride for ride in rides if not ride.is_cached]
     new = [scale * seconds / cost.duration_s for seconds in _seconds(missing, new=True)]
     numbers = each(scenario.spec.passes) if scenario.spec.passes is not None else (1,)
-    recordings = (
-        plan.cells // len(numbers) * int(max(numbers))
-    )  # cells of fewer passes share those of the most
+    # Cells of fewer passes share the recordings of those of the most.
+    recordings = plan.cells // len(numbers) * int(max(numbers))
     recorded = recordings * plan.simulated_s / plan.rides / cost.duration_s
     simulated = new[0] * cost.engine_s + new[1] * cost.vibration_s
     rows = plan.cells * len(cost.result.scores)

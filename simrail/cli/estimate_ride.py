@@ -8,7 +8,7 @@ from simrail.core.atomic_files import draft_of
 from simrail.core.columns import ODOMETRY
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame, label
-from simrail.estimation.estimate import Estimate, description_of
+from simrail.estimation.estimate import Estimate, Estimator, description_of
 from simrail.estimation.recorded_ride import read_ride
 from simrail.estimation.user_modules import class_named
 from simrail.recording.files.ride_writer import Format, write_frame
@@ -18,6 +18,38 @@ from simrail.scenario.build_estimator import construct
 from simrail.scenario.overrides import override
 
 PAGE = "estimate.html"
+
+
+def estimator_named(method: str, settings: Sequence[str]) -> Estimator:
+    """The estimator that a command names, with its options.
+
+    Raises
+    ------
+    InputError
+        If there is no such estimator or option.
+    """
+    with blame("--estimator", method):
+        estimator_class = class_named(method, None)
+    with blame("--set", method):
+        estimator: Estimator = construct(estimator_class, override({}, settings))
+    return estimator
+
+
+def ride_for(estimator: Estimator, method: str, ride: Path) -> Recording:
+    """Read a ride for an estimator.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or does not say where the train is, which the estimator has to be told.
+    """
+    recording = read_ride(ride)
+    if recording.odometry is None and "odometry" in description_of(estimator).needs:
+        problem = f"{method} needs to know where the train is, and the ride does not say"
+        limit = "[encoder], [odometer] or [odometry]"
+        remedy = "add the table of the one that was recorded, or choose an estimator that needs none"
+        raise InputError(problem, file=label(ride), field="encoder", limit=limit, remedy=remedy)
+    return recording
 
 
 def estimate_ride(
@@ -53,16 +85,8 @@ def estimate_ride(
             limit=f"a new folder, or one that holds an {PAGE}",
             remedy="choose another folder with --out",
         )
-    with blame("--estimator", method):
-        estimator_class = class_named(method, None)
-    with blame("--set", method):
-        estimator = construct(estimator_class, override({}, settings))
-    recording = read_ride(ride)
-    if recording.odometry is None and "odometry" in description_of(estimator).needs:
-        problem = f"{method} needs to know where the train is, and the ride does not say"
-        limit = "[encoder], [odometer] or [odometry]"
-        remedy = "add the table of the one that was recorded, or choose an estimator that needs none"
-        raise InputError(problem, file=label(ride), field="encoder", limit=limit, remedy=remedy)
+    estimator = estimator_named(method, settings)
+    recording = ride_for(estimator, method, ride)
     begun = time.perf_counter()
     estimate = estimator.estimate(recording)
     us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)

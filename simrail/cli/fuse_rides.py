@@ -3,16 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from simrail.cli.estimate_ride import estimator_named, ride_for
 from simrail.core.atomic_files import draft_of
-from simrail.core.errors import InputError
 from simrail.core.toml_files import blame, label
-from simrail.estimation.estimate import Estimate, description_of
-from simrail.estimation.recorded_ride import read_ride
-from simrail.estimation.user_modules import class_named
+from simrail.estimation.estimate import Estimate
 from simrail.estimators.rails.fuse import Fused, fuse, rails_and_place_of
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame
-from simrail.scenario.build_estimator import construct
-from simrail.scenario.overrides import override
 
 
 def fuse_rides(
@@ -40,21 +36,10 @@ def fuse_rides(
         rides share too little of a line, or the folder exists.
     """
     refuse_existing(folder)
-    with blame("--estimator", method):
-        estimator_class = class_named(method, None)
-    with blame("--set", method):
-        estimator = construct(estimator_class, override({}, settings))
+    estimator = estimator_named(method, settings)
     estimates: list[Estimate] = []
     for ride in rides:
-        recording = read_ride(ride)
-        if recording.odometry is None and "odometry" in description_of(estimator).needs:
-            raise InputError(
-                f"{method} needs to know where the train is, and the ride does not say",
-                file=label(ride),
-                field="encoder",
-                limit="[encoder], [odometer] or [odometry]",
-                remedy="add the table of the one that was recorded, or choose an estimator that needs none",
-            )
+        recording = ride_for(estimator, method, ride)
         estimates.append(rails_and_place_of(estimator.estimate(recording), recording))
     with blame("--fuse", method):
         fused = fuse(estimates)

@@ -251,6 +251,11 @@ class Recording:
     map_errors: MapErrors = UNSTATED
     vehicle_sheet: VehicleSheet | None = None
 
+    @property
+    def has_wheel(self) -> bool:
+        """Whether there are counts of an encoder, and its data sheet."""
+        return self.encoder is not None and self.encoder_sheet is not None
+
     def with_odometry(self, odometry: pd.DataFrame, source: str) -> Recording:
         """Return the same recording with another odometry frame."""
         return replace(self, odometry=odometry, odometry_source=source)

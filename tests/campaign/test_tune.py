@@ -216,7 +216,6 @@ def test_fits_on_several_draws_of_new_tracks_first(
     assert one is not None and one.fitted_on == both.fitted_on[:1] and one.objective != both.objective
 
 
-@pytest.mark.slow
 def test_sizes_of_the_track_relative_smoother_are_searched_by_name(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

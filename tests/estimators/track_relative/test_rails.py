@@ -138,7 +138,6 @@ def test_the_noise_is_that_of_the_sheet(rough: Callable) -> None:
         assert (one.waves.shaking == 0.0).all()
 
 
-@pytest.mark.slow
 def test_draws_are_displaced_as_the_place_is_uncertain(rough: Callable, kept: dict) -> None:
     """By 5 cm against not at all: the slope of the rails times that, a normal number for each of 24 draws."""
     recording, estimate, _ = of(kept, rough, 1)
