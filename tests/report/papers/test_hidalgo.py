@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import lru_cache
 
@@ -55,8 +56,7 @@ def planted(
                                 "cell": cell,
                                 "vehicle": vehicle,
                                 "mount": mount,
-                                "map": "erring",
-                                "vibration": "on",
+                                "imu": "lord_3dm_gx4_25",
                                 "track_draw": 0,
                                 "estimator": f"m_{part}",
                                 "quantity": "vertical_profile",
@@ -103,7 +103,7 @@ def test_all_claims_hold_where_the_paper_is_right() -> None:
 @pytest.mark.parametrize(
     ("key", "change"),
     [
-        ("found", only("gyro", 2.0, WAGON)),
+        ("found", only("zero", 0.5, WAGON)),
         ("gyro", only("gyro", 1.45, WAGON)),
         ("gyro", only("no_gyro", 0.7, BOGIE)),
         ("chord", only("deviation", 0.9, WAGON)),
@@ -114,7 +114,9 @@ def test_all_claims_hold_where_the_paper_is_right() -> None:
 def test_each_claim_falls_alone(key: str, change: Change) -> None:
     fallen = {name for name, claim in verdicts(seen(change)).items() if claim.verdict == "not reproduced"}
     assert key in fallen
-    assert fallen <= {key, "chord", "found", "zeros", "delay"} - ({"delay"} if key == "gyro" else set())
+    # What changes the paper's filter changes what is set beside it.
+    beside = {"chord", "gyro"} if key in ("found", "gyro") else set()
+    assert fallen <= {key} | beside
 
 
 def test_a_gain_that_chance_explains_is_none() -> None:
@@ -150,8 +152,9 @@ def test_notes_tell_what_errata_cost_and_where_ours_does_not_win() -> None:
     assert "does not win everywhere" in told and f"in {WAGON} its error is" in told
     assert f"in {BOGIE} its error is" not in told
     wins = " ".join(judges.notes(seen()))
-    assert "does not win" not in wins and "-20 %" in wins
-    assert "+20 %" in wins  # of the newest node, by 0.30 / 0.25
+    assert "does not win" not in wins
+    assert re.search(rf"changes by -(19|20|21) % .* in {WAGON}; -(19|20|21) % .* in {BOGIE}\.", wins)
+    assert re.search(rf"newest|oldest node.*{WAGON} \+(19|20|21) %", wins)  # 0.30 / 0.25
 
 
 def test_the_scenario_plays_every_part() -> None:

@@ -46,5 +46,7 @@ def notes(seen: Places) -> list[str]:
     told = [PAPER.written(PAPER.words["misprints"], effects=effects)] if effects else []
     told.append(PAPER.written(PAPER.words["sign"]))
     if seen.has("own") and seen.has("gyro"):
-        told.append(PAPER.written(PAPER.words["own"], changes=seen.changes("own", "gyro")))
+        changes = seen.changes("own", "gyro")
+        lost = {place: one for place, one in changes.items() if one.low > 0.0}
+        told.append(PAPER.written(PAPER.words["own"], changes=changes, lost=lost))
     return told
