@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from simrail.core.seeds import stream
 from simrail.report.papers.claim import Claim, judged
 from simrail.report.papers.hidalgo import judges
 from simrail.report.papers.hidalgo.places import PAPER, Places, places_of
+from simrail.report.papers.hidalgo.section import section
 from simrail.scenario.cells import methods
 from simrail.scenario.scenario import load_scenario
 
@@ -155,6 +157,25 @@ def test_notes_tell_what_errata_cost_and_where_ours_does_not_win() -> None:
     assert "does not win" not in wins
     assert re.search(rf"changes by -(19|20|21) % .* in {WAGON}; -(19|20|21) % .* in {BOGIE}\.", wins)
     assert re.search(rf"newest|oldest node.*{WAGON} \+(19|20|21) %", wins)  # 0.30 / 0.25
+
+
+def test_the_section_has_a_row_for_every_part() -> None:
+    scores, cells = planted()
+    played = [
+        SimpleNamespace(name=name, part=SimpleNamespace(stands_for=part)) for part, name in NAMES.items()
+    ]
+    (made,) = section(SimpleNamespace(scores=scores, cells=cells, methods=played, styles=[], examples=[]))
+    table = made.data["table"]
+    assert [row.label for row in table.rows] == [role.label for role in PAPER.parts.values()]
+    assert [words for words, _ in table.groups] == [WAGON, BOGIE] and made.data["draws"] == 20
+    gyro = table.rows[0].cells[0]
+    low, high = map(float, gyro.spread.split(" to "))
+    assert low < float(gyro.text) < high
+
+
+def test_an_ideal_device_claims_nothing() -> None:
+    scores, cells = planted()
+    assert places_of(scores.assign(imu="ideal"), cells, NAMES) is None
 
 
 def test_the_scenario_plays_every_part() -> None:
