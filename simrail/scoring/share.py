@@ -63,9 +63,7 @@ def effective(values: npt.ArrayLike, clusters: npt.ArrayLike) -> float:
     return n / (1.0 + (n / k - 1.0) * rho)
 
 
-def decide(
-    passed: float, devices: float, share: float, *, chance: float, looks: Sequence[int] = (1,)
-) -> str:
+def decide(passed: float, devices: float, share: float, *, chance: float, looks: Sequence[int] = (1,)) -> str:
     """Whether a share of the devices meets a limit, wrong with no more than a chance.
 
     By the exact limits of a binomial share (Clopper & Pearson 1934), one-sided: enough if fewer than

@@ -69,7 +69,11 @@ def _failed_cells(scores: pd.DataFrame, chosen: pd.DataFrame) -> pd.DataFrame:
 
 
 def verdict_table(
-    scores: pd.DataFrame, cells: pd.DataFrame, requirements: Iterable[Requirement], *, looks: Sequence[int] = (1,)
+    scores: pd.DataFrame,
+    cells: pd.DataFrame,
+    requirements: Iterable[Requirement],
+    *,
+    looks: Sequence[int] = (1,),
 ) -> pd.DataFrame:
     """A verdict for each requirement, IMU, mount and method.
 
