@@ -172,7 +172,7 @@ def limit_of(value: float | str, quantity: str) -> float:
         )
     if _SI[written][0] != kind:
         raise InputError(
-            f"has a unit of {_SI[written][0]}, {quantity} is a {kind}",
+            f"has a unit of {_SI[written][0]}; {quantity} is measured in {unit}",
             field="limit",
             value=value,
             limit=alike,
