@@ -4,6 +4,7 @@ A place is a vehicle and a mount. Rides of one draw, there and back, are over th
 cluster: intervals resample the draws (`simrail.scoring.bootstrap`).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -62,7 +63,7 @@ class Places:
         found = {}
         for place in self.names:
             both = self.table[[part, other]].xs(place).dropna()
-            logs = _interval(np.log(both[part] / both[other]))
+            logs = _interval((both[part] / both[other]).map(math.log))
             found[place] = Interval(*(100.0 * np.expm1([logs.value, logs.low, logs.high])))
         return found
 
