@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from simrail.estimators.odometry.calibration_file import SpectralCalibration
 from simrail.estimators.odometry.direction import BLOCK_S, DIRECTIONS, running_direction
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.spectral_kernel import led_on, spectral_filter
@@ -250,6 +251,8 @@ class SpectralOdometry:
         rho of Eq. 1, (m/s) / (m/s2)^0.5, from `calibrate` on other rides of the vehicle.
     intercept_mps : float, optional
         beta of Eq. 1, likewise.
+    calibration_file : SpectralCalibration, optional
+        Both of them by mount, in place of the two numbers. In a scenario, its path.
     calibration : str
         One of `CALIBRATIONS`.
     direction : str
@@ -274,6 +277,7 @@ class SpectralOdometry:
     speed_sd_mps: float = 2.5
     calibration_relative_sd: float = 0.17
     printed: bool = False
+    calibration_file: SpectralCalibration | None = None
 
     label = "spectral odometry"
     cites = ("Veillard, Mailly and Fraisse 2016",)
@@ -286,6 +290,14 @@ class SpectralOdometry:
                 raise InputError(
                     "is out of range", field=name, value=getattr(self, name), limit=f">= {least}"
                 )
+        if self.calibration_file is not None and (self.slope is not None or self.intercept_mps is not None):
+            raise InputError(
+                "numbers and a file cannot both be given",
+                field="slope" if self.slope is not None else "intercept_mps",
+                value=self.slope if self.slope is not None else self.intercept_mps,
+                limit="none beside a calibration_file",
+                remedy="give up one of the two",
+            )
         if self.hop > self.frame:
             raise InputError(
                 "leaves samples out", field="hop", value=self.hop, limit=f"<= frame, {self.frame}"
@@ -359,17 +371,21 @@ class SpectralOdometry:
                 return Calibration(0.0, 0.0, self.speed_sd_mps)
             fit = _line(found.root[good], speed[found.ends[good] - self.frame // 2])
             return fit._replace(rms=max(fit.rms, LEAST_MPS))
-        if self.slope is None or (self.intercept_mps is None and self.calibration == "given"):
+        slope, intercept = self.slope, self.intercept_mps
+        if self.calibration_file is not None:
+            line = self.calibration_file.of(recording.mount)
+            slope, intercept = line.slope, line.intercept_mps
+        if slope is None or (intercept is None and self.calibration == "given"):
             raise InputError(
                 "is not given: how a vehicle shakes at which speed is found on other rides of it",
-                field="slope" if self.slope is None else "intercept_mps",
+                field="slope" if slope is None else "intercept_mps",
                 value="none",
-                limit="(m/s) per sqrt(m/s2)" if self.slope is None else "m/s",
+                limit="(m/s) per sqrt(m/s2)" if slope is None else "m/s",
                 remedy='see simrail.estimators.odometry.spectral.calibrate, or set calibration = "encoder"',
             )
-        if self.calibration == "given" and self.intercept_mps is not None:
-            return self.slope, self.intercept_mps, self.speed_sd_mps
-        return self.slope, -self.slope * self._root_at_rest(recording, found), self.speed_sd_mps
+        if self.calibration == "given" and intercept is not None:
+            return slope, intercept, self.speed_sd_mps
+        return slope, -slope * self._root_at_rest(recording, found), self.speed_sd_mps
 
     def _root_at_rest(self, recording: Recording, found: Frames) -> FloatArray:
         """Mean sqrt(S) over the frames of the first rest so far, at each frame; NaN before the first such."""
