@@ -556,7 +556,8 @@ def test_columns_and_vocabulary_are_those_of_the_design() -> None:
     quantities = (
         "roll pitch yaw lateral vertical position speed acceleration_x acceleration_y acceleration_z "
         "alignment vertical_profile cross_level gauge twist yaw_debiased distance_relative gyro_bias "
-        "accel_bias derailment_quotient sum_y sum_y_relative guiding_force wheel_load wheel_unloading comfort_nmv "
+        "accel_bias "
+        "derailment_quotient sum_y sum_y_relative guiding_force wheel_load wheel_unloading comfort_nmv "
         "sperling_lateral sperling_vertical lateral_growth"
     )
     assert " ".join(QUANTITY_UNITS) == quantities

@@ -267,7 +267,7 @@ def test_ours_is_said_to_lose_where_it_loses() -> None:
 
 
 def test_the_table_has_every_part_in_mg_and_the_range_of_the_distance() -> None:
-    table = table_of(planted())
+    table = table_of(planted(), "frame")
     assert [row.label for row in table.rows[1:]] == [role.label for role in PAPER.parts.values()]
     assert table.rows[0].cells[0].text == "4" and table.rows[1].cells[0].text == "4.0"
     smooth = table.rows[1 + list(PAPER.parts).index("smooth")].cells[6].text

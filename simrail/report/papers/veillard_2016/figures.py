@@ -51,7 +51,7 @@ def distributions_figure(lines: Lines) -> str:
         return ""
     with canvas.look():
         figure, axes = canvas.panels_beside(
-            len(PANELS), tall_in=2.7, across=2, left_in=0.7, top_in=0.6, row_gap_in=0.95
+            len(PANELS), tall_in=2.3, across=2, left_in=0.7, top_in=0.45, gap_in=0.75, row_gap_in=0.6
         )
         for axis, (name, printed, words) in zip(axes, PANELS, strict=True):
             for order, mount in enumerate(lines.mounts):

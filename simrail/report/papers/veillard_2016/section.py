@@ -44,7 +44,7 @@ def section(data: PageData) -> list[Section]:
         "lines": max(first.line_count, 1),
         "recordings": max(lines.recordings(mount) for mount in lines.mounts),
         "mounts": lines.mounts,
-        "rows": table_of(lines),
+        "tables": [(mount, table_of(lines, mount)) for mount in lines.mounts],
         "all_claims": judged(PAPER, evidence, judges, has=lines.has),
         "notes": [ours] if ours else [],
         "errata": judges.errata(evidence),
@@ -55,20 +55,17 @@ def section(data: PageData) -> list[Section]:
     return [Section("paper", f"Beside {PAPER.heading}", "papers/veillard_2016/section.html.j2", shown)]
 
 
-def table_of(lines: Lines) -> Table:
-    """Mean over lines and devices of every part, with half of its 95 % interval, beside what is printed."""
-    printed = [
-        PAPER.printed[name][0][0]
-        for name in ("acceleration", "acceleration", "attitude", "attitude", "speed")
-    ]
-    cells = [*(Cell(f"{value:g}") for value in printed), NONE, Cell(f"{PAPER.printed['distance'][0][0]:g}")]
-    rows = [Row("printed, of one ride", "", "", cells * len(lines.mounts))]
+def table_of(lines: Lines, mount: str) -> Table:
+    """Mean over lines and devices of every part at a mount, beside what is printed."""
+    names = ("acceleration", "acceleration", "attitude", "attitude", "speed")
+    printed = [Cell(f"{PAPER.printed[name][0][0]:g}") for name in names]
+    cells = [*printed, NONE, Cell(f"{PAPER.printed['distance'][0][0]:g}")]
+    rows = [Row("printed, of one ride", "", "", cells)]
     for part, role in PAPER.parts.items():
         if lines.has(part):
-            own = [cell for mount in lines.mounts for cell in _cells(lines, part, mount)]
-            rows.append(Row(role.label, "", role.colour, own))
-    groups = [(mount, len(COLUMNS) + 1) for mount in lines.mounts]
-    return Table(groups, [*(words for _, words, _ in COLUMNS), "distance, %"] * len(lines.mounts), rows)
+            rows.append(Row(role.label, "", role.colour, _cells(lines, part, mount)))
+    columns = [*(words for _, words, _ in COLUMNS), "distance, %"]
+    return Table([("acceleration", 2), ("attitude", 2), ("speed", 2), ("at the end", 1)], columns, rows)
 
 
 def _cells(lines: Lines, part: str, mount: str) -> list[Cell]:
