@@ -20,6 +20,10 @@ from simrail.recording.recording import Recording
 
 TEXT = """
 rides = ["one"]
+[mount.frame]
+slope = 0.4
+intercept_mps = -5.0
+rms_mps = 3.0
 [mount.axle]
 slope = 0.9
 intercept_mps = -16.0
@@ -80,7 +84,12 @@ def test_a_file_beside_a_number_is_refused(number: str, file: Path) -> None:
 
 @pytest.mark.parametrize(
     ("before", "after"),
-    [("slope = 0.9", "slope = -0.9"), ("rms_mps", "rms"), ("[mount.axle]", "[mount]"), ("0.9", '"0.9"')],
+    [
+        ("slope = 0.9", "slope = -0.9"),
+        ("rms_mps = 2.0", "rms = 2.0"),
+        ("[mount.axle]\nslope = 0.9", "[mount.axle]"),
+        ("0.9", '"0.9"'),
+    ],
 )
 def test_a_broken_file_is_told(before: str, after: str, file: Path) -> None:
     file.write_text(TEXT.replace(before, after), encoding="utf-8")

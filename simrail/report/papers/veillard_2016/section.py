@@ -1,5 +1,7 @@
 """The section beside Veillard et al. 2016: tables, claims and figures of ours, gathered for its template."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from simrail.report.pages.section import PageData, Section
@@ -74,11 +76,12 @@ def _cells(lines: Lines, part: str, mount: str) -> list[Cell]:
 
 
 def _mean_cell(draws: Draws, decimals: int) -> Cell:
-    """Mean over lines and devices, and half of its interval."""
+    """Mean over lines and devices, and the ends of its interval."""
     if not len(draws.values):
         return NONE
     mean, low, high = draws.mean()
-    return number_cell(mean, decimals=decimals, spread=0.5 * (high - low))
+    ends = signed(f"{low:.{decimals}f} to {high:.{decimals}f}") if np.isfinite([low, high]).all() else ""
+    return replace(number_cell(mean, decimals=decimals), spread=ends)
 
 
 def _range_cell(draws: Draws) -> Cell:
