@@ -18,11 +18,11 @@ What of the paper is mended or added (EQUATIONS 4):
 * A frame of 1024 samples at 250 Hz is 4.1 s long: its speed is dated at its centre, and known at its end.
   What is said of the present is led on from there. Dated at its end: 1.9 to 3.0 m/s on those rides.
 * The paper does not say where its IMU was, nor its rate. A bogie frame shakes by its speed. A floor shakes by
-  what stands at any speed: of a line fitted to the ride itself (metro_line, seed 401 of the scenario
-  `imu_only`, 250 Hz) the frame is left with 2.4 m/s, the floor with 7.1; with silent motors 5.1, without
-  equipment and passengers as well 4.3, of which the sensor's own noise is most. Motors work when a train is
-  slow: they lift sqrt(S) at 1 to 15 m/s above that at 20. At 125 Hz the floor has 5.2, at 62.5 Hz, in frames of
-  512, 4.3: the sum over frequencies that tell nothing is what spoils it.
+  what stands at any speed: a line fitted to the ride itself (scenario `imu_only`, seed 401, 250 Hz) leaves
+  2.4 m/s on the frame and 7.1 on the floor; there 5.1 with silent motors, and 4.3 without equipment and
+  passengers as well, beside the sensor's own noise. Motors work when a train is slow: they lift sqrt(S) at 10
+  to 15 m/s above that at 20. At 125 Hz the floor has 5.2, at 62.5 Hz, in frames of 512, 4.3: the sum over
+  frequencies that tell nothing is what spoils it.
 * sqrt(S) is linear in the speed on average only: rough and smooth sections differ by metres per second, over
   hundreds of metres, and a calibration of other rails is wrong for the whole ride. Standard deviations have
   both, the latter as one constant factor of speed and way.
@@ -387,7 +387,8 @@ class SpectralOdometry:
                 field="slope" if slope is None else "intercept_mps",
                 value="none",
                 limit="(m/s) per sqrt(m/s2)" if slope is None else "m/s",
-                remedy='see simrail.estimators.odometry.spectral.calibrate, or set calibration = "encoder"',
+                remedy="give a calibration_file, see simrail.estimators.odometry.spectral.calibrate, or set "
+                'calibration = "encoder"',
             )
         if self.calibration == "given" and intercept is not None:
             return slope, intercept, self.speed_sd_mps
