@@ -34,7 +34,14 @@ from simrail.estimators.attitude.veillard_kernel import (
 )
 from simrail.estimators.odometry.calibration_file import SpectralCalibration
 from simrail.estimators.odometry.direction import BLOCK_S
-from simrail.estimators.odometry.spectral import FRAME, HOP, ROUGH_S, FrameSpeeds, SpectralOdometry
+from simrail.estimators.odometry.spectral import (
+    FRAME,
+    HOP,
+    ROUGH_S,
+    START_SD_M,
+    FrameSpeeds,
+    SpectralOdometry,
+)
 from simrail.estimators.odometry.standstill import quiet_of
 
 from simrail.core.columns import ACCEL, ACCELERATION, GYRO, INNOVATION, ODOMETRY, ODOMETRY_SD, RATE_INNOVATION
@@ -194,7 +201,7 @@ class VeillardEkf:
             ODOMETRY[0]: recording.start_position_m + way,
             ODOMETRY[1]: speed,
             ODOMETRY[2]: found.states[:, AX],
-            ODOMETRY_SD[0]: np.sqrt(rough + (factor * way) ** 2),
+            ODOMETRY_SD[0]: np.sqrt(START_SD_M**2 + rough + (factor * way) ** 2),
             ODOMETRY_SD[1]: np.sqrt(found.variances[:, V] + (factor * speed) ** 2),
             ODOMETRY_SD[2]: np.sqrt(found.variances[:, AX]),
             **{name: found.states[:, AX + axis] for axis, name in enumerate(ACCELERATION)},

@@ -68,6 +68,9 @@ for half of its time, some ten seconds each."""
 ROUGH_S = 10.0
 """Correlation time of the error that rough and smooth sections make: 200 m at 20 m/s."""
 
+START_SD_M = 0.05
+"""How well the start of a ride is known."""
+
 LEAST_MPS = 0.1
 """Standard deviation that a frame's speed has at least, where a fit leaves less, as at rest."""
 
@@ -344,7 +347,7 @@ class SpectralOdometry:
             correlation_s=(ACCELERATION_S, ROUGH_S),
         )
         # A train begins its ride at rest; a pace of walking is not excluded.
-        start = np.array([0.0, 0.1**2, 0.1**2, told.rough_sd_mps**2])
+        start = np.array([START_SD_M**2, 0.1**2, 0.1**2, told.rough_sd_mps**2])
         out = np.empty((len(recording.imu), 6))
         spectral_filter(told.speed, told.white_variance, told.direction, told.ends, half, led, start, out)
         factor = self.calibration_relative_sd * out[:, :3]

@@ -57,6 +57,7 @@ def test_a_file_is_as_its_two_numbers(kind, calibration: str, file: Path, shakin
     by_file = kind(calibration=calibration, calibration_file=SpectralCalibration.from_file(file))
     by_number = kind(calibration=calibration, **numbers)
     pd.testing.assert_frame_equal(by_file.estimate(shaking).states, by_number.estimate(shaking).states)
+    assert (by_file.estimate(shaking).states["position_sd_m"] >= 0.05).all()
     assert by_file.causal and by_file.needs == () and by_file.role == "method"
 
 

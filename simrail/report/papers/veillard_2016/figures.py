@@ -106,7 +106,7 @@ def spectrum_figure(spectra: Mapping[str, SpectrumOverSpeed]) -> str:
                 lw=1.3,
                 label="line of Eq. 1, least squares",
             )
-            axis.set(xlabel="true speed, m/s", title=mount)
+            axis.set(xlabel="true speed, m/s", title=mount, xlim=(-0.5, 1.05 * max(one.speed.max(), 1.0)))
         axes[0].set_ylabel("\u221aS, (m/s\u00b2)$^{1/2}$")
         canvas.figure_legend(figure, *axes[0].get_legend_handles_labels())
         return canvas.to_svg(figure, description="Square root of the spectrum's sum over speed, by mount")
