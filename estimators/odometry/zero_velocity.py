@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 from simrail.estimators.kalman import History, fixed_interval, room_for_history
 from simrail.estimators.odometry.calm import ACCELERATION_SD_MPS2, calm, calm_so_far, power, unsteady
-from simrail.estimators.odometry.curve_matched import chainage_sd, chord_of
+from simrail.estimators.odometry.curve_matched import chainage_sd, chord_of, lag_of
 from simrail.estimators.odometry.standstill import require_rest_first, signs_of_rest
 from simrail.estimators.odometry.vertical import vertical_force
 from simrail.estimators.odometry.zero_velocity_kernel import (
@@ -126,7 +126,7 @@ class ZeroVelocityOdometry:
     smoothed: bool = False
     push_density_mps2sqrts: float = 2e-3
     turn_density_radpsqrts: float = 1e-5
-    lateral_density_mps2sqrts: float = 0.15
+    lateral_density_mps2sqrts: float = 0.3
     rest_speed_mps: float = 0.02
     surely: float = 0.99
     start_sd_m: float = 0.05
@@ -205,6 +205,7 @@ class ZeroVelocityOdometry:
             step_s=step,
             gravity=recording.gravity_mps2,
             lever_m=recording.mount_position_m[0] - (0.0 if chord is None else chord.centre_m),
+            lag_m=0.0 if chord is None else lag_of(chord)[0],
             signals=signals,
             **signs._asdict(),
             given=np.full(steps, -1.0),

@@ -45,8 +45,9 @@ class Model(NamedTuple):
 
     Attributes
     ----------
-    step_s, gravity, lever_m : float
-        Step, gravity, and how far the IMU is ahead of the middle of its body's chord.
+    step_s, gravity, lever_m, lag_m : float
+        Step, gravity, how far the IMU is ahead of the middle of its body's chord, and how far that middle
+        moves against the direction of running in a curve.
     signals : ndarray (n, 5)
         Mean angular rates, rad/s, and specific forces along X and Y, m/s2, over the step that ends here.
     shaking, turning, turn_s, force : ndarray
@@ -68,6 +69,7 @@ class Model(NamedTuple):
     step_s: float
     gravity: float
     lever_m: float
+    lag_m: float
     signals: FloatArray
     shaking: FloatArray
     turning: FloatArray
@@ -179,7 +181,8 @@ def _predict(
     work: FloatArray,
 ) -> float:
     """State and covariance over one step, F in ``f``; returns the mean acceleration."""
-    dt, g, lever = model.step_s, model.gravity, model.lever_m
+    dt, g = model.step_s, model.gravity
+    lever = model.lever_m + (model.lag_m if x[V] > 0.0 else -model.lag_m)
     sr, cr, sp, cp = math.sin(x[ROLL]), math.cos(x[ROLL]), math.sin(x[PITCH]), math.cos(x[PITCH])
     a, b, c = (signal[0] - x[DRIFT_X], signal[1] - x[DRIFT_Y], signal[2] - x[DRIFT_Z])
     turns = 0.0 if rests else 1.0

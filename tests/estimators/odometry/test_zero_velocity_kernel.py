@@ -1,4 +1,4 @@
-"""The zero-velocity filter: against filterpy, its smoother against a joint Gaussian, and how it adds up odds."""
+"""The zero-velocity filter against filterpy, its smoother against a joint Gaussian, and how odds add up."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ def ride_of(steps: int, *, given: np.ndarray | None = None) -> Model:
         step_s=STEP_S,
         gravity=G,
         lever_m=7.0,
+        lag_m=0.4,
         signals=signals,
         shaking=np.full(steps, math.log(2.0)),
         turning=signals[:, :3].copy(),

@@ -1,7 +1,7 @@
 """The zero-velocity filter by filterpy: short, readable, what its kernel is held to.
 
-The motion is written with vectors and rotation matrices, and derived by complex steps (W. Squire and G. Trapp, SIAM
-Review 40 (1998) 110-112), which have no truncation error. When the train stands is given.
+The motion is written with vectors and rotation matrices, and derived by complex steps (W. Squire and G.
+Trapp, SIAM Review 40 (1998) 110-112), which have no truncation error. When the train stands is given.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def moved(x: np.ndarray, model: Model, k: int, rests: bool) -> np.ndarray:
     turn = rates[2] * np.cos(pitch)
     gravity = into_body(roll, pitch) @ np.array([0.0, 0.0, model.gravity])
     force = (1.0 + scale) * model.signals[k, 3] - push - gravity[0]
-    acceleration = force + model.lever_m * turn**2 + askew * v * turn
+    acceleration = force + (model.lever_m + np.sign(v.real) * model.lag_m) * turn**2 + askew * v * turn
     dt = model.step_s
     way = np.cos(pitch) * (v * dt + 0.5 * acceleration * dt**2)
     return np.concatenate(
