@@ -74,10 +74,13 @@ FASTEST_MPS = 40.0
 PRIOR = -1.0
 """Log odds of a train about which nothing is known: it stands for a quarter of its time."""
 
-LOUDER_START, LOUDEST_REST_MPS2 = 2.0, 0.3
-"""A first second that shakes by more than twice what the quietest
-seconds do, or by more than this up and down, is none of rest: floors at rest have some hundredths of that,
-by passengers and equipment."""
+REST_EXCESS = np.array([3e-3] * 3 + [0.05] * 3)
+"""By what shakes so much more than the quietest seconds of a
+ride, rad/s and m/s2, and `LOUDER` times as much, the train ran: passengers and equipment shake a floor by
+half of that."""
+
+LOUDEST_REST_MPS2 = 0.3
+"""What shakes more than this up and down runs, be there quieter seconds or not: ten times a floor at rest."""
 
 SUREST = 14.0
 """Log odds that no number of seconds exceeds: one in a million is something else."""
@@ -135,8 +138,7 @@ def require_rest_first(recording: Recording) -> None:
     Raises
     ------
     InputError
-        If an axis shakes by `LOUDER_START` times as much in the first second as later, or up and down by more
-        than `LOUDEST_REST_MPS2`.
+        If what shakes in the first second is above `REST_EXCESS` or `LOUDEST_REST_MPS2`.
     """
     rate = recording.imu_sheet.rate_hz
     block = max(1, round(0.1 * rate))
@@ -144,15 +146,18 @@ def require_rest_first(recording: Recording) -> None:
     if len(loud) < round(WINDOW_S * rate / block):
         return
     first = loud[round(REFERENCE_S * rate / block) - 1]
-    ratio = float(((first + LEAST_SHAKING) / (least[-1] + LEAST_SHAKING)).max())
+    quietest = least[-1]
+    excess = np.sqrt(np.maximum(first**2 - quietest**2, 0.0))
+    runs = bool(((excess > REST_EXCESS) & (first > LOUDER * quietest)).any())
     vertical = math.sqrt(max(first[5] ** 2 - (_floor(recording)[5] / 0.75) ** 2, 0.0))
-    if ratio < LOUDER_START and vertical < LOUDEST_REST_MPS2:
+    if not runs and vertical < LOUDEST_REST_MPS2:
         return
+    ratio = float((first / np.maximum(quietest, LEAST_SHAKING)).max())
     raise InputError(
         "the ride does not begin at rest, and without a stop nobody knows the biases of an IMU and its speed",
         field="imu",
         value=f"{vertical:.2g} m/s2 up and down in its first second, {ratio:.2g} times the quietest",
-        limit=f"{LOUDEST_REST_MPS2:g} m/s2, {LOUDER_START:g} times",
+        limit=f"{LOUDEST_REST_MPS2:g} m/s2, {LOUDER:g} times",
         remedy="begin the recording while the train stands, some ten seconds before it leaves",
     )
 
