@@ -71,6 +71,9 @@ RUN_FORCE_MPS2 = 0.2
 FASTEST_MPS = 40.0
 """Speeds up to this one, of either sign, are taken as equally likely of a train that runs."""
 
+ASTRAY, ASTRAY_SDS = 0.05, 3.0
+"""So many estimates of the speed are off by so many times their standard deviation more."""
+
 PRIOR = -1.0
 """Log odds of a train about which nothing is known: it stands for a quarter of its time."""
 
@@ -220,12 +223,17 @@ def rest_log_ratio(
 
 @njit_borrowed
 def speed_log_ratio(speed: float, variance: float) -> float:
-    """Logarithm of how much likelier an estimate of the speed is at rest than of a train that runs."""
-    return (
-        -0.5 * speed * speed / variance
-        - 0.5 * math.log(2.0 * math.pi * variance)
-        + math.log(2.0 * FASTEST_MPS)
-    )
+    """Logarithm of how much likelier an estimate of the speed is at rest than of a train that runs.
+
+    A share `ASTRAY` of estimates is off by `ASTRAY_SDS` times what it says: a stop at which a filter was led
+    astray must be found above all.
+    """
+    square = speed * speed / variance
+    said = math.log(1.0 - ASTRAY) - 0.5 * square
+    more = math.log(ASTRAY / ASTRAY_SDS) - 0.5 * square / ASTRAY_SDS**2
+    most = max(said, more)
+    likely = most + math.log(math.exp(said - most) + math.exp(more - most))
+    return likely - 0.5 * math.log(2.0 * math.pi * variance) + math.log(2.0 * FASTEST_MPS)
 
 
 @njit_borrowed

@@ -40,7 +40,6 @@ from simrail.estimators.odometry.zero_velocity_kernel import (
     REST,
     REST_X,
     ROLL,
-    SCALE,
     STATES,
     SWAY,
     UPDATES,
@@ -214,6 +213,7 @@ class ZeroVelocityOdometry:
             noise=noise,
             rate_variance=rate_variance,
             force_variance=force_variance,
+            scale_variance=sheet.gyro_scale_error**2 / 3.0,
             surely=math.log(self.surely / (1.0 - self.surely)),
             unheard_mps=UNHEARD_MPS,
         )
@@ -231,7 +231,6 @@ class ZeroVelocityOdometry:
         sd[[ROLL, PITCH]] = LEANS_RAD
         sd[DRIFT_X : DRIFT_Z + 1] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
         sd[[PUSH, SWAY]] = sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0) + 1e-4
-        sd[SCALE] = sheet.accel_scale_error / math.sqrt(3.0)
         sd[ASKEW] = math.hypot(ASKEW_RAD, sheet.package_misalignment_rad / math.sqrt(3.0))
         return x, np.diag(sd**2)
 
@@ -248,6 +247,9 @@ class ZeroVelocityOdometry:
         left = unsteady(recording, _block(recording), len(own)) + (found.acceleration - own) ** 2
         shaking = power(left, rate, both_ways=self.smoothed)
         sd = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2)[:, [S, V]])
+        # A scale that is off makes all changes of the speed wrong by the same share, and no stop shows it.
+        scaled = found.states[:, [S, V]] - [recording.start_position_m, 0.0]
+        sd = np.hypot(sd, recording.imu_sheet.accel_scale_error / math.sqrt(3.0) * scaled)
         lines = np.column_stack(
             [
                 found.states[:, S],

@@ -5,7 +5,7 @@ step to the next, and the accelerometer less gravity is the change of speed (EQU
 
     psd = sin(roll) q + cos(roll) r                               turning about the vertical of the body
     roll' = p + tan(pitch) psd,    pitch' = cos(roll) q - sin(roll) r
-    v' = (1 + scale) f_x - push + g sin(pitch) + lever psd^2 + askew v psd,    s' = v cos(pitch)
+    v' = f_x - push + g sin(pitch) + lever psd^2 + askew v psd,    s' = v cos(pitch)
     f_y = v psd + g sin(roll) cos(pitch) + sway                    lateral row, every step
 
 with p, q, r the gyro less its biases. An IMU that is ``lever`` ahead of the middle of the chord on which its
@@ -29,11 +29,13 @@ from simrail.estimators.odometry.standstill import PRIOR, SUREST, TURN_S, rest_l
 
 from simrail.core.jit import FloatArray, njit, njit_borrowed
 
-STATES = 11
-S, V, ROLL, PITCH, DRIFT_X, DRIFT_Y, DRIFT_Z, PUSH, SWAY, SCALE, ASKEW = range(STATES)
-"""Place
-and speed along the track, roll, pitch, biases of the gyros, offsets of the accelerometers along X and Y,
-relative error of the scale along X, yaw of the IMU in its track."""
+STATES = 10
+S, V, ROLL, PITCH, DRIFT_X, DRIFT_Y, DRIFT_Z, PUSH, SWAY, ASKEW = range(STATES)
+"""Place and speed along the track, roll, pitch, biases of the gyros, offsets of the accelerometers along X
+and Y, yaw of the IMU in its track."""
+
+SCALED_S = 10.0
+"""A curve or a vertical curve lasts so long: an error of a gyro's scale does the same all along."""
 
 UPDATES = 5
 LATERAL, REST, REST_X, REST_Y, REST_Z = range(UPDATES)
@@ -54,12 +56,14 @@ class Model(NamedTuple):
         `simrail.estimators.odometry.standstill.Signs`.
     given : ndarray (n,)
         1 where the train is told to stand, 0 where to run; below 0 the filter judges.
-    process, rest_process : ndarray (11,)
+    process, rest_process : ndarray (10,)
         Variances that a step adds while the train runs, and at rest.
     noise : ndarray (5,)
         Variances of the rows.
     rate_variance, force_variance : float
         White noise of a gyro and of the accelerometer along X: variances of a mean over one second.
+    scale_variance : float
+        Of the relative error of a gyro's scale.
     surely : float
         Log odds from which on the train is held to stand.
     unheard_mps : float
@@ -81,6 +85,7 @@ class Model(NamedTuple):
     noise: FloatArray
     rate_variance: float
     force_variance: float
+    scale_variance: float
     surely: float
     unheard_mps: float
 
@@ -90,7 +95,7 @@ class Found(NamedTuple):
 
     Attributes
     ----------
-    states, covariances : ndarray (n, 11), (n, m, m)
+    states, covariances : ndarray (n, 10), (n, m, m)
         Of the first m states.
     acceleration : ndarray (n,)
         Mean of v' over the step, m/s2; 0 at rest.
@@ -117,7 +122,7 @@ def zero_velocity(model: Model, x: FloatArray, p: FloatArray, found: Found, past
     Parameters
     ----------
     model : Model
-    x, p : ndarray (11,), (11, 11), in and out
+    x, p : ndarray (10,), (10, 10), in and out
         State and covariance at the start of the first step.
     found : Found, out
     past : History or None, out
@@ -160,13 +165,20 @@ def zero_velocity(model: Model, x: FloatArray, p: FloatArray, found: Found, past
 def _evidence(
     model: Model, k: int, x: FloatArray, p: FloatArray, turn: FloatArray, variance: FloatArray
 ) -> float:
-    """What the signals say of rest, less the biases and the slope that the filter knows."""
+    """What the signals say of rest, less the biases and the slope that the filter knows.
+
+    What has led the speed astray has led the slope astray as well. The speed is judged elsewhere; here the
+    acceleration is that of a train of speed zero, given which less is doubtful.
+    """
     for i in range(3):
         turn[i] = model.turning[k, i] - x[DRIFT_X + i]
         variance[i] = p[DRIFT_X + i, DRIFT_X + i] + model.rate_variance / model.turn_s[k]
     slope = model.gravity * math.cos(x[PITCH])
     push = model.force[k] - x[PUSH] + model.gravity * math.sin(x[PITCH])
     known = p[PUSH, PUSH] - 2.0 * slope * p[PUSH, PITCH] + slope * slope * p[PITCH, PITCH]
+    shared = (slope * p[V, PITCH] - p[V, PUSH]) / p[V, V]
+    push -= shared * x[V]
+    known -= shared * shared * p[V, V]
     return rest_log_ratio(model.shaking[k], turn, variance, push, max(known, 0.0) + model.force_variance)
 
 
@@ -184,16 +196,16 @@ def _predict(
     dt, g = model.step_s, model.gravity
     lever = model.lever_m + (model.lag_m if x[V] > 0.0 else -model.lag_m)
     sr, cr, sp, cp = math.sin(x[ROLL]), math.cos(x[ROLL]), math.sin(x[PITCH]), math.cos(x[PITCH])
-    a, b, c = (signal[0] - x[DRIFT_X], signal[1] - x[DRIFT_Y], signal[2] - x[DRIFT_Z])
+    a, b, c = signal[0] - x[DRIFT_X], signal[1] - x[DRIFT_Y], signal[2] - x[DRIFT_Z]
     turns = 0.0 if rests else 1.0
     psd, pitching = turns * (sr * b + cr * c), turns * (cr * b - sr * c)
     pull = 2.0 * lever * psd + x[ASKEW] * x[V]  # derivative of v' by psd
-    acceleration = (1.0 + x[SCALE]) * signal[3] - x[PUSH] + g * sp + lever * psd * psd + x[ASKEW] * x[V] * psd
+    acceleration = signal[3] - x[PUSH] + g * sp + lever * psd * psd + x[ASKEW] * x[V] * psd
     for i in range(V, PITCH + 1):
         for j in range(STATES):
             f[i, j] = 1.0 if i == j else 0.0
     f[V, V] += dt * x[ASKEW] * psd
-    f[V, PITCH], f[V, PUSH], f[V, SCALE], f[V, ASKEW] = dt * g * cp, -dt, dt * signal[3], dt * x[V] * psd
+    f[V, PITCH], f[V, PUSH], f[V, ASKEW] = dt * g * cp, -dt, dt * x[V] * psd
     f[V, ROLL] = dt * pull * pitching
     f[V, DRIFT_Y], f[V, DRIFT_Z] = -dt * pull * sr * turns, -dt * pull * cr * turns
     f[ROLL, ROLL] += dt * sp / cp * pitching
@@ -216,6 +228,9 @@ def _predict(
     process = model.rest_process if rests else model.process
     for i in range(STATES):
         p[i, i] += process[i]
+    scaled = turns * dt * SCALED_S * model.scale_variance
+    p[ROLL, ROLL] += scaled * (a * a + (sp / cp) ** 2 * ((sr * b) ** 2 + (cr * c) ** 2))
+    p[PITCH, PITCH] += scaled * ((cr * b) ** 2 + (sr * c) ** 2)
     return float(acceleration)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
-from simrail.estimators.odometry.zero_velocity_kernel import Found, Model
+from simrail.estimators.odometry.zero_velocity_kernel import SCALED_S, Found, Model
 
 from simrail.core.jit import FloatArray
 
@@ -41,17 +41,26 @@ def euler_rates(w: np.ndarray, roll: complex, pitch: complex) -> np.ndarray:
 def moved(x: np.ndarray, model: Model, k: int, rests: bool) -> np.ndarray:
     """State a step later."""
     s, v, roll, pitch = x[:4]
-    push, scale, askew = x[7], x[9], x[10]
+    push, askew = x[7], x[9]
     rates = np.zeros(3) if rests else euler_rates(model.signals[k, :3] - x[4:7], roll, pitch)
     turn = rates[2] * np.cos(pitch)
     gravity = into_body(roll, pitch) @ np.array([0.0, 0.0, model.gravity])
-    force = (1.0 + scale) * model.signals[k, 3] - push - gravity[0]
+    force = model.signals[k, 3] - push - gravity[0]
     acceleration = force + (model.lever_m + np.sign(v.real) * model.lag_m) * turn**2 + askew * v * turn
     dt = model.step_s
     way = np.cos(pitch) * (v * dt + 0.5 * acceleration * dt**2)
     return np.concatenate(
         [[s + way, v + acceleration * dt, roll + rates[0] * dt, pitch + rates[1] * dt], x[4:]]
     )
+
+
+def scaled(x: FloatArray, model: Model, k: int) -> FloatArray:
+    """Variances that errors of the gyros' scales add to roll and pitch, each by its share of their rates."""
+    w = model.signals[k, :3] - x[4:7]
+    shares = np.column_stack([euler_rates(w[i] * np.eye(3)[i], x[2], x[3]) for i in range(3)])
+    variances = np.zeros(len(x))
+    variances[2:4] = model.step_s * SCALED_S * model.scale_variance * (shares[:2] ** 2).sum(axis=1)
+    return variances
 
 
 def lateral(x: np.ndarray, model: Model, k: int) -> complex:
@@ -70,8 +79,9 @@ def filterpy_zero_velocity(model: Model, x: FloatArray, p: FloatArray, rests: np
             ekf.P[1, 1] += model.unheard_mps**2
         stood = rests[k]
         f = derived(lambda state, k=k: moved(state, model, k, rests[k]), ekf.x)
+        noise = model.rest_process if rests[k] else model.process + scaled(ekf.x, model, k)
         ekf.x = moved(ekf.x, model, k, rests[k])
-        ekf.P = f @ ekf.P @ f.T + np.diag(model.rest_process if rests[k] else model.process)
+        ekf.P = f @ ekf.P @ f.T + np.diag(noise)
         rows = [(model.signals[k, 4], lambda state, k=k: lateral(state, model, k))]
         if rests[k]:
             rows.append((0.0, lambda state: state[1]))
