@@ -5,13 +5,12 @@ a cell do not depend on which cells ran before it, or with it. Who runs which ce
 where, is decided in `simrail.campaign.campaign`.
 """
 
+import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from itertools import pairwise
-from statistics import fmean
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,11 +22,11 @@ from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
+from simrail.recording.sheets.grades import imu_sheet
 from simrail.ride.ride import simulate
 from simrail.ride.truth import Truth
-from simrail.scenario.build import Parts
-from simrail.scenario.cells import Cell
-from simrail.scenario.tables import RidePart
+from simrail.scenario.build import Parts, ResolvedCell
+from simrail.scenario.cells import Cell, cell_record, labels_of
 from simrail.scoring.geometry import score_geometry
 from simrail.scoring.kick import score_kick
 from simrail.scoring.ride_figures import RIDE, score_ride_comfort, score_running_safety
@@ -144,7 +143,7 @@ class BatchTally:
 
     def add(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
         """Note the figures of one estimator, or of the odometry, on a cell."""
-        labels = _labels(cell) | {"scenario": self.scenario, "estimator": estimator}
+        labels = labels_of(cell) | {"scenario": self.scenario, "estimator": estimator}
         self.figures.append((figures, labels | {"tuning": self.tunings.get(estimator, "default")}))
 
 
@@ -200,9 +199,15 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
                 tally.fail(one.cell, name, error)
 
 
-def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
-    """Measure a cell, its sensors on its ride, and run its odometry."""
-    resolved = parts.resolve(cell)
+def record_cell(
+    cell: Cell, truth: Truth, parts: Parts, *, spared: Callable[[ResolvedCell], ResolvedCell] | None = None
+) -> Recording:
+    """Measure a cell, its sensors on its ride, and run its odometry.
+
+    ``spared`` takes errors away from what is recorded; the sheets that the train knows stay as they are.
+    """
+    told = parts.resolve(cell)
+    resolved = told if spared is None else spared(told)
     recording = measure(
         truth,
         name=cell.ride.name,
@@ -221,9 +226,22 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         map_errors=resolved.map_errors,
         vehicle_sheet=resolved.vehicle_sheet,
     )
+    if spared is not None:
+        recording = with_sheets_of(recording, told)
     if resolved.odometry is None:
         return recording
     return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
+
+
+def with_sheets_of(recording: Recording, told: ResolvedCell) -> Recording:
+    """A recording whose train believes of its sensors and its map what it is told."""
+    sheet = imu_sheet(told.grade, delay_s=recording.imu_sheet.delay_s)
+    recording = replace(recording, imu_sheet=sheet, map_errors=told.map_errors)
+    encoder = recording.encoder_sheet
+    if encoder is None or told.encoder is None:
+        return recording
+    sd = math.hypot(told.encoder.radius_error_sd, told.encoder.rolling_sd)
+    return replace(recording, encoder_sheet=replace(encoder, radius_relative_sd=sd))
 
 
 def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: int) -> Truth:
@@ -254,44 +272,6 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     motion = truth_at_imu(truth, recording)
     shaken = None if truth.short_waves is None else truth.short_waves.sources
     return CellResult(labels, recording, motion, estimates, rails, truth.contacts, truth.track, shaken)
-
-
-def _labels(cell: Cell) -> dict[str, object]:
-    """What tells the rows of a cell from those of others."""
-    return {
-        "cell": cell.number,
-        "ride": "+".join(dict.fromkeys(one.ride.name for one in cell.passes or (cell,))),
-        "vehicle": cell.spec.vehicle,
-        "mount": cell.imu.name,
-        "imu": cell.imu.grade,
-        "odometry": cell.spec.odometry,
-        "map": cell.map_label,
-        "vibration": cell.vibration_label,
-        "track_draw": cell.track_draw,
-        "sensor_draw": cell.sensor_draw,
-    }
-
-
-def cell_record(cell: Cell) -> dict[str, object]:
-    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
-    rides = [one.ride for one in cell.passes or (cell,)]
-    record: dict[str, object] = _labels(cell) | {
-        "case": cell.case,
-        "sample": cell.sample,
-        "map_draw": cell.map_draw,
-        "track": cell.spec.track,
-        "engine": cell.spec.engine,
-        "speed_kmh": fmean(float(ride.speed_kmh or 0.0) for ride in rides),
-        "direction": _direction(rides),
-    }
-    return record | {name: value for name, value in cell.settings.items() if name not in record}
-
-
-def _direction(rides: Sequence[RidePart]) -> str:
-    """Whether rides run towards larger s, smaller s, both ways, or not at all."""
-    steps = [step for ride in rides for step in pairwise((ride.start_m, *ride.ends_m))]
-    ways = {"forward" if after > before else "backward" for before, after in steps}
-    return "both ways" if len(ways) > 1 else next(iter(ways), "standing")
 
 
 def _reason_of(error: Exception) -> str:

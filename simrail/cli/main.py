@@ -1,4 +1,4 @@
-"""The command line: `run`, `check`, `export`, `estimate`, `tune`, `spectra`, and what shows or makes parts.
+"""The command line: `run`, `check`, `grade`, `export`, `estimate`, `tune`, `spectra`, and those of parts.
 
 Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
 imports stand inside the commands, so that those that need little answer at once.
@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from simrail.cli.grade import grade
 from simrail.cli.library import cache, imu, list_parts, new, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
 from simrail.cli.rides import estimate, export
@@ -76,6 +77,6 @@ def _options(
     pass
 
 
-for _command in (run, check, export, estimate, tune, spectra, vehicle, imu, new, cache):
+for _command in (run, check, grade, export, estimate, tune, spectra, vehicle, imu, new, cache):
     app.command()(_command)
 app.command(name="list")(list_parts)

@@ -18,8 +18,8 @@ from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.check_vibration import step_words
 from simrail.scenario.distributions import dimensions, sample_count
+from simrail.scenario.requirements import judge_requirements, judge_requirements_of_ride
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.stop_rule import judge_stop_rule
 from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.table import CURVE_PREFIX, METRICS, ON_REQUEST, WINDOWS
 from simrail.track.laid_track import LaidTrack
@@ -94,7 +94,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         estimators = parts.estimators(0)
         for sample in range(1, sample_count(scenario.spec)):
             parts.estimators(sample)
-        judge_stop_rule(scenario, [*estimators, *_judge_ride_figures(scenario, estimators)])
+        judge_requirements(scenario.spec, [*estimators, *_judge_ride_figures(scenario, estimators)])
         simulated, unusual, notes = _judge_cells(scenario, parts)
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
     return Plan(
@@ -138,6 +138,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             same = judged_rails[1] if judged_rails is not None and judged_rails[0] == rails_key else None
             durations[ride_key], unusual, laid = judge_ride(resolved, known_rails=same)
             judged_rails = rails_key, laid
+            judge_requirements_of_ride(scenario.spec, ride.track, resolved.bands, cell.ride.reach_m)
             warnings += unusual
             notes += [f"vibration: {words}" for words in [step_words(ride)] if words]
         if cell.ride_number != last_ride:

@@ -16,6 +16,7 @@ from simrail.report.campaign.axes import is_campaign
 from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.passes import passes_section
 from simrail.report.campaign.section import campaign_section
+from simrail.report.campaign.verdicts import verdicts_section
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
 from simrail.report.pages.frame import page_text
 from simrail.report.pages.ride import ride_sections
@@ -51,6 +52,7 @@ def write_report(
     examples: Sequence[CellResult],
     manifest: Mapping[str, Any],
     beside: StoredResults | None = None,
+    budgets: pd.DataFrame | None = None,
 ) -> None:
     """Write the report of a campaign; where it has axes, its tables into a folder beside it as well.
 
@@ -58,10 +60,10 @@ def write_report(
     ----------
     path : Path
         The HTML file.
-    scenario, scores, cells, examples, manifest, beside
+    scenario, scores, cells, examples, manifest, beside, budgets
         The campaign, see `PageData`.
     """
-    data = PageData(scenario, scores, cells, examples, manifest, beside)
+    data = PageData(scenario, scores, cells, examples, manifest, beside, budgets)
     sections = [section for make in in_order(data) for section in make(data)]
     spec = scenario.spec.monte_carlo
     text = page_text(
@@ -215,6 +217,7 @@ SectionMaker = Callable[[PageData], list[Section]]
 """Makes sections of a campaign."""
 
 SECTIONS: tuple[SectionMaker, ...] = (
+    verdicts_section,
     _failures,
     _paper,
     passes_section,
