@@ -7,13 +7,9 @@ difference to the accelerometer for a share of the centripetal acceleration, and
 """
 
 import numpy as np
-from scipy import signal
+from simrail.estimators.odometry.calm import calm
 
-from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording, odometry_of
-
-CALM_HZ = 1.0
-"""Up to here a slope of the speed is the train's."""
 
 AGREES_MPS2 = 0.01
 """Rms difference up to there, below which an acceleration is the slope: a smoothed odometry has 0.003, an
@@ -28,16 +24,8 @@ def with_consistent_acceleration(recording: Recording) -> Recording:
     odometry, rate = odometry_of(recording), recording.imu_sheet.rate_hz
     slope = np.gradient(odometry["speed_mps"].to_numpy(dtype=np.float64), 1.0 / rate)
     off = odometry["acceleration_mps2"].to_numpy(dtype=np.float64) - slope
-    if np.sqrt(np.mean(_calm(off, rate) ** 2)) < AGREES_MPS2:
+    if np.sqrt(np.mean(calm(off, rate) ** 2)) < AGREES_MPS2:
         return recording
     return recording.with_odometry(
-        odometry.assign(acceleration_mps2=_calm(slope, rate)), recording.odometry_source
+        odometry.assign(acceleration_mps2=calm(slope, rate)), recording.odometry_source
     )
-
-
-def _calm(values: FloatArray, rate_hz: float) -> FloatArray:
-    """What lies below `CALM_HZ`, without lag."""
-    sections = signal.butter(2, CALM_HZ, fs=rate_hz, output="sos")
-    padding = min(len(values) - 1, int(3.0 * rate_hz / CALM_HZ))
-    low: FloatArray = signal.sosfiltfilt(sections, values, padlen=padding)
-    return low

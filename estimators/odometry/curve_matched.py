@@ -50,8 +50,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import signal
 from simrail.estimators.kalman import fixed_interval, room_for_history
+from simrail.estimators.odometry.calm import ACCELERATION_SD_MPS2, calm, calm_so_far, power, unsteady
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.kernel import (
     BEND,
@@ -95,17 +95,8 @@ _STILL_S = 0.5
 RATE_HZ = 50.0
 """Rate of the filter. A train's jerk is limited: between two steps nothing happens along the track."""
 
-CALM_HZ = 1.0
-"""Up to here an acceleration is the train's."""
-
 HOLD_S = 2.0
 """After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
-
-ACCELERATION_SD_MPS2 = 0.03
-"""Of that acceleration: what the body's pitching leaves in it. What it shakes beside that is measured."""
-
-POWER_S = 5.0
-"""So long is averaged over what it shakes: it changes with the speed."""
 
 
 class Pointing(NamedTuple):
@@ -309,11 +300,14 @@ class CurveMatchedOdometry:
         """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
         recording = self._heard(recording)
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
-        calm = _calm(steps, smoothed=self.smoothed)
-        shaking = _power(
-            _unsteady(recording, len(calm)) + (steps.acceleration - calm) ** 2, both_ways=self.smoothed
-        )
-        values = np.column_stack([steps.states[:, [S, V]], calm])
+        if self.smoothed:
+            own = calm(np.gradient(steps.states[:, V], 1.0 / RATE_HZ), RATE_HZ)
+        else:
+            own = calm_so_far(steps.acceleration, RATE_HZ)
+        block = max(1, round(recording.imu_sheet.rate_hz / RATE_HZ))
+        left = unsteady(recording, block, len(own)) + (steps.acceleration - own) ** 2
+        shaking = power(left, RATE_HZ, both_ways=self.smoothed)
+        values = np.column_stack([steps.states[:, [S, V]], own])
         values[steps.resting, 1:] = 0.0
         sd = np.sqrt(np.diagonal(steps.covariance, axis1=1, axis2=2)[:, [S, V]])
         sd[:, 0] = np.hypot(sd[:, 0], chainage_sd(recording, values[:, 0]))
@@ -329,15 +323,15 @@ class CurveMatchedOdometry:
             values = lines[last]
             rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
             if recording.has_wheel:
-                own = self._wheel_acceleration(recording, steps.time_s, calm, shaking, last)
-                values[rolls, 2::3] = own[rolls]
+                wheel = self._wheel_acceleration(recording, steps.time_s, own, shaking, last)
+                values[rolls, 2::3] = wheel[rolls]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
         return pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
 
     def _wheel_acceleration(
-        self, recording: Recording, times: FloatArray, calm: FloatArray, shaking: FloatArray, last: IntArray
+        self, recording: Recording, times: FloatArray, calmed: FloatArray, shaking: FloatArray, last: IntArray
     ) -> FloatArray:
         """The wheel's own acceleration and its sd (n, 2), for where it rolls.
 
@@ -348,7 +342,7 @@ class CurveMatchedOdometry:
         wheel = EncoderOdometry().estimate(recording).states
         read = np.searchsorted(wheel.index.to_numpy(), times + 1e-9, side="right") - 1
         own = wheel["acceleration_mps2"].to_numpy()
-        off = _power((own[read] - calm) ** 2, both_ways=False)
+        off = power((own[read] - calmed) ** 2, RATE_HZ, both_ways=False)
         sd = np.sqrt(wheel["acceleration_sd_mps2"].to_numpy() ** 2 + np.append(off + shaking, 0.0)[last - 1])
         return np.column_stack([own, sd])
 
@@ -499,39 +493,6 @@ def tread_share(recording: Recording) -> float:
     sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
     axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
     return WHEELSET_TREAD if axle is not None and axle.wheelset else 1.0
-
-
-def _calm(steps: Steps, *, smoothed: bool) -> FloatArray:
-    """Acceleration without what the body shakes, (n,): the train's own changes slowly."""
-    if smoothed:
-        slope = np.gradient(steps.states[:, V], 1.0 / RATE_HZ)
-        sections = signal.butter(2, CALM_HZ, fs=RATE_HZ, output="sos")
-        calm: FloatArray = signal.sosfiltfilt(sections, slope, padlen=min(len(slope) - 1, 150))
-        return calm
-    # Critically damped: the slope of the speed, followed by two equal lags.
-    keep = math.exp(-2.0 * math.pi * CALM_HZ / RATE_HZ)
-    passed: FloatArray = signal.lfilter(
-        [(1.0 - keep) ** 2], [1.0, -2.0 * keep, keep * keep], steps.acceleration
-    )
-    return passed
-
-
-def _unsteady(recording: Recording, steps: int) -> FloatArray:
-    """Variance of the accelerometer along X within each step less its white noise, (steps,), (m/s2)^2."""
-    sheet = recording.imu_sheet
-    block = max(1, round(sheet.rate_hz / RATE_HZ))
-    force = recording.imu[ACCEL[0]].to_numpy(dtype=np.float64)[: steps * block].reshape(steps, block)
-    within: FloatArray = force.var(axis=1) - sheet.accel_noise_mpsqrts**2 * sheet.rate_hz
-    return within
-
-
-def _power(squares: FloatArray, *, both_ways: bool) -> FloatArray:
-    """Mean of squares (n,) over the last `POWER_S`, or over as long before and after; not negative."""
-    keep = math.exp(-1.0 / (POWER_S * RATE_HZ))
-    passed: FloatArray = signal.lfilter([1.0 - keep], [1.0, -keep], squares)
-    if both_ways:
-        passed = signal.lfilter([1.0 - keep], [1.0, -keep], passed[::-1])[::-1]
-    return np.maximum(passed, 0.0)
 
 
 def _held(flags: BoolArray, hold_s: float) -> BoolArray:

@@ -40,8 +40,9 @@ from simrail.estimators.odometry.direction import BLOCK_S, DIRECTIONS, running_d
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.spectral_kernel import led_on, spectral_filter
 from simrail.estimators.odometry.standstill import quiet_of
+from simrail.estimators.odometry.vertical import vertical_force
 
-from simrail.core.columns import ACCEL, ODOMETRY, ODOMETRY_SD
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError, one_of
 from simrail.core.jit import FloatArray, IntArray
 from simrail.estimation.estimate import Estimate
@@ -146,7 +147,7 @@ def frames_of(recording: Recording, *, frame: int = FRAME, hop: int = HOP, print
     InputError
         If there is no vertical signal, or the rate is too low for such frames.
     """
-    rate, column = recording.imu_sheet.rate_hz, ACCEL[2]
+    rate = recording.imu_sheet.rate_hz
     if frame / rate > LONGEST_FRAME_S:
         raise InputError(
             f"the rate is too low for frames of {frame} samples: a train changes its speed within one",
@@ -155,16 +156,7 @@ def frames_of(recording: Recording, *, frame: int = FRAME, hop: int = HOP, print
             limit=f">= {frame / LONGEST_FRAME_S:g} Hz",
             remedy="record faster, or set a shorter frame",
         )
-    vertical = recording.imu.get(column)
-    if vertical is None or not np.isfinite(vertical).all() or not np.any(vertical):
-        raise InputError(
-            "the recording has no vertical signal, which tells the speed",
-            field=column,
-            value="none" if vertical is None else "NaN" if vertical.isna().any() else 0.0,
-            limit="the specific force along Z, at rest +g",
-            remedy="name the column of the vertical accelerometer",
-        )
-    force = vertical.to_numpy(dtype=np.float64)
+    force = vertical_force(recording, tells="the speed")
     root = np.sqrt(spectral_sums(force, frame=frame, hop=hop, printed=printed))
     ends = frame - 1 + hop * np.arange(len(root), dtype=np.int64)
     if recording.gaps is not None:

@@ -40,6 +40,7 @@ RELATIVE_POSITION = ("lateral_m", "vertical_m")
 RELATIVE_POSITION_SD = ("lateral_sd_m", "vertical_sd_m")
 BOUND = ("roll_bound_rad", "position_bound_m")
 FAULT = "fault"
+STANDSTILL = "standstill_probability"
 ENCODER = ("pulse_count",)
 EDGE_TIME = "edge_time_s"
 RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
@@ -107,6 +108,7 @@ _TABLE = [
         "position_bound_m", "m", "track", "what the error of position_m exceeds in one of a thousand metres"
     ),
     Column("fault", "1", "-", "1 once a ride has contradicted its sheets: no bound holds from there on"),
+    Column("standstill_probability", "1", "-", "probability that the train stands"),
     Column("contact_angle_rad", "rad", "rail", "angle of the contact, positive where the flange touches"),
     Column("flange_contact", "1", "rail", "1 where the flange touches its rail, else 0"),
 ]

@@ -20,6 +20,8 @@ SHIPPED: dict[str, tuple[str, dict[str, Any]]] = {
     "curve_matched": ("CurveMatchedOdometry", {"smoothed": False}),
     "curve_smoothed": ("CurveMatchedOdometry", {"smoothed": True}),
     "encoder": ("EncoderOdometry", {}),
+    "zero_velocity": ("ZeroVelocityOdometry", {"smoothed": False}),
+    "zero_velocity_smoothed": ("ZeroVelocityOdometry", {"smoothed": True}),
 }
 """Short names: registered class and its options."""
 

@@ -25,10 +25,13 @@ from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
 from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.attitude.veillard_kernel import Model as ElevenStates
 from simrail.estimators.attitude.veillard_kernel import eleven_states, room
+from simrail.estimators.odometry import zero_velocity_kernel
 from simrail.estimators.odometry.spectral import FRAME, HOP, spectral_sums
 from simrail.estimators.profile.kernel import profile_filter
 from simrail.estimators.profile.kernel import room as room_for_profile
 from simrail.estimators.profile.profile_filter import ProfileFilter
+from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
+from simrail.estimators.odometry.zero_velocity_kernel import zero_velocity
 from simrail.estimators.trajectory.kernel import (
     Model,
     room_for_filtered,
@@ -41,6 +44,7 @@ from twins.attitude import filterpy_ekf
 from twins.profile import filterpy_profile
 from twins.trajectory import filterpy_smoother
 from twins.veillard import filterpy_eleven_states
+from twins.zero_velocity import filterpy_zero_velocity
 from vqf import VQF
 
 from simrail.estimation.choose_odometry import with_odometry
@@ -210,6 +214,29 @@ def test_profile_kernel(benchmark: Callable, step_m: float) -> None:
     us = report(benchmark, lambda: profile_filter(model, found), n, ratio_to_filterpy=theirs)
     assert us <= 1.0
     assert benchmark.extra_info["ratio_to_filterpy"] >= 100.0
+
+
+def test_zero_velocity_kernel(benchmark: Callable) -> None:
+    """A step of ten samples a second: microseconds are those of a sample of the IMU."""
+    method, recording = ZeroVelocityOdometry(), ride()
+    model, few = method.model(recording), SLOW // 25
+    rests = method.trace(recording).found.log_odds > model.surely
+    short = model._replace(signals=model.signals[:few])
+    twin = zero_velocity_kernel.room(few, 4)
+    theirs = best_us(
+        lambda: filterpy_zero_velocity(short, *method.start(recording, model), rests, twin),
+        25 * few,
+        rounds=2,
+    )
+    found = zero_velocity_kernel.room(len(model.signals), 4)
+    us = report(
+        benchmark,
+        lambda: zero_velocity(model, *method.start(recording, model), found, None),
+        len(recording.imu),
+        ratio_to_filterpy=theirs,
+    )
+    assert us <= 0.4
+    assert benchmark.extra_info["ratio_to_filterpy"] >= 250.0
 
 
 def test_spectral_sums(benchmark: Callable) -> None:

@@ -20,6 +20,7 @@ from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.spectral import SpectralOdometry
 from simrail.estimators.profile.profile_filter import ProfileFilter
+from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
@@ -401,6 +402,8 @@ SHAKEN: dict[str, Estimator] = {
     "veillard": VeillardEkf(0.9, -16.0, "given", direction="backwards"),
     "veillard_compensated": VeillardEkf(0.9, frame=128, hop=32, compensated=True, dated="end"),
     "veillard_own": VeillardEkf(calibration="encoder", start_bias=False),
+    "zero_velocity": ZeroVelocityOdometry(),
+    "zero_velocity_smoothed": ZeroVelocityOdometry(smoothed=True),
 }
 
 
@@ -410,7 +413,7 @@ def test_odometries_of_an_imu_pass(method: Estimator) -> None:
 
 
 def test_odometries_of_an_imu_pass_backwards_and_with_a_perfect_imu() -> None:
-    for method in (SHAKEN["spectral"], SHAKEN["veillard_compensated"]):
+    for method in (SHAKEN["spectral"], SHAKEN["veillard_compensated"], SHAKEN["zero_velocity"]):
         check_odometry(method, ride(-1, "ideal"))
 
 

@@ -258,6 +258,12 @@ def line_exactly() -> Callable[..., tuple[Recording, pd.DataFrame]]:
 
 
 @pytest.fixture
+def follow() -> Callable[..., dict[str, Channel]]:
+    """Channels of a body that keeps to irregular rails."""
+    return following
+
+
+@pytest.fixture
 def bogie_recording() -> Callable[..., Recording]:
     return record_bogie
 

@@ -8,7 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from simrail.estimators.odometry.standstill import LOUDER, TURNING_RADPS, WINDOW_S, quiet_of
+from scipy.stats import norm
+from simrail.estimators.odometry.standstill import (
+    ASTRAY,
+    ASTRAY_SDS,
+    FASTEST_MPS,
+    FORCE_S,
+    LEAST_TURN_RADPS,
+    LOUDER,
+    REST_FORCE_MPS2,
+    REST_TURN_RADPS,
+    RUN_FORCE_MPS2,
+    TURN_S,
+    TURNING_RADPS,
+    WINDOW_S,
+    quiet_of,
+    rest_log_ratio,
+    signs_of_rest,
+    speed_log_ratio,
+)
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.seeds import stream
@@ -71,3 +89,44 @@ def test_nothing_later_enters(still: Recording) -> None:
     whole = quiet_of(still, BLOCK)
     part = quiet_of(replace(still, imu=still.imu.iloc[:5000]), BLOCK)
     np.testing.assert_array_equal(part, whole[:1000])
+
+
+def test_signs_are_means_of_what_came_before(still: Recording) -> None:
+    """White noise and biases: as quiet as ever, and nothing later enters."""
+    signs = signs_of_rest(still, 25)
+    assert np.mean(signs.shaking > -1.5) > 0.98 and signs.shaking.max() <= np.log(2.0)
+    signals = still.imu[[*GYRO, *ACCEL]].to_numpy()
+    k, turn, force = 300, round(TURN_S * 10.0), round(FORCE_S * 10.0)
+    np.testing.assert_allclose(signs.turning[k], signals[(k + 1 - turn) * 25 : (k + 1) * 25, :3].mean(axis=0))
+    np.testing.assert_allclose(signs.force[k], signals[(k + 1 - force) * 25 : (k + 1) * 25, 3].mean())
+    part = signs_of_rest(replace(still, imu=still.imu.iloc[:5000]), 25)
+    for mine, whole in zip(part, signs, strict=True):
+        np.testing.assert_array_equal(mine, whole[:200])
+
+
+@pytest.mark.parametrize("column", [*GYRO, *ACCEL[:2]])
+def test_slow_shaking_speaks_against_rest_where_noise_hides_it(still: Recording, column: str) -> None:
+    """2 Hz with half the noise's standard deviation: a twelfth more in all, three times in what is slow."""
+    sd, n = still.imu[column].std(), len(still.imu)
+    imu = still.imu.copy()
+    imu.iloc[5000:, imu.columns.get_loc(column)] += (
+        0.5 * np.sqrt(2.0) * sd * np.sin(4.0 * np.pi * np.arange(n - 5000) / RATE_HZ)
+    )
+    signs = signs_of_rest(replace(still, imu=imu), 25)
+    assert (signs.shaking[225:] < -2.0).all() and np.median(signs.shaking[:200]) > -0.5
+
+
+def test_log_ratios_are_those_of_normal_laws() -> None:
+    """Of each sign under both hypotheses, by scipy; the speed's law has a share that is astray."""
+    turn, variance = np.array([1e-4, -2e-4, 3e-4]), np.array([1e-9, 2e-9, 3e-9])
+    rest = np.sqrt(variance + REST_TURN_RADPS**2)
+    runs = np.hypot(rest, LEAST_TURN_RADPS)
+    expected = 0.3 + (norm.logpdf(turn, scale=rest) - norm.logpdf(turn, scale=runs)).sum()
+    still_sd = np.hypot(0.01, REST_FORCE_MPS2)
+    expected += norm.logpdf(0.05, scale=still_sd) - norm.logpdf(
+        0.05, scale=np.hypot(still_sd, RUN_FORCE_MPS2)
+    )
+    assert rest_log_ratio(0.3, turn, variance, 0.05, 0.01**2) == pytest.approx(expected, rel=1e-10)
+    for speed in (0.0, 1.0, 5.0):
+        law = (1.0 - ASTRAY) * norm.pdf(speed, scale=0.5) + ASTRAY * norm.pdf(speed, scale=0.5 * ASTRAY_SDS)
+        assert speed_log_ratio(speed, 0.25) == pytest.approx(np.log(law * 2.0 * FASTEST_MPS), rel=1e-10)

@@ -2,8 +2,9 @@
 
     python tests/estimators/twins
 
-filterpy's filters are a few lines of matrices: `attitude.py`, `veillard.py` and `trajectory.py` here. The
-kernels make the same numbers; this prints how far apart they are, and the time that each takes for a sample.
+filterpy's filters are a few lines of matrices: `attitude.py`, `veillard.py`, `zero_velocity.py` and
+`trajectory.py` here. The kernels make the same numbers; this prints how far apart they are, and the time that
+each takes for a sample.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from simrail.estimators.attitude.ekf import AttitudeEkf
 from simrail.estimators.attitude.kernel import attitude_ekf
 from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.attitude.veillard_kernel import Found, Model, eleven_states, room
+from simrail.estimators.odometry import zero_velocity_kernel
+from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 from trajectory import trace
 from veillard import filterpy_eleven_states
+from zero_velocity import filterpy_zero_velocity
 
 from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import with_odometry
@@ -81,6 +85,20 @@ def main() -> None:
 
     beside("attitude EKF", lambda: attitude(attitude_ekf), lambda: attitude(filterpy_ekf))
     beside("EKF of 11 states", lambda: states_of(eleven_states), lambda: states_of(filterpy_eleven_states))
+    stops = ZeroVelocityOdometry()
+    slow = stops.model(recording)
+    rests = stops.trace(recording).found.log_odds > slow.surely
+
+    def at_stops(run: Callable[..., None], *given: object) -> FloatArray:
+        found = zero_velocity_kernel.room(len(slow.signals), 4)
+        run(slow, *stops.start(recording, slow), *given, found, *([] if given else [None]))
+        return found.states
+
+    beside(
+        "zero-velocity filter",
+        lambda: at_stops(zero_velocity_kernel.zero_velocity),
+        lambda: at_stops(filterpy_zero_velocity, rests),
+    )
     for name, smoothed in (("trajectory filter", False), ("trajectory smoother", True)):
         method = TrajectorySmoother(smoothed=smoothed)
         beside(name, lambda m=method: m.trace(recording).states, lambda m=method: trace(m, recording).states)

@@ -12,6 +12,7 @@ def test_the_lesson_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert [line[:20].strip() for line in lines] == [
         "attitude EKF",
         "EKF of 11 states",
+        "zero-velocity filter",
         "trajectory filter",
         "trajectory smoother",
     ]

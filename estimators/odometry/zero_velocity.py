@@ -1,0 +1,319 @@
+"""Speed and way from an IMU alone: dead reckoning that every stop of the train puts right.
+
+An accelerometer that is integrated drifts: by gravity along a slope that the gyros have not seen, and by its
+bias. But trains stop, every other minute on a metro line, and then their speed is known exactly. A Kalman
+filter that is told so learns pitch, biases and speed from each stop, and a smoother draws the speed between
+two stops back to zero at both ends. Neither a map nor a wheel is needed, and which way the train runs is no
+question.
+
+Between two stops the error of the speed grows by the gyro's noise N as g N sqrt(t^3/3): .4 m/s after 90 s
+with .005 deg/s/sqrt(Hz). A ride that never stops again is no fault, but its standard deviations grow without
+end.
+
+Zero-velocity updates are those of pedestrian navigation: I. Skog, P. Handel, J.-O. Nilsson and J.
+Rantakokko, IEEE Trans. Biomed. Eng. 57(11) (2010) 2657-2666. The model along a track, and the detector,
+which lives on the turning of the rails under a train that is not quite at rest, are ours.
+
+Not here: the loop (`simrail.estimators.odometry.zero_velocity_kernel`), the detector
+(`simrail.estimators.odometry.standstill`), and odometry with a map
+(`simrail.estimators.odometry.curve_matched`).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from simrail.estimators.kalman import History, fixed_interval, room_for_history
+from simrail.estimators.odometry.calm import ACCELERATION_SD_MPS2, calm, calm_so_far, power, unsteady
+from simrail.estimators.odometry.curve_matched import chainage_sd, chord_of, lag_of
+from simrail.estimators.odometry.standstill import require_rest_first, signs_of_rest
+from simrail.estimators.odometry.vertical import vertical_force
+from simrail.estimators.odometry.zero_velocity_kernel import (
+    ASKEW,
+    DRIFT_X,
+    DRIFT_Z,
+    LATERAL,
+    PITCH,
+    PUSH,
+    REST,
+    REST_X,
+    ROLL,
+    STATES,
+    SWAY,
+    UPDATES,
+    Found,
+    Model,
+    S,
+    V,
+    room,
+    zero_velocity,
+)
+
+from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD, STANDSTILL
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.estimation.estimate import Estimate
+from simrail.recording.recording import ImuSheet, Recording
+
+RATE_HZ = 10.0
+"""Rate of the filter. A train's jerk is limited, and what shakes faster averages out in between."""
+
+BIAS_S = 300.0
+"""Time within which a bias wanders by its instability, where no sheet says it."""
+
+LEANS_RAD = 0.1
+"""Roll and pitch of a train that stands, and of an IMU in it: standard deviation."""
+
+ASKEW_RAD = 5e-4
+"""Yaw of a body in its track in a curve, at the middle of its chord: standard deviation."""
+
+REST_TURNING_RADPSQRTS = 5e-5
+"""Density of the angular rate that passengers give a body at rest."""
+
+REST_LEANING_RADPSQRTS = 3e-5
+"""By this random walk a body leans as passengers change their places."""
+
+UNHEARD_MPS = 0.03
+"""A train that leaves with the jerk of a gentle start runs so fast by the time it is heard."""
+
+
+class Trace(NamedTuple):
+    """The filter's, or the smoother's, own steps.
+
+    Attributes
+    ----------
+    time_s : ndarray (n,)
+        End of each step.
+    model : Model
+        What went in.
+    found : Found
+        What came out, smoothed if that is wanted.
+    past : History or None
+        What the filter left behind for the smoother.
+    """
+
+    time_s: FloatArray
+    model: Model
+    found: Found
+    past: History | None
+
+
+@dataclass(frozen=True)
+class ZeroVelocityOdometry:
+    """Odometry from an IMU alone, by zero-velocity updates.
+
+    Attributes
+    ----------
+    smoothed : bool
+        Smooth over the whole ride: the error between two stops is some tenth of the filter's.
+    push_density_mps2sqrts : float
+        Density of what the force along the track has beside motion, slope and the sensor's own noise.
+    turn_density_radpsqrts : float
+        Density of what a gyro has beside turning and its own noise.
+    lateral_density_mps2sqrts : float
+        Density of the sway, in the lateral row.
+    rest_speed_mps : float
+        Standard deviation of the speed of a body at rest, which passengers move.
+    surely : float
+        Probability from which on the train is held to stand.
+    start_sd_m : float
+        Of the place where the ride begins.
+    """
+
+    smoothed: bool = False
+    push_density_mps2sqrts: float = 2e-3
+    turn_density_radpsqrts: float = 1e-5
+    lateral_density_mps2sqrts: float = 0.3
+    rest_speed_mps: float = 0.02
+    surely: float = 0.99
+    start_sd_m: float = 0.05
+
+    cites = ("Skog, Handel, Nilsson and Rantakokko, IEEE Trans. Biomed. Eng. 57(11) 2657, 2010",)
+
+    @property
+    def causal(self) -> bool:
+        """The filter is causal, the smoother is not."""
+        return not self.smoothed
+
+    @property
+    def label(self) -> str:
+        """What a reader calls it."""
+        return "zero-velocity odometry, smoothed" if self.smoothed else "zero-velocity odometry"
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if name not in ("smoothed", "surely") and not 0.0 < value < math.inf:
+                raise InputError("is out of range", field=name, value=value, limit="> 0")
+        if not 0.5 <= self.surely < 1.0:
+            raise InputError(
+                "is no probability that tells", field="surely", value=self.surely, limit=">= .5 and < 1"
+            )
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate position, speed and acceleration along the track at every IMU sample.
+
+        Raises
+        ------
+        InputError
+            If there is no vertical signal, or the ride does not begin at rest.
+        """
+        vertical_force(recording, tells="rest from motion")
+        require_rest_first(recording)
+        trace = self.trace(recording)
+        return Estimate(states=self.at_imu_times(trace, recording), mount=recording.mount)
+
+    def trace(self, recording: Recording) -> Trace:
+        """Run the filter, and the smoother if wanted; all states at its own steps."""
+        block = _block(recording)
+        times = recording.imu.index.to_numpy(dtype=np.float64)
+        steps = len(times) // block
+        model = self.model(recording)
+        x, p = self.start(recording, model)
+        found = room(steps, STATES if self.smoothed else PITCH + 1)
+        past = room_for_history(steps, STATES, UPDATES) if self.smoothed else None
+        zero_velocity(model, x, p, found, past)
+        if past is not None:
+            fixed_interval(past, found.states, found.covariances)
+        return Trace(times[block - 1 :: block][:steps], model, found, past)
+
+    def model(self, recording: Recording) -> Model:
+        """Signals at the filter's rate, and the noise: the method's own, with what the data sheet adds."""
+        sheet, block = recording.imu_sheet, _block(recording)
+        step = block / sheet.rate_hz
+        signals = recording.imu[[*GYRO, *ACCEL[:2]]].to_numpy(dtype=np.float64)
+        steps = len(signals) // block
+        signals = np.ascontiguousarray(signals[: steps * block].reshape(steps, block, 5).mean(axis=1))
+        rate_variance, force_variance = white(sheet)
+        process = np.zeros(STATES)
+        process[V] = force_variance + self.push_density_mps2sqrts**2
+        process[[ROLL, PITCH]] = rate_variance + self.turn_density_radpsqrts**2
+        drift, push = wandering(sheet)
+        process[DRIFT_X : DRIFT_Z + 1], process[[PUSH, SWAY]] = drift, push
+        rest_process = process.copy()
+        rest_process[[ROLL, PITCH]] = REST_LEANING_RADPSQRTS**2
+        noise = np.empty(UPDATES)
+        noise[LATERAL] = self.lateral_density_mps2sqrts**2 / step
+        noise[REST] = self.rest_speed_mps**2
+        noise[REST_X:] = (rate_variance + REST_TURNING_RADPSQRTS**2) / step
+        chord = chord_of(recording)
+        signs = signs_of_rest(recording, block)
+        return Model(
+            step_s=step,
+            gravity=recording.gravity_mps2,
+            lever_m=recording.mount_position_m[0] - (0.0 if chord is None else chord.centre_m),
+            lag_m=0.0 if chord is None else lag_of(chord)[0],
+            signals=signals,
+            **signs._asdict(),
+            given=np.full(steps, -1.0),
+            process=process * step,
+            rest_process=rest_process * step,
+            noise=noise,
+            rate_variance=rate_variance,
+            force_variance=force_variance,
+            scale_variance=sheet.gyro_scale_error**2 / 3.0,
+            surely=math.log(self.surely / (1.0 - self.surely)),
+            unheard_mps=UNHEARD_MPS,
+        )
+
+    def start(self, recording: Recording, model: Model) -> tuple[FloatArray, FloatArray]:
+        """State and covariance of a train that stands where it is known to stand, leaning as it seems to."""
+        sheet = recording.imu_sheet
+        x, sd = np.zeros(STATES), np.zeros(STATES)
+        x[S] = recording.start_position_m
+        if len(model.signals):
+            lean = np.clip(model.signals[0, 3:] / model.gravity, -0.5, 0.5)
+            x[PITCH], x[ROLL] = -math.asin(lean[0]), math.asin(lean[1])
+        sd[S] = math.hypot(self.start_sd_m, float(chainage_sd(recording, x[S])))
+        sd[V] = self.rest_speed_mps
+        sd[[ROLL, PITCH]] = LEANS_RAD
+        sd[DRIFT_X : DRIFT_Z + 1] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
+        sd[[PUSH, SWAY]] = sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0) + 1e-4
+        sd[ASKEW] = math.hypot(ASKEW_RAD, sheet.package_misalignment_rad / math.sqrt(3.0))
+        return x, np.diag(sd**2)
+
+    def at_imu_times(self, trace: Trace, recording: Recording) -> pd.DataFrame:
+        """States at every IMU sample: interpolated, or of nothing later."""
+        wanted, found = recording.imu.index.to_numpy(dtype=np.float64), trace.found
+        odds = found.log_odds
+        rests = odds > trace.model.surely
+        rate = 1.0 / trace.model.step_s
+        if self.smoothed and len(odds) > 1:
+            own = calm(np.gradient(found.states[:, V], 1.0 / rate), rate)
+        else:
+            own = calm_so_far(found.acceleration, rate)
+        left = unsteady(recording, _block(recording), len(own)) + (found.acceleration - own) ** 2
+        shaking = power(left, rate, both_ways=self.smoothed)
+        sd = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2)[:, [S, V]])
+        # A scale that is off makes all changes of the speed wrong by the same share, and no stop shows it.
+        scaled = found.states[:, [S, V]] - [recording.start_position_m, 0.0]
+        sd = np.hypot(sd, recording.imu_sheet.accel_scale_error / math.sqrt(3.0) * scaled)
+        lines = np.column_stack(
+            [
+                found.states[:, S],
+                found.states[:, V] * np.cos(found.states[:, PITCH]),
+                np.where(rests, 0.0, own),
+                sd,
+                np.sqrt(ACCELERATION_SD_MPS2**2 + shaking),
+                1.0 / (1.0 + np.exp(-np.maximum(odds, -700.0))),
+            ]
+        )
+        # Until the filter's first step: standing at the start.
+        start_sd = math.hypot(self.start_sd_m, float(chainage_sd(recording, recording.start_position_m)))
+        sds = [start_sd, self.rest_speed_mps, ACCELERATION_SD_MPS2]
+        start = [recording.start_position_m, 0.0, 0.0, *sds, 1.0]
+        lines, times = np.vstack([start, lines]), np.concatenate([[-np.inf], trace.time_s])
+        last = np.searchsorted(times, wanted, side="right") - 1
+        if self.smoothed:
+            times[0] = wanted[0] - 1.0 / rate
+            values = np.column_stack([np.interp(wanted, times, column) for column in lines.T])
+            ahead = np.maximum(wanted - times[-1], 0.0)
+        else:
+            values = lines[last]
+            ahead = np.where(last > 0, wanted - times[last], 0.0)
+        values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
+        values[:, 1] += ahead * values[:, 2]
+        return pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD, STANDSTILL])
+
+
+def white(sheet: ImuSheet) -> tuple[float, float]:
+    """Variance of the mean over one second of a gyro and of an accelerometer, (rad/s)^2 s and (m/s2)^2 s."""
+    gyro, accel = (
+        density**2 + count**2 / (12.0 * sheet.rate_hz)
+        for density, count in (
+            (sheet.gyro_noise_radpsqrts, sheet.gyro_resolution_radps),
+            (sheet.accel_noise_mpsqrts, sheet.accel_resolution_mps2),
+        )
+    )
+    return gyro, accel
+
+
+def wandering(sheet: ImuSheet) -> tuple[float, float]:
+    """Variance that the biases of a gyro and of an accelerometer gain in a second.
+
+    Of a Markov process that wanders by its bias instability within its correlation time, and of the random
+    walk.
+    """
+    gyro, accel = (
+        2.0 * instability**2 / (time or BIAS_S) + walk**2
+        for instability, time, walk in (
+            (
+                sheet.gyro_bias_instability_radps,
+                sheet.gyro_bias_correlation_s,
+                sheet.gyro_random_walk_radpspsqrts,
+            ),
+            (
+                sheet.accel_bias_instability_mps2,
+                sheet.accel_bias_correlation_s,
+                sheet.accel_random_walk_mps2psqrts,
+            ),
+        )
+    )
+    return gyro + 1e-16, accel + 1e-14
+
+
+def _block(recording: Recording) -> int:
+    """Samples in a step of the filter."""
+    return max(1, round(recording.imu_sheet.rate_hz / RATE_HZ))

@@ -1,0 +1,247 @@
+"""Compiled loop of the zero-velocity odometry: strapdown along the track, held whenever the train stands.
+
+The train moves along its own X axis, up to what the body points askew. Gyros carry roll and pitch from one
+step to the next, and the accelerometer less gravity is the change of speed (EQUATIONS 0):
+
+    psd = sin(roll) q + cos(roll) r                               turning about the vertical of the body
+    roll' = p + tan(pitch) psd,    pitch' = cos(roll) q - sin(roll) r
+    v' = f_x - push + g sin(pitch) + lever psd^2 + askew v psd,    s' = v cos(pitch)
+    f_y = v psd + g sin(roll) cos(pitch) + sway                    lateral row, every step
+
+with p, q, r the gyro less its biases. An IMU that is ``lever`` ahead of the middle of the chord on which its
+body runs is pulled towards that middle in a curve (`simrail.recording.sheets.vehicle_sheet.Chord`).
+
+At rest the body turns no more than passengers turn it, and the rows are v = 0 and the gyro's biases. That
+gives the pitch less push / g anew at each stop, and the biases of the gyros, which the way in between lives
+on.
+
+Whether the train stands is judged by `simrail.estimators.odometry.standstill`, from the signals and from
+what the filter knows. Odds from seconds that have nothing in common add up, and one second that speaks
+against rest takes all of that away.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
+from simrail.estimators.odometry.standstill import PRIOR, SUREST, TURN_S, rest_log_ratio, speed_log_ratio
+
+from simrail.core.jit import FloatArray, njit, njit_borrowed
+
+STATES = 10
+S, V, ROLL, PITCH, DRIFT_X, DRIFT_Y, DRIFT_Z, PUSH, SWAY, ASKEW = range(STATES)
+"""Place and speed along the track, roll, pitch, biases of the gyros, offsets of the accelerometers along X
+and Y, yaw of the IMU in its track."""
+
+SCALED_S = 10.0
+"""A curve or a vertical curve lasts so long: an error of a gyro's scale does the same all along."""
+
+UPDATES = 5
+LATERAL, REST, REST_X, REST_Y, REST_Z = range(UPDATES)
+"""Rows: lateral force; at rest, the speed and the three gyros."""
+
+
+class Model(NamedTuple):
+    """What the filter takes of a ride of n steps.
+
+    Attributes
+    ----------
+    step_s, gravity, lever_m, lag_m : float
+        Step, gravity, how far the IMU is ahead of the middle of its body's chord, and how far that middle
+        moves against the direction of running in a curve.
+    signals : ndarray (n, 5)
+        Mean angular rates, rad/s, and specific forces along X and Y, m/s2, over the step that ends here.
+    shaking, turning, turn_s, force : ndarray
+        `simrail.estimators.odometry.standstill.Signs`.
+    given : ndarray (n,)
+        1 where the train is told to stand, 0 where to run; below 0 the filter judges.
+    process, rest_process : ndarray (10,)
+        Variances that a step adds while the train runs, and at rest.
+    noise : ndarray (5,)
+        Variances of the rows.
+    rate_variance, force_variance : float
+        White noise of a gyro and of the accelerometer along X: variances of a mean over one second.
+    scale_variance : float
+        Of the relative error of a gyro's scale.
+    surely : float
+        Log odds from which on the train is held to stand.
+    unheard_mps : float
+        What a train may have run by the time it is heard to leave: standard deviation.
+    """
+
+    step_s: float
+    gravity: float
+    lever_m: float
+    lag_m: float
+    signals: FloatArray
+    shaking: FloatArray
+    turning: FloatArray
+    turn_s: FloatArray
+    force: FloatArray
+    given: FloatArray
+    process: FloatArray
+    rest_process: FloatArray
+    noise: FloatArray
+    rate_variance: float
+    force_variance: float
+    scale_variance: float
+    surely: float
+    unheard_mps: float
+
+
+class Found(NamedTuple):
+    """What it says after each of n steps.
+
+    Attributes
+    ----------
+    states, covariances : ndarray (n, 10), (n, m, m)
+        Of the first m states.
+    acceleration : ndarray (n,)
+        Mean of v' over the step, m/s2; 0 at rest.
+    log_odds : ndarray (n,)
+        That the train stands.
+    """
+
+    states: FloatArray
+    covariances: FloatArray
+    acceleration: FloatArray
+    log_odds: FloatArray
+
+
+def room(steps: int, spoken_of: int) -> Found:
+    """Room for what the filter says."""
+    square = (steps, spoken_of, spoken_of)
+    return Found(np.empty((steps, STATES)), np.empty(square), np.empty(steps), np.empty(steps))
+
+
+@njit
+def zero_velocity(model: Model, x: FloatArray, p: FloatArray, found: Found, past: History | None) -> None:
+    """Run the filter over n steps.
+
+    Parameters
+    ----------
+    model : Model
+    x, p : ndarray (10,), (10, 10), in and out
+        State and covariance at the start of the first step.
+    found : Found, out
+    past : History or None, out
+        For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
+    """
+    f, work, h = np.eye(STATES), np.zeros((STATES, STATES)), np.zeros((UPDATES, STATES))
+    gain, v, turn, variance = np.zeros(STATES), np.zeros(STATES), np.zeros(3), np.zeros(3)
+    h[REST, V] = h[REST_X, DRIFT_X] = h[REST_Y, DRIFT_Y] = h[REST_Z, DRIFT_Z] = 1.0
+    odds, rests = SUREST, True  # a train begins its ride at rest
+    for k in range(model.signals.shape[0]):
+        signal = model.signals[k]
+        now = _evidence(model, k, x, p, turn, variance)
+        more = max(now, odds + model.step_s / TURN_S * now) if now > 0.0 else max(odds, 0.0) + now
+        odds = min(more, SUREST)
+        found.log_odds[k] = PRIOR + odds + speed_log_ratio(x[V], p[V, V])
+        stood = rests
+        rests = found.log_odds[k] > model.surely if model.given[k] < 0.0 else model.given[k] > 0.0
+        if stood and not rests:
+            p[V, V] += model.unheard_mps**2
+        found.acceleration[k] = _predict(model, signal, rests, x, p, f, work)
+        if past is not None:
+            remember_prediction(past, k, x, p, f)
+        for m in range(UPDATES):
+            if m == LATERAL:
+                error = _lateral(model, signal, x, h[LATERAL])
+            elif m == REST:
+                error = -x[V]
+            else:
+                error = signal[m - REST_X] - x[DRIFT_X + m - REST_X]
+            if rests or m == LATERAL:
+                s = update(x, p, h[m], error, model.noise[m], gain, v)
+                if past is not None:
+                    remember(past, k, m, h[m], gain, error, s)
+        if rests:
+            found.acceleration[k] = 0.0
+        keep(found.states, found.covariances, k, x, p)
+
+
+@njit_borrowed
+def _evidence(
+    model: Model, k: int, x: FloatArray, p: FloatArray, turn: FloatArray, variance: FloatArray
+) -> float:
+    """What the signals say of rest, less the biases and the slope that the filter knows.
+
+    What has led the speed astray has led the slope astray as well. The speed is judged elsewhere; here the
+    acceleration is that of a train of speed zero, given which less is doubtful.
+    """
+    for i in range(3):
+        turn[i] = model.turning[k, i] - x[DRIFT_X + i]
+        variance[i] = p[DRIFT_X + i, DRIFT_X + i] + model.rate_variance / model.turn_s[k]
+    slope = model.gravity * math.cos(x[PITCH])
+    push = model.force[k] - x[PUSH] + model.gravity * math.sin(x[PITCH])
+    known = p[PUSH, PUSH] - 2.0 * slope * p[PUSH, PITCH] + slope * slope * p[PITCH, PITCH]
+    shared = (slope * p[V, PITCH] - p[V, PUSH]) / p[V, V]
+    push -= shared * x[V]
+    known -= shared * shared * p[V, V]
+    return rest_log_ratio(model.shaking[k], turn, variance, push, max(known, 0.0) + model.force_variance)
+
+
+@njit_borrowed
+def _predict(
+    model: Model,
+    signal: FloatArray,
+    rests: bool,
+    x: FloatArray,
+    p: FloatArray,
+    f: FloatArray,
+    work: FloatArray,
+) -> float:
+    """State and covariance over one step, F in ``f``; returns the mean acceleration."""
+    dt, g = model.step_s, model.gravity
+    lever = model.lever_m + (model.lag_m if x[V] > 0.0 else -model.lag_m)
+    sr, cr, sp, cp = math.sin(x[ROLL]), math.cos(x[ROLL]), math.sin(x[PITCH]), math.cos(x[PITCH])
+    a, b, c = signal[0] - x[DRIFT_X], signal[1] - x[DRIFT_Y], signal[2] - x[DRIFT_Z]
+    turns = 0.0 if rests else 1.0
+    psd, pitching = turns * (sr * b + cr * c), turns * (cr * b - sr * c)
+    pull = 2.0 * lever * psd + x[ASKEW] * x[V]  # derivative of v' by psd
+    acceleration = signal[3] - x[PUSH] + g * sp + lever * psd * psd + x[ASKEW] * x[V] * psd
+    for i in range(V, PITCH + 1):
+        for j in range(STATES):
+            f[i, j] = 1.0 if i == j else 0.0
+    f[V, V] += dt * x[ASKEW] * psd
+    f[V, PITCH], f[V, PUSH], f[V, ASKEW] = dt * g * cp, -dt, dt * x[V] * psd
+    f[V, ROLL] = dt * pull * pitching
+    f[V, DRIFT_Y], f[V, DRIFT_Z] = -dt * pull * sr * turns, -dt * pull * cr * turns
+    f[ROLL, ROLL] += dt * sp / cp * pitching
+    f[ROLL, PITCH] = dt * psd / (cp * cp)
+    f[ROLL, DRIFT_X] = -dt * turns
+    f[ROLL, DRIFT_Y], f[ROLL, DRIFT_Z] = -dt * sp / cp * sr * turns, -dt * sp / cp * cr * turns
+    f[PITCH, ROLL] = -dt * psd
+    f[PITCH, DRIFT_Y], f[PITCH, DRIFT_Z] = -dt * cr * turns, dt * sr * turns
+    way = dt * (x[V] + 0.5 * dt * acceleration)
+    for j in range(STATES):
+        f[S, j] = 0.5 * dt * cp * f[V, j]
+    f[S, S] = 1.0
+    f[S, V] += 0.5 * dt * cp
+    f[S, PITCH] -= sp * way
+    x[S] += cp * way
+    x[V] += dt * acceleration
+    x[ROLL] += dt * (turns * a + sp / cp * psd)
+    x[PITCH] += dt * pitching
+    congruence(f, p, work)
+    process = model.rest_process if rests else model.process
+    for i in range(STATES):
+        p[i, i] += process[i]
+    scaled = turns * dt * SCALED_S * model.scale_variance
+    p[ROLL, ROLL] += scaled * (a * a + (sp / cp) ** 2 * ((sr * b) ** 2 + (cr * c) ** 2))
+    p[PITCH, PITCH] += scaled * ((cr * b) ** 2 + (sr * c) ** 2)
+    return float(acceleration)
+
+
+@njit_borrowed
+def _lateral(model: Model, signal: FloatArray, x: FloatArray, h: FloatArray) -> float:
+    """Innovation of the lateral force, its row in ``h``."""
+    sr, cr, sp, cp = math.sin(x[ROLL]), math.cos(x[ROLL]), math.sin(x[PITCH]), math.cos(x[PITCH])
+    b, c = signal[1] - x[DRIFT_Y], signal[2] - x[DRIFT_Z]
+    psd = sr * b + cr * c
+    h[V], h[SWAY] = psd, 1.0
+    h[ROLL] = x[V] * (cr * b - sr * c) + model.gravity * cr * cp
+    h[PITCH] = -model.gravity * sr * sp
+    h[DRIFT_Y], h[DRIFT_Z] = -x[V] * sr, -x[V] * cr
+    return float(signal[4] - x[V] * psd - model.gravity * sr * cp - x[SWAY])
