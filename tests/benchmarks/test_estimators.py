@@ -27,11 +27,11 @@ from simrail.estimators.attitude.veillard_kernel import Model as ElevenStates
 from simrail.estimators.attitude.veillard_kernel import eleven_states, room
 from simrail.estimators.odometry import zero_velocity_kernel
 from simrail.estimators.odometry.spectral import FRAME, HOP, spectral_sums
+from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
+from simrail.estimators.odometry.zero_velocity_kernel import zero_velocity
 from simrail.estimators.profile.kernel import profile_filter
 from simrail.estimators.profile.kernel import room as room_for_profile
 from simrail.estimators.profile.profile_filter import ProfileFilter
-from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
-from simrail.estimators.odometry.zero_velocity_kernel import zero_velocity
 from simrail.estimators.trajectory.kernel import (
     Model,
     room_for_filtered,

@@ -19,8 +19,8 @@ from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.spectral import SpectralOdometry
-from simrail.estimators.profile.profile_filter import ProfileFilter
 from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
+from simrail.estimators.profile.profile_filter import ProfileFilter
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
