@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
+from simrail.recording.sheets.grades import silent_noise
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
@@ -148,6 +149,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
         if sensor_key not in judged_sensors:
             judged_sensors.add(sensor_key)
             judge_sensors(resolved)
+            warnings += silent_noise(resolved.grade)
     return simulated, warnings, notes
 
 
