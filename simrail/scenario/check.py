@@ -18,6 +18,7 @@ from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.check_vibration import step_words
+from simrail.scenario.designs import DESIGNS
 from simrail.scenario.distributions import dimensions, sample_count
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import judge_stop_rule
@@ -92,9 +93,11 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         )
     with blame(scenario.file):
         _judge_score(scenario)
+        _judge_design(scenario)
         estimators = parts.estimators(0)
-        for sample in range(1, sample_count(scenario.spec)):
-            parts.estimators(sample)
+        if parts.draws_estimators:
+            for sample in range(1, sample_count(scenario.spec)):
+                parts.estimators(sample)
         judge_stop_rule(scenario, [*estimators, *_judge_ride_figures(scenario, estimators)])
         simulated, unusual, notes = _judge_cells(scenario, parts)
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
@@ -190,6 +193,28 @@ def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> lis
         for name, step in steps.items()
         if isinstance(step, int | float) and step > 0.0 and abs(round(base / step) * step / base - 1.0) > 1e-6
     ]
+
+
+def _judge_design(scenario: Scenario) -> None:
+    """Refuse a design of a sensitivity analysis that has nothing to vary, or would not be run as a whole."""
+    spec = scenario.spec
+    method = spec.monte_carlo.method
+    if method not in DESIGNS:
+        return
+    here = {"field": "monte_carlo.method", "value": method}
+    if not dimensions(spec):
+        raise InputError(
+            "is a design over distributions, and no value is one",
+            **here,
+            remedy='write a range, e.g. --set "imu.sheet.gyro_noise_degpsqrth={ log_uniform = [0.05, 1.0] }"',
+        )
+    for name in ("stop", "passes"):
+        if getattr(spec, name) is not None:
+            raise InputError(
+                f"needs all of its samples, each by itself, and does not go with {name}",
+                **here,
+                remedy=f"leave out {name}, or the method",
+            )
 
 
 def _judge_samples(scenario: Scenario) -> list[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, create_model
 
@@ -68,6 +68,12 @@ class ImuHead(Part):
     def grade(self, name: str) -> ImuGrade:
         """The grade in SI units; `name` is the stem of the file."""
         return grade_from_datasheet(name, **self.model_dump(exclude=set(_HEAD)))
+
+    def with_figures(self, figures: Mapping[str, float]) -> Self:
+        """The same device with other figures, each in the place of its quantity in whatever unit."""
+        fields = {FIGURES[name].field for name in figures}
+        replaced = {name: None for name, figure in FIGURES.items() if figure.field in fields}
+        return self.model_copy(update=replaced | dict(figures))
 
     @classmethod
     def explained(cls, key: str, value: object) -> str | None:
