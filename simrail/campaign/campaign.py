@@ -243,11 +243,7 @@ class _Loop:
         if ride[0].passes:  # those of all numbers of passes share their rides' estimates
             self.ready.extend(_Batch(False, tuple(own)) for _, own in groupby(ride, key=_recordings_of))
         else:
-            # A batch has the estimators of one sample.
-            of_sample = self.plan.parts.draws_estimators
-            for _, group in groupby(ride, key=lambda cell: cell.sample if of_sample else 0):
-                own = tuple(group)
-                self.ready.extend(_Batch(False, own[i : i + size]) for i in range(0, len(own), size))
+            self.ready.extend(_Batch(False, ride[i : i + size]) for i in range(0, len(ride), size))
         self.watcher.ride_ends()
 
     def _submit(self, batch: _Batch) -> Future[BatchResult]:

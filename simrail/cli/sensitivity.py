@@ -88,7 +88,9 @@ def sensitivity(
         if one.indices.notna().any(axis=None):
             with whole_file(file) as stream:
                 # By itself, without a page that chooses the font.
-                picture = responses_figure(one, drawn).replace("<svg ", '<svg font-family="sans-serif" ', 1)
+                picture = str(responses_figure(one, drawn)).replace(
+                    "<svg ", '<svg font-family="sans-serif" ', 1
+                )
                 stream.write(picture.encode())
     print(f"wrote {folder / name}.csv, and the responses beside it as .svg")
     return CELL_FAILED if failures else DONE

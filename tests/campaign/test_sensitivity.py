@@ -35,7 +35,7 @@ truth_rate_hz = 100.0
 odometry = "none"
 [monte_carlo]
 method = "saltelli"
-samples = 64
+samples = 16
 [[ride]]
 name = "rest"
 start_m = 50.0
@@ -79,15 +79,15 @@ def roll_of(recording, roll):
 
 @dataclass(frozen=True)
 class Ishigami:
-    "A roll error of Ishigami's function, in milliradians and above 20 of them; it fails where x1 is large."
+    "A roll error of Ishigami's function, in milliradians and above 20 of them; it fails by digits of x2."
     x1: float
     x2: float
     x3: float
-    fails_above: float = 10.0
+    fails: float = 0.0
     causal = True
 
     def estimate(self, recording):
-        if self.x1 > self.fails_above:
+        if abs(1e4 * self.x2) % 1.0 < self.fails:
             raise ValueError("planted failure")
         y = np.sin(self.x1) * (1.0 + 0.1 * self.x3**4) + 7.0 * np.sin(self.x2) ** 2
         return roll_of(recording, 1e-3 * (y + 20.0))
@@ -160,11 +160,11 @@ def ishigami_indices() -> tuple[list[float], list[float]]:
     return [first / whole, second / whole, 0.0], [(first + both) / whole, second / whole, both / whole]
 
 
-def agree(found: pd.DataFrame, first: list[float], total: list[float]) -> None:
-    """Within two half widths of a 95 % interval: 3.9 standard deviations."""
+def agree(found: pd.DataFrame, first: list[float], total: list[float], *, neglected: float = 1e-9) -> None:
+    """Within two half widths of a 95 % interval: 3.9 standard deviations; and what the closed form neglects."""
     for name, values in (("first", first), ("total", total)):
         away = np.abs(found[name].to_numpy() - values)
-        assert np.all(away <= 2.0 * found[f"{name}_pm"].to_numpy() + 1e-9), found
+        assert np.all(away <= 2.0 * found[f"{name}_pm"].to_numpy() + neglected), found
 
 
 def test_sobol_of_ishigami() -> None:
@@ -224,21 +224,49 @@ def test_where_there_are_no_indices_it_is_said(values: FloatArray, words: str) -
     assert found.isna().all(axis=None)
 
 
-def test_ishigami_through_the_campaign_loop_with_failures(place: Path) -> None:
-    """32 blocks of 5; x1 beyond 3.0 fails: 4.5 % of its values, 9 % of blocks, which have two of them."""
-    scenario, result = ran("ishigami", "estimator.options.fails_above=3.0", "monte_carlo.samples=32")
+def failing(shares: FloatArray, share: float) -> FloatArray:
+    """Samples at which the toy fails: by digits of x2 that have nothing to do with the response."""
+    x2 = math.pi * (2.0 * shares[:, 1] - 1.0)
+    mask: FloatArray = np.abs(1e4 * x2) % 1.0 < share
+    return mask
+
+
+def ishigami_through_the_loop(blocks: int) -> Sensitivity:
+    """Run it with 5 % of the values of x2 failing, and judge all but the indices."""
+    scenario, result = ran(
+        "ishigami", "estimator.options.fails=0.05", f"monte_carlo.samples={blocks}", "seed=2"
+    )
     found = only_one(scenario, result)
     failed = np.isnan(found.values)
-    x1 = math.pi * (2.0 * found.shares[:, 0] - 1.0)
-    np.testing.assert_array_equal(failed, x1 > 3.0)
-    assert 0 < found.dropped == np.count_nonzero(failed.reshape(32, 5).any(axis=1)) < 10
+    np.testing.assert_array_equal(failed, failing(found.shares, 0.05))
+    assert 0 < found.dropped == np.count_nonzero(failed.reshape(blocks, 5).any(axis=1)) < 0.4 * blocks
     assert "planted failure" in found.note
     responses = np.degrees(1e-3 * (ishigami(found.shares) + 20.0))
     np.testing.assert_allclose(found.values[~failed], responses[~failed], rtol=1e-9)
-    agree(found.indices, *ishigami_indices())
+    return found
+
+
+def test_ishigami_through_the_campaign_loop_with_failures(place: Path) -> None:
+    """Few blocks: held against what so few give of the function itself, over 60 other seeds."""
+    found = ishigami_through_the_loop(16)
+    names = list(found.indices.index)
+    others = []
+    for seed in range(100, 160):
+        shares = design_shares("saltelli", 16, names, seed=seed)
+        values = np.where(failing(shares, 0.05), np.nan, ishigami(shares))
+        others.append(
+            indices_of("saltelli", names, shares, values, seed=seed)[0][["first", "total"]].to_numpy()
+        )
+    mean, sd = np.mean(others, axis=0), np.std(others, axis=0)
+    assert np.all(np.abs(found.indices[["first", "total"]].to_numpy() - mean) < 4.0 * sd)
     table = sensitivity_table([found])
-    assert list(table["value"]) == [f"estimator.toy.options.{name}" for name in ("x1", "x2", "x3")]
+    assert sorted(table["value"]) == [f"estimator.toy.options.{name}" for name in ("x1", "x2", "x3")]
     assert table["dropped"].eq(found.dropped).all()
+
+
+@pytest.mark.slow
+def test_ishigami_through_the_campaign_loop_equals_the_closed_form(place: Path) -> None:
+    agree(ishigami_through_the_loop(512).indices, *ishigami_indices())
 
 
 def linear_slopes(scenario: Scenario) -> FloatArray:
@@ -267,8 +295,11 @@ def test_terms_of_a_sheet_through_the_campaign_loop(place: Path) -> None:
     ]
     assert sorted(found.indices.index) == sorted(names)
     ordered = found.indices.loc[names]
+    places = [list(found.indices.index).index(name) for name in names[:2]]
+    rest = found.values - found.shares[:, places] @ slopes
+    assert np.ptp(rest) < 1e-3 * np.abs(slopes).min()  # the bias that wanders; noise is the same everywhere
     shares = [*(slopes**2 / (slopes**2).sum()), 0.0]
-    agree(ordered, shares, shares)
+    agree(ordered, shares, shares, neglected=1e-3)
     assert len(result.rides) == 1
     design = [*BIASES, "monte_carlo.method='morris'", "monte_carlo.samples=4"]
     scenario, result = ran("linear", *design)
@@ -281,7 +312,8 @@ def test_devices_are_averaged_and_the_same_in_every_sample(place: Path) -> None:
     """Of more draws, the mean over the same devices; a sample of which one draw failed has no response."""
     scenario, result = ran("linear", *BIASES, "monte_carlo.samples=4", "monte_carlo.sensor_draws=3")
     found = only_one(scenario, result)
-    of_roll = result.scores[(result.scores["quantity"] == "roll") & (result.scores["estimator"] == "toy")]
+    scores = result.scores
+    of_roll = scores[(scores["quantity"] == "roll") & (scores["reference"] == "truth")]
     assert len(of_roll) == 3 * len(found.values)
     np.testing.assert_allclose(found.values, of_roll["value"].to_numpy().reshape(-1, 3).mean(axis=1))
     holed = result.scores.copy()
@@ -395,7 +427,7 @@ def test_a_design_is_run_whole(table: str, place: Path) -> None:
 def test_the_command_writes_tables_and_figures_and_does_not_run_twice(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["sensitivity", "ishigami.toml", "--samples", "16", "--workers", "1"]
+    arguments = ["sensitivity", "ishigami.toml", "--samples", "4", "--workers", "1"]
     assert call(arguments) == DONE
     said = capsys.readouterr()
     assert "estimator.toy.options.x1" in said.out and "first order" in said.out
@@ -413,6 +445,6 @@ def test_the_command_writes_tables_and_figures_and_does_not_run_twice(
 
 def test_a_failure_is_told_and_ends_with_its_code(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["ishigami.toml", "--method", "morris", "--samples", "4", "--workers", "1"]
-    assert call(["sensitivity", *arguments, "--set", "estimator.options.fails_above=3.1"]) == CELL_FAILED
+    assert call(["sensitivity", *arguments, "--set", "estimator.options.fails=0.95"]) == CELL_FAILED
     said = capsys.readouterr().out
     assert "trajectories left out" in said and "planted failure" in said
