@@ -234,7 +234,7 @@ def _rows_of(scores: pd.DataFrame, figure: FigureName, estimators: Sequence[str]
 def _pairs(cells: pd.DataFrame, rows: pd.DataFrame) -> Iterator[tuple[tuple[int, str], str]]:
     """Cases with what they are called, and the estimators that have the figure."""
     labels = [name for name in (*_CASE_LABELS, *axis_columns(cells)) if name in cells]
-    telling = [name for name in dict.fromkeys(labels) if cells[name].nunique(dropna=False) > 1]
+    telling = [name for name in dict.fromkeys(labels) if len(cells[name].unique()) > 1]
     for case, group in cells.groupby("case", sort=True):
         first = group.iloc[0]
         words = ", ".join(f"{name} = {first[name]}" for name in telling)
@@ -267,7 +267,7 @@ def sensitivity_table(found: Sequence[Sensitivity]) -> pd.DataFrame:
     for one in found:
         labels = {"case": one.case, "estimator": one.estimator, **one.figure._asdict(), "unit": one.unit}
         for rank, name in enumerate(one.order, start=1):
-            row = {str(key): float(value) for key, value in one.indices.loc[name].items()}
+            row = {str(column): one.indices[column][name] for column in one.indices}
             told = {"blocks": one.blocks, "dropped": one.dropped, "note": one.note}
             rows.append({**labels, "method": one.method, "rank": rank, "value": name, **row, **told})
     return pd.DataFrame(rows)

@@ -1,5 +1,4 @@
-"""The command line: `run`, `check`, `export`, `estimate`, `tune`, `sensitivity`, `spectra`,
-and what shows or makes parts.
+"""The command line: what runs scenarios and rides, and what shows or makes parts.
 
 Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
 imports stand inside the commands, so that those that need little answer at once.

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from simrail.cli.options import CELL_FAILED, DONE, Scenario, Seed, Settings, number, say
-from simrail.core.errors import InputError, one_of
+from simrail.core.errors import one_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -132,7 +132,7 @@ def _scores(
             kept = read_results(folder, field="--out", remedy="run it with --fresh")
             return kept.scores, kept.cells, int(former.get("failed", 0))
     with ProgressWatcher(Console(stderr=True)) as watcher:
-        start = cast("Literal['auto', 'fresh']", "fresh" if fresh else "auto")
+        start: Literal["auto", "fresh"] = "fresh" if fresh else "auto"
         results = run(read, out=folder, workers=workers, cluster=cluster, start=start, watcher=watcher)
     campaign = results.campaign
     return campaign.scores, campaign.cells, len(campaign.failures)

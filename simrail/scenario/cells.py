@@ -7,8 +7,9 @@ sample of the scenario's distributions, and in their draws) share a *case*: scor
 the cells of a case.
 
 A list compares: its values meet the same draws. A distribution is chance: each of its samples has
-draws of its own, but those of a design (`simrail.scenario.designs`), which differ by their values alone. Of lists that set an ablation beside what a train has, an exact map and silence, one thing
-is taken away at a time: no cell has both.
+draws of its own, but those of a design (`simrail.scenario.designs`), which differ by their values alone:
+they share their seeds, and those with the same motion their ride. Of lists that set an ablation beside what a train
+has, an exact map and silence, one thing is taken away at a time: no cell has both.
 
 Of several passes, a cell is so many rides over the same rails, in an order that chance decides, anew for each
 track draw: four passes are the first four of sixteen. Each has a device of its own, and the same map.

@@ -1,7 +1,7 @@
 """Designs of a sensitivity analysis: which values the samples of a scenario have, so that indices follow.
 
-A design takes the place of the Latin hypercube (``[monte_carlo] method``). Its samples come in blocks, of which
-one is worth nothing without all of its samples:
+A design takes the place of the Latin hypercube (``[monte_carlo] method``). Its samples come in blocks, each
+of which is worth nothing unless it is whole:
 
 * ``morris``: trajectories of D + 1 samples over a grid of four levels, each step of which changes one value
   (Morris 1991): which of many values matter at all, for little.

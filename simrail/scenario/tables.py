@@ -306,8 +306,8 @@ class ImuPart(Part):
 
     ``sensor_draws`` limits the draws of this IMU below those of ``[monte_carlo]``: an ideal one has no
     errors to be drawn, so that one or two draws (of the encoder) say all. ``vehicle`` names the one that it
-    is on, where a scenario has several whose bodies have other names. ``sheet`` has figures that take the place
-    of those of the grade's data sheet, by the keys of IMU files: a number, a list, or a distribution.
+    is on, where a scenario has several whose bodies have other names. ``sheet`` has figures that take the
+    place of those of the grade's data sheet, by the keys of IMU files: a number, a list, or a distribution.
     """
 
     name: Name
@@ -420,9 +420,9 @@ class MonteCarloPart(Part):
     ``map_draws`` draws of the map, and recorded with ``sensor_draws`` draws of the sensors.
     Without a distribution there is one sample.
 
-    ``"morris"`` and ``"saltelli"`` are the designs of a sensitivity analysis (`simrail.scenario.designs`), whose
-    samples come in blocks: ``samples`` is then the number of trajectories, or of blocks, and all of them share
-    their draws.
+    ``"morris"`` and ``"saltelli"`` are the designs of a sensitivity analysis (`simrail.scenario.designs`),
+    whose samples come in blocks: ``samples`` is then the number of trajectories, or of blocks, and all of
+    them share their draws.
     """
 
     samples: Draws = 1

@@ -161,7 +161,7 @@ def ishigami_indices() -> tuple[list[float], list[float]]:
 
 
 def agree(found: pd.DataFrame, first: list[float], total: list[float], *, neglected: float = 1e-9) -> None:
-    """Within two half widths of a 95 % interval: 3.9 standard deviations; and what the closed form neglects."""
+    """Within two half widths of a 95 % interval: 3.9 standard deviations; and what is neglected."""
     for name, values in (("first", first), ("total", total)):
         away = np.abs(found[name].to_numpy() - values)
         assert np.all(away <= 2.0 * found[f"{name}_pm"].to_numpy() + neglected), found
@@ -344,7 +344,7 @@ def test_the_same_bits_in_batches_of_any_size(place: Path) -> None:
 def test_samples_that_differ_in_sensors_only_share_the_ride(
     settings: list[str], rides_expected: int, place: Path
 ) -> None:
-    """Of a block of Saltelli with one value of the rails, A has one and B another, and all others one of these."""
+    """Of one value of the rails, a block of Saltelli has two: that of A, and that of B."""
     scenario = load_scenario("linear.toml", overrides=[*BIASES, "monte_carlo.samples=4", *settings])
     listed = list(cells(scenario))
     assert count(scenario) == (rides_expected, len(listed))
@@ -415,7 +415,7 @@ def test_bad_input_is_one_line(
 @pytest.mark.parametrize("table", ["stop", "passes"])
 def test_a_design_is_run_whole(table: str, place: Path) -> None:
     other = {
-        "stop": '[stop]\nestimator = "toy"\nquantity = "roll"\nmetric = "rms"\nwidth = 1.0\nleast_draws = 2\n',
+        "stop": '[stop]\nestimator = "toy"\nquantity = "roll"\nmetric = "rms"\nwidth = 1.0\n',
         "passes": "",
     }[table]
     text = (place / "ishigami.toml").read_text() + other

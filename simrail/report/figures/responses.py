@@ -22,8 +22,8 @@ _TICKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 def smooth(x: FloatArray, y: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Local-linear smooth of points, with a Gaussian kernel, and half of its 95 % band.
 
-    The band is that of the mean: 1.96 sqrt(sum l_i^2 r_i^2) with the weights l_i of the smooth and the residuals
-    r_i of the points, whose scatter need not be alike everywhere. It holds no bias of the smooth.
+    The band is that of the mean: 1.96 sqrt(sum l_i^2 r_i^2) with the weights l_i of the smooth and the
+    residuals r_i of the points, whose scatter need not be alike everywhere. It holds no bias of the smooth.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def smooth(x: FloatArray, y: FloatArray, at: FloatArray) -> tuple[FloatArray, Fl
 def independent_rows(method: str, dimensions: int, count: int) -> FloatArray:
     """Which samples (count,) of a design are independent of each other, as a mask.
 
-    Of Saltelli's blocks the two points that the others are made of; of Morris' trajectories all, which are not
-    quite.
+    Of Saltelli's blocks the two points that the others are made of; of Morris' trajectories all, which are
+    not quite.
     """
     if method == "morris":
         return np.ones(count, dtype=bool)
@@ -108,7 +108,7 @@ def _word(distribution: Distribution, share: float) -> str:
 def _words(one: Sensitivity, name: str) -> str:
     """The index that ranks a value, with its interval."""
     column = INDEX_COLUMNS[one.method][2 if one.method == "saltelli" else 0]
-    value, half = one.indices.loc[name, column], one.indices.loc[name, f"{column}_pm"]
+    value, half = (float(one.indices[which][name]) for which in (column, f"{column}_pm"))
     if not np.isfinite(value):
         return "no index"
     if one.method == "saltelli":
