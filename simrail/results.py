@@ -219,6 +219,8 @@ def _write(
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
     campaign.cells.to_parquet(draft / "cells.parquet", index=False)
     aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
+    if len(campaign.verdicts):
+        campaign.verdicts.to_csv(draft / "verdicts.csv", index=False, float_format="%.9g")
     drawing = time.perf_counter()
     write_report(
         draft / "report.html",

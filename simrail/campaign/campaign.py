@@ -16,9 +16,10 @@ import inspect
 import json
 import tempfile
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
@@ -34,8 +35,9 @@ from simrail.core.source_hash import score_code_hash
 from simrail.ride.ride import is_cached
 from simrail.scenario.cells import Cell, rides_of
 from simrail.scenario.check import Plan, judge_scenario
+from simrail.scenario.requirements import VerdictState, stop_rule_of
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.stop_rule import StopState, stop_rule_of
+from simrail.scenario.stop_rule import StopState
 
 _MOST_CELLS, _MOST_SECONDS = 20, 600.0
 """Largest batch: cells, and seconds of recordings together, which are held in memory at once."""
@@ -153,6 +155,7 @@ class _Loop:
         self.total = plan.cells if only is None else 1
         self.left = self.total - len(self.done)
         self.failed = 0
+        self._chosen: Callable[[], Iterator[Cell]] = partial(chosen_cells, plan, only)
         self.simulated: dict[int, BatchResult] = {}
         self.ready: deque[_Batch] = deque()
         self.suspects: deque[_Batch] = deque()
@@ -161,32 +164,34 @@ class _Loop:
         if self.done:
             self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
-    def run(self, executor: Executor) -> StopState | None:
+    def run(self, executor: Executor) -> StopState | VerdictState | None:
         """Run what is left, or as much as the stop rule asks for; its last state."""
         self.executor = executor
         rule = stop_rule_of(self.plan.scenario) if self.only is None else None
         if rule is None:
             self._run()
             return None
+        state = None
         for draws in rule.stages:
-            numbers = {cell.number for cell in chosen_cells(self.plan, draws=draws)}
+            self._chosen = partial(chosen_cells, self.plan, draws=draws, former=state)
+            numbers = {cell.number for cell in self._chosen()}
             self.total, self.left = len(numbers), len(numbers - self.done)
-            self._run(draws=draws)
+            self._run()
             tables = (result.scores for result in self.checkpoint.results())
-            state = rule.state(chosen_cells(self.plan), tables, draws)
+            state = rule.state(chosen_cells(self.plan), tables, draws, state)
             self._tell(state.words)
             if state.reached:
                 break
         return state
 
-    def _run(self, *, draws: int | None = None) -> None:
-        """Run what is left of these draws; each batch is kept before its worker gets another."""
+    def _run(self) -> None:
+        """Run what is left of the chosen cells; each batch is kept before its worker gets another."""
         if not self.left:
             return
         self.checkpoint.log(f"{self.left} cells to run, {self.executor.workers()} at once")
         self.watcher.cells_begin(self.total - self.left, self.total)
         waiting: dict[Future[BatchResult], _Batch] = {}
-        rides = self._rides(draws)
+        rides = self._rides()
         while True:
             # What has killed a worker before runs alone, so that nothing else is lost with it.
             while len(waiting) < (1 if self._suspected(waiting) else self.executor.workers()):
@@ -216,10 +221,9 @@ class _Loop:
         for future in done:
             self._take(waiting.pop(future), future)
 
-    def _rides(self, draws: int | None) -> Iterator[tuple[Cell, ...]]:
+    def _rides(self) -> Iterator[tuple[Cell, ...]]:
         """The cells left of each ride."""
-        chosen = chosen_cells(self.plan, self.only, draws=draws)
-        for _, group in groupby(chosen, key=lambda cell: cell.ride_number):
+        for _, group in groupby(self._chosen(), key=lambda cell: cell.ride_number):
             left = tuple(cell for cell in group if cell.number not in self.done)
             if left:
                 yield left

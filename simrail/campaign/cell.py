@@ -10,8 +10,6 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from itertools import pairwise
-from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,8 +24,7 @@ from simrail.recording.recording import Recording, beginning
 from simrail.ride.ride import simulate
 from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts
-from simrail.scenario.cells import Cell
-from simrail.scenario.tables import RidePart
+from simrail.scenario.cells import Cell, cell_record, labels_of
 from simrail.scoring.geometry import score_geometry
 from simrail.scoring.kick import score_kick
 from simrail.scoring.ride_figures import RIDE, score_ride_comfort, score_running_safety
@@ -144,7 +141,7 @@ class BatchTally:
 
     def add(self, cell: Cell, estimator: str, figures: pd.DataFrame) -> None:
         """Note the figures of one estimator, or of the odometry, on a cell."""
-        labels = _labels(cell) | {"scenario": self.scenario, "estimator": estimator}
+        labels = labels_of(cell) | {"scenario": self.scenario, "estimator": estimator}
         self.figures.append((figures, labels | {"tuning": self.tunings.get(estimator, "default")}))
 
 
@@ -254,44 +251,6 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     motion = truth_at_imu(truth, recording)
     shaken = None if truth.short_waves is None else truth.short_waves.sources
     return CellResult(labels, recording, motion, estimates, rails, truth.contacts, truth.track, shaken)
-
-
-def _labels(cell: Cell) -> dict[str, object]:
-    """What tells the rows of a cell from those of others."""
-    return {
-        "cell": cell.number,
-        "ride": "+".join(dict.fromkeys(one.ride.name for one in cell.passes or (cell,))),
-        "vehicle": cell.spec.vehicle,
-        "mount": cell.imu.name,
-        "imu": cell.imu.grade,
-        "odometry": cell.spec.odometry,
-        "map": cell.map_label,
-        "vibration": cell.vibration_label,
-        "track_draw": cell.track_draw,
-        "sensor_draw": cell.sensor_draw,
-    }
-
-
-def cell_record(cell: Cell) -> dict[str, object]:
-    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
-    rides = [one.ride for one in cell.passes or (cell,)]
-    record: dict[str, object] = _labels(cell) | {
-        "case": cell.case,
-        "sample": cell.sample,
-        "map_draw": cell.map_draw,
-        "track": cell.spec.track,
-        "engine": cell.spec.engine,
-        "speed_kmh": fmean(float(ride.speed_kmh or 0.0) for ride in rides),
-        "direction": _direction(rides),
-    }
-    return record | {name: value for name, value in cell.settings.items() if name not in record}
-
-
-def _direction(rides: Sequence[RidePart]) -> str:
-    """Whether rides run towards larger s, smaller s, both ways, or not at all."""
-    steps = [step for ride in rides for step in pairwise((ride.start_m, *ride.ends_m))]
-    ways = {"forward" if after > before else "backward" for before, after in steps}
-    return "both ways" if len(ways) > 1 else next(iter(ways), "standing")
 
 
 def _reason_of(error: Exception) -> str:

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from simrail.campaign.cell import cell_record, record_cell, simulated
+from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
 from simrail.ride.truth import Truth
-from simrail.scenario.cells import Cell, first_cells
+from simrail.scenario.cells import Cell, cell_record, first_cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.score import truth_at_imu

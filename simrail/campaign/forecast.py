@@ -28,8 +28,9 @@ from simrail.scenario.axes import each
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, first_cells
 from simrail.scenario.check import Plan, judge_scenario
+from simrail.scenario.requirements import stop_rule_of
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.stop_rule import LEVELS, stop_rule_of
+from simrail.scenario.stop_rule import LEVELS
 
 SCORE_ROW_BYTES = 8.0
 """Of ``scores.parquet``; recorded on tables of 60,000 to 800,000 rows, which take 5 to 8."""

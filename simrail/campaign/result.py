@@ -12,14 +12,16 @@ from typing import Any
 
 import pandas as pd
 
-from simrail.campaign.cell import STAGES, CellResult, Failure, cell_record
+from simrail.campaign.cell import STAGES, CellResult, Failure
 from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.worker import BatchResult, example_of
-from simrail.scenario.cells import Cell, cells
+from simrail.scenario.cells import Cell, cell_record, cells
 from simrail.scenario.check import Plan
-from simrail.scenario.stop_rule import StopState, stop_rule_of
+from simrail.scenario.requirements import VerdictState, looks_of, requirements_of, stop_rule_of
+from simrail.scenario.stop_rule import StopState
 from simrail.scoring.ablations import without_ablations
 from simrail.scoring.table import concat_scores, in_order
+from simrail.scoring.verdicts import verdict_table
 
 MOST_EXAMPLES = 6
 """Recordings that are kept for the report's figures, one per ride."""
@@ -45,7 +47,7 @@ class CampaignResult:
         What failed; each is a row of the scores as well.
     plan : Plan
         What was planned, with its warnings.
-    stopped : StopState, optional
+    stopped : StopState or VerdictState, optional
         The last state of the scenario's stop rule: the tables hold the draws that it was asked about.
     """
 
@@ -57,7 +59,13 @@ class CampaignResult:
     cpu_s: dict[str, float]
     failures: list[Failure]
     plan: Plan
-    stopped: StopState | None = None
+    stopped: StopState | VerdictState | None = None
+
+    @property
+    def verdicts(self) -> pd.DataFrame:
+        """What became of the scenario's requirements (`simrail.scoring.verdicts.verdict_table`)."""
+        spec = self.plan.scenario.spec
+        return verdict_table(self.scores, self.cells, requirements_of(spec), looks=looks_of(spec))
 
     @property
     def warnings(self) -> list[str]:
@@ -68,11 +76,20 @@ class CampaignResult:
         return [*self.plan.warnings, *dict.fromkeys(of_rides)]
 
 
-def chosen_cells(plan: Plan, only: int | None = None, *, draws: int | None = None) -> Iterator[Cell]:
-    """The cells of a plan: all, the one that is wanted, or those of the first draws of its stop rule."""
+def chosen_cells(
+    plan: Plan,
+    only: int | None = None,
+    *,
+    draws: int | None = None,
+    former: StopState | VerdictState | None = None,
+) -> Iterator[Cell]:
+    """The cells of a plan: all, the one that is wanted, or those of the first draws of its stop rule.
+
+    ``former`` is what the rule knew before these draws: what it had settled is drawn no more.
+    """
     rule = stop_rule_of(plan.scenario)
     for cell in cells(plan.scenario):
-        beyond = rule is not None and draws is not None and not rule.has(cell, draws)
+        beyond = rule is not None and draws is not None and not rule.has(cell, draws, former)
         if not beyond and (only is None or cell.number == only):
             yield cell
 
@@ -83,7 +100,7 @@ def gather(
     checkpoint: Checkpoint,
     *,
     only: int | None = None,
-    stopped: StopState | None = None,
+    stopped: StopState | VerdictState | None = None,
 ) -> CampaignResult:
     """Put together the batches that are kept, up to where the stop rule ended the campaign.
 
@@ -95,10 +112,11 @@ def gather(
         Its batches.
     only : int, optional
         The one cell that was wanted.
-    stopped : StopState, optional
+    stopped : StopState or VerdictState, optional
         Where the stop rule ended it.
     """
-    listed = list(chosen_cells(plan, only, draws=None if stopped is None else stopped.draws))
+    draws = None if stopped is None else stopped.draws
+    listed = list(chosen_cells(plan, only, draws=draws, former=stopped))
     results = list(checkpoint.results())
     if stopped is not None:
         results = _without_others(results, {cell.number for cell in listed})

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from simrail.campaign.result import CampaignResult
 from simrail.cli.ablation_tables import print_costs, print_odometries
+from simrail.cli.verdict_tables import print_verdicts
 from simrail.report.campaign.odometry import odometry_frames
 from simrail.report.tables.geometry import (
     JUDGED,
@@ -60,7 +61,10 @@ def print_scores(console: Console, results: Results) -> None:
     # Of odometries alone their own table says all; what ablations would change stands in others.
     shown = without_ablations(cells)
     alone = bool(odometries) and all(style.baseline for style in styles)
-    shown = shown[:0] if alone else shown
+    # Where something is asked for, the answer stands in place of the means.
+    verdicts = campaign.verdicts
+    shown = shown[:0] if alone or len(verdicts) else shown
+    print_verdicts(console, verdicts, styles)
     for number, (_, members) in enumerate(shown.groupby("case", sort=True)):
         if number == MOST_GROUPS:
             console.print(f"... and {shown['case'].nunique() - number} more cases: see scores.csv")

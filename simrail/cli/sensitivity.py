@@ -105,11 +105,14 @@ def _designed(
 
     if method is not None:
         one_of(method, DESIGNS, "is no design of a sensitivity analysis", field="--method")
-    own = load_scenario(scenario, seed=seed, overrides=settings).spec.monte_carlo
+    read = load_scenario(scenario, seed=seed, overrides=settings).spec
+    own = read.monte_carlo
     chosen = method or (own.method if own.method in DESIGNS else "saltelli")
     count = samples or (own.samples if own.method == chosen else _USUAL[chosen])
     design = [f'monte_carlo.method="{chosen}"', f"monte_carlo.samples={count}"]
-    return load_scenario(scenario, seed=seed, overrides=[*settings, *design])
+    # Verdicts over devices are another question (`simrail grade`).
+    left_out = ["require=[]"] if read.require else []
+    return load_scenario(scenario, seed=seed, overrides=[*settings, *design, *left_out])
 
 
 def _scores(

@@ -6,10 +6,10 @@ and a track draw make one simulated ride; a ride, a sensor setting, an IMU and a
 sample of the scenario's distributions, and in their draws) share a *case*: scores are aggregated over
 the cells of a case.
 
-A list compares: its values meet the same draws. A distribution is chance: each of its samples has
-draws of its own, but those of a design (`simrail.scenario.designs`), which differ by their values alone:
-they share their seeds, and those with the same motion their ride. Of lists that set an ablation beside what a train
-has, an exact map and silence, one thing is taken away at a time: no cell has both.
+A list compares: its values meet the same draws. A distribution is chance: each of its samples has draws of
+its own, but those of a design (`simrail.scenario.designs`), which differ by their values alone: they share
+their seeds, and those with the same motion their ride. Of lists that set an ablation beside what a train has,
+an exact map and silence, one thing is taken away at a time: no cell has both.
 
 Of several passes, a cell is so many rides over the same rails, in an order that chance decides, anew for each
 track draw: four passes are the first four of sixteen. Each has a device of its own, and the same map.
@@ -19,10 +19,11 @@ the same scores alone, among others, or in another order.
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from math import prod
+from statistics import fmean
 from typing import Any
 
 from simrail.core.seeds import stream
@@ -215,6 +216,44 @@ def rides_of(cells: Iterable[Cell]) -> list[Cell]:
     """The cells that stand for the rides of these: of one ride, or of passes over the same rails."""
     listed = list(cells)
     return list(max((cell.passes for cell in listed), key=len, default=()) or listed[:1])
+
+
+def labels_of(cell: Cell) -> dict[str, object]:
+    """What tells the rows of a cell from those of others: the labels of the score table."""
+    return {
+        "cell": cell.number,
+        "ride": "+".join(dict.fromkeys(one.ride.name for one in cell.passes or (cell,))),
+        "vehicle": cell.spec.vehicle,
+        "mount": cell.imu.name,
+        "imu": cell.imu.grade,
+        "odometry": cell.spec.odometry,
+        "map": cell.map_label,
+        "vibration": cell.vibration_label,
+        "track_draw": cell.track_draw,
+        "sensor_draw": cell.sensor_draw,
+    }
+
+
+def cell_record(cell: Cell) -> dict[str, object]:
+    """Row of the table of cells: labels, what is worth knowing of the ride, and the axes' values."""
+    rides = [one.ride for one in cell.passes or (cell,)]
+    record: dict[str, object] = labels_of(cell) | {
+        "case": cell.case,
+        "sample": cell.sample,
+        "map_draw": cell.map_draw,
+        "track": cell.spec.track,
+        "engine": cell.spec.engine,
+        "speed_kmh": fmean(float(ride.speed_kmh or 0.0) for ride in rides),
+        "direction": _direction(rides),
+    }
+    return record | {name: value for name, value in cell.settings.items() if name not in record}
+
+
+def _direction(rides: Sequence[RidePart]) -> str:
+    """Whether rides run towards larger s, smaller s, both ways, or not at all."""
+    steps = [step for ride in rides for step in pairwise((ride.start_m, *ride.ends_m))]
+    ways = {"forward" if after > before else "backward" for before, after in steps}
+    return "both ways" if len(ways) > 1 else next(iter(ways), "standing")
 
 
 def first_cells(scenario: Scenario) -> Iterator[Cell]:

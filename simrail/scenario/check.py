@@ -20,8 +20,8 @@ from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.check_vibration import step_words
 from simrail.scenario.designs import DESIGNS
 from simrail.scenario.distributions import dimensions, sample_count
+from simrail.scenario.requirements import judge_requirements, judge_requirements_of_ride
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.stop_rule import judge_stop_rule
 from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.table import CURVE_PREFIX, METRICS, ON_REQUEST, WINDOWS
 from simrail.track.laid_track import LaidTrack
@@ -98,7 +98,7 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         if parts.draws_estimators:
             for sample in range(1, sample_count(scenario.spec)):
                 parts.estimators(sample)
-        judge_stop_rule(scenario, [*estimators, *_judge_ride_figures(scenario, estimators)])
+        judge_requirements(scenario.spec, [*estimators, *_judge_ride_figures(scenario, estimators)])
         simulated, unusual, notes = _judge_cells(scenario, parts)
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
     return Plan(
@@ -142,6 +142,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             same = judged_rails[1] if judged_rails is not None and judged_rails[0] == rails_key else None
             durations[ride_key], unusual, laid = judge_ride(resolved, known_rails=same)
             judged_rails = rails_key, laid
+            judge_requirements_of_ride(scenario.spec, ride.track, resolved.bands, cell.ride.reach_m)
             warnings += unusual
             notes += [f"vibration: {words}" for words in [step_words(ride)] if words]
         if cell.ride_number != last_ride:
@@ -208,8 +209,9 @@ def _judge_design(scenario: Scenario) -> None:
             **here,
             remedy='write a range, e.g. --set "imu.sheet.gyro_noise_degpsqrth={ log_uniform = [0.05, 1.0] }"',
         )
-    for name in ("stop", "passes"):
-        if getattr(spec, name) is not None:
+    # A requirement is judged over devices, and all samples of a design have the same.
+    for name in ("stop", "passes", "require"):
+        if getattr(spec, name):
             raise InputError(
                 f"needs all of its samples, each by itself, and does not go with {name}",
                 **here,

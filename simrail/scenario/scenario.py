@@ -66,6 +66,7 @@ class ScenarioFile(Part):
     temperature: tables.TemperaturePart | None = None
     estimator: Annotated[list[tables.EstimatorPart], Field(min_length=1)]
     score: tables.ScorePart = tables.ScorePart()
+    require: tuple[tables.RequirePart, ...] = ()
     stop: tables.StopRulePart | None = None
     geometry: tables.GeometryPart = tables.GeometryPart()
     running_safety: tables.RunningSafetyPart | None = None

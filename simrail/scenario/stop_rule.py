@@ -26,7 +26,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.scenario.cells import Cell, sensor_draws
 from simrail.scenario.distributions import sample_count
-from simrail.scenario.scenario import Scenario, ScenarioFile
+from simrail.scenario.scenario import ScenarioFile
 from simrail.scenario.tables import StopRulePart
 from simrail.scoring.bootstrap import clustered, mean_interval
 from simrail.scoring.table import BANDS, CURVE_PREFIX, EVERY_CURVE, METRICS, QUANTITY_UNITS, WINDOWS, unit_of
@@ -93,6 +93,31 @@ class StopState:
         return asdict(self) | {"reached": self.reached, "told": self.words}
 
 
+def level_of(spec: ScenarioFile) -> str:
+    """What a draw of a scenario is, one of `LEVELS`."""
+    if spec.monte_carlo.track_draws > 1:
+        return "track_draw"
+    return "sample" if sample_count(spec) > 1 else "sensor_draw"
+
+
+def draws_of(spec: ScenarioFile) -> int:
+    """Number of draws that a scenario has."""
+    level = level_of(spec)
+    if level == "track_draw":
+        return spec.monte_carlo.track_draws
+    if level == "sample":
+        return sample_count(spec)
+    return max(sensor_draws(spec, imu) for imu in spec.imu)
+
+
+def stages_of(least: int, draws: int) -> tuple[int, ...]:
+    """After how many draws a rule is asked: at first `least`, then half as many more each time."""
+    stages = [min(least, draws)]
+    while stages[-1] < draws:
+        stages.append(min(draws, (3 * stages[-1] + 1) // 2))
+    return tuple(stages)
+
+
 @dataclass(frozen=True)
 class StopRule:
     """The stop rule of a scenario.
@@ -111,33 +136,26 @@ class StopRule:
     @property
     def level(self) -> str:
         """What a draw is, one of `LEVELS`."""
-        if self.spec.monte_carlo.track_draws > 1:
-            return "track_draw"
-        return "sample" if sample_count(self.spec) > 1 else "sensor_draw"
+        return level_of(self.spec)
 
     @property
     def draws(self) -> int:
         """Number of draws that the scenario has."""
-        if self.level == "track_draw":
-            return self.spec.monte_carlo.track_draws
-        if self.level == "sample":
-            return sample_count(self.spec)
-        return max(sensor_draws(self.spec, imu) for imu in self.spec.imu)
+        return draws_of(self.spec)
 
     @property
     def stages(self) -> tuple[int, ...]:
         """After how many draws the rule is asked."""
-        stages, draws = [self.asked.least_draws], self.draws
-        while stages[-1] < draws:
-            stages.append(min(draws, (3 * stages[-1] + 1) // 2))
-        return tuple(stages)
+        return stages_of(self.asked.least_draws, self.draws)
 
-    def has(self, cell: Cell, draws: int) -> bool:
+    def has(self, cell: Cell, draws: int, _former: object) -> bool:
         """Whether a cell is among those of the first so many draws."""
         number: int = getattr(cell, self.level)
         return number < draws
 
-    def state(self, cells: Iterable[Cell], tables: Iterable[pd.DataFrame], draws: int) -> StopState:
+    def state(
+        self, cells: Iterable[Cell], tables: Iterable[pd.DataFrame], draws: int, _former: object = None
+    ) -> StopState:
         """What the first so many draws say.
 
         Intervals are those of ``scores.csv``, but for the ends that are cut off at 0 there: cut, they would
@@ -157,7 +175,7 @@ class StopRule:
         cases: dict[int, list[Cell]] = {}
         for cell in cells:
             short = self.level == "sensor_draw" and sensor_draws(self.spec, cell.imu) < self.draws
-            if not short and self.has(cell, draws):
+            if not short and self.has(cell, draws, None):
                 cases.setdefault(cell.case, []).append(cell)
         widths = self._widths([self._clusters(members, values) for members in cases.values()])
         widest = int(np.argmax(widths))
@@ -218,19 +236,13 @@ class StopRule:
         return ", ".join(words + [f"{name} = {value}" for name, value in same.items()])
 
 
-def stop_rule_of(scenario: Scenario) -> StopRule | None:
-    """The stop rule of a scenario, if it has one."""
-    asked = scenario.spec.stop
-    return None if asked is None else StopRule(scenario.spec, asked)
-
-
-def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
+def judge_stop_rule(spec: ScenarioFile, estimators: Collection[str]) -> None:
     """Refuse a stop rule that could not be asked, or would never be told anything.
 
     Parameters
     ----------
-    scenario : Scenario
-        As read.
+    spec : ScenarioFile
+        A scenario with such a rule.
     estimators : collection of str
         Names of its estimators in the tables.
 
@@ -239,11 +251,8 @@ def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
     InputError
         If the rule names what the score table does not have, or there are too few draws.
     """
-    rule = stop_rule_of(scenario)
-    if rule is None:
-        return
-    asked, spec = rule.asked, scenario.spec
-    windows, metrics = spec.score.windows, spec.score.metrics
+    assert spec.stop is not None
+    asked, windows, metrics = spec.stop, spec.score.windows, spec.score.metrics
     possible: dict[str, Collection[str]] = {
         "estimator": estimators,
         "quantity": QUANTITY_UNITS,
@@ -266,11 +275,17 @@ def judge_stop_rule(scenario: Scenario, estimators: Collection[str]) -> None:
                 limit="one of " + ", ".join(words),
                 remedy=f"name one of these{scored}",
             )
-    if asked.least_draws > rule.draws:
+    judge_least_draws(spec, asked.least_draws)
+
+
+def judge_least_draws(spec: ScenarioFile, least: int) -> None:
+    """Refuse a rule that would be asked after more draws than there are."""
+    draws = draws_of(spec)
+    if least > draws:
         raise InputError(
-            f"is more than the scenario has {LEVELS[rule.level]}",
+            f"is more than the scenario has {LEVELS[level_of(spec)]}",
             field="stop.least_draws",
-            value=asked.least_draws,
-            limit=f"2 to {rule.draws}" if rule.draws > 1 else "at least 2 draws, this scenario has 1",
+            value=least,
+            limit=f"2 to {draws}" if draws > 1 else "at least 2 draws, this scenario has 1",
             remedy="raise track_draws or sensor_draws in [monte_carlo], or leave out [stop]",
         )

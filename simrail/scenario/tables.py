@@ -6,6 +6,7 @@ the scenario itself, and the reading of it, in `simrail.scenario.scenario`.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
@@ -17,6 +18,7 @@ from simrail.recording.sheets.imu_file import ImuHead, limited
 from simrail.scenario.axes import Listed, each
 from simrail.scenario.designs import DESIGNS
 from simrail.scenario.measured_file import MeasuredPart
+from simrail.scoring.requirement import Requirement, limit_of
 from simrail.track.defects import Defect
 from simrail.track.irregularity import Irregularity
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors
@@ -453,21 +455,63 @@ class MonteCarloPart(Part):
         return self
 
 
-class StopRulePart(Part):
-    """``[stop]``: draw no more once the 95 % interval of a mean is narrower than ``width``, in every case.
+class RequirePart(Part):
+    """``[[require]]``: what is asked of an IMU: a figure below a limit, on a share of the devices.
 
-    The mean over the draws of one figure of the score table, in its unit there; see
-    `simrail.scenario.stop_rule`.
+    A device is one draw of the errors that stay with a sensor. ``limit`` has a unit (``"0.1 deg"``; a bare
+    number is in that of the score table). With ``over = "all"`` a device must meet it on every ride of the
+    scenario, with ``"each"`` every kind of ride has a verdict of its own. ``chance`` is that of a false
+    verdict. See `simrail.scoring.verdicts`.
     """
 
-    estimator: str
     quantity: str
-    metric: str
-    width: Positive
+    limit: float | str
+    metric: Literal["rms", "sd", "p95", "p9985", "max"] = "rms"
+    band: str = "full"
+    window: str = "whole"
+    reference: Literal["truth", "design"] = "truth"
+    share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    over: Literal["all", "each"] = "all"
+    chance: Annotated[float, Field(ge=1e-4, le=0.2)] = 0.05
+
+    def requirement(self) -> Requirement:
+        """The requirement, in the unit of the score table."""
+        own = self.model_dump()
+        return Requirement(**own | {"limit": limit_of(self.limit, self.quantity)})
+
+
+class StopRulePart(Part):
+    """``[stop]``: draw no more once chance would change little.
+
+    Either ``verdicts = true``: once every ``[[require]]`` is settled for every IMU and method; what is
+    settled before is drawn no more (`simrail.scenario.requirements`). Or once the 95 % interval of a mean is
+    narrower than ``width``, in every case: the mean over the draws of one figure of the score table, in its
+    unit there (`simrail.scenario.stop_rule`).
+    """
+
+    estimator: str = ""
+    quantity: str = ""
+    metric: str = ""
+    width: Annotated[float, Field(gt=0.0)] = math.inf
     window: str = "whole"
     reference: Literal["truth", "design"] = "truth"
     band: str = "full"
     least_draws: Annotated[int, Field(ge=2, le=1_000_000)] = 10
+    verdicts: bool = False
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        for name in ("estimator", "quantity", "metric", "width"):
+            given = name in self.model_fields_set
+            if given == self.verdicts:
+                raise InputError(
+                    "goes with an interval, verdicts have none" if given else "is missing",
+                    field=name,
+                    value=getattr(self, name) if given else None,
+                    limit="estimator, quantity, metric and width; or verdicts = true alone",
+                    remedy=f"take out {name}, or verdicts" if given else f"add {name}, or verdicts = true",
+                )
+        return self
 
 
 class ScorePart(Part):

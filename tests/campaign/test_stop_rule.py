@@ -21,8 +21,9 @@ from simrail.cli.main import CELL_FAILED, DONE, call
 from simrail.results import keep_good
 from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
+from simrail.scenario.requirements import stop_rule_of
 from simrail.scenario.scenario import Scenario, load_scenario
-from simrail.scenario.stop_rule import StopRule, StopState, stop_rule_of
+from simrail.scenario.stop_rule import StopRule, StopState
 from simrail.scoring.bootstrap import interval
 
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
@@ -84,7 +85,7 @@ def test_a_draw_is_one_of_what_the_interval_resamples(short: Short) -> None:
         found = rule(scenario)
         assert (found.level, found.draws) == (level, number)
         listed = list(cells(scenario))
-        taken = [cell for cell in listed if found.has(cell, 2)]
+        taken = [cell for cell in listed if found.has(cell, 2, None)]
         assert len(taken) * number == 2 * len(listed)
         assert {getattr(cell, level) for cell in taken} == {0, 1}
 

@@ -16,6 +16,7 @@ from simrail.report.campaign.axes import is_campaign
 from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.passes import passes_section
 from simrail.report.campaign.section import campaign_section
+from simrail.report.campaign.verdicts import verdicts_section
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
 from simrail.report.pages.frame import page_text
 from simrail.report.pages.ride import ride_sections
@@ -215,6 +216,7 @@ SectionMaker = Callable[[PageData], list[Section]]
 """Makes sections of a campaign."""
 
 SECTIONS: tuple[SectionMaker, ...] = (
+    verdicts_section,
     _failures,
     _paper,
     passes_section,

@@ -1,0 +1,142 @@
+"""``simrail grade``: whether an IMU is good enough for what is asked of it."""
+
+import json
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from simrail.cli.options import CELL_FAILED, DONE, Seed, Settings
+from simrail.core.errors import InputError, one_of
+from simrail.core.toml_files import parse_toml
+
+DEFAULT_SCENARIO = "which_imu"
+
+
+def grade(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="IMU", help="A shipped grade, an IMU file, several with commas between them, or 'all'."
+        ),
+    ],
+    wanted: Annotated[
+        list[str],
+        typer.Option(
+            "--for",
+            metavar="REQUIREMENT",
+            help="What is asked, e.g. 'roll<0.1deg in curves at 60km/h' or 'alignment D1<0.5mm for 90%'.",
+        ),
+    ],
+    scenario: Annotated[
+        str,
+        typer.Option(
+            "--scenario", metavar="NAME", help="A shipped scenario, or your own: its rides and mounts."
+        ),
+    ] = DEFAULT_SCENARIO,
+    mount: Annotated[
+        str | None,
+        typer.Option("--mount", metavar="NAME", help="One [[imu]] of the scenario; all if not given."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder of the results; results/grade_<imu> if not given."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes; all cores if not given.")
+    ] = None,
+    seed: Seed = None,
+    settings: Settings = None,
+) -> int:
+    """Say whether an IMU is good enough: draw devices of its sheet until that is settled."""
+    from rich.console import Console
+
+    from simrail.campaign.progress import ProgressWatcher
+    from simrail.cli.score_tables import print_scores
+    from simrail.cli.verdict_tables import print_coarsest
+    from simrail.results import run
+    from simrail.scenario.scenario import load_scenario
+
+    grades = grades_of(name)
+    asked = load_scenario(scenario)
+    overrides = [*requirement_settings(wanted), imu_setting(asked.text, asked.file, grades, mount)]
+    read = load_scenario(scenario, overrides=[*overrides, *(settings or [])], seed=seed)
+    folder = out or Path("results") / ("grade_" + re.sub(r"\W+", "_", Path(name).stem))
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        results = run(read, out=folder, workers=workers, watcher=watcher)
+    console = Console()
+    print_scores(console, results)
+    if len(grades) > 1:
+        print_coarsest(console, results)
+    return CELL_FAILED if results.campaign.failures else DONE
+
+
+def grades_of(name: str) -> list[str]:
+    """Grades that a word names: shipped ones, files, or with ``all`` the ladder of the shipped scenario.
+
+    Raises
+    ------
+    InputError
+        If it names nothing, or there is no such grade.
+    """
+    from simrail.core.toml_files import find
+    from simrail.scenario.axes import each
+    from simrail.scenario.scenario import load_scenario
+
+    if name == "all":
+        first, *_ = load_scenario(DEFAULT_SCENARIO).spec.imu
+        return [str(one) for one in each(first.grade)]
+    names = [part.strip() for part in name.split(",") if part.strip()]
+    if not names:
+        raise InputError("names no IMU", field="IMU", value=name, remedy="name a grade, a file, or all")
+    # A file is named as seen from here, not from the scenario's folder.
+    return [str(find("imu", one).resolve()) if _is_file(one) else one for one in names if find("imu", one)]
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith(".toml") or "/" in name
+
+
+def imu_setting(text: str, file: str, grades: list[str], mount: str | None) -> str:
+    """Setting that puts grades on the mounts of a scenario, or on one of them.
+
+    Raises
+    ------
+    InputError
+        If there is no such mount.
+    """
+    tables = parse_toml(text, file=file).get("imu", [])
+    names = [str(table.get("name")) for table in tables]
+    if mount is not None:
+        one_of(mount, names, f"is no [[imu]] of {file}", field="--mount")
+    kept = [table | {"grade": grades} for table in tables if mount in (None, table.get("name"))]
+    return f"imu=[{', '.join(_inline(table) for table in kept)}]"
+
+
+def _inline(table: dict[str, Any]) -> str:
+    """A table of plain values in one line of TOML."""
+    return "{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in table.items()) + " }"
+
+
+def requirement_settings(lines: list[str]) -> list[str]:
+    """Settings of a scenario that ask for what these lines do, and draw until it is settled."""
+    from simrail.scoring.requirement import read_requirement
+
+    read = [read_requirement(line) for line in lines]
+    speeds = {one.speed_kmh for one in read}
+    if len(speeds) > 1:
+        raise InputError(
+            "are asked at different speeds",
+            field="--for",
+            value=", ".join("the scenario's" if one is None else f"{one:g} km/h" for one in speeds),
+            limit="one speed for all of them",
+            remedy="ask for each by a command of its own",
+        )
+    tables = []
+    for one, _ in read:
+        pairs = {"quantity": one.quantity, "limit": f"{one.limit:.12g} {one.unit}", "metric": one.metric}
+        tables.append(_inline(pairs | {"band": one.band, "window": one.window, "share": one.share}))
+    settings = [f"require=[{', '.join(tables)}]", "stop={ verdicts = true, least_draws = 20 }"]
+    (speed,) = speeds
+    return settings if speed is None else [*settings, f"ride.speed_kmh={speed:.12g}"]

@@ -1,0 +1,68 @@
+"""Verdicts as the command line shows them."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from simrail.report.campaign.verdicts import groups_of
+from simrail.report.tables.methods import MethodStyle, method_styles
+from simrail.report.words.verdicts import (
+    best_method,
+    devices_words,
+    judged_methods,
+    share_words,
+    verdict_sentence,
+)
+from simrail.results import Results
+from simrail.scenario.cells import first_cells
+from simrail.scoring.share import ENOUGH, NOT_ENOUGH
+
+_COLOURS = {ENOUGH: "green", NOT_ENOUGH: "red"}
+
+
+def print_verdicts(console: Console, verdicts: pd.DataFrame, styles: Sequence[MethodStyle]) -> None:
+    """Print each requirement at each mount: a sentence, and a table of IMUs by methods."""
+    for _, _, _, rows in groups_of(verdicts):
+        console.print()
+        console.print(Text(verdict_sentence(rows, styles), style="bold"), soft_wrap=True)
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        table.add_column("IMU", overflow="fold")
+        methods = judged_methods(rows, styles)
+        for style in methods:
+            table.add_column(style.label, overflow="fold")
+        for imu, own in rows.groupby("imu", sort=False):
+            cells = [_cell(own[own["estimator"] == style.name]) for style in methods]
+            table.add_row(str(imu), *cells)
+        console.print(table)
+        console.print(Text(devices_words(rows), style="dim"), soft_wrap=True)
+
+
+def print_coarsest(console: Console, results: Results) -> None:
+    """Print the coarsest IMU that is enough, by the bias instability of its gyro, for each requirement."""
+    grades = {
+        cell.imu.grade: results.campaign.plan.parts.grade(cell) for cell in first_cells(results.scenario)
+    }
+    styles = list(method_styles(results.scenario).values())
+    for _, _, mount, rows in groups_of(results.campaign.verdicts):
+        best = best_method(rows, styles)
+        own = rows[rows["estimator"] == best.name] if best is not None else rows[:0]
+        enough = own.loc[own["verdict"] == ENOUGH, "imu"].astype(str).unique()
+        coarsest = max(enough, key=lambda imu: grades[imu].gyro_bias_instability_radps, default=None)
+        words = (
+            "none of these is enough" if coarsest is None else f"{coarsest} is the coarsest that is enough"
+        )
+        console.print(
+            f"{rows['requirement'].iloc[0]}, on the {mount}: {words}", highlight=False, soft_wrap=True
+        )
+
+
+def _cell(rows: pd.DataFrame) -> Text:
+    """The verdict of an IMU with a method; of several kinds of rides, the one that fewest devices meet."""
+    if rows.empty:
+        return Text("")
+    worst = rows.sort_values("share", na_position="first").iloc[0]
+    return Text(share_words(worst), style=_COLOURS.get(worst["verdict"], "yellow"))

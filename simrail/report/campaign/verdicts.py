@@ -1,0 +1,187 @@
+"""First section of a page with requirements: the verdict in a sentence, its chart, and the table."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from simrail.core.jit import FloatArray
+from simrail.report.figures import canvas
+from simrail.report.pages.section import PageData, Section
+from simrail.report.tables.methods import MethodStyle
+from simrail.report.words.verdicts import MARKS, best_method, devices_words, judged_methods, verdict_sentence
+from simrail.scenario.requirements import looks_of, requirements_of
+from simrail.scoring.requirement import Requirement
+from simrail.scoring.share import ENOUGH, NOT_ENOUGH
+from simrail.scoring.verdicts import device_figures, verdict_table
+
+MOST_CHARTS = 12
+"""Requirements times mounts that are drawn; ``verdicts.csv`` holds all."""
+
+MOST_DOTS = 60
+"""Devices that are drawn of an IMU with a method, evenly by rank."""
+
+COLOURS = {ENOUGH: "#15803d", NOT_ENOUGH: "#b42318"}
+"""Of verdicts; any other is muted."""
+
+
+def verdicts_section(data: PageData) -> list[Section]:
+    """Make the section; none for a scenario that asks for nothing."""
+    wanted = requirements_of(data.scenario.spec)
+    table = verdict_table(data.scores, data.cells, wanted, looks=looks_of(data.scenario.spec))
+    if table.empty:
+        return []
+    groups: list[dict[str, Any]] = []
+    for number, vehicle, mount, rows in groups_of(table):
+        devices = device_figures(data.scores, data.cells, wanted[number])
+        devices = devices[(devices["vehicle"] == vehicle) & (devices["mount"] == mount)]
+        drawn = len(groups) < MOST_CHARTS
+        groups.append(
+            {
+                "sentence": verdict_sentence(rows, data.styles),
+                "devices": devices_words(rows),
+                "chart": decision_chart(rows, devices, wanted[number], data.styles) if drawn else "",
+                "columns": [style.label for style in judged_methods(rows, data.styles)],
+                "rows": list(_table_rows(rows, judged_methods(rows, data.styles))),
+            }
+        )
+    shown = {"groups": groups, "chance": 100.0 * max(one.chance for one in wanted)}
+    return [Section("verdict", "Verdict", "campaign/verdicts.html.j2", shown)]
+
+
+def groups_of(table: pd.DataFrame) -> Iterator[tuple[int, str, str, pd.DataFrame]]:
+    """Number of a requirement, vehicle and mount, and the verdicts there."""
+    if table.empty:
+        return
+    for names, rows in table.groupby(["number", "vehicle", "mount"], sort=False):
+        number, vehicle, mount = (str(name) for name in names)
+        yield int(number), vehicle, mount, rows
+
+
+def _table_rows(rows: pd.DataFrame, styles: Sequence[MethodStyle]) -> Iterator[dict[str, Any]]:
+    """An IMU's verdicts by method."""
+    keys = [name for name in _case_columns(rows) if name == "imu" or len(rows[name].drop_duplicates()) > 1]
+    for names, own in rows.groupby(keys, sort=False, dropna=False):
+        by_method = own.set_index(own["estimator"].astype(str))
+        names = names if isinstance(names, tuple) else (names,)
+        yield {
+            "name": " \u00b7 ".join(_word(key, value) for key, value in zip(keys, names, strict=True)),
+            "cells": [
+                _cell(by_method.loc[[style.name]].iloc[0]) if style.name in by_method.index else None
+                for style in styles
+            ],
+        }
+
+
+def _case_columns(rows: pd.DataFrame) -> list[str]:
+    """What tells verdicts of a requirement apart, beside the method: IMU and, of each kind of ride, axes."""
+    figures = {"verdict", "devices", "passed", "share", "low95", "high95", "tracks", "effective"}
+    figures |= {"median", "at_share", "unit", "reason", "requirement", "number", "estimator", "tuning"}
+    return [str(name) for name in rows.columns if name not in figures]
+
+
+def _word(key: str, value: object) -> str:
+    number = f"{value:g}" if isinstance(value, float) else str(value)
+    return number if key in ("imu", "ride", "direction") else f"{key} {number}"
+
+
+def _cell(row: pd.Series) -> dict[str, Any]:
+    return {
+        "mark": MARKS[row["verdict"]],
+        "verdict": row["verdict"],
+        "colour": COLOURS.get(row["verdict"], canvas.MUTED),
+        "share": f"{row['passed']} of {row['devices']}" if row["devices"] else row["reason"],
+        "interval": f"{100.0 * row['low95']:.0f} to {100.0 * row['high95']:.0f} %" if row["devices"] else "",
+        "at_share": f"{row['at_share']:.3g}" if row["devices"] else "",
+    }
+
+
+def decision_chart(
+    rows: pd.DataFrame, devices: pd.DataFrame, wanted: Requirement, styles: Sequence[MethodStyle]
+) -> str:
+    """A dot for each device over the grades, by method, with the limit as a line and verdicts above.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Verdicts of a requirement at a mount.
+    devices : pandas.DataFrame
+        Figures of the devices there (`simrail.scoring.verdicts.device_figures`).
+    wanted : Requirement
+        What is asked.
+    styles : sequence of MethodStyle
+        The scenario's.
+    """
+    methods = judged_methods(rows, styles)[:4]
+    finite = devices[np.isfinite(devices["value"]) & (devices["value"] > 0.0)]
+    if not methods or finite.empty:
+        return ""
+    imus = list(dict.fromkeys(rows["imu"].astype(str)))
+    best = best_method(rows, styles)
+    with canvas.look():
+        figure, (panel,) = canvas.panels([2.7], top_in=0.75)
+        for slot, style in enumerate(methods):
+            for i, imu in enumerate(imus):
+                own = finite[(finite["imu"] == imu) & (finite["estimator"] == style.name)]["value"]
+                left = i - 0.4 + (slot + 0.1) * 0.8 / len(methods)
+                _draw_devices(panel, own.to_numpy(), left, 0.64 / len(methods), style)
+        panel.axhline(wanted.limit, color=canvas.INK, lw=1.2, ls=(0, (4, 2)), zorder=1)
+        low, high = finite["value"].min(), finite["value"].max()
+        panel.set_ylim(0.7 * min(low, 0.8 * wanted.limit), 1.6 * max(high, 1.25 * wanted.limit))
+        canvas.log_scale(panel.yaxis)
+        canvas.categories(panel, [_in_lines(imu) for imu in imus], size=8.0 if len(imus) < 9 else 7.0)
+        unit = "\u00b0" if wanted.unit == "deg" else wanted.unit
+        panel.set_ylabel(f"{wanted.what},\n{unit}")
+        if best is not None:
+            _write_shares(panel, rows[rows["estimator"] == best.name], imus)
+        handles = [Line2D([], [], color=style.colour, lw=4.0) for style in methods]
+        labels = [style.label for style in methods]
+        limit = Line2D([], [], color=canvas.INK, lw=1.2, ls=(0, (4, 2)))
+        canvas.figure_legend(figure, [*handles, limit], [*labels, "limit"])
+        return canvas.to_svg(figure, description=verdict_sentence(rows, styles))
+
+
+def _draw_devices(panel: Axes, values: FloatArray, left: float, wide: float, style: MethodStyle) -> None:
+    """Draw devices as short strokes; of many so many by rank, the best and the worst among them."""
+    if len(values) == 0:
+        return
+    ranked = np.sort(values)
+    shown = ranked[np.unique(np.linspace(0, len(ranked) - 1, MOST_DOTS).round().astype(int))]
+    x = np.tile([left, left + wide, np.nan], len(shown))
+    y = np.repeat(shown, 3)
+    panel.plot(x, y, color=style.colour, lw=1.6, alpha=0.75, solid_capstyle="butt", zorder=3)
+
+
+def _write_shares(panel: Axes, rows: pd.DataFrame, imus: Sequence[str]) -> None:
+    """Write the verdict and the share of devices above each grade, of the method that is best."""
+    for i, imu in enumerate(imus):
+        own = rows[rows["imu"] == imu]
+        if own.empty or not own["devices"].iloc[0]:
+            continue
+        worst = own.sort_values("share").iloc[0]
+        text = f"{MARKS[worst['verdict']]} {100.0 * worst['share']:.0f} %"
+        colour = COLOURS.get(worst["verdict"], canvas.MUTED)
+        panel.annotate(
+            text,
+            (i, 1.0),
+            (0, 3),
+            xycoords=panel.get_xaxis_transform(),
+            textcoords="offset points",
+            ha="center",
+            fontsize=8.0,
+            weight="bold",
+            color=colour,
+        )
+
+
+def _in_lines(name: str) -> str:
+    """A grade's name in lines of some ten letters, parted at underscores."""
+    lines = [""]
+    for part in name.replace(".imu.toml", "").replace(".toml", "").split("_"):
+        if lines[-1] and len(lines[-1]) + len(part) > 9:
+            lines.append("")
+        lines[-1] += ("_" if lines[-1] else "") + part
+    return "\n".join(lines)

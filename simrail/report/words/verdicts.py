@@ -1,0 +1,74 @@
+"""Verdicts in words: which IMUs are good enough, of how many devices that is known, and what is open."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from simrail.report.tables.methods import MethodStyle
+from simrail.scoring.share import ENOUGH, NOT_ENOUGH, NOT_JUDGED, UNDECIDED
+
+MARKS = {ENOUGH: "\u2713", NOT_ENOUGH: "\u2717", UNDECIDED: "?", NOT_JUDGED: "\u2013"}
+"""Short forms, for tables."""
+
+_MOST_NAMES = 6
+
+
+def judged_methods(verdicts: pd.DataFrame, styles: Sequence[MethodStyle]) -> list[MethodStyle]:
+    """Methods with a verdict: those under test first, those without an IMU last."""
+    have = set(verdicts.loc[verdicts["verdict"] != NOT_JUDGED, "estimator"].astype(str))
+    return sorted(
+        (style for style in styles if style.name in have),
+        key=lambda style: (not style.uses_imu, bool(style.baseline)),
+    )
+
+
+def best_method(verdicts: pd.DataFrame, styles: Sequence[MethodStyle]) -> MethodStyle | None:
+    """The method under test with which most IMUs are enough, and devices are best where as many are."""
+
+    def merit(style: MethodStyle) -> tuple[int, float]:
+        own = verdicts[verdicts["estimator"] == style.name]
+        return int((own["verdict"] == ENOUGH).sum()), -float(own["at_share"].median())
+
+    tested = [style for style in judged_methods(verdicts, styles) if style.uses_imu]
+    tested = [style for style in tested if not style.baseline] or tested
+    return max(tested, key=merit, default=None)
+
+
+def verdict_sentence(verdicts: pd.DataFrame, styles: Sequence[MethodStyle]) -> str:
+    """One sentence of the verdicts of a requirement at a mount, with the method that is best there."""
+    wanted, mount = str(verdicts["requirement"].iloc[0]), str(verdicts["mount"].iloc[0])
+    best = best_method(verdicts, styles)
+    if best is None:
+        reason = next((str(one) for one in verdicts["reason"] if one), "no method gives it")
+        return f"{wanted}, on the {mount}: not judged ({reason})."
+    own = verdicts[verdicts["estimator"] == best.name]
+    parts = [
+        f"{words} {_names(own.loc[own['verdict'] == verdict, 'imu'])}"
+        for verdict, words in ((ENOUGH, "enough:"), (NOT_ENOUGH, "not enough:"), (UNDECIDED, "open:"))
+        if (own["verdict"] == verdict).any()
+    ]
+    return f"{wanted}, on the {mount} with {best.label}: " + "; ".join(parts) + "."
+
+
+def devices_words(verdicts: pd.DataFrame) -> str:
+    """Of how many devices on how many tracks verdicts are."""
+    devices, tracks = verdicts["devices"], int(verdicts["tracks"].max())
+    low, high = int(devices.min()), int(devices.max())
+    many = f"{low}" if low == high else f"{low} to {high}"
+    where = "one track: what other rails would do is not in it" if tracks == 1 else f"{tracks} tracks"
+    return f"{many} device{'s' * (high != 1)} each, on {where}"
+
+
+def share_words(row: pd.Series) -> str:
+    """A verdict with its share of devices: ``"enough: 60 of 60, 94 to 100 %"``."""
+    if row["verdict"] == NOT_JUDGED:
+        return f"{NOT_JUDGED}: {row['reason']}"
+    low, high = 100.0 * row["low95"], 100.0 * row["high95"]
+    return f"{row['verdict']}: {row['passed']} of {row['devices']}, {low:.0f} to {high:.0f} %"
+
+
+def _names(imus: "pd.Series[str]") -> str:
+    names = list(dict.fromkeys(imus.astype(str)))
+    if len(names) > _MOST_NAMES:
+        return ", ".join(names[:_MOST_NAMES]) + f" and {len(names) - _MOST_NAMES} more"
+    return ", ".join(names)

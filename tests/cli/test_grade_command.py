@@ -1,0 +1,104 @@
+"""``simrail grade``: a verdict of a sheet, its files, and what is no requirement."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from simrail.cli.main import call
+
+SCENARIO = """
+title = "Grades on a short ride"
+seed = 5
+track = "condequinto_olivar"
+vehicle = "metro_irw_bogie"
+engine = "kinematic"
+truth_rate_hz = 250.0
+odometry = "truth"
+[monte_carlo]
+sensor_draws = 60
+[[ride]]
+name = "line"
+start_m = 40.0
+end_m = 140.0
+speed_kmh = 40.0
+acceleration_mps2 = 1.5
+jerk_mps3 = 1.5
+rest_s = 3.0
+final_rest_s = 1.0
+[encoder]
+wheel = "trailing.left"
+pulses_per_revolution = 1024
+rate_hz = 250.0
+[[imu]]
+name = "axle"
+grade = "ideal"
+body = "front"
+position_m = [0.0, 0.0, 0.6]
+[[imu]]
+name = "other"
+grade = "ideal"
+body = "front"
+position_m = [0.0, 0.0, 0.6]
+[[estimator]]
+name = "ekf"
+method = "AttitudeEkf"
+[estimator.options]
+compensated = true
+"""
+
+SHEET = 'title = "t"\nsource = "synthetic"\nrate_hz = 250.0\ngyro_noise_degpsqrthz = 0.001\naccel_turn_on_bias_mg = {:g}\n'
+
+
+@pytest.fixture
+def ladder(here: Path) -> Path:
+    """A scenario and two sheets: of a bias to 0.2 mg, and to 4 mg."""
+    (here / "own.toml").write_text(SCENARIO)
+    (here / "fine.toml").write_text(SHEET.format(0.2))
+    (here / "coarse.toml").write_text(SHEET.format(4.0))
+    return here
+
+
+def grade(*words: str) -> int:
+    return call(["grade", *words, "--scenario", "own.toml", "--workers", "1"])
+
+
+def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A bias of up to 4 mg leans by up to 0.23 degrees, and 44 % of a uniform one by less than 0.1."""
+    assert grade("./coarse.toml,./fine.toml", "--for", "roll<0.1deg", "--mount", "axle") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "fine.toml is the coarsest that is enough" in told
+    (folder,) = (ladder / "results").iterdir()
+    verdicts = pd.read_csv(folder / "verdicts.csv").set_index("imu")
+    assert verdicts["verdict"].str.cat(sep=", ") == "not enough, enough"
+    assert set(verdicts["mount"]) == {"axle"}
+    coarse = verdicts.iloc[0]
+    assert coarse["devices"] == 20  # was settled at the first look, and drawn no more
+    assert verdicts.iloc[1]["devices"] == 60
+    assert coarse["low95"] < 0.44 < coarse["high95"]
+    assert "not enough" in (folder / "report.html").read_text()
+    stop = json.loads((folder / "manifest.json").read_text())["stop"]
+    assert stop["reached"] and sorted(stop["settled"].values()) == [20, 60]
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["ideal", "--for", "roll<0.1mm"], "unit of length; roll is measured in deg"),
+        (["ideal", "--for", "roll is small"], "is no requirement"),
+        (["ideal", "--for", "roll<0.1deg", "--mount", "roof"], "is no [[imu]] of own.toml"),
+        (["noname", "--for", "roll<0.1deg"], "no imu of this name"),
+        (["ideal", "--for", "cross_level D1<1mm"], "a band that this ride is too short for"),
+        (["ideal", "--for", "roll<0.1deg in curves"], "is no part of this ride"),
+        (["ideal", "--for", "roll<0.1deg", "--for", "roll<1deg at 30km/h"], "at different speeds"),
+        (["ideal", "--for", "roll<0.1deg", "--set", "stop.least_draws=90"], "has draws of the sensors"),
+    ],
+)
+def test_what_cannot_be_asked(
+    words: list[str], told: str, ladder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert grade(*words) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
+    assert not (ladder / "results").exists()
