@@ -5,11 +5,12 @@ a cell do not depend on which cells ran before it, or with it. Who runs which ce
 where, is decided in `simrail.campaign.campaign`.
 """
 
+import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,9 +22,10 @@ from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimate_many
 from simrail.recording.recording import Recording, beginning
+from simrail.recording.sheets.grades import imu_sheet
 from simrail.ride.ride import simulate
 from simrail.ride.truth import Truth
-from simrail.scenario.build import Parts
+from simrail.scenario.build import Parts, ResolvedCell
 from simrail.scenario.cells import Cell, cell_record, labels_of
 from simrail.scoring.geometry import score_geometry
 from simrail.scoring.kick import score_kick
@@ -197,9 +199,15 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
                 tally.fail(one.cell, name, error)
 
 
-def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
-    """Measure a cell, its sensors on its ride, and run its odometry."""
-    resolved = parts.resolve(cell)
+def record_cell(
+    cell: Cell, truth: Truth, parts: Parts, *, spared: Callable[[ResolvedCell], ResolvedCell] | None = None
+) -> Recording:
+    """Measure a cell, its sensors on its ride, and run its odometry.
+
+    ``spared`` takes errors away from what is recorded; the sheets that the train knows stay as they are.
+    """
+    told = parts.resolve(cell)
+    resolved = told if spared is None else spared(told)
     recording = measure(
         truth,
         name=cell.ride.name,
@@ -218,9 +226,22 @@ def record_cell(cell: Cell, truth: Truth, parts: Parts) -> Recording:
         map_errors=resolved.map_errors,
         vehicle_sheet=resolved.vehicle_sheet,
     )
+    if spared is not None:
+        recording = with_sheets_of(recording, told)
     if resolved.odometry is None:
         return recording
     return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
+
+
+def with_sheets_of(recording: Recording, told: ResolvedCell) -> Recording:
+    """A recording whose train believes of its sensors and its map what it is told."""
+    sheet = imu_sheet(told.grade, delay_s=recording.imu_sheet.delay_s)
+    recording = replace(recording, imu_sheet=sheet, map_errors=told.map_errors)
+    encoder = recording.encoder_sheet
+    if encoder is None or told.encoder is None:
+        return recording
+    sd = math.hypot(told.encoder.radius_error_sd, told.encoder.rolling_sd)
+    return replace(recording, encoder_sheet=replace(encoder, radius_relative_sd=sd))
 
 
 def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: int) -> Truth:

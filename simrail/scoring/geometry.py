@@ -102,6 +102,35 @@ def score_geometry(
     return table_of(rows, bands=[band.name for band in bands])
 
 
+def rail_error_of(
+    estimate: Estimate, rails: LaidTrack, quantity: str, band: Band | None, *, twist_base_m: float = 3.0
+) -> "pd.Series[float] | None":
+    """Error of one quantity of the rails, mm, over the places that count; None if it is not estimated.
+
+    Parameters
+    ----------
+    estimate, rails
+        As of `score_geometry`.
+    quantity : str
+        As in the score table.
+    band : Band, optional
+        None for all wavelengths.
+    twist_base_m : float
+        Base of the twist.
+    """
+    geometry = estimate.geometry
+    if geometry is None:
+        return None
+    position = geometry.index.to_numpy(dtype=np.float64)
+    bands, wanted = ([], "full") if band is None else ([band], band.name)
+    none = np.empty((0, len(geometry), len(IRREGULARITY)))
+    truth = rails.irregularities(position)
+    for series, counts in _series(geometry, truth, none, _step_of(position), bands, twist_base_m):
+        if series.quantity == quantity and series.band == wanted and not series.reason:
+            return pd.Series(series.error[counts], index=position[counts])
+    return None
+
+
 def _step_of(position: FloatArray) -> float:
     """Distance of the places; 0 if there are fewer than two."""
     steps = np.diff(position)

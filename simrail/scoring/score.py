@@ -162,6 +162,15 @@ def score(
     return table_of(rows)
 
 
+def error_of(estimate: Estimate, against: Reference, quantity: str) -> FloatArray | None:
+    """Error (n,) of a quantity against the truth, in the score table's unit; None if it is not estimated."""
+    states = estimate.states
+    for series in chain(_attitude_series(states, against), _other_series(states, against.motion)):
+        if series.quantity == quantity and series.reference == "truth":
+            return series.error
+    return None
+
+
 def score_odometry(
     recording: Recording,
     truth: Truth | pd.DataFrame | Reference,

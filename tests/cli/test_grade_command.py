@@ -48,7 +48,13 @@ method = "AttitudeEkf"
 compensated = true
 """
 
-SHEET = 'title = "t"\nsource = "synthetic"\nrate_hz = 250.0\ngyro_noise_degpsqrthz = 0.001\naccel_turn_on_bias_mg = {:g}\n'
+SHEET = """
+title = "t"
+source = "synthetic"
+rate_hz = 250.0
+gyro_noise_degpsqrthz = 0.001
+accel_turn_on_bias_mg = {:g}
+"""
 
 
 @pytest.fixture

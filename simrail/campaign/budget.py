@@ -1,0 +1,251 @@
+"""The budget of an error: how much of its square each term of the sensors' sheets makes.
+
+One term at a time is taken away from what is recorded, on the same ride and the same draws, and from nothing
+else: the train still believes its sheets. What the error then changes by is what the term has done to it.
+Where an estimator is linear, and the terms have nothing in common, the mean squares of these changes and of
+the error that is left without any of them add up to that of the error; what they lack or have too much stands
+in the budget as ``together``.
+
+The bandwidth, which delays and is no error of a draw, is part of the estimator's own floor.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from simrail.campaign.cell import record_cell, simulated
+from simrail.campaign.progress import Watcher
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.estimation.estimate import Estimator, estimate_many
+from simrail.recording.recording import Recording
+from simrail.recording.sheets.grades import ImuGrade
+from simrail.ride.truth import Truth
+from simrail.scenario.build import Parts, ResolvedCell, bands_by_name
+from simrail.scenario.cells import Cell
+from simrail.scoring.bootstrap import mean_interval
+from simrail.scoring.geometry import rail_error_of
+from simrail.scoring.requirement import RAILS, Requirement
+from simrail.scoring.score import Reference, error_of, reference_of
+from simrail.scoring.windows import chosen_windows, windows_of
+from simrail.track.map_errors import EXACT
+
+FLOOR, TOGETHER = "floor", "together"
+"""Rows of a budget beside its terms."""
+
+WORDS = {
+    FLOOR: "what the method leaves with no error of sensors or map",
+    TOGETHER: "what terms do together, or against each other",
+}
+
+
+@dataclass(frozen=True)
+class Term:
+    """An error that can be taken away.
+
+    Attributes
+    ----------
+    name, words : str
+        Its name in tables, and in sentences.
+    grade : tuple of str
+        Fields of `ImuGrade` that are it.
+    encoder : dict
+        Fields of the encoder's specification, with what they are without it.
+    is_map : bool
+        True for the errors of the map.
+    """
+
+    name: str
+    words: str
+    grade: tuple[str, ...] = ()
+    encoder: Mapping[str, Any] | None = None
+    is_map: bool = False
+
+    def is_in(self, told: ResolvedCell) -> bool:
+        """Whether a cell has it."""
+        if self.is_map:
+            return told.track_map is not None
+        if self.encoder is not None:
+            spec = told.encoder
+            return spec is not None and any(
+                getattr(spec, key) not in (value, None) for key, value in self.encoder.items()
+            )
+        return any(getattr(told.grade, name) != _NONE[name] for name in self.grade)
+
+    def spared(self, told: ResolvedCell) -> ResolvedCell:
+        """The cell without it."""
+        if self.is_map:
+            return replace(told, track_map=None, map_errors=EXACT)
+        if self.encoder is not None and told.encoder is not None:
+            return replace(told, encoder=replace(told.encoder, **self.encoder))
+        return replace(told, grade=replace(told.grade, **{name: _NONE[name] for name in self.grade}))
+
+
+_NONE: dict[str, Any] = {field.name: field.default for field in fields(ImuGrade)}
+"""What each field of a grade is without its term."""
+
+
+def _both(term: str) -> tuple[str, ...]:
+    """Fields of a term of both triads."""
+    return tuple(name for name in _NONE if name.split("_", 1)[-1].startswith(term))
+
+
+def _of(kind: str, term: str) -> tuple[str, ...]:
+    return tuple(name for name in _NONE if name.startswith(f"{kind}_{term}"))
+
+
+TERMS = (
+    Term("gyro_turn_on_bias", "the gyro's turn-on bias", _of("gyro", "turn_on_bias")),
+    Term("accel_turn_on_bias", "the accelerometer's turn-on bias", _of("accel", "turn_on_bias")),
+    Term("gyro_in_run_bias", "the gyro's in-run bias", _of("gyro", "bias_instability")),
+    Term("accel_in_run_bias", "the accelerometer's in-run bias", _of("accel", "bias_instability")),
+    Term("gyro_noise", "the gyro's white noise", _of("gyro", "noise")),
+    Term("accel_noise", "the accelerometer's white noise", _of("accel", "noise")),
+    Term("rate_walk", "rate random walk", _both("random_walk")),
+    Term("gyro_scale", "the gyro's scale", (*_of("gyro", "scale_error"), "gyro_nonlinearity")),
+    Term("accel_scale", "the accelerometer's scale", (*_of("accel", "scale_error"), "accel_nonlinearity")),
+    Term("misalignment", "misalignment of the package", ("package_misalignment_rad",)),
+    Term("axes", "axes that are not square", _both("nonorthogonality")),
+    Term("g_sensitivity", "g-sensitivity", _of("gyro", "g_sensitivity")),
+    Term("rectification", "vibration rectification", _both("vibration_rectification")),
+    Term("quantisation", "quantisation", _both("resolution")),
+    Term("clock", "the IMU's clock", ("clock_jitter_s", "clock_drift")),
+    Term("temperature", "temperature", (*_both("bias_temperature"), *_both("scale_temperature"))),
+    Term("wheel_radius", "the wheel's radius", encoder={"radius_error_sd": 0.0, "radius_error": 0.0}),
+    Term("wheel_slip", "slip", encoder={"slip": ()}),
+    Term(
+        "edges",
+        "edges of the encoder",
+        encoder={"edge_pattern_sd": 0.0, "edge_jitter_sd": 0.0, "missed_rate": 0.0},
+    ),
+    Term("map", "the map", is_map=True),
+)
+"""What is taken away, one at a time; data sheets of the rest have no draws."""
+
+
+def error_budget(
+    cells: Sequence[Cell],
+    parts: Parts,
+    estimator: Estimator,
+    wanted: Requirement,
+    *,
+    watcher: Watcher | None = None,
+) -> pd.DataFrame:
+    """The budget of the error of one figure, over some cells that share IMU, mount and method.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Draws of one case, or of one on several kinds of rides.
+    parts : Parts
+        Of their scenario.
+    estimator : Estimator
+        The method.
+    wanted : Requirement
+        Whose quantity, band and window; the figure is the mean square of the error.
+    watcher : Watcher, optional
+        Is told of the progress.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per term that the cells have, then `FLOOR` and `TOGETHER`: ``term``, ``words``, ``rms`` in the
+        score table's unit, ``share`` of the mean square with ``low95`` and ``high95`` (bootstrap over draws;
+        NaN of one), largest share first.
+
+    Raises
+    ------
+    InputError
+        If the method says nothing of the quantity, or a cell is of several passes.
+    """
+    watcher = watcher or Watcher()
+    rows = []
+    terms = [term for term in TERMS if term.is_in(parts.resolve(cells[0]))]
+    watcher.cells_begin(0, len(cells))
+    for number, cell in enumerate(cells):
+        if cell.passes:
+            raise InputError("has no budget: it is fused of several rides", field="passes")
+        truth = simulated(cell, parts, watcher, number + 1, len(cells))
+        rows.append(_squares(cell, truth, parts, estimator, wanted, terms))
+        watcher.cells_done(number + 1, len(cells), 0, "")
+    squares = np.array(rows)
+    names = [*(term.name for term in terms), FLOOR, TOGETHER]
+    words = WORDS | {term.name: term.words for term in terms}
+    whole, parts_of_it = (
+        squares[:, 0],
+        np.column_stack([squares[:, 1:], squares[:, 0] - squares[:, 1:].sum(axis=1)]),
+    )
+    # A ratio of means: each draw's part counts by how large its error is.
+    share, low, high = mean_interval(parts_of_it.T, np.tile(whole, (len(names), 1)))
+    table = pd.DataFrame({"term": names, "words": [words[name] for name in names]})
+    table["rms"] = np.sign(parts_of_it.mean(axis=0)) * np.sqrt(np.abs(parts_of_it.mean(axis=0)))
+    table["unit"], table["share"], table["low95"], table["high95"] = wanted.unit, share, low, high
+    table["rms_of_whole"], table["draws"] = float(np.sqrt(whole.mean())), len(cells)
+    last = table["term"].isin((FLOOR, TOGETHER))
+    return pd.concat([table[~last].sort_values("share", ascending=False), table[last]], ignore_index=True)
+
+
+def _squares(
+    cell: Cell, truth: Truth, parts: Parts, estimator: Estimator, wanted: Requirement, terms: Sequence[Term]
+) -> list[float]:
+    """Mean squares of the error, of what each term changes it by, and of what is left without all of them."""
+
+    def error(spared: Callable[[ResolvedCell], ResolvedCell] | None) -> "pd.Series[float]":
+        recording = record_cell(cell, truth, parts, spared=spared)
+        return _error(cell, recording, truth, parts, estimator, wanted)
+
+    def without_all(told: ResolvedCell) -> ResolvedCell:
+        for term in terms:
+            told = term.spared(told)
+        return told
+
+    whole = error(None)
+    squares = [_mean_square(whole)]
+    squares += [_mean_square((whole - error(term.spared)).dropna()) for term in terms]
+    return [*squares, _mean_square(error(without_all))]
+
+
+def _mean_square(values: "pd.Series[float]") -> float:
+    return float(np.square(values.to_numpy(dtype=np.float64)).mean()) if len(values) else 0.0
+
+
+def _error(
+    cell: Cell, recording: Recording, truth: Truth, parts: Parts, estimator: Estimator, wanted: Requirement
+) -> "pd.Series[float]":
+    """The error of one recording, over time or, of rails, over places."""
+    (estimate,) = estimate_many(estimator, [recording])
+    if wanted.quantity in RAILS:
+        band = None if wanted.band == "full" else bands_by_name(cell.spec)[wanted.band]
+        base = cell.spec.geometry.twist_base_m
+        of_rails = rail_error_of(estimate, parts.rails(cell), wanted.quantity, band, twist_base_m=base)
+        if of_rails is not None:
+            places = of_rails.index.to_numpy(dtype=np.float64)
+            windows = windows_of(truth.track, places, np.ones(len(places)))
+            return of_rails.iloc[chosen_windows(windows, (wanted.window,))[wanted.window]]
+    else:
+        against: Reference = reference_of(truth, recording)
+        values: FloatArray | None = error_of(estimate, against, wanted.quantity)
+        if values is not None:
+            at = chosen_windows(against.windows, (wanted.window,))[wanted.window]
+            return pd.Series(values[at], index=at)
+    raise InputError(
+        "this method says nothing of it", field="quantity", value=wanted.what, remedy="name another method"
+    )
+
+
+def budget_sentence(budget: pd.DataFrame, wanted: Requirement) -> str:
+    """The largest part of an error in one sentence: ``"94 % of the roll error is ..."``."""
+    first = budget.sort_values("share", ascending=False).iloc[0]
+    rms = f"{budget['rms_of_whole'].iloc[0]:.3g} {wanted.unit} rms"
+    quantity = wanted.quantity.replace("_", " ")
+    return f"{100.0 * first['share']:.0f} % of the squared {quantity} error ({rms}) is {first['words']}"
+
+
+def first_draws(cells: Iterator[Cell], imu: str, mount: str, most: int) -> list[Cell]:
+    """The first draws of a grade at a mount."""
+    own = [cell for cell in cells if cell.imu.grade == imu and cell.imu.name == mount]
+    order = sorted(own, key=lambda cell: (cell.track_draw, cell.sample, cell.sensor_draw, cell.number))
+    return order[:most]
