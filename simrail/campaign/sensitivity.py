@@ -223,7 +223,8 @@ def _rows_of(scores: pd.DataFrame, figure: FigureName, estimators: Sequence[str]
     wanted = scores
     for name, word in figure._asdict().items():
         words = [str(one) for one in wanted[name].dropna().unique() if str(one)]
-        one_of(word, sorted(words), "is not in the scores of this scenario", field=f"--{name}")
+        option = "--of" if name == "quantity" else f"--{name}"
+        one_of(word, sorted(words), "is not in the scores of this scenario", field=option)
         wanted = wanted[wanted[name] == word]
     for estimator in estimators:
         words = [str(one) for one in wanted["estimator"].unique()]

@@ -64,6 +64,10 @@ _MOST_RESOLVED = 1000
 """Resolved cells that are remembered; cells come ride by ride, and draws of the sensors share one."""
 
 
+_MOST_MAPS = 16
+"""Drawn maps that are remembered."""
+
+
 @dataclass(frozen=True)
 class ResolvedCell:
     """A cell and the nouns that its words stand for.
@@ -130,12 +134,13 @@ class Parts:
         self._tunings: dict[int, dict[str, str]] = {}
         self._resolved: dict[tuple[int, ...], ResolvedCell] = {}
         self._rides: dict[tuple[int, ...], Ride] = {}
+        self._maps: dict[tuple[str, str, int, int], TrackDesign] = {}
         self._laid: tuple[Ride, LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
 
     def __getstate__(self) -> dict[str, Any]:
         """What was read, for another process: cells are resolved, and rails laid, faster than sent."""
-        return {**self.__dict__, "_laid": None, "_resolved": {}, "_rides": {}}
+        return {**self.__dict__, "_laid": None, "_resolved": {}, "_rides": {}, "_maps": {}}
 
     @property
     def hash(self) -> str:
@@ -264,14 +269,20 @@ class Parts:
         part = cell.spec.map
         if part is None or part.exact:
             return None
-        with blame(self.scenario.file, "map"):
-            return draw_map(
-                self.track(cell),
-                part.errors(),
-                seed=cell.map_seed,
-                draw=cell.map_draw,
-                defects=part.defects(),
-            )
+        # Many samples of a design have one map.
+        key = (cell.spec.track, part.model_dump_json(), cell.map_seed, cell.map_draw)
+        if key not in self._maps:
+            if len(self._maps) >= _MOST_MAPS:
+                self._maps.clear()
+            with blame(self.scenario.file, "map"):
+                self._maps[key] = draw_map(
+                    self.track(cell),
+                    part.errors(),
+                    seed=cell.map_seed,
+                    draw=cell.map_draw,
+                    defects=part.defects(),
+                )
+        return self._maps[key]
 
     def vehicle(self, cell: Cell) -> VehicleModel:
         """Vehicle of a cell."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
 from simrail.campaign.sensitivity import FigureName, Sensitivity, indices_of, sensitivities, sensitivity_table
-from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
+from simrail.cli.main import BAD_INPUT, CELL_FAILED, call
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.scenario.cells import cells, count, first_cells
@@ -372,9 +371,6 @@ def test_figures_of_a_sheet_take_the_place_of_its_own(place: Path) -> None:
         assert grade.accel_noise_mpsqrts == pytest.approx(1e-4 * 9.80665)
 
 
-Edit = Callable[[list[str]], list[str]]
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -427,24 +423,20 @@ def test_a_design_is_run_whole(table: str, place: Path) -> None:
 def test_the_command_writes_tables_and_figures_and_does_not_run_twice(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["sensitivity", "ishigami.toml", "--samples", "4", "--workers", "1"]
-    assert call(arguments) == DONE
+    """One of 8 blocks has a failure: it is told, and ends with the code of failed cells."""
+    arguments = ["sensitivity", "ishigami.toml", "--samples", "8", "--workers", "1", "--seed", "2"]
+    arguments += ["--set", "estimator.options.fails=0.05"]
+    assert call(arguments) == CELL_FAILED
     said = capsys.readouterr()
     assert "estimator.toy.options.x1" in said.out and "first order" in said.out
+    assert "1 of 8 blocks left out: ValueError: planted failure" in said.out
     folder = place / "results" / "ishigami_saltelli"
     table = pd.read_csv(folder / "sensitivity_roll_rms_whole.csv")
-    assert list(table["rank"]) == [1, 2, 3]
+    assert list(table["rank"]) == [1, 2, 3] and list(table["dropped"]) == [1, 1, 1]
     figure = (folder / "sensitivity_roll_rms_whole_toy.svg").read_text()
     assert figure.startswith("<svg") and figure.count("total index") == 3
-    assert call(arguments) == DONE
+    assert call(arguments) == CELL_FAILED
     again = capsys.readouterr()
     assert "of the finished results" in again.err and again.out == said.out
     assert call([*arguments, "--of", "rol"]) == BAD_INPUT
-    assert "--quantity" in capsys.readouterr().err
-
-
-def test_a_failure_is_told_and_ends_with_its_code(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["ishigami.toml", "--method", "morris", "--samples", "4", "--workers", "1"]
-    assert call(["sensitivity", *arguments, "--set", "estimator.options.fails=0.95"]) == CELL_FAILED
-    said = capsys.readouterr().out
-    assert "trajectories left out" in said and "planted failure" in said
+    assert "--of" in capsys.readouterr().err
