@@ -20,6 +20,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
+from simrail.campaign.budget import budgets_of
 from simrail.campaign.campaign import key_of, run_campaign
 from simrail.campaign.cell import STAGES
 from simrail.campaign.checkpoint import LOG, Checkpoint, Start, checkpoint_of
@@ -53,12 +56,17 @@ MANIFEST = "manifest.json"
 
 @dataclass(frozen=True)
 class Results:
-    """What `run` returns: the campaign's tables, the manifest, and the folder that holds them."""
+    """What `run` returns: the campaign's tables, the manifest, and the folder that holds them.
+
+    ``budgets`` say what errors are made of, where a requirement asks for it
+    (`simrail.campaign.budget.budgets_of`).
+    """
 
     folder: Path
     scenario: Scenario
     campaign: CampaignResult
     manifest: dict[str, Any]
+    budgets: pd.DataFrame
 
 
 def run(
@@ -128,6 +136,7 @@ def run(
         campaign = run_campaign(
             plan, workers=workers, cluster=cluster, checkpoint=checkpoint, watcher=watcher
         )
+        budgets = budgets_of(plan, campaign.verdicts, watcher=watcher)
         manifest = describe(scenario, campaign)
         manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": key}
         if other is not None:
@@ -135,10 +144,10 @@ def run(
             manifest["beside"] = {name: other.manifest.get(name) for name in names}
             manifest["command"] += f" --beside {shlex.quote(label(other.folder))}"
         with draft_of(folder) as draft:
-            _write(draft, scenario, campaign, manifest, begun=begun, beside=other)
+            _write(draft, scenario, campaign, manifest, begun=begun, beside=other, budgets=budgets)
             shutil.copyfile(checkpoint.folder / LOG, draft / LOG)
         checkpoint.remove()
-    return Results(folder, scenario, campaign, manifest)
+    return Results(folder, scenario, campaign, manifest, budgets)
 
 
 def run_cell(
@@ -214,13 +223,17 @@ def _write(
     *,
     begun: float,
     beside: StoredResults | None = None,
+    budgets: pd.DataFrame | None = None,
 ) -> None:
     """Write the results of a campaign into a folder."""
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
     campaign.cells.to_parquet(draft / "cells.parquet", index=False)
     aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
-    if len(campaign.verdicts):
-        campaign.verdicts.to_csv(draft / "verdicts.csv", index=False, float_format="%.9g")
+    verdicts = campaign.verdicts
+    if len(verdicts):
+        verdicts.to_csv(draft / "verdicts.csv", index=False, float_format="%.9g")
+    if budgets is not None and len(budgets):
+        budgets.to_csv(draft / "budget.csv", index=False, float_format="%.9g")
     drawing = time.perf_counter()
     write_report(
         draft / "report.html",
@@ -230,6 +243,7 @@ def _write(
         examples=campaign.examples,
         manifest=manifest,
         beside=beside,
+        budgets=budgets,
     )
     ended = time.perf_counter()
     manifest["wall_s"] |= {"report": ended - drawing, "total": ended - begun}

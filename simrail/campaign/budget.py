@@ -9,7 +9,7 @@ in the budget as ``together``.
 The bandwidth, which delays and is no error of a draw, is part of the estimator's own floor.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -20,16 +20,20 @@ from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.estimation.estimate import Estimator, estimate_many
+from simrail.estimation.estimate import Estimator, description_of, estimate_many
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.ride.truth import Truth
 from simrail.scenario.build import Parts, ResolvedCell, bands_by_name
-from simrail.scenario.cells import Cell
+from simrail.scenario.cells import Cell, cells, labels_of
+from simrail.scenario.check import Plan
+from simrail.scenario.requirements import requirements_of
+from simrail.scoring.ablations import without_ablations
 from simrail.scoring.bootstrap import mean_interval
 from simrail.scoring.geometry import rail_error_of
 from simrail.scoring.requirement import RAILS, Requirement
 from simrail.scoring.score import Reference, error_of, reference_of
+from simrail.scoring.verdicts import GROUP
 from simrail.scoring.windows import chosen_windows, windows_of
 from simrail.track.map_errors import EXACT
 
@@ -127,7 +131,7 @@ TERMS = (
 
 
 def error_budget(
-    cells: Sequence[Cell],
+    draws: Sequence[Cell],
     parts: Parts,
     estimator: Estimator,
     wanted: Requirement,
@@ -138,7 +142,7 @@ def error_budget(
 
     Parameters
     ----------
-    cells : sequence of Cell
+    draws : sequence of Cell
         Draws of one case, or of one on several kinds of rides.
     parts : Parts
         Of their scenario.
@@ -163,14 +167,14 @@ def error_budget(
     """
     watcher = watcher or Watcher()
     rows = []
-    terms = [term for term in TERMS if term.is_in(parts.resolve(cells[0]))]
-    watcher.cells_begin(0, len(cells))
-    for number, cell in enumerate(cells):
+    terms = [term for term in TERMS if term.is_in(parts.resolve(draws[0]))]
+    watcher.cells_begin(0, len(draws))
+    for number, cell in enumerate(draws):
         if cell.passes:
             raise InputError("has no budget: it is fused of several rides", field="passes")
-        truth = simulated(cell, parts, watcher, number + 1, len(cells))
+        truth = simulated(cell, parts, watcher, number + 1, len(draws))
         rows.append(_squares(cell, truth, parts, estimator, wanted, terms))
-        watcher.cells_done(number + 1, len(cells), 0, "")
+        watcher.cells_done(number + 1, len(draws), 0, "")
     squares = np.array(rows)
     names = [*(term.name for term in terms), FLOOR, TOGETHER]
     words = WORDS | {term.name: term.words for term in terms}
@@ -182,8 +186,9 @@ def error_budget(
     share, low, high = mean_interval(parts_of_it.T, np.tile(whole, (len(names), 1)))
     table = pd.DataFrame({"term": names, "words": [words[name] for name in names]})
     table["rms"] = np.sign(parts_of_it.mean(axis=0)) * np.sqrt(np.abs(parts_of_it.mean(axis=0)))
-    table["unit"], table["share"], table["low95"], table["high95"] = wanted.unit, share, low, high
-    table["rms_of_whole"], table["draws"] = float(np.sqrt(whole.mean())), len(cells)
+    table["what"], table["unit"] = wanted.what, wanted.unit
+    table["share"], table["low95"], table["high95"] = share, low, high
+    table["rms_of_whole"], table["draws"] = float(np.sqrt(whole.mean())), len(draws)
     last = table["term"].isin((FLOOR, TOGETHER))
     return pd.concat([table[~last].sort_values("share", ascending=False), table[last]], ignore_index=True)
 
@@ -236,16 +241,63 @@ def _error(
     )
 
 
-def budget_sentence(budget: pd.DataFrame, wanted: Requirement) -> str:
-    """The largest part of an error in one sentence: ``"94 % of the roll error is ..."``."""
+def budget_sentence(budget: pd.DataFrame) -> str:
+    """The largest part of an error in one sentence: ``"94 % of the squared error of roll rms is ..."``."""
     first = budget.sort_values("share", ascending=False).iloc[0]
-    rms = f"{budget['rms_of_whole'].iloc[0]:.3g} {wanted.unit} rms"
-    quantity = wanted.quantity.replace("_", " ")
-    return f"{100.0 * first['share']:.0f} % of the squared {quantity} error ({rms}) is {first['words']}"
+    whole = f"{first['what']} ({first['rms_of_whole']:.3g} {first['unit']})"
+    return f"{100.0 * first['share']:.0f} % of the squared error of {whole} is {first['words']}"
 
 
-def first_draws(cells: Iterator[Cell], imu: str, mount: str, most: int) -> list[Cell]:
-    """The first draws of a grade at a mount."""
-    own = [cell for cell in cells if cell.imu.grade == imu and cell.imu.name == mount]
-    order = sorted(own, key=lambda cell: (cell.track_draw, cell.sample, cell.sensor_draw, cell.number))
-    return order[:most]
+def budgets_of(plan: Plan, verdicts: pd.DataFrame, *, watcher: Watcher | None = None) -> pd.DataFrame:
+    """Budgets of a scenario's requirements that ask for one, of each IMU at each mount.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was run.
+    verdicts : pandas.DataFrame
+        What became of it: the budget is of the method under test whose devices are best.
+    watcher : Watcher, optional
+        Is told of the progress.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `error_budget`, behind ``requirement``, ``number``, ``vehicle``, ``mount``, ``imu``, ``estimator``.
+    """
+    tables = []
+    for number, (part, wanted) in enumerate(
+        zip(plan.scenario.spec.require, requirements_of(plan.scenario.spec), strict=True)
+    ):
+        if not part.budget_draws or verdicts.empty:
+            continue
+        of_this = verdicts[(verdicts["number"] == number) & verdicts["estimator"].map(_is_tested(plan))]
+        for names, rows in of_this.groupby(list(GROUP), sort=False):
+            vehicle, mount, imu = (str(name) for name in names)
+            best = str(rows.sort_values("at_share", na_position="last")["estimator"].iloc[0])
+            chosen = _first_draws(plan, (vehicle, mount, imu), part.budget_draws)
+            labels = {"requirement": wanted.words, "number": number, "vehicle": vehicle, "mount": mount}
+            labels |= {"imu": imu, "estimator": best}
+            budget = error_budget(chosen, plan.parts, plan.estimators[best], wanted, watcher=watcher)
+            tables.append(pd.DataFrame([labels] * len(budget)).join(budget))
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def _is_tested(plan: Plan) -> dict[str, bool]:
+    """Which methods are under test, by name."""
+    told = {name: description_of(estimator) for name, estimator in plan.estimators.items()}
+    tested = {name: one.uses_imu and one.role == "method" for name, one in told.items()}
+    return tested if any(tested.values()) else {name: one.uses_imu for name, one in told.items()}
+
+
+def _first_draws(plan: Plan, group: tuple[str, str, str], most: int) -> list[Cell]:
+    """The first draws of a grade at a mount of a vehicle; of the rides that it has, the first."""
+    own = [
+        cell
+        for cell in cells(plan.scenario)
+        if (cell.spec.vehicle, cell.imu.name, str(cell.imu.grade)) == group
+    ]
+    kept = set(without_ablations(pd.DataFrame([labels_of(cell) for cell in own]))["cell"])
+    first = min(cell.case for cell in own if cell.number in kept)
+    own = [cell for cell in own if cell.case == first]
+    return sorted(own, key=lambda cell: (cell.track_draw, cell.sample, cell.sensor_draw))[:most]

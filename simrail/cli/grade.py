@@ -13,6 +13,9 @@ from simrail.core.toml_files import parse_toml
 
 DEFAULT_SCENARIO = "which_imu"
 
+BUDGET_DRAWS = 8
+"""Draws of which the error is taken apart, where one IMU is asked for."""
+
 
 def grade(
     name: Annotated[
@@ -54,19 +57,23 @@ def grade(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.score_tables import print_scores
-    from simrail.cli.verdict_tables import print_coarsest
+    from simrail.cli.verdict_tables import print_budgets, print_coarsest
     from simrail.results import run
     from simrail.scenario.scenario import load_scenario
 
     grades = grades_of(name)
     asked = load_scenario(scenario)
-    overrides = [*requirement_settings(wanted), imu_setting(asked.text, asked.file, grades, mount)]
+    overrides = [
+        *requirement_settings(wanted, BUDGET_DRAWS if len(grades) == 1 else 0),
+        imu_setting(asked.text, asked.file, grades, mount),
+    ]
     read = load_scenario(scenario, overrides=[*overrides, *(settings or [])], seed=seed)
     folder = out or Path("results") / ("grade_" + re.sub(r"\W+", "_", Path(name).stem))
     with ProgressWatcher(Console(stderr=True)) as watcher:
         results = run(read, out=folder, workers=workers, watcher=watcher)
     console = Console()
     print_scores(console, results)
+    print_budgets(console, results.budgets)
     if len(grades) > 1:
         print_coarsest(console, results)
     return CELL_FAILED if results.campaign.failures else DONE
@@ -119,7 +126,7 @@ def _inline(table: dict[str, Any]) -> str:
     return "{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in table.items()) + " }"
 
 
-def requirement_settings(lines: list[str]) -> list[str]:
+def requirement_settings(lines: list[str], budget_draws: int = 0) -> list[str]:
     """Settings of a scenario that ask for what these lines do, and draw until it is settled."""
     from simrail.scoring.requirement import read_requirement
 
@@ -135,8 +142,13 @@ def requirement_settings(lines: list[str]) -> list[str]:
         )
     tables = []
     for one, _ in read:
-        pairs = {"quantity": one.quantity, "limit": f"{one.limit:.12g} {one.unit}", "metric": one.metric}
-        tables.append(_inline(pairs | {"band": one.band, "window": one.window, "share": one.share}))
+        pairs: dict[str, Any] = {
+            "quantity": one.quantity,
+            "limit": f"{one.limit:.12g} {one.unit}",
+            "metric": one.metric,
+        }
+        pairs |= {"band": one.band, "window": one.window, "share": one.share}
+        tables.append(_inline(pairs | {"budget_draws": budget_draws}))
     settings = [f"require=[{', '.join(tables)}]", "stop={ verdicts = true, least_draws = 20 }"]
     (speed,) = speeds
     return settings if speed is None else [*settings, f"ride.speed_kmh={speed:.12g}"]

@@ -8,7 +8,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from simrail.report.campaign.verdicts import groups_of
+from simrail.campaign.budget import budget_sentence
+from simrail.report.campaign.verdicts import LEAST_SHARE, groups_of
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.report.words.verdicts import (
     best_method,
@@ -39,6 +40,23 @@ def print_verdicts(console: Console, verdicts: pd.DataFrame, styles: Sequence[Me
             table.add_row(str(imu), *cells)
         console.print(table)
         console.print(Text(devices_words(rows), style="dim"), soft_wrap=True)
+
+
+def print_budgets(console: Console, budgets: pd.DataFrame) -> None:
+    """Print what errors are made of, one table for each IMU, mount and requirement."""
+    if budgets.empty:
+        return
+    for _, own in budgets.groupby(["number", "vehicle", "mount", "imu"], sort=False):
+        first = own.iloc[0]
+        console.print()
+        console.print(Text(f"{budget_sentence(own)}, {first['imu']} on the {first['mount']}", style="bold"))
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        for title in ("what", "share of the square", "95 %"):
+            table.add_column(title, justify="left" if title == "what" else "right")
+        for row in own[(own["share"].abs() >= LEAST_SHARE)].to_dict("records"):
+            ends = f"{100.0 * row['low95']:.1f} to {100.0 * row['high95']:.1f}"
+            table.add_row(row["words"], f"{100.0 * row['share']:.1f} %", ends)
+        console.print(table)
 
 
 def print_coarsest(console: Console, results: Results) -> None:

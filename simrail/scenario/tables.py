@@ -461,7 +461,8 @@ class RequirePart(Part):
     A device is one draw of the errors that stay with a sensor. ``limit`` has a unit (``"0.1 deg"``; a bare
     number is in that of the score table). With ``over = "all"`` a device must meet it on every ride of the
     scenario, with ``"each"`` every kind of ride has a verdict of its own. ``chance`` is that of a false
-    verdict. See `simrail.scoring.verdicts`.
+    verdict. See `simrail.scoring.verdicts`. ``budget_draws`` is over how many draws it is found out which
+    terms of the sheets the error is made of (`simrail.campaign.budget`); 0 for not at all.
     """
 
     quantity: str
@@ -473,10 +474,11 @@ class RequirePart(Part):
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     over: Literal["all", "each"] = "all"
     chance: Annotated[float, Field(ge=1e-4, le=0.2)] = 0.05
+    budget_draws: Annotated[int, Field(ge=0, le=1000)] = 0
 
     def requirement(self) -> Requirement:
         """The requirement, in the unit of the score table."""
-        own = self.model_dump()
+        own = self.model_dump(exclude={"budget_draws"})
         return Requirement(**own | {"limit": limit_of(self.limit, self.quantity)})
 
 

@@ -111,7 +111,7 @@ def test_an_ekf_that_cannot_see_the_bias_errs_by_it() -> None:
     budget = error_budget(listed[:4], parts, AttitudeEkf(), WANTED)
     assert budget["term"].iloc[0] == "accel_turn_on_bias"
     assert budget["share"].iloc[0] > 0.5
-    assert "the accelerometer's turn-on bias" in budget_sentence(budget, WANTED)
+    assert "the accelerometer's turn-on bias" in budget_sentence(budget)
 
 
 def test_every_term_of_a_sheet_is_in_the_budget_or_named_as_left_out() -> None:

@@ -88,6 +88,19 @@ def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.Ca
     assert stop["reached"] and sorted(stop["settled"].values()) == [20, 60]
 
 
+def test_one_grade_is_told_what_its_error_is_made_of(
+    ladder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert grade("./coarse.toml", "--for", "roll<0.1deg", "--mount", "axle") == 0
+    assert "of the squared error of roll rms" in capsys.readouterr().out
+    (folder,) = (ladder / "results").iterdir()
+    budget = pd.read_csv(folder / "budget.csv")
+    assert budget["term"].iloc[0] == "accel_turn_on_bias"
+    assert budget["share"].sum() == pytest.approx(1.0, abs=1e-6)
+    page = (folder / "report.html").read_text()
+    assert "of the squared error of roll rms" in page and "share of the squared error" in page
+
+
 @pytest.mark.parametrize(
     "words, told",
     [

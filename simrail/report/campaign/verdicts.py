@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from simrail.campaign.budget import FLOOR, TOGETHER, budget_sentence
 from simrail.core.jit import FloatArray
 from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
@@ -23,6 +24,11 @@ MOST_CHARTS = 12
 
 MOST_DOTS = 60
 """Devices that are drawn of an IMU with a method, evenly by rank."""
+
+LEAST_SHARE = 0.002
+"""Terms with less of the squared error are not drawn."""
+
+LABELS = {FLOOR: "the method's own floor", TOGETHER: "together"}
 
 COLOURS = {ENOUGH: "#15803d", NOT_ENOUGH: "#b42318"}
 """Of verdicts; any other is muted."""
@@ -46,10 +52,47 @@ def verdicts_section(data: PageData) -> list[Section]:
                 "chart": decision_chart(rows, devices, wanted[number], data.styles) if drawn else "",
                 "columns": [style.label for style in judged_methods(rows, data.styles)],
                 "rows": list(_table_rows(rows, judged_methods(rows, data.styles))),
+                "budgets": list(_budgets(data.budgets, number, vehicle, mount)),
             }
         )
     shown = {"groups": groups, "chance": 100.0 * max(one.chance for one in wanted)}
     return [Section("verdict", "Verdict", "campaign/verdicts.html.j2", shown)]
+
+
+def _budgets(
+    budgets: pd.DataFrame | None, number: int, vehicle: str, mount: str
+) -> Iterator[tuple[str, str]]:
+    """Sentence and figure of each budget of a requirement at a mount."""
+    if budgets is None or budgets.empty:
+        return
+    own = budgets[
+        (budgets["number"] == number) & (budgets["vehicle"] == vehicle) & (budgets["mount"] == mount)
+    ]
+    for imu, budget in own.groupby("imu", sort=False):
+        sentence = f"{imu}: {budget_sentence(budget)}."
+        yield sentence, budget_chart(budget, sentence)
+
+
+def budget_chart(budget: pd.DataFrame, description: str) -> str:
+    """Shares of the squared error as bars, largest first, with their intervals."""
+    shown = budget[(budget["share"].abs() >= LEAST_SHARE) | budget["term"].isin((FLOOR, TOGETHER))]
+    names = [LABELS.get(str(term), str(term).replace("_", " ")) for term in shown["term"]]
+    place = np.arange(len(shown))[::-1]
+    share = 100.0 * shown["share"].to_numpy()
+    with canvas.look():
+        figure, (panel,) = canvas.panels([0.24 * len(shown) + 0.1], top_in=0.15)
+        is_term = ~shown["term"].isin((FLOOR, TOGETHER)).to_numpy()
+        panel.barh(place, share, height=0.62, color=np.where(is_term, "#0b7285", "#98a1af"), zorder=3)
+        low, high = (100.0 * shown[name].to_numpy() for name in ("low95", "high95"))
+        for y, left, right in zip(place, low, high, strict=True):
+            panel.plot([left, right], [y, y], color=canvas.INK, lw=1.0, zorder=4)
+        panel.axvline(0.0, color=canvas.INK, lw=0.7)
+        panel.set_yticks(place, names, fontsize=8.0)
+        panel.tick_params(axis="y", length=0)
+        panel.grid(axis="y", visible=False)
+        panel.set_position((0.22, panel.get_position().y0, 0.76, panel.get_position().height))
+        panel.set_xlabel("share of the squared error, %")
+        return canvas.to_svg(figure, description=description)
 
 
 def groups_of(table: pd.DataFrame) -> Iterator[tuple[int, str, str, pd.DataFrame]]:

@@ -52,6 +52,7 @@ def write_report(
     examples: Sequence[CellResult],
     manifest: Mapping[str, Any],
     beside: StoredResults | None = None,
+    budgets: pd.DataFrame | None = None,
 ) -> None:
     """Write the report of a campaign; where it has axes, its tables into a folder beside it as well.
 
@@ -59,10 +60,10 @@ def write_report(
     ----------
     path : Path
         The HTML file.
-    scenario, scores, cells, examples, manifest, beside
+    scenario, scores, cells, examples, manifest, beside, budgets
         The campaign, see `PageData`.
     """
-    data = PageData(scenario, scores, cells, examples, manifest, beside)
+    data = PageData(scenario, scores, cells, examples, manifest, beside, budgets)
     sections = [section for make in in_order(data) for section in make(data)]
     spec = scenario.spec.monte_carlo
     text = page_text(

@@ -40,6 +40,8 @@ class PageData:
         What the campaign noted of itself: command, versions, times; plain values.
     beside : StoredResults, optional
         Results of another scenario of the same publication.
+    budgets : pandas.DataFrame, optional
+        What errors are made of (`simrail.campaign.budget.budgets_of`).
     """
 
     scenario: Scenario
@@ -48,6 +50,7 @@ class PageData:
     examples: Sequence[CellResult]
     manifest: Mapping[str, Any]
     beside: StoredResults | None = None
+    budgets: pd.DataFrame | None = None
 
     @cached_property
     def cases(self) -> list[Case]:
