@@ -13,6 +13,7 @@ from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
 from simrail.campaign.sensitivity import FigureName, Sensitivity, indices_of, sensitivities, sensitivity_table
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, call
+from simrail.cli.sensitivity import _designed
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.scenario.cells import cells, count, first_cells
@@ -406,6 +407,19 @@ def test_bad_input_is_one_line(
     for word in words:
         assert word in said.err
     assert not (place / "results").exists()
+
+
+def test_requirements_are_left_out_and_the_design_put_in(place: Path) -> None:
+    """Verdicts are over devices, and all samples of a design have the same."""
+    required = (place / "ishigami.toml").read_text() + '[[require]]\nquantity = "roll"\nlimit = "1 deg"\n'
+    (place / "required.toml").write_text(required)
+    assert load_scenario("required.toml").spec.require
+    spec = _designed("required.toml", "morris", 3, None, []).spec
+    assert (spec.require, spec.monte_carlo.method, spec.monte_carlo.samples) == ((), "morris", 3)
+    assert _designed("required.toml", None, None, None, []).spec.monte_carlo.samples == 16  # its own
+    assert _designed("required.toml", "morris", None, None, []).spec.monte_carlo.samples == 10  # the usual
+    with pytest.raises(InputError, match="does not go with require"):
+        judge_scenario(load_scenario("required.toml"))
 
 
 @pytest.mark.parametrize("table", ["stop", "passes"])
