@@ -32,11 +32,19 @@ from simrail.estimators.attitude.veillard_kernel import (
     eleven_states,
     room,
 )
+from simrail.estimators.odometry.calibration_file import SpectralCalibration
 from simrail.estimators.odometry.direction import BLOCK_S
-from simrail.estimators.odometry.spectral import FRAME, HOP, ROUGH_S, FrameSpeeds, SpectralOdometry
+from simrail.estimators.odometry.spectral import (
+    FRAME,
+    HOP,
+    ROUGH_S,
+    START_SD_M,
+    FrameSpeeds,
+    SpectralOdometry,
+)
 from simrail.estimators.odometry.standstill import quiet_of
 
-from simrail.core.columns import ACCEL, GYRO, INNOVATION, ODOMETRY, ODOMETRY_SD, RATE_INNOVATION
+from simrail.core.columns import ACCEL, ACCELERATION, GYRO, INNOVATION, ODOMETRY, ODOMETRY_SD, RATE_INNOVATION
 from simrail.core.errors import InputError, one_of
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
@@ -81,13 +89,16 @@ NOISE = Noise()
 class VeillardEkf:
     """Eleven-state extended Kalman filter of Veillard et al. 2016, section II.C: an IMU and nothing else.
 
-    Roll, pitch, and way, speed and acceleration along the track, which makes it an odometry as well. Way and
-    yaw are no states: they are the sums of speed and of yaw rate, from where the ride begins on the map.
+    Roll, pitch, the acceleration in body axes, and way, speed and acceleration along the track, which makes
+    it an odometry as well. Way and yaw are no states: they are the sums of speed and of yaw rate, from where
+    the ride begins on the map.
 
     Attributes
     ----------
-    slope, intercept_mps, calibration, direction, frame, hop, speed_sd_mps, calibration_relative_sd
+    slope, intercept_mps, calibration, direction, frame, hop, speed_sd_mps
         Of the spectral speed, as in `simrail.estimators.odometry.spectral.SpectralOdometry`.
+    calibration_relative_sd, calibration_file
+        Likewise.
     time_constant_s : float
         Of the complementary filter.
     compensated : bool
@@ -111,6 +122,7 @@ class VeillardEkf:
     compensated: bool = False
     dated: str = "centre"
     start_bias: bool = True
+    calibration_file: SpectralCalibration | None = None
 
     label = "EKF of 11 states"
     cites = ("Veillard, Mailly and Fraisse 2016",)
@@ -134,6 +146,7 @@ class VeillardEkf:
             hop=self.hop,
             speed_sd_mps=self.speed_sd_mps,
             calibration_relative_sd=self.calibration_relative_sd,
+            calibration_file=self.calibration_file,
         )
 
     @property
@@ -188,9 +201,10 @@ class VeillardEkf:
             ODOMETRY[0]: recording.start_position_m + way,
             ODOMETRY[1]: speed,
             ODOMETRY[2]: found.states[:, AX],
-            ODOMETRY_SD[0]: np.sqrt(rough + (factor * way) ** 2),
+            ODOMETRY_SD[0]: np.sqrt(START_SD_M**2 + rough + (factor * way) ** 2),
             ODOMETRY_SD[1]: np.sqrt(found.variances[:, V] + (factor * speed) ** 2),
             ODOMETRY_SD[2]: np.sqrt(found.variances[:, AX]),
+            **{name: found.states[:, AX + axis] for axis, name in enumerate(ACCELERATION)},
         }
         return pd.DataFrame(values, index=recording.imu.index)
 

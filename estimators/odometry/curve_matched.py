@@ -45,7 +45,7 @@ encoder alone (`simrail.estimators.odometry.encoder`).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -220,6 +220,8 @@ class CurveMatchedOdometry:
         White part of that.
     gate : float
         Innovations of the wheel beyond so many standard deviations are slip.
+    wheel : bool
+        False leaves the encoder aside: an IMU and a map alone.
     """
 
     smoothed: bool = False
@@ -235,6 +237,7 @@ class CurveMatchedOdometry:
     unsteady_s05: float = 0.03
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
+    wheel: bool = True
 
     needs = ()
     cites = ("Escalona, Urda and Munoz, Sensors 21(3) 683, 2021",)
@@ -252,7 +255,7 @@ class CurveMatchedOdometry:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
-            if name != "smoothed" and not 0.0 < value < math.inf:
+            if name not in ("smoothed", "wheel") and not 0.0 < value < math.inf:
                 raise InputError("is out of range", field=name, value=value, limit="> 0")
 
     def estimate(self, recording: Recording) -> Estimate:
@@ -262,6 +265,7 @@ class CurveMatchedOdometry:
 
     def trace(self, recording: Recording) -> Steps:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
+        recording = self._heard(recording)
         sheet = recording.imu_sheet
         block = max(1, round(sheet.rate_hz / RATE_HZ))
         time = recording.imu.index.to_numpy(dtype=np.float64)
@@ -295,8 +299,15 @@ class CurveMatchedOdometry:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
 
+    def _heard(self, recording: Recording) -> Recording:
+        """What of a recording it takes: without a wheel, if it is told so."""
+        if self.wheel:
+            return recording
+        return replace(recording, encoder=None, encoder_sheet=None, odometer=None, odometer_sheet=None)
+
     def at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
         """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
+        recording = self._heard(recording)
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
         calm = _calm(steps, smoothed=self.smoothed)
         shaking = _power(

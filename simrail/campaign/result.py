@@ -23,6 +23,9 @@ from simrail.scoring.ablations import without_ablations
 from simrail.scoring.table import concat_scores, in_order
 from simrail.scoring.verdicts import verdict_table
 
+EACH_MOUNT = ("veillard_2016",)
+"""Publications whose section draws a ride as each of its mounts recorded it."""
+
 MOST_EXAMPLES = 6
 """Recordings that are kept for the report's figures, one per ride."""
 
@@ -155,18 +158,23 @@ def _without_others(results: list[BatchResult], numbers: set[int]) -> list[Batch
 
 
 def _examples(plan: Plan, packed: bytes, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
-    """The first cell of each ride over the first draw that did not fail altogether, and of added noise."""
+    """The first cell of each ride over the first draw that did not fail altogether, and of added noise.
+
+    Of each mount, where the publication beside it is of `EACH_MOUNT`.
+    """
     failed = Counter(failure.cell for failure in failures)
-    shown: set[int] = set()
+    by_mount = plan.scenario.spec.paper in EACH_MOUNT
+    shown: set[tuple[int, str]] = set()
     noise_shown = False
     examples: list[CellResult] = []
     for cell in sorted(listed, key=lambda cell: cell.ride_number):
         if len(examples) == MOST_EXAMPLES:
             break
         lost = failed[cell.number] >= len(plan.estimators)
-        first = cell.ride_number not in shown or (cell.imu.noise_added and not noise_shown)
+        key = cell.ride_number, cell.imu.name if by_mount else ""
+        first = key not in shown or (cell.imu.noise_added and not noise_shown)
         if cell.track_draw == cell.sample == 0 and first and not lost:
-            shown.add(cell.ride_number)
+            shown.add(key)
             noise_shown |= cell.imu.noise_added
             with suppress(Exception):
                 examples.append(example_of(packed, cell))

@@ -33,6 +33,7 @@ ATTITUDE_SD = ("roll_sd_rad", "pitch_sd_rad", "yaw_sd_rad")
 RELATIVE_ATTITUDE = ("relative_roll_rad", "relative_pitch_rad", "relative_yaw_rad")
 POSITION = ("x_m", "y_m", "z_m")
 VELOCITY = ("velocity_x_mps", "velocity_y_mps", "velocity_z_mps")
+ACCELERATION = ("acceleration_x_mps2", "acceleration_y_mps2", "acceleration_z_mps2")
 ODOMETRY = ("position_m", "speed_mps", "acceleration_mps2")
 ODOMETRY_SD = ("position_sd_m", "speed_sd_mps", "acceleration_sd_mps2")
 RELATIVE_POSITION = ("lateral_m", "vertical_m")
@@ -67,6 +68,12 @@ _TABLE = [
     Column("position_m", "m", "track", "distance s along the horizontal projection of the track"),
     Column("speed_mps", "m/s", "track", "ds/dt, negative when running towards smaller s"),
     Column("acceleration_mps2", "m/s2", "track", "d2s/dt2"),
+    Column(
+        "acceleration_{axis}_mps2",
+        "m/s2",
+        "body",
+        "acceleration of the mount along the axis, without gravity",
+    ),
     Column("lateral_m", "m", "track", "lateral position r_y of the mount, positive left"),
     Column("vertical_m", "m", "track", "vertical position r_z of the mount above the design rail plane"),
     Column("pulse_count", "1", "-", "signed encoder counts since the start"),

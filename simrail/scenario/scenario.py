@@ -42,7 +42,7 @@ class ScenarioFile(Part):
     """
 
     title: str
-    paper: Literal["briales_2021", "gonzalez_2023"] | None = None
+    paper: Literal["briales_2021", "gonzalez_2023", "veillard_2016", "hidalgo"] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)]
     track: Listed[str]
     vehicle: Listed[str]

@@ -14,8 +14,18 @@ from itertools import chain
 
 import numpy as np
 import pandas as pd
+from scipy.signal import butter, sosfiltfilt
 
-from simrail.core.columns import ATTITUDE, FAULT, MOTION, ODOMETRY, RELATIVE_POSITION, require
+from simrail.core.columns import (
+    ACCEL,
+    ACCELERATION,
+    ATTITUDE,
+    FAULT,
+    MOTION,
+    ODOMETRY,
+    RELATIVE_POSITION,
+    require,
+)
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
@@ -38,15 +48,22 @@ class Reference:
         Design roll, pitch and yaw of the track at the true position, rad.
     windows : dict of str to ndarray of int
         Sample numbers of every window, possibly none.
+    gravity_mps2 : float
+        What the true specific force holds beside the acceleration.
     """
 
     motion: pd.DataFrame
     design: FloatArray
     windows: Mapping[str, IntArray]
+    gravity_mps2: float = 9.81
 
 
-SCORED = (*ATTITUDE, *ODOMETRY, *RELATIVE_POSITION)
+SCORED = (*ATTITUDE, *ACCEL, *ODOMETRY, *RELATIVE_POSITION)
 """Columns of a motion that estimates are compared with."""
+
+ACCELERATION_HZ = 1.0
+"""Errors of an acceleration are scored below this frequency: a train takes seconds to change its own, and
+what its floor shakes by beside that is no matter of where it is."""
 
 
 def truth_at_imu(truth: Truth, recording: Recording, columns: Sequence[str] = MOTION) -> pd.DataFrame:
@@ -104,7 +121,7 @@ def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
     time = recording.imu.index.to_numpy(dtype=np.float64)
     windows = windows_of(track, position, motion["speed_mps"].to_numpy(), time_s=time)
-    return Reference(motion, design, windows)
+    return Reference(motion, design, windows, recording.gravity_mps2)
 
 
 def score(
@@ -151,7 +168,11 @@ def score(
     chosen = chosen_windows(against.windows, windows)
     keep = chosen_metrics(metrics)
     rows: list[Row] = []
-    for series in chain(_attitude_series(states, against), _other_series(states, against.motion)):
+    for series in chain(
+        _attitude_series(states, against),
+        _other_series(states, against.motion),
+        _acceleration_series(states, against),
+    ):
         rows += figures(series, chosen, keep)
     first = rows[0][0] if rows else "roll"
     if estimate.innovations is not None and "nis" in keep:
@@ -256,3 +277,40 @@ def _other_series(states: pd.DataFrame, motion: pd.DataFrame) -> Iterator[Series
             run = float(np.abs(np.diff(motion[name].to_numpy())).sum())
             reason = "" if run > 1.0 else "less than 1 m run"
             yield Series("distance_relative", "truth", (error - error[0]) / max(run, 1.0), None, reason)
+
+
+def true_acceleration(motion: pd.DataFrame, *, gravity_mps2: float) -> FloatArray:
+    """Acceleration of a mount in its own axes (n, 3), m/s2: its true specific force without gravity.
+
+    f_x = a_x - g sin(pitch), f_y = a_y + g sin(roll) cos(pitch), f_z = a_z + g cos(roll) cos(pitch)
+    (Veillard et al. 2016, Eq. 7).
+    """
+    roll, pitch = (motion[name].to_numpy(dtype=np.float64) for name in ATTITUDE[:2])
+    gravity = gravity_mps2 * np.column_stack(
+        (-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch))
+    )
+    acceleration: FloatArray = motion[list(ACCEL)].to_numpy(dtype=np.float64) - gravity
+    return acceleration
+
+
+def _acceleration_series(states: pd.DataFrame, against: Reference) -> Iterator[Series]:
+    """Errors of the acceleration in body axes, below `ACCELERATION_HZ`, by a filter without delay."""
+    estimated = [name for name in ACCELERATION if name in states.columns]
+    if not estimated or not set(ACCEL) <= set(against.motion.columns):
+        return
+    true = true_acceleration(against.motion, gravity_mps2=against.gravity_mps2)
+    for name in estimated:
+        error = states[name].to_numpy(dtype=np.float64) - true[:, ACCELERATION.index(name)]
+        yield Series(name.removesuffix("_mps2"), "truth", _slow(error, states.index.to_numpy()), None)
+
+
+def _slow(error: FloatArray, time_s: FloatArray) -> FloatArray:
+    """What of an error lies below `ACCELERATION_HZ`; as it is where it is not finite, or too short for that.
+
+    A Butterworth filter of second order, run forward and backward, so that nothing is delayed.
+    """
+    rate = (len(error) - 1) / (time_s[-1] - time_s[0]) if len(error) > 1 else 0.0
+    if len(error) < rate / ACCELERATION_HZ or rate <= 2.0 * ACCELERATION_HZ or not np.isfinite(error).all():
+        return error
+    slow: FloatArray = sosfiltfilt(butter(2, ACCELERATION_HZ, fs=rate, output="sos"), error)
+    return slow

@@ -61,6 +61,7 @@ QUANTITY_UNITS = {
     "speed": "m/s",
     "acceleration_x": "m/s2",
     "acceleration_y": "m/s2",
+    "acceleration_z": "m/s2",
     "alignment": "mm",
     "vertical_profile": "mm",
     "cross_level": "mm",

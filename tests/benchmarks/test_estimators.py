@@ -26,6 +26,9 @@ from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.attitude.veillard_kernel import Model as ElevenStates
 from simrail.estimators.attitude.veillard_kernel import eleven_states, room
 from simrail.estimators.odometry.spectral import FRAME, HOP, spectral_sums
+from simrail.estimators.profile.kernel import profile_filter
+from simrail.estimators.profile.kernel import room as room_for_profile
+from simrail.estimators.profile.profile_filter import ProfileFilter
 from simrail.estimators.trajectory.kernel import (
     Model,
     room_for_filtered,
@@ -35,6 +38,7 @@ from simrail.estimators.trajectory.kernel import (
 )
 from simrail.estimators.trajectory.smoother import TrajectorySmoother, log_likelihood, run_model
 from twins.attitude import filterpy_ekf
+from twins.profile import filterpy_profile
 from twins.trajectory import filterpy_smoother
 from twins.veillard import filterpy_eleven_states
 from vqf import VQF
@@ -187,6 +191,25 @@ def test_eleven_states_kernel(benchmark: Callable, compensated: bool) -> None:
     us = report(benchmark, lambda: eleven_states(model, found), n, ratio_to_filterpy=theirs)
     assert us <= 0.4
     assert benchmark.extra_info["ratio_to_filterpy"] >= 250.0
+
+
+@pytest.mark.parametrize("step_m", [0.25, 0.18])
+def test_profile_kernel(benchmark: Callable, step_m: float) -> None:
+    """26 and 30 states: nodes over a bogie's wheelbase of 1.8 m, and as many behind."""
+    model = ProfileFilter(other_axle_m=-1.8, step_m=step_m).model(ride())
+    n, few = len(model.place), 800
+    assert 26 <= len(model.start) <= 30
+    cut = {
+        name: value[4000 : 4000 + few]
+        for name, value in model._asdict().items()
+        if isinstance(value, np.ndarray) and value.shape == (n,)
+    }
+    short = model._replace(**cut)
+    theirs = best_us(lambda: filterpy_profile(short, room_for_profile(short)), few, rounds=2)
+    found = room_for_profile(model)
+    us = report(benchmark, lambda: profile_filter(model, found), n, ratio_to_filterpy=theirs)
+    assert us <= 1.0
+    assert benchmark.extra_info["ratio_to_filterpy"] >= 100.0
 
 
 def test_spectral_sums(benchmark: Callable) -> None:

@@ -19,6 +19,7 @@ from simrail.estimators.attitude.veillard_ekf import VeillardEkf
 from simrail.estimators.baselines import DesignAngles
 from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.spectral import SpectralOdometry
+from simrail.estimators.profile.profile_filter import ProfileFilter
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
@@ -79,6 +80,9 @@ OURS = [
     Vqf(compensated=True),
     Imufusion(),
     Imufusion(compensated=True, rest_bias=False),
+    ProfileFilter(other_axle_m=-6.0),
+    ProfileFilter(gyro=False),
+    ProfileFilter(other_axle_m=2.0, printed=True),
     TrajectorySmoother(),
     TrajectorySmoother(with_covariance=False),
     TrajectorySmoother(smoothed=False),
@@ -99,6 +103,7 @@ BACKWARDS = {
     "complementary": ComplementaryFilter(compensated=True),
     "vqf": Vqf(),
     "imufusion": Imufusion(),
+    "profile": ProfileFilter(other_axle_m=-2.0),
     "trajectory": TrajectorySmoother(draws=2),
     "trajectory_filter": TrajectorySmoother(smoothed=False),
     "track_relative": TrackRelativeSmoother(passes=1),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,8 +12,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from scipy.spatial.transform import Rotation
 
-from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
+from simrail.core.columns import ACCEL, ACCELERATION, ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, Recording
@@ -32,7 +34,7 @@ from simrail.scoring.table import (
 )
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION
 
-RATE = 100.0
+RATE, G = 100.0, 9.81
 
 
 class PiecewiseTrack:
@@ -185,6 +187,66 @@ def test_debiased_yaw_has_its_initial_offset_removed_and_keeps_its_drift() -> No
     # Removed is the offset at the start of the ride, not at the start of a window.
     last = value(table, quantity="yaw_debiased", metric="final", window="curve:part 4")
     assert last == pytest.approx(2.0 * 4999 / 5999, abs=2.0 * 2 / 5999)
+
+
+# ---- acceleration ------------------------------------------------------------------------------
+
+
+def felt(motion: pd.DataFrame, acceleration: np.ndarray) -> pd.DataFrame:
+    """The motion with what a body feels that so accelerates in its own axes: gravity turned into them."""
+    turns = Rotation.from_euler("ZYX", motion[list(ATTITUDE)[::-1]].to_numpy())
+    gravity = turns.inv().apply([0.0, 0.0, G])
+    return motion.assign(**dict(zip(ACCEL, (acceleration + gravity).T, strict=True)))
+
+
+def shaking(n: int, hz: float) -> np.ndarray:
+    return np.sin(2.0 * np.pi * hz * np.arange(n) / RATE)
+
+
+def test_acceleration_is_the_specific_force_without_gravity_in_body_axes() -> None:
+    """A body that leans, gains speed and sways; by scipy's rotations."""
+    n = 6000
+    acceleration = np.column_stack([np.full(n, 0.9), 0.3 * shaking(n, 0.1), shaking(n, 0.05)])
+    motion = felt(ride(n), acceleration)
+    own = dict(zip(ACCELERATION, (acceleration + np.array([0.02, -0.03, 0.04])).T, strict=True))
+    table = score(estimated(motion, {}, **own), motion, recorded(motion))
+    for axis, error in zip("xyz", (0.02, -0.03, 0.04), strict=True):
+        for metric in ("mean", "max", "final"):
+            size = abs(error) if metric == "max" else error
+            found = value(table, quantity=f"acceleration_{axis}", metric=metric)
+            assert found == pytest.approx(size, abs=1e-9)
+        assert pick(table, quantity=f"acceleration_{axis}", metric="rms")["unit"] == "m/s2"
+
+
+def test_gravity_is_that_of_the_recording() -> None:
+    motion = felt(ride(), np.zeros((6000, 3)))
+    recording = replace(recorded(motion), gravity_mps2=G - 0.5)
+    table = score(estimated(motion, {}, acceleration_z_mps2=np.zeros(6000)), motion, recording)
+    # Half a metre per second squared of the true force is then no gravity, all but what the roll takes.
+    assert value(table, quantity="acceleration_z", metric="mean") == pytest.approx(-0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize(("hz", "share"), [(0.05, 1.0), (1.0, 0.5), (20.0, 0.0)])
+def test_acceleration_is_scored_below_one_hertz(hz: float, share: float) -> None:
+    """Twice through a Butterworth filter of second order: 1 / (1 + (f / f0)^4); the ends ring a little."""
+    n = 6000
+    motion = felt(ride(n), np.zeros((n, 3)))
+    table = score(estimated(motion, {}, acceleration_x_mps2=shaking(n, hz)), motion, recorded(motion))
+    assert value(table, quantity="acceleration_x", metric="rms") == pytest.approx(share * 0.5**0.5, abs=0.02)
+
+
+def test_acceleration_needs_what_the_body_felt_and_a_finite_estimate() -> None:
+    n = 6000
+    motion = ride(n)
+    own = np.zeros(n)
+    bare = score(estimated(motion, {}, acceleration_x_mps2=own), motion, recorded(motion))
+    assert "acceleration_x" not in set(bare["quantity"])
+    motion, broken = felt(motion, np.zeros((n, 3))), np.where(np.arange(n) == 7, np.nan, 0.0)
+    table = score(estimated(motion, {}, acceleration_x_mps2=broken), motion, recorded(motion))
+    assert (
+        pick(table, quantity="acceleration_x", metric="rms")["status"]
+        == f"estimate not finite in 1 of {n} samples"
+    )
 
 
 # ---- windows -----------------------------------------------------------------------------------
@@ -492,8 +554,9 @@ def test_columns_and_vocabulary_are_those_of_the_design() -> None:
     )
     assert ", ".join(SCORE_COLUMNS) == written
     quantities = (
-        "roll pitch yaw lateral vertical position speed acceleration_x acceleration_y alignment "
-        "vertical_profile cross_level gauge twist yaw_debiased distance_relative gyro_bias accel_bias "
+        "roll pitch yaw lateral vertical position speed acceleration_x acceleration_y acceleration_z "
+        "alignment vertical_profile cross_level gauge twist yaw_debiased distance_relative gyro_bias "
+        "accel_bias "
         "derailment_quotient sum_y sum_y_relative guiding_force wheel_load wheel_unloading comfort_nmv "
         "sperling_lateral sperling_vertical lateral_growth"
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.lines import Line2D
 
 from simrail.report.figures import canvas
@@ -58,14 +59,18 @@ _MOST_NAMES = 8
 
 
 def curves_figure(case: Case, styles: Sequence[MethodStyle]) -> str:
-    """Rms roll error of every method in each curve; "" if there are no curves."""
+    """Rms roll error of every method in each curve; "" if there are no curves, or no method tells roll."""
     windows = case.curves()
-    if not windows:
+    scores_of = {
+        style.name: [case.get(style.name, "roll", "rms", window=window) for window in windows]
+        for style in styles
+    }
+    if not any(np.isfinite(score.value) for scores in scores_of.values() for score in scores):
         return ""
     with canvas.look():
         figure, (axis,) = canvas.panels([2.1])
         for order, style in enumerate(styles):
-            scores = [case.get(style.name, "roll", "rms", window=window) for window in windows]
+            scores = scores_of[style.name]
             slot, wide = (order, len(styles)), min(0.62, 0.045 * len(windows) * len(styles))
             canvas.draw_marks(
                 axis, scores, style, slot=slot, wide=wide, marker="D" if style.baseline else "o"

@@ -75,7 +75,8 @@ class PageData:
     @property
     def attitude_styles(self) -> list[MethodStyle]:
         """How those look that are told apart by their attitude."""
-        return attitude_methods(self.styles)
+        found = set(self.scores.loc[self.scores["quantity"] == "roll", "estimator"].astype(str))
+        return [style for style in attitude_methods(self.styles) if style.name in found]
 
     @property
     def asks_of_ride(self) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import pandas as pd
 import pytest
 from simrail.estimators.kalman import fixed_interval, room_for_history
 from simrail.estimators.odometry.curve_matched import AXLE as YAW_OF_AXLE
@@ -311,6 +312,16 @@ def test_without_a_wheel_the_line_and_the_accelerometer_do(ride: int):
     fast = np.interp(CurveMatchedOdometry().trace(recording).time_s, truth.index, truth["speed_mps"].abs())
     assert fast[resting].max() < 0.05
     assert resting.sum() > 0.5 * (fast < 1e-3).sum()
+
+
+@pytest.mark.parametrize("smoothed", [False, True])
+def test_a_wheel_that_is_left_aside_is_no_wheel(smoothed: bool):
+    recording = beginning(record(truth_of(*FAST[0]), 0), samples=4000)
+    bare = replace(recording, encoder=None, encoder_sheet=None)
+    aside = CurveMatchedOdometry(smoothed=smoothed, wheel=False).estimate(recording).states
+    pd.testing.assert_frame_equal(aside, CurveMatchedOdometry(smoothed=smoothed).estimate(bare).states)
+    with_wheel = CurveMatchedOdometry(smoothed=smoothed).estimate(recording).states
+    assert not aside["position_sd_m"].equals(with_wheel["position_sd_m"])
 
 
 def line(**values: float) -> Line:

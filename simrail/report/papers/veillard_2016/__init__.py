@@ -1,0 +1,1 @@
+"""Veillard, Mailly and Fraisse 2016 beside ours: an IMU alone, over many lines."""
