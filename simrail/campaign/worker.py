@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Any
 
 import pandas as pd
@@ -78,9 +79,13 @@ class _Worker:
     ride: tuple[int, Truth, dict[str, Any]] | None = None
 
     def tally(self, sample: int) -> BatchTally:
-        """What gathers one batch, whose cells are of one sample, as they share a ride."""
+        """What gathers one batch; with the estimators of a sample."""
         parts = self.parts
         return BatchTally(parts.scenario.name, parts.estimators(sample), parts.tunings(sample), self.warm)
+
+    def take_sample(self, tally: BatchTally, sample: int) -> None:
+        """Give a batch the estimators of another sample; their names are the same in every one."""
+        tally.estimators, tally.tunings = self.parts.estimators(sample), self.parts.tunings(sample)
 
     def truth(
         self, cell: Cell, notes: list[str], progress: Progress | None = None
@@ -172,7 +177,12 @@ def _run(
 
             run_passes(cells, ride_of, worker.parts, tally, check)
         elif not ride_only:
-            run_cells(cells, truth, worker.parts, tally, check)
+            # What all samples have in common takes their recordings at once.
+            apart = worker.parts.draws_estimators
+            for _, own in groupby(cells, key=lambda cell: cell.sample if apart else 0):
+                of_sample = tuple(own)
+                worker.take_sample(tally, of_sample[0].sample)
+                run_cells(of_sample, truth, worker.parts, tally, check)
     return _result(cells[0].ride_number, () if ride_only else cells, tally, facts, notes)
 
 

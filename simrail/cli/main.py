@@ -1,4 +1,4 @@
-"""The command line: `run`, `check`, `grade`, `export`, `estimate`, `tune`, `spectra`, and those of parts.
+"""The command line: what runs scenarios and rides, and what shows or makes parts.
 
 Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 130 interrupted. Heavy
 imports stand inside the commands, so that those that need little answer at once.
@@ -15,6 +15,7 @@ from simrail.cli.library import cache, imu, list_parts, new, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
 from simrail.cli.rides import estimate, export
 from simrail.cli.run import check, run
+from simrail.cli.sensitivity import sensitivity
 from simrail.cli.spectra import spectra
 from simrail.cli.tune import tune
 from simrail.core.errors import InputError
@@ -77,6 +78,6 @@ def _options(
     pass
 
 
-for _command in (run, check, grade, export, estimate, tune, spectra, vehicle, imu, new, cache):
+for _command in (run, check, grade, export, estimate, tune, sensitivity, spectra, vehicle, imu, new, cache):
     app.command()(_command)
 app.command(name="list")(list_parts)

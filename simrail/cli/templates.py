@@ -1,31 +1,37 @@
 """Templates: ``simrail new estimator NAME`` writes one file that works, to be changed into one's own.
 
-An estimator, an odometry and a ride are made from the files in ``template_files``; a track, vehicle, IMU or
-scenario is a copy of a shipped file, so the template is always one that runs. A ride has its data beside it:
+An estimator, an odometry and a ride are made from the files in ``template_files``; a track, vehicle or
+scenario is a copy of a shipped file, and an IMU has the figures of one among all the keys that there are, so
+the template is always one that runs. A ride has its data beside it:
 simulated, and written as a logger might have, of a device upside down, in deg/s and g, with time stamps in
 milliseconds that jitter, and a few samples lost.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from simrail.core.errors import InputError, did_you_mean, one_of
-from simrail.core.toml_files import label, shipped
+from simrail.core.toml_files import label, read_toml, shipped
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from simrail.core.jit import FloatArray
 
+IMU = "lord_3dm_gx4_25"
+"""The device whose figures an IMU to begin with has."""
+
 SHIPPED = {
     "track": ("smooth_curve", 'track = "./{file}"', ""),
     "vehicle": ("metro_irw_bogie", 'vehicle = "./{file}"', "look at it: simrail vehicle {path}\n"),
-    "imu": ("lord_3dm_gx4_25", 'grade = "./{file}" in an [[imu]]', "look at it: simrail imu {path}\n"),
+    "imu": (IMU, 'grade = "./{file}" in an [[imu]]', "look at it: simrail imu {path}\n"),
 }
 KINDS = ("estimator", "odometry", *SHIPPED, "scenario", "ride")
 
@@ -87,7 +93,7 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
         text, next_step = _copy("scenario", "quick_kinematic", name), f"run it: simrail run {label(path)}"
     else:
         source, use, look = SHIPPED[kind]
-        text = _copy(kind, source, name)
+        text = imu_template(name) if kind == "imu" else _copy(kind, source, name)
         next_step = look.format(path=label(path))
         next_step += f"use it in a scenario beside it: {use.format(file=path.name)}"
     path.write_text(text, encoding="utf-8")
@@ -115,6 +121,49 @@ def _of_class(kind: str, name: str, path: Path) -> tuple[str, str]:
 def _copy(kind: str, source: str, name: str) -> str:
     text = shipped(kind)[source].read_text(encoding="utf-8")
     return f"# {name}: a copy of the shipped {kind} {source!r}, to be changed.\n\n{text}"
+
+
+def imu_template(name: str) -> str:
+    """Text of an IMU file with every key that there is: the figures of a device, the others commented out."""
+    from simrail.recording.sheets.figures import FIGURES, MEANINGS, QUANTITIES
+    from simrail.recording.sheets.imu_file import ImuHead
+
+    given = read_toml(shipped("imu")[IMU])
+    lines = [
+        f"# {name}: the figures of the shipped imu {IMU!r}, to be changed into those of your data sheet.",
+        "# Every key that there is stands here: put # before what the sheet does not print, and take it away",
+        "# from what it does. Of a quantity in two units give one. A figure in the words of the sheet, as in",
+        "# 'angle_random_walk = \"0.34 deg/sqrt(h)\"', is refused with the line to write in its place.",
+        "",
+    ]
+    for key, field in ImuHead.model_fields.items():
+        lines += [
+            *wrap(str(field.description), 110, initial_indent="# ", subsequent_indent="# "),
+            _entry(key, given.get(key, field.default), commented=key not in given),
+        ]
+    for quantity, meaning in MEANINGS.items():
+        lines += ["", *wrap(meaning, 110, initial_indent="# ", subsequent_indent="# ")]
+        for key in QUANTITIES[quantity]:
+            entry = _entry(key, given.get(key, _usual(key)), commented=key not in given)
+            lines.append(f"{entry}  # {FIGURES[key].unit}")
+    return "\n".join(lines) + "\n"
+
+
+def _usual(key: str) -> float:
+    """What an IMU has whose file does not say a figure, in its unit; a bandwidth where there is none."""
+    from simrail.recording.sheets.figures import FIGURES
+    from simrail.recording.sheets.grades import ImuGrade
+
+    figure = FIGURES[key]
+    value = getattr(ImuGrade("usual", 1.0), figure.field)
+    return 100.0 if value is None else float(value / figure.si)
+
+
+def _entry(key: str, value: object, *, commented: bool) -> str:
+    """One line of a TOML file."""
+    text = " ".join(value.split()) if isinstance(value, str) else value
+    # Text, numbers, truth and lists of numbers are written alike in JSON and TOML.
+    return f"{'# ' if commented else ''}{key} = {json.dumps(text, ensure_ascii=False)}"
 
 
 def ride_template(name: str) -> tuple[str, str]:
@@ -153,7 +202,7 @@ def _logged(imu: pd.DataFrame, encoder: pd.DataFrame) -> str:
 
     from simrail.core.columns import ACCEL, GYRO
     from simrail.core.seeds import stream
-    from simrail.recording.sheets.datasheet import STANDARD_GRAVITY_MPS2
+    from simrail.recording.sheets.units import STANDARD_GRAVITY_MPS2
 
     time = imu.index.to_numpy()
     generator = stream(1, "template", "ride")

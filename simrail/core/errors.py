@@ -7,7 +7,8 @@ exceptions and are not wrapped.
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class InputError(ValueError):
@@ -39,13 +40,46 @@ class InputError(ValueError):
     ) -> None:
         self.problem, self.file, self.field = problem, file, field
         self.value, self.limit, self.remedy = value, limit, remedy
+        self.also: tuple[InputError, ...] = ()
         super().__init__(problem)
 
+    @property
+    def each(self) -> tuple["InputError", ...]:
+        """The fault itself, and those that were found beside it."""
+        return self, *self.also
+
     def __str__(self) -> str:
+        return "\n".join(one.line for one in self.each)
+
+    @property
+    def line(self) -> str:
+        """The fault in one line, without those beside it."""
         value = None if self.value is None else repr(self.value)
         more = (("found", value), ("limit:", self.limit), ("remedy:", self.remedy))
         text = "".join(f"{place}: " for place in (self.file, self.field) if place is not None)
         return text + self.problem + "".join(f"; {word} {words}" for word, words in more if words is not None)
+
+
+class Faults:
+    """Gathers faults of one input, so that its author is told of all of them at once."""
+
+    def __init__(self) -> None:
+        self.found: list[InputError] = []
+
+    @contextmanager
+    def gathered(self) -> Iterator[None]:
+        """Note an `InputError` of a block, and go on behind it."""
+        try:
+            yield
+        except InputError as error:
+            self.found += error.each
+
+    def refuse(self) -> None:
+        """Raise what was gathered, if it was anything, as one error of a line for each."""
+        if self.found:
+            first, *others = self.found
+            first.also = tuple(others)
+            raise first
 
 
 def one_of(

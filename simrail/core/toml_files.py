@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import json
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from importlib.resources import files
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import tomli_w
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from simrail.core.errors import InputError, did_you_mean
+from simrail.core.errors import Faults, InputError, did_you_mean
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -37,6 +37,22 @@ class Part(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+    @classmethod
+    def explained(cls, key: str, value: object) -> str | None:  # noqa: ARG003
+        """What to write in the place of an unknown key, or of a value of the wrong type.
+
+        None where the model knows no better than a guess by letters.
+        """
+        return None
+
+    @classmethod
+    def others(cls, data: Mapping[str, Any]) -> Iterable[InputError]:  # noqa: ARG003
+        """Faults that only several keys have together; asked for where a file has faults already.
+
+        ``data`` are those keys that have none.
+        """
+        return ()
 
 
 _Part = TypeVar("_Part", bound=Part)
@@ -158,7 +174,7 @@ def _plain(value: Any) -> Any:
 
 
 def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Path | None = None) -> _Part:
-    """Build a file model from raw TOML data; the first fault becomes an `InputError`.
+    """Build a file model from raw TOML data; its faults become an `InputError`, a line for each.
 
     ``folder`` is where files that the data names by a relative path are looked for.
     """
@@ -166,7 +182,14 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Pat
         # JSON is the mode in which pydantic is strict about numbers and still takes arrays for tuples.
         return model.model_validate_json(json.dumps(data, default=str), context={"folder": folder})
     except ValidationError as error:
-        raise _as_input_error(error, model, file) from None
+        faults = error.errors()
+        found = _input_errors(faults, model, file)
+        bad = {fault["loc"][0] for fault in faults if fault["loc"]}
+        with blame(file):
+            gathered = Faults()
+            gathered.found = [*found, *model.others({k: v for k, v in data.items() if k not in bad})]
+            gathered.refuse()
+        raise
 
 
 def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None) -> _Part:
@@ -181,8 +204,9 @@ def blame(file: object, field: str = "") -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.file is None:
-            _place(error, file, field)
+        for one in error.each:
+            if one.file is None:
+                _place(one, file, field)
         raise
 
 
@@ -201,29 +225,48 @@ class _Message(NamedTuple):
     with_value: bool = True
 
 
-def _as_input_error(error: ValidationError, model: type[Part], file: object) -> InputError:
-    """The first fault of a model as a message that names its place."""
-    faults = error.errors()
-    # An unknown key is usually a misspelling that also leaves a required one missing: say it first.
-    first = next((fault for fault in faults if fault["type"] in _UNKNOWN), faults[0])
+def _input_errors(faults: list[ErrorDetails], model: type[Part], file: object) -> list[InputError]:
+    """The faults of a model as messages that name their places."""
+    # An unknown key is usually a misspelling that also leaves a required one missing: say it first, and once.
+    faults = sorted(faults, key=lambda fault: fault["type"] not in _UNKNOWN)
+    found: dict[tuple[int | str, ...], InputError] = {}
+    for fault in faults:
+        # Items of one array with one fault, such as a unit that was mistaken, are told once.
+        place = fault["loc"]
+        if isinstance(place[-1] if place else None, int):
+            place = (*place[:-1], "[out of range]" if fault["type"] in _SIGNS else f"[{fault['type']}]")
+        misspelt = fault["type"] == "missing" and any(
+            other[:-1] == place[:-1] and f" {place[-1]}" in (error.remedy or "")
+            for other, error in found.items()
+        )
+        if place not in found and not misspelt:
+            found[place] = _input_error(fault, model, file)
+    return list(found.values())
+
+
+def _input_error(fault: ErrorDetails, model: type[Part], file: object) -> InputError:
+    """A fault of a model as a message that names its place."""
     field = ""
-    for step in first["loc"]:
+    for step in fault["loc"]:
         field += f"[{step}]" if isinstance(step, int) else (f".{step}" if field else str(step))
-    inner = first.get("ctx", {}).get("error")
+    inner = fault.get("ctx", {}).get("error")
     if isinstance(inner, InputError):
-        _place(inner, file, field)
+        for one in inner.each:
+            _place(one, file, field)
         return inner
-    if first["type"] == "string_pattern_mismatch":
+    if fault["type"] == "string_pattern_mismatch":
         field = field.removesuffix(".[key]")
-    message = _message(first, model)
-    value = first.get("input")
+    message = _message(fault, model)
+    value = fault.get("input")
     if not message.with_value or (isinstance(value, (dict, list)) and len(repr(value)) > 60):
         value = None
-    problem, more = message.problem, len(faults) - 1
-    if more:
-        problem += f" (and {more} more fault{'s' if more > 1 else ''} in this file)"
     return InputError(
-        problem, file=file, field=field or None, value=value, limit=message.limit, remedy=message.remedy
+        message.problem,
+        file=file,
+        field=field or None,
+        value=value,
+        limit=message.limit,
+        remedy=message.remedy,
     )
 
 
@@ -231,7 +274,7 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
     """What to say of a fault that pydantic found."""
     kind, context = fault["type"], fault.get("ctx", {})
     if kind in _UNKNOWN:
-        return _unknown_key(model, fault["loc"])
+        return _unknown_key(model, fault["loc"], fault["input"])
     if kind in _SIGNS:
         # A count has no unit.
         key, sign = _SIGNS[kind]
@@ -240,7 +283,7 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
             remedy = "give a number within the limit"
         return _Message("is out of range", f"{sign} {context[key]}", remedy)
     if kind in _TYPES:
-        return _wrong_type(kind, fault["input"])
+        return _wrong_type(kind, fault["input"], _explained(model, fault["loc"], fault["input"]))
     if kind == "literal_error":
         expected = str(context.get("expected", ""))
         words = expected.replace("'", "").replace(" or ", ", ").split(", ")
@@ -256,7 +299,10 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
     }.get(kind, _Message(fault["msg"]))
 
 
-def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
+def _unknown_key(model: type[Part], place: tuple[int | str, ...], value: Any) -> _Message:
+    explained = _explained(model, place, value)
+    if explained is not None:
+        return _Message("unknown key", remedy=explained)
     allowed = _fields_at(model, place[:-1])
     guess = did_you_mean(place[-1], allowed)
     # A guess is worth more than a list that nobody reads.
@@ -264,8 +310,16 @@ def _unknown_key(model: type[Part], place: tuple[int | str, ...]) -> _Message:
     return _Message("unknown key", limit, guess or "remove it")
 
 
-def _wrong_type(kind: str, value: Any) -> _Message:
+def _explained(model: type[Part], place: tuple[int | str, ...], value: Any) -> str | None:
+    """What the model at a place says itself of a key."""
+    owner = _model_at(model, place[:-1])
+    return owner.explained(str(place[-1]), value) if owner and issubclass(owner, Part) else None
+
+
+def _wrong_type(kind: str, value: Any, explained: str | None) -> _Message:
     limit = _TYPES[kind]
+    if explained is not None:
+        return _Message("has the wrong type", limit, explained)
     remedy: str | None = None
     if kind == "string_type":
         remedy = "write it in quotes"
@@ -307,15 +361,21 @@ _TYPES = {
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """Names of the fields that are allowed at a place in a model."""
+    current = _model_at(model, location)
+    if current is None:
+        return []
+    return list(current.model_fields) if issubclass(current, BaseModel) else [f.name for f in fields(current)]
+
+
+def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[Any] | None:
+    """The model or dataclass that stands at a place in a model."""
     current: type[Any] | None = model
     for step in location:
         if isinstance(step, int) or current is None or not issubclass(current, BaseModel):
             continue
         annotation = current.model_fields.get(step)
         current = _model_in(annotation.annotation) if annotation else None
-    if current is None:
-        return []
-    return list(current.model_fields) if issubclass(current, BaseModel) else [f.name for f in fields(current)]
+    return current
 
 
 def _model_in(annotation: Any) -> type[Any] | None:

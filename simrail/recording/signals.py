@@ -17,7 +17,7 @@ from simrail.core.columns import (
     ODOMETRY_SD,
     RAIL_DISPLACEMENT,
 )
-from simrail.recording.sheets.datasheet import STANDARD_GRAVITY_MPS2
+from simrail.recording.sheets.units import STANDARD_GRAVITY_MPS2
 
 Factor = tuple[float, float]
 """A unit in SI as (multiply by, divide by): 1/1000 is no binary number, so milliseconds are divided."""

@@ -64,6 +64,10 @@ _MOST_RESOLVED = 1000
 """Resolved cells that are remembered; cells come ride by ride, and draws of the sensors share one."""
 
 
+_MOST_MAPS = 16
+"""Drawn maps that are remembered."""
+
+
 @dataclass(frozen=True)
 class ResolvedCell:
     """A cell and the nouns that its words stand for.
@@ -130,12 +134,13 @@ class Parts:
         self._tunings: dict[int, dict[str, str]] = {}
         self._resolved: dict[tuple[int, ...], ResolvedCell] = {}
         self._rides: dict[tuple[int, ...], Ride] = {}
+        self._maps: dict[tuple[str, str, int, int], TrackDesign] = {}
         self._laid: tuple[Ride, LaidTrack] | None = None
         self._content: dict[str, Any] = {"scenario": scenario.spec.model_dump(mode="json", warnings=False)}
 
     def __getstate__(self) -> dict[str, Any]:
         """What was read, for another process: cells are resolved, and rails laid, faster than sent."""
-        return {**self.__dict__, "_laid": None, "_resolved": {}, "_rides": {}}
+        return {**self.__dict__, "_laid": None, "_resolved": {}, "_rides": {}, "_maps": {}}
 
     @property
     def hash(self) -> str:
@@ -190,7 +195,8 @@ class Parts:
 
     def ride(self, cell: Cell) -> Ride:
         """Ride of a cell: all that decides the motion."""
-        key = (cell.ride_number, cell.sample, cell.track_draw)
+        # Samples of a design that have the same ride share its number.
+        key = (cell.ride_number, 0 if cell.shares_seeds else cell.sample, cell.track_draw)
         if key not in self._rides:
             if len(self._rides) >= _MOST_RESOLVED:
                 self._rides.clear()
@@ -263,14 +269,20 @@ class Parts:
         part = cell.spec.map
         if part is None or part.exact:
             return None
-        with blame(self.scenario.file, "map"):
-            return draw_map(
-                self.track(cell),
-                part.errors(),
-                seed=cell.map_seed,
-                draw=cell.map_draw,
-                defects=part.defects(),
-            )
+        # Many samples of a design have one map.
+        key = (cell.spec.track, part.model_dump_json(), cell.map_seed, cell.map_draw)
+        if key not in self._maps:
+            if len(self._maps) >= _MOST_MAPS:
+                self._maps.clear()
+            with blame(self.scenario.file, "map"):
+                self._maps[key] = draw_map(
+                    self.track(cell),
+                    part.errors(),
+                    seed=cell.map_seed,
+                    draw=cell.map_draw,
+                    defects=part.defects(),
+                )
+        return self._maps[key]
 
     def vehicle(self, cell: Cell) -> VehicleModel:
         """Vehicle of a cell."""
@@ -281,20 +293,35 @@ class Parts:
         return vehicle
 
     def grade(self, cell: Cell) -> ImuGrade:
-        """IMU grade of a cell."""
-        return self._noun("imu", ImuFile, cell.imu.grade, f"imu[{cell.imu_index}].grade", ImuFile.grade)
+        """IMU grade of a cell, with the figures that the scenario puts in the place of its own."""
+        field = f"imu[{cell.imu_index}]"
+        grade = self._noun("imu", ImuFile, cell.imu.grade, f"{field}.grade", ImuFile.grade)
+        figures = cell.imu.sheet.figures() if cell.imu.sheet is not None else {}
+        if not figures:
+            return grade
+        file = self._noun("imu", ImuFile, cell.imu.grade, f"{field}.grade", _as_it_is, noun="imu file")
+        with blame(self.scenario.file, f"{field}.sheet"):
+            return file.with_figures(figures).grade(grade.name)
 
     def _noun(
-        self, kind: str, model: type[_Part], name: str, field: str, make: Callable[[_Part, str], _Noun]
+        self,
+        kind: str,
+        model: type[_Part],
+        name: str,
+        field: str,
+        make: Callable[[_Part, str], _Noun],
+        *,
+        noun: str = "",
     ) -> _Noun:
         """What a file of a kind stands for, read once; ``field`` is where the scenario names it."""
-        if (kind, name) not in self._nouns:
+        key = (noun or kind, name)
+        if key not in self._nouns:
             with blame(self.scenario.file, field):
                 part = load(model, kind, name, folder=self.scenario.folder)
                 self._content[f"{kind} {name}"] = part.model_dump(mode="json")
-                self._nouns[kind, name] = make(part, Path(name).stem)
-        noun: _Noun = self._nouns[kind, name]
-        return noun
+                self._nouns[key] = make(part, Path(name).stem)
+        made: _Noun = self._nouns[key]
+        return made
 
     def odometry(self, cell: Cell) -> Estimator | None:
         """Odometry of a cell; None where there is none to be run (`odometry_estimator`)."""
@@ -311,11 +338,18 @@ class Parts:
 
     def tunings(self, sample: int) -> dict[str, str]:
         """How each estimator of a sample is tuned, by its name in the tables."""
+        sample = sample if self.draws_estimators else 0
         self.estimators(sample)
         return self._tunings[sample]
 
+    @property
+    def draws_estimators(self) -> bool:
+        """Whether an option of an estimator is a distribution."""
+        return any(distributions_of(part) for part in self.scenario.spec.estimator)
+
     def estimators(self, sample: int) -> dict[str, Estimator]:
         """Estimators of a sample by their names in the tables; those that no sample changes are shared."""
+        sample = sample if self.draws_estimators else 0
         if sample in self._estimators:
             return self._estimators[sample]
         estimators: dict[str, Estimator] = {}
@@ -339,6 +373,11 @@ class Parts:
         self._estimators[sample] = estimators
         self._tunings[sample] = {method.name: method.tuning for method in listed}
         return estimators
+
+
+def _as_it_is(part: _Part, _name: str) -> _Part:
+    """A file's content itself."""
+    return part
 
 
 def _profile(ride: RidePart) -> SpeedProfile:

@@ -6,9 +6,10 @@ and a track draw make one simulated ride; a ride, a sensor setting, an IMU and a
 sample of the scenario's distributions, and in their draws) share a *case*: scores are aggregated over
 the cells of a case.
 
-A list compares: its values meet the same draws. A distribution is chance: each of its samples has
-draws of its own. Of lists that set an ablation beside what a train has, an exact map and silence, one thing
-is taken away at a time: no cell has both.
+A list compares: its values meet the same draws. A distribution is chance: each of its samples has draws of
+its own, but those of a design (`simrail.scenario.designs`), which differ by their values alone: they share
+their seeds, and those with the same motion their ride. Of lists that set an ablation beside what a train has,
+an exact map and silence, one thing is taken away at a time: no cell has both.
 
 Of several passes, a cell is so many rides over the same rails, in an order that chance decides, anew for each
 track draw: four passes are the first four of sixteen. Each has a device of its own, and the same map.
@@ -27,7 +28,8 @@ from typing import Any
 
 from simrail.core.seeds import stream
 from simrail.scenario.axes import axes_of, drawn, each, expand
-from simrail.scenario.distributions import Value, sample_count, samples_of
+from simrail.scenario.designs import DESIGNS
+from simrail.scenario.distributions import Value, distributions_of, sample_count, samples_of
 from simrail.scenario.scenario import Scenario, ScenarioFile, ride_count
 from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
@@ -104,9 +106,14 @@ class Cell:
         return SILENT if self.spec.vibration is None or self.spec.vibration.off else SHAKEN
 
     @property
+    def shares_seeds(self) -> bool:
+        """Whether all samples have the same seeds: those of a design (`simrail.scenario.designs`)."""
+        return self.spec.monte_carlo.method in DESIGNS
+
+    @property
     def _sample_name(self) -> tuple[str | int, ...]:
         # The first sample keeps the seeds that the cell has without any distribution.
-        return ("sample", self.sample) if self.sample else ()
+        return ("sample", self.sample) if self.sample and not self.shares_seeds else ()
 
 
 @dataclass(frozen=True)
@@ -271,12 +278,27 @@ class _World:
     spec: ScenarioFile
     ride: RidePart
     ride_index: int
-    sample: int
-    values: dict[str, Value]
+    samples: tuple[tuple[int, dict[str, Value]], ...]
+    """Numbers and values of the samples that have it."""
+
+
+def _of_one_ride(spec: ScenarioFile) -> list[tuple[tuple[int, dict[str, Value]], ...]]:
+    """Samples that share their rides: each has its own, but those of a design that differ in sensors only."""
+    samples = list(enumerate(samples_of(spec)))
+    if spec.monte_carlo.method not in DESIGNS:
+        return [(one,) for one in samples]
+    deciding = [
+        *distributions_of(spec, fields=WORLD),
+        *(name for part in spec.ride for name in distributions_of(part, prefix=f"ride.{part.name}.")),
+    ]
+    alike: dict[tuple[Value, ...], list[tuple[int, dict[str, Value]]]] = {}
+    for k, values in samples:
+        alike.setdefault(tuple(values[name] for name in deciding), []).append((k, values))
+    return [tuple(group) for group in alike.values()]
 
 
 def _worlds(spec: ScenarioFile) -> Iterator[_World]:
-    samples, sensings = samples_of(spec), _sensing_count(spec)
+    groups, sensings = _of_one_ride(spec), _sensing_count(spec)
     listed = (
         (world_settings, world, i, ride_settings, ride)
         for world_settings, world in expand(spec, fields=WORLD)
@@ -284,30 +306,36 @@ def _worlds(spec: ScenarioFile) -> Iterator[_World]:
         for ride_settings, ride in expand(part, prefix="ride.")
     )
     for w, (world_settings, world, i, ride_settings, ride) in enumerate(listed):
-        for k, values in enumerate(samples):
+        for group in groups:
+            values = group[0][1]
             world_drawn, concrete = drawn(world, values, fields=WORLD)
             ride_drawn, ridden = drawn(ride, values, prefix=f"ride.{ride.name}.", shown="ride.")
             settings = world_settings | world_drawn | ride_settings | ride_drawn
-            yield _World(w * sensings, settings, concrete, ridden.as_ridden, i, k, values)
+            yield _World(w * sensings, settings, concrete, ridden.as_ridden, i, group)
 
 
 def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
-    """First cells of a world, one for each setting of the sensors; not numbered."""
-    listed = (
-        (sensing_settings, sensing, i, imu_settings, imu)
-        for sensing_settings, sensing in expand(spec, fields=SENSING)
-        for i, part in enumerate(spec.imu)
-        for imu_settings, imu in expand(part, prefix="imu.")
-    )
-    of_estimators = {name: value for name, value in world.values.items() if name.startswith("estimator.")}
-    for k, (sensing_settings, sensing, i, imu_settings, imu) in enumerate(listed):
+    """First cells of a world, one for each of its samples and each setting of the sensors; not numbered."""
+    listed = [
+        (k, sensing_settings, sensing, i, imu_settings, imu)
+        for k, (sensing_settings, sensing, i, imu_settings, imu) in enumerate(
+            (sensing_settings, sensing, i, imu_settings, imu)
+            for sensing_settings, sensing in expand(spec, fields=SENSING)
+            for i, part in enumerate(spec.imu)
+            for imu_settings, imu in expand(part, prefix="imu.")
+        )
+    ]
+    for (sample, values), (k, sensing_settings, sensing, i, imu_settings, imu) in product(
+        world.samples, listed
+    ):
         if not imu.is_on(world.spec.vehicle):
             continue
         if _takes_both(spec, world.spec, sensing):
             continue
-        sensing_drawn, concrete = drawn(sensing, world.values, fields=SENSING)
-        imu_drawn, mounted = drawn(imu, world.values, prefix=f"imu.{imu.name}.", shown="imu.")
+        sensing_drawn, concrete = drawn(sensing, values, fields=SENSING)
+        imu_drawn, mounted = drawn(imu, values, prefix=f"imu.{imu.name}.", shown="imu.")
         settings = world.settings | sensing_settings | sensing_drawn | imu_settings | imu_drawn
+        of_estimators = {name: value for name, value in values.items() if name.startswith("estimator.")}
         yield Cell(
             number=0,
             case=world.case + k,
@@ -317,7 +345,7 @@ def _sensings(spec: ScenarioFile, world: _World) -> Iterator[Cell]:
             imu=mounted,
             ride_index=world.ride_index,
             imu_index=i,
-            sample=world.sample,
+            sample=sample,
             track_draw=0,
             map_draw=0,
             sensor_draw=0,
@@ -356,10 +384,12 @@ def _sensing_count(spec: ScenarioFile) -> int:
 def count(scenario: Scenario) -> tuple[int, int]:
     """Return the numbers of rides to simulate and of cells, without listing them."""
     spec = scenario.spec
-    worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * sample_count(spec)
-    rides = worlds * spec.monte_carlo.track_draws
+    worlds = _size(spec, WORLD) * sum(_size(part) for part in spec.ride) * spec.monte_carlo.track_draws
+    recorded_rides = worlds * sample_count(spec)
+    shared = spec.monte_carlo.method in DESIGNS
+    rides = worlds * len(_of_one_ride(spec)) if shared else recorded_rides
     counts = 0 if spec.passes is None else len(each(spec.passes))
-    groups = rides * counts // ride_count(spec.ride) if counts else rides
+    groups = recorded_rides * counts // ride_count(spec.ride) if counts else recorded_rides
     maps = groups * _size(spec, SENSING)
     if spec.map is not None:
         exact = each(spec.map.exact)

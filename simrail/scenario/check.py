@@ -12,11 +12,13 @@ from dataclasses import dataclass, field
 from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
+from simrail.recording.sheets.grades import silent_noise
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
 from simrail.scenario.check_sensors import judge_sensors
 from simrail.scenario.check_vibration import step_words
+from simrail.scenario.designs import DESIGNS
 from simrail.scenario.distributions import dimensions, sample_count
 from simrail.scenario.requirements import judge_requirements, judge_requirements_of_ride
 from simrail.scenario.scenario import Scenario
@@ -91,9 +93,11 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         )
     with blame(scenario.file):
         _judge_score(scenario)
+        _judge_design(scenario)
         estimators = parts.estimators(0)
-        for sample in range(1, sample_count(scenario.spec)):
-            parts.estimators(sample)
+        if parts.draws_estimators:
+            for sample in range(1, sample_count(scenario.spec)):
+                parts.estimators(sample)
         judge_requirements(scenario.spec, [*estimators, *_judge_ride_figures(scenario, estimators)])
         simulated, unusual, notes = _judge_cells(scenario, parts)
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
@@ -149,6 +153,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
         if sensor_key not in judged_sensors:
             judged_sensors.add(sensor_key)
             judge_sensors(resolved)
+            warnings += silent_noise(resolved.grade)
     return simulated, warnings, notes
 
 
@@ -189,6 +194,29 @@ def _judge_twist(scenario: Scenario, estimators: Mapping[str, Estimator]) -> lis
         for name, step in steps.items()
         if isinstance(step, int | float) and step > 0.0 and abs(round(base / step) * step / base - 1.0) > 1e-6
     ]
+
+
+def _judge_design(scenario: Scenario) -> None:
+    """Refuse a design of a sensitivity analysis that has nothing to vary, or would not be run as a whole."""
+    spec = scenario.spec
+    method = spec.monte_carlo.method
+    if method not in DESIGNS:
+        return
+    here = {"field": "monte_carlo.method", "value": method}
+    if not dimensions(spec):
+        raise InputError(
+            "is a design over distributions, and no value is one",
+            **here,
+            remedy='write a range, e.g. --set "imu.sheet.gyro_noise_degpsqrth={ log_uniform = [0.05, 1.0] }"',
+        )
+    # A requirement is judged over devices, and all samples of a design have the same.
+    for name in ("stop", "passes", "require"):
+        if getattr(spec, name):
+            raise InputError(
+                f"needs all of its samples, each by itself, and does not go with {name}",
+                **here,
+                remedy=f"leave out {name}, or the method",
+            )
 
 
 def _judge_samples(scenario: Scenario) -> list[str]:

@@ -13,6 +13,8 @@ a random stream of its own, found by its name:
 * Sobol: a dimension's values stay when samples are added, and when a distribution is added behind it;
   the number of samples is a power of two. Points are moved by a random digital shift per dimension.
 
+* The designs of a sensitivity analysis, in blocks: `simrail.scenario.designs`.
+
 Sources: McKay, Beckman, Conover 1979 (Latin hypercube); Owen 1998, section on digital shifts (Sobol).
 """
 
@@ -20,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from math import exp, log
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +33,7 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 from simrail.core.toml_files import Part
+from simrail.scenario.designs import DESIGNS, block_size, design_shares
 
 if TYPE_CHECKING:
     from simrail.scenario.scenario import ScenarioFile
@@ -252,29 +256,46 @@ def samples_of(spec: ScenarioFile) -> list[dict[str, Value]]:
     named = dimensions(spec)
     if not named:
         return [{}]
-    shares = _shares(spec, list(named))
+    draws = spec.monte_carlo
+    return _samples(draws.method, draws.samples, spec.seed, tuple(named.items()))
+
+
+@lru_cache(maxsize=4)
+def _samples(
+    method: str, count: int, seed: int, named: tuple[tuple[str, Distribution], ...]
+) -> list[dict[str, Value]]:
+    """The samples, remembered: many ask for one of them."""
+    shares = _shares(method, count, seed, [name for name, _ in named])
     return [
-        {name: distribution.at(share) for (name, distribution), share in zip(named.items(), row, strict=True)}
+        {name: distribution.at(share) for (name, distribution), share in zip(named, row, strict=True)}
         for row in shares.tolist()
     ]
 
 
 def sample_count(spec: ScenarioFile) -> int:
     """Number of samples; 1 without distributions."""
-    return spec.monte_carlo.samples if dimensions(spec) else 1
+    count, draws = len(dimensions(spec)), spec.monte_carlo
+    if count == 0:
+        return 1
+    return draws.samples * (block_size(draws.method, count) if draws.method in DESIGNS else 1)
 
 
-def _shares(spec: ScenarioFile, names: list[str]) -> FloatArray:
-    """Points (samples, dimensions) in the unit cube."""
+def shares_of(spec: ScenarioFile) -> FloatArray:
+    """Points (samples, dimensions) in the unit cube, whose values are `samples_of`."""
+    return _shares(spec.monte_carlo.method, spec.monte_carlo.samples, spec.seed, list(dimensions(spec)))
+
+
+def _shares(method: str, n: int, seed: int, names: list[str]) -> FloatArray:
+    if method in DESIGNS:
+        return design_shares(method, n, names, seed)
     from scipy.stats import qmc  # slow to import, and needed by few scenarios
 
-    n = spec.monte_carlo.samples
-    if spec.monte_carlo.method == "latin_hypercube":
+    if method == "latin_hypercube":
         # Columns of a Latin hypercube are independent, so that each may have a stream of its own.
-        columns = [qmc.LatinHypercube(1, rng=stream(spec.seed, "sample", name)).random(n) for name in names]
+        columns = [qmc.LatinHypercube(1, rng=stream(seed, "sample", name)).random(n) for name in names]
         return np.hstack(columns)
     points = qmc.Sobol(len(names), scramble=False, bits=SOBOL_BITS).random(n)
     digits = np.round(points * 2**SOBOL_BITS).astype(np.int64)
-    shifts = [int(stream(spec.seed, "sample", name).integers(2**SOBOL_BITS)) for name in names]
+    shifts = [int(stream(seed, "sample", name).integers(2**SOBOL_BITS)) for name in names]
     shares: FloatArray = ((digits ^ np.array(shifts)) + 0.5) / 2.0**SOBOL_BITS
     return shares

@@ -7,13 +7,16 @@ the scenario itself, and the reading of it, in `simrail.scenario.scenario`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
+from simrail.recording.sheets.figures import FIGURES
+from simrail.recording.sheets.imu_file import ImuHead, limited
 from simrail.scenario.axes import Listed, each
+from simrail.scenario.designs import DESIGNS
 from simrail.scenario.measured_file import MeasuredPart
 from simrail.scoring.requirement import Requirement, limit_of
 from simrail.track.defects import Defect
@@ -276,6 +279,26 @@ class RailConditionPart(Part):
         return what if self.rails == "both" else f"{what}, {self.rails} rail"
 
 
+class _SheetPart(Part):
+    """``[imu.sheet]``: figures that take the place of those of the grade's data sheet."""
+
+    @classmethod
+    def explained(cls, key: str, value: object) -> str | None:
+        """What to write in the place of the words of a data sheet; see `ImuHead.explained`."""
+        return ImuHead.explained(key, value)
+
+    def figures(self) -> dict[str, float]:
+        """Those that are given. Nothing of it is a list."""
+        return {name: value for name, value in self.model_dump().items() if value is not None}
+
+
+if TYPE_CHECKING:
+    SheetPart = _SheetPart
+else:
+    _figures: dict[str, Any] = {name: (Listed[limited(name)] | None, None) for name in FIGURES}
+    SheetPart = create_model("SheetPart", __base__=_SheetPart, __module__=__name__, **_figures)
+
+
 NOISE = "noise"
 """Word in the name of an IMU or of its grade that says that noise was added to its signals."""
 
@@ -285,7 +308,8 @@ class ImuPart(Part):
 
     ``sensor_draws`` limits the draws of this IMU below those of ``[monte_carlo]``: an ideal one has no
     errors to be drawn, so that one or two draws (of the encoder) say all. ``vehicle`` names the one that it
-    is on, where a scenario has several whose bodies have other names.
+    is on, where a scenario has several whose bodies have other names. ``sheet`` has figures that take the
+    place of those of the grade's data sheet, by the keys of IMU files: a number, a list, or a distribution.
     """
 
     name: Name
@@ -297,6 +321,7 @@ class ImuPart(Part):
     pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
     yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
     sensor_draws: Draws | None = None
+    sheet: SheetPart | None = None
 
     def is_on(self, vehicle: str) -> bool:
         """Whether it is on a vehicle."""
@@ -396,23 +421,36 @@ class MonteCarloPart(Part):
     and has draws of its own: ``track_draws`` lay the rails anew, each ride over them is made with
     ``map_draws`` draws of the map, and recorded with ``sensor_draws`` draws of the sensors.
     Without a distribution there is one sample.
+
+    ``"morris"`` and ``"saltelli"`` are the designs of a sensitivity analysis (`simrail.scenario.designs`),
+    whose samples come in blocks: ``samples`` is then the number of trajectories, or of blocks, and all of
+    them share their draws.
     """
 
     samples: Draws = 1
-    method: Literal["latin_hypercube", "sobol"] = "latin_hypercube"
+    method: Literal["latin_hypercube", "sobol", "morris", "saltelli"] = "latin_hypercube"
     track_draws: Draws = 1
     map_draws: Draws = 1
     sensor_draws: Draws = 1
 
     @model_validator(mode="after")
     def _fills_the_space(self) -> MonteCarloPart:
-        if self.method == "sobol" and self.samples & (self.samples - 1):
+        if self.method in ("sobol", "saltelli") and self.samples & (self.samples - 1):
             raise InputError(
                 "Sobol points are balanced in powers of two only",
                 field="samples",
                 value=self.samples,
                 limit="1, 2, 4, 8, ...",
-                remedy=f"take {1 << self.samples.bit_length()}, or the method latin_hypercube",
+                remedy=f"take {1 << self.samples.bit_length()}"
+                + (", or the method latin_hypercube" if self.method == "sobol" else ""),
+            )
+        if self.method in DESIGNS and self.samples < 2:
+            raise InputError(
+                "is too few for indices with intervals",
+                field="samples",
+                value=self.samples,
+                limit=">= 2 trajectories, or blocks",
+                remedy="take some 10 trajectories of morris, or 256 blocks of saltelli",
             )
         return self
 

@@ -138,7 +138,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "a design that is none": (
         "sensor_draws = 2",
         'samples = 12\nmethod = "halton"',
-        ["monte_carlo.method", "'halton'", "'latin_hypercube' or 'sobol'"],
+        ["monte_carlo.method", "'halton'", "'sobol', 'morris' or 'saltelli'"],
     ),
     "a standstill the other way": (
         "end_m = 590.0\nspeed_kmh = 50.0",

@@ -19,6 +19,7 @@ from simrail.scenario.build import Parts
 from simrail.scenario.build_estimator import estimator_of
 from simrail.scenario.cells import cells, count, derived_seed, methods
 from simrail.scenario.check import judge_scenario
+from simrail.scenario.distributions import distributions_of
 from simrail.scenario.overrides import override
 from simrail.scenario.scenario import load_scenario, read_scenario
 from simrail.scenario.vibration_tables import VibrationPart
@@ -69,8 +70,10 @@ def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) 
     rails_alone = ("passes", "vertical_profile")
     assert ("zero_track" if name in rails_alone else "design_angles") in plan.estimators
     grades = {cell.imu.grade for cell in cells(load_scenario(name))}
-    # The floor of every estimator is in every table; a table of odometries alone has none of an estimator.
-    assert ("ideal" in grades) == (name not in ("odometry", "track_relative_parts"))
+    # The floor of every estimator is in every table; a table of odometries alone has none of an estimator,
+    # and ranges of a sheet are no grade.
+    without = ("odometry", "track_relative_parts", "sensitivity")
+    assert ("ideal" in grades) == (name not in without)
 
 
 @pytest.mark.parametrize("name", sorted(shipped("scenario")))
@@ -84,6 +87,9 @@ def test_a_train_knows_its_line_by_a_map_that_errs_and_a_laboratory_exactly(name
     beside = {"go20a", "metro_table3", "metro_geometry", "odometry", "passes"}
     assert axes_of(spec.map) == ({"exact": (False, True)} if name in beside else {})
     assert next(cells(load_scenario(name))).map_label == "drawn", "the ablation does not come first"
+    if name == "sensitivity":
+        assert set(distributions_of(spec.map)) == {"cant_sd_mm"}
+        return
     assert all(part.errors() == MapErrors() for _, part in expand(spec.map) if not part.exact)
 
 
@@ -95,7 +101,7 @@ def test_full_size_vehicles_shake_by_default_and_say_it(name: str) -> None:
     """
     scenario = load_scenario(name)
     part, first = scenario.spec.vibration, next(cells(scenario))
-    if name in ("scale_ride", "scale_track", "quick_kinematic", "standstill"):
+    if name in ("scale_ride", "scale_track", "quick_kinematic", "standstill", "sensitivity"):
         assert part is None and first.vibration_label == "off"
         assert "# Without [vibration]" in scenario.text or "Without\n# [vibration]" in scenario.text
         return

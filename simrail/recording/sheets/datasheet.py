@@ -1,81 +1,19 @@
-"""From the figures that a data sheet prints, in its own units, to an IMU grade, and back for reading.
+"""From the figures that a data sheet prints, in its own units, to an IMU grade.
 
-The only place in simrail where degrees per hour, milli-g, ppm and their like are turned into SI units.
+Only here are degrees per hour, milli-g, ppm and their like (`simrail.recording.sheets.figures`) turned into
+SI units.
 """
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
-from simrail.core.errors import InputError, did_you_mean
+from simrail.core.errors import Faults, InputError
+from simrail.recording.sheets.figures import FIGURES, Figure
 from simrail.recording.sheets.grades import ImuGrade, judge_choice
-
-STANDARD_GRAVITY_MPS2 = 9.80665
-"""The g of data sheets (mg, ug), by definition; local gravity is a matter of the recording."""
+from simrail.recording.sheets.sheet_words import explain
+from simrail.recording.sheets.units import STANDARD_GRAVITY_MPS2
 
 _G = STANDARD_GRAVITY_MPS2
-_DEG = math.pi / 180.0
-_DEGPH = _DEG / 3600.0
-
-
-class Figure(NamedTuple):
-    """One figure as sheets print it: the field of the grade, SI value of one unit, and the unit in words."""
-
-    field: str
-    si: float
-    unit: str
-
-
-_BOTH = {
-    "{}_scale_error_percent": ("{}_scale_error", 1e-2, "%"),
-    "{}_scale_error_ppm": ("{}_scale_error", 1e-6, "ppm"),
-    "{}_nonlinearity_percentfs": ("{}_nonlinearity", 1e-2, "% of full scale"),
-    "{}_nonlinearity_ppmfs": ("{}_nonlinearity", 1e-6, "ppm of full scale"),
-    "{}_nonorthogonality_deg": ("{}_nonorthogonality_rad", _DEG, "deg"),
-    "{}_nonorthogonality_mrad": ("{}_nonorthogonality_rad", 1e-3, "mrad"),
-    "{}_scale_temperature_ppmpk": ("{}_scale_temperature_1pk", 1e-6, "ppm/K"),
-    "{}_bias_correlation_s": ("{}_bias_correlation_s", 1.0, "s"),
-}
-
-FIGURES: dict[str, Figure] = {
-    "gyro_noise_degpsqrthz": Figure("gyro_noise_radpsqrts", _DEG, "deg/s/sqrt(Hz)"),
-    "gyro_noise_degpsqrth": Figure("gyro_noise_radpsqrts", _DEG / 60.0, "deg/sqrt(h)"),
-    "accel_noise_ugpsqrthz": Figure("accel_noise_mpsqrts", 1e-3 * (1e-3 * _G), "ug/sqrt(Hz)"),
-    "accel_noise_mpspsqrth": Figure("accel_noise_mpsqrts", 1.0 / 60.0, "m/s/sqrt(h)"),
-    "gyro_bias_instability_degph": Figure("gyro_bias_instability_radps", _DEGPH, "deg/h"),
-    "accel_bias_instability_mg": Figure("accel_bias_instability_mps2", 1e-3 * _G, "mg"),
-    "accel_bias_instability_ug": Figure("accel_bias_instability_mps2", 1e-6 * _G, "ug"),
-    "gyro_random_walk_degphpsqrth": Figure("gyro_random_walk_radpspsqrts", _DEGPH / 60.0, "deg/h/sqrt(h)"),
-    "accel_random_walk_mgpsqrth": Figure("accel_random_walk_mps2psqrts", 1e-3 * _G / 60.0, "mg/sqrt(h)"),
-    "gyro_turn_on_bias_degps": Figure("gyro_turn_on_bias_radps", _DEG, "deg/s"),
-    "gyro_turn_on_bias_degph": Figure("gyro_turn_on_bias_radps", _DEGPH, "deg/h"),
-    "accel_turn_on_bias_mg": Figure("accel_turn_on_bias_mps2", 1e-3 * _G, "mg"),
-    "gyro_g_sensitivity_degpspg": Figure("gyro_g_sensitivity_radspm", _DEG / _G, "deg/s/g"),
-    "gyro_g_sensitivity_degphpg": Figure("gyro_g_sensitivity_radspm", _DEGPH / _G, "deg/h/g"),
-    "gyro_vibration_rectification_degphpg2": Figure(
-        "gyro_vibration_rectification_rads3pm2", _DEGPH / _G**2, "deg/h/g2"
-    ),
-    "accel_vibration_rectification_ugpg2": Figure("accel_vibration_rectification_s2pm", 1e-6 / _G, "ug/g2"),
-    "gyro_bias_temperature_degpspk": Figure("gyro_bias_temperature_radpspk", _DEG, "deg/s/K"),
-    "gyro_bias_temperature_degphpk": Figure("gyro_bias_temperature_radpspk", _DEGPH, "deg/h/K"),
-    "accel_bias_temperature_mgpk": Figure("accel_bias_temperature_mps2pk", 1e-3 * _G, "mg/K"),
-    "package_misalignment_deg": Figure("package_misalignment_rad", _DEG, "deg"),
-    "package_misalignment_mrad": Figure("package_misalignment_rad", 1e-3, "mrad"),
-    "gyro_range_degps": Figure("gyro_range_radps", _DEG, "deg/s"),
-    "accel_range_g": Figure("accel_range_mps2", _G, "g"),
-    "gyro_resolution_degps": Figure("gyro_resolution_radps", _DEG, "deg/s"),
-    "accel_resolution_mg": Figure("accel_resolution_mps2", 1e-3 * _G, "mg"),
-    "vibration_averaging_s": Figure("vibration_averaging_s", 1.0, "s"),
-    "bandwidth_hz": Figure("bandwidth_hz", 1.0, "Hz"),
-    "clock_jitter_us": Figure("clock_jitter_s", 1e-6, "us"),
-    "clock_drift_ppm": Figure("clock_drift", 1e-6, "ppm"),
-    "dropped_percent": Figure("dropped_fraction", 1e-2, "%"),
-    "dropped_burst_samples": Figure("dropped_burst", 1.0, "samples"),
-} | {
-    name.format(kind): Figure(field.format(kind), si, unit)
-    for name, (field, si, unit) in _BOTH.items()
-    for kind in ("gyro", "accel")
-}
-"""Every figure of a data sheet, by its name in IMU files. Several may stand for one field of a grade."""
 
 _OPTIONS = ("source", "bias_process", "flicker_range_s", "oversampling", "output")
 """What a grade says beside its figures."""
@@ -123,34 +61,45 @@ def grade_from_datasheet(
     judge_choice("noise_reading", noise_reading, ("allan", "one_sided_density"))
     values = {name: figures.pop(name) for name in _OPTIONS if name in figures}
     said: dict[str, str] = {}
+    faults = Faults()
     for key, number in figures.items():
-        if key not in FIGURES:
-            raise InputError(
-                "no data sheet prints this figure",
-                field=key,
-                value=number,
-                remedy=did_you_mean(key, FIGURES) or "see simrail.recording.sheets.datasheet.FIGURES",
-            )
-        if number is None:
+        if number is None and key in FIGURES:
             continue
-        figure = FIGURES[key]
-        if figure.field in said:
-            raise InputError(
-                "is given twice, in two units",
-                field=key,
-                value=number,
-                limit=f"either this or {said[figure.field]}",
-                remedy="keep the one that the sheet prints",
-            )
-        said[figure.field] = key
-        reading = math.sqrt(0.5) if key in _DENSITIES and noise_reading == "one_sided_density" else 1.0
-        values[figure.field] = _in_si(key, number, figure.si) * reading
-    return ImuGrade(
-        name=name,
-        rate_hz=rate_hz,
-        assumed=(*([assumed.strip()] if assumed.strip() else []), *_assumptions(said, noise_reading)),
-        **values,
-    )
+        with faults.gathered():
+            figure = _figure(key, number, said)
+            reading = math.sqrt(0.5) if key in _DENSITIES and noise_reading == "one_sided_density" else 1.0
+            values[figure.field] = _in_si(key, number, figure.si) * reading
+            said[figure.field] = key
+    with faults.gathered():
+        grade = ImuGrade(
+            name=name,
+            rate_hz=rate_hz,
+            assumed=(*([assumed.strip()] if assumed.strip() else []), *_assumptions(said, noise_reading)),
+            **values,
+        )
+    faults.refuse()
+    return grade
+
+
+def _figure(key: str, number: Any, said: dict[str, str]) -> Figure:
+    """The figure of a key, or what is wrong with it beside those that were said before."""
+    if key not in FIGURES:
+        raise InputError(
+            "no data sheet prints this figure",
+            field=key,
+            value=number,
+            remedy=explain(key, number) or "see simrail.recording.sheets.figures.FIGURES",
+        )
+    figure = FIGURES[key]
+    if figure.field in said:
+        raise InputError(
+            "is given twice, in two units",
+            field=key,
+            value=number,
+            limit=f"either this or {said[figure.field]}",
+            remedy="keep the one that the sheet prints",
+        )
+    return figure
 
 
 def _in_si(key: str, number: float, si: float) -> float:

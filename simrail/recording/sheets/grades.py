@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from simrail.core.errors import InputError
+from simrail.core.errors import Faults, InputError
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import ImuSheet
 from simrail.recording.sheets.allan import (
@@ -170,14 +170,24 @@ class ImuGrade:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        faults = Faults()
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, int | float):
-                _judge(self.name, field.name, value)
+                with faults.gathered():
+                    _judge(self.name, field.name, value)
         here = f"imu grade {self.name}: "
-        judge_choice(here + "bias_process", self.bias_process, ("gauss_markov", "flicker"))
-        judge_choice(here + "output", self.output, ("rates", "increments"))
-        _judge_together(self)
+        for name, choices in (
+            ("bias_process", ("gauss_markov", "flicker")),
+            ("output", ("rates", "increments")),
+        ):
+            with faults.gathered():
+                judge_choice(here + name, getattr(self, name), choices)
+        if not faults.found:
+            for judged in (_judge_nonlinearity, _judge_jitter, _judge_flicker):
+                with faults.gathered():
+                    judged(self)
+        faults.refuse()
 
     @classmethod
     def from_datasheet(cls, name: str, rate_hz: float, **figures: Any) -> ImuGrade:
@@ -267,6 +277,35 @@ def imu_sheet(grade: ImuGrade, *, delay_s: float) -> ImuSheet:
     return ImuSheet(grade=grade.name, delay_s=delay_s, **shared | unlimited)
 
 
+def silent_noise(grade: ImuGrade) -> tuple[str, ...]:
+    """Warnings, a line each, of triads without white noise on a device that has errors.
+
+    Every real gyroscope and accelerometer has some: it is missing from the file then, and what an estimator
+    reaches would be better than it is. A device without any error is meant to have none.
+    """
+    triads = {kind: grade.triad(kind) for kind in ("gyro", "accel")}
+    errors = [
+        getattr(terms, name)
+        for terms in triads.values()
+        for name in _TERMS
+        if name not in ("range", "bias_correlation", "resolution")
+    ]
+    if not any(errors) and grade.package_misalignment_rad == 0.0:
+        return ()
+    wanted = {
+        "gyro": ("gyro", "angle random walk: gyro_noise_degpsqrth, or its density: gyro_noise_degpsqrthz"),
+        "accel": (
+            "accelerometer",
+            "velocity random walk: accel_noise_mpspsqrth, or its density: accel_noise_ugpsqrthz",
+        ),
+    }
+    return tuple(
+        f"IMU {grade.name} has no white noise of the {wanted[kind][0]}: give its {wanted[kind][1]}"
+        for kind, terms in triads.items()
+        if terms.noise == 0.0
+    )
+
+
 _POSITIVE = ("rate_hz", "correlation_s", "bandwidth_hz", "averaging_s")
 _SMALL = ("scale_error", "nonlinearity", "misalignment_rad", "nonorthogonality_rad", "1pk", "clock_drift")
 
@@ -293,30 +332,40 @@ def judge_choice(field: str, value: Any, choices: tuple[str, ...]) -> None:
         raise InputError("is not one of the possible values", field=field, value=value, limit=limit)
 
 
-def _judge_together(grade: ImuGrade) -> None:
-    """Refuse figures that contradict each other."""
-    field = f"imu grade {grade.name}: "
+def _judge_nonlinearity(grade: ImuGrade) -> None:
+    """Refuse fractions of a full scale that is not given."""
+    faults = Faults()
     for kind, unit in (("gyro", "radps"), ("accel", "mps2")):
         terms = grade.triad(kind)
-        if terms.nonlinearity > 0.0 and math.isinf(terms.range):
-            raise InputError(
-                "is a fraction of a full scale that is not given",
-                field=f"{field}{kind}_nonlinearity",
-                value=terms.nonlinearity,
-                remedy=f"give {kind}_range_{unit} as well",
-            )
+        with faults.gathered():
+            if terms.nonlinearity > 0.0 and math.isinf(terms.range):
+                raise InputError(
+                    "is a fraction of a full scale that is not given",
+                    field=f"imu grade {grade.name}: {kind}_nonlinearity",
+                    value=terms.nonlinearity,
+                    remedy=f"give {kind}_range_{unit} as well",
+                )
+    faults.refuse()
+
+
+def _judge_jitter(grade: ImuGrade) -> None:
+    """Refuse a clock that would change the order of samples."""
     if grade.clock_jitter_s > 0.1 / grade.rate_hz:
         raise InputError(
             "is more than a tenth of the sample interval",
-            field=f"{field}clock_jitter_s",
+            field=f"imu grade {grade.name}: clock_jitter_s",
             value=grade.clock_jitter_s,
             limit=f"<= {0.1 / grade.rate_hz:g} s",
         )
+
+
+def _judge_flicker(grade: ImuGrade) -> None:
+    """Refuse a floor that is flat nowhere."""
     low, high = grade.flicker_range_s
     if grade.bias_process == "flicker" and not 10.0 / grade.rate_hz <= low < high < math.inf:
         raise InputError(
             "is not (shortest, longest)",
-            field=f"{field}flicker_range_s",
+            field=f"imu grade {grade.name}: flicker_range_s",
             value=grade.flicker_range_s,
             limit=f"{10.0 / grade.rate_hz:g} s <= shortest < longest",
             remedy="the floor is flat from the shortest to the longest averaging time",

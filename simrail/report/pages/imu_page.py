@@ -9,8 +9,8 @@ import pandas as pd
 from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.core.jit import FloatArray
 from simrail.recording.sheets.allan import overlapping_allan
-from simrail.recording.sheets.datasheet import FIGURES
-from simrail.recording.sheets.grades import ImuGrade
+from simrail.recording.sheets.figures import FIGURES
+from simrail.recording.sheets.grades import ImuGrade, silent_noise
 from simrail.recording.sheets.imu_file import ImuHead
 from simrail.report.figures.canvas import INK, legend_above, log_scale, look, panels, to_svg
 from simrail.report.pages.frame import page_text, write_page
@@ -29,6 +29,7 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
         grade=grade,
         device=device_rows(grade),
         triads=triad_rows(grade),
+        warnings=silent_noise(grade),
         allan=allan_figure(grade, seed=seed),
     )
     return write_page(folder, grade.name, text)

@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from simrail.recording.sheets.datasheet import FIGURES
-from simrail.recording.sheets.grades import ImuGrade
+from simrail.recording.sheets.figures import FIGURES
+from simrail.recording.sheets.grades import ImuGrade, silent_noise
 from simrail.recording.sheets.imu_file import ImuHead
 
 _ROWS = (
@@ -94,5 +94,7 @@ def print_imu(console: Console, file: ImuHead, grade: ImuGrade) -> None:
         console.print(table)
     else:
         console.print("no error terms: it records the true motion, filtered and sampled at its rate")
+    for warning in silent_noise(grade):
+        console.print(f"warning: {warning}", highlight=False, markup=False, soft_wrap=True)
     for sentence in grade.assumed:
         console.print(f"assumed: {' '.join(sentence.split())}", highlight=False, markup=False)
