@@ -500,7 +500,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "a stop rule without a width": (
         "[encoder]",
         _stop(width=None),
-        ["stop.width", "is required"],
+        ["stop.width", "is missing", "verdicts = true", "add width"],
     ),
     "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 28", "quotes"]),
     "a key twice": ("seed = 1", "seed = 1\nseed = 2", ["not valid TOML"]),

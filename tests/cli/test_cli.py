@@ -39,7 +39,7 @@ def no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Spare the figures of the report, where it does not matter what is drawn."""
 
     def write(path: Path, **keywords: object) -> None:
-        assert set(keywords) == {"scenario", "scores", "cells", "examples", "manifest", "beside"}
+        assert set(keywords) == {"scenario", "scores", "cells", "examples", "manifest", "beside", "budgets"}
         path.write_text("<html></html>")
 
     monkeypatch.setattr(results, "write_report", write)
