@@ -13,6 +13,7 @@ from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
 from simrail.recording.sheets.grades import silent_noise
+from simrail.ride.vibration.sources import Vibration
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
 from simrail.scenario.check_ride import judge_ride
@@ -122,6 +123,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
     last_ride = None
     durations: dict[tuple[object, ...], float] = {}
     judged_sensors: set[tuple[object, ...]] = set()
+    shaken: set[tuple[int, Vibration]] = set()
     judged_rails: tuple[tuple[object, ...], LaidTrack] | None = None
     for cell in first_cells(scenario):
         resolved = parts.resolve(cell)
@@ -140,7 +142,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             rails_key = (id(ride.track), ride.irregularity, ride.conditions)
             # One is remembered: rides over the same rails come in a row, and rails of many are large.
             same = judged_rails[1] if judged_rails is not None and judged_rails[0] == rails_key else None
-            durations[ride_key], unusual, laid = judge_ride(resolved, known_rails=same)
+            durations[ride_key], unusual, laid = judge_ride(resolved, shaken=shaken, known_rails=same)
             judged_rails = rails_key, laid
             judge_requirements_of_ride(scenario.spec, ride.track, resolved.bands, cell.ride.reach_m)
             warnings += unusual

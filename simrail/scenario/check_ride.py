@@ -13,6 +13,7 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import blame
 from simrail.ride.hunting import hunting_warning
 from simrail.ride.ride import Ride, rails_of
+from simrail.ride.vibration.sources import Vibration
 from simrail.scenario.build import ResolvedCell
 from simrail.scenario.check_vibration import judge_vibration
 from simrail.scenario.tables import RidePart
@@ -34,7 +35,7 @@ MOST_BASE_PER_GAUGE = 1.1
 
 
 def judge_ride(
-    resolved: ResolvedCell, *, known_rails: LaidTrack | None = None
+    resolved: ResolvedCell, *, shaken: set[tuple[int, Vibration]], known_rails: LaidTrack | None = None
 ) -> tuple[float, list[str], LaidTrack]:
     """Judge the ride of a cell.
 
@@ -42,6 +43,8 @@ def judge_ride(
     ----------
     resolved : ResolvedCell
         Any cell of the ride.
+    shaken : set of (int, Vibration)
+        As of `simrail.scenario.check_vibration.judge_vibration`.
     known_rails : LaidTrack, optional
         Its rails, if another ride that has been judged had the same.
 
@@ -97,7 +100,7 @@ def judge_ride(
             )
     _judge_contact_rate(resolved.ride)
     _judge_ride_figures(resolved)
-    warnings = _judge_step(resolved) + judge_vibration(resolved.ride)
+    warnings = _judge_step(resolved) + judge_vibration(resolved.ride, shaken)
     if not words.stands:
         warnings += _judge_dynamics(resolved) + _judge_hunting(resolved, laid)
     return duration, warnings, laid

@@ -21,8 +21,15 @@ _HELD = 0.45
 """Highest frequency of noise over the rate that holds it."""
 
 
-def judge_vibration(ride: Ride) -> list[str]:
+def judge_vibration(ride: Ride, shaken: set[tuple[int, Vibration]]) -> list[str]:
     """Refuse a vibration that cannot be worked out; warn of short and long waves that do not meet.
+
+    Parameters
+    ----------
+    ride : Ride
+        The ride.
+    shaken : set of (int, Vibration)
+        Vehicles, by identity, and what shakes them, of which it is known that it can be; this one is added.
 
     Raises
     ------
@@ -35,10 +42,12 @@ def judge_vibration(ride: Ride) -> list[str]:
         return []
     _judge_rates(ride, vibration)
     _judge_waves(ride, vibration)
-    modes_of(
-        linear_vehicle_of(vibration, ride.vehicle, gravity_mps2=ride.gravity_mps2),
-        step_s=1.0 / vibration.rate_hz,
-    )
+    if (id(ride.vehicle), vibration) not in shaken:
+        modes_of(
+            linear_vehicle_of(vibration, ride.vehicle, gravity_mps2=ride.gravity_mps2),
+            step_s=1.0 / vibration.rate_hz,
+        )
+        shaken.add((id(ride.vehicle), vibration))
     return _unusual(ride, vibration)
 
 

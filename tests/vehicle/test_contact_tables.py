@@ -1,6 +1,8 @@
 """One contact table per static wheel load: shared where loads are alike, right where they are not."""
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +12,9 @@ from simrail.core.toml_files import load
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
+from simrail.vehicle.contact import contact_tables
 from simrail.vehicle.contact.contact import static_height
-from simrail.vehicle.contact.contact_geometry import build_contact
+from simrail.vehicle.contact.contact_geometry import ContactTable, build_contact
 from simrail.vehicle.contact.contact_tables import contacts_of, rest_drops_m
 from simrail.vehicle.contact.profiles import rail_60e1, s1002
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
@@ -95,3 +98,39 @@ def test_a_table_is_built_once():
     assert contacts_of(bogie()).tables[0] is contacts_of(bogie()).tables[0]
     rough = replace(bogie(), wheel_rail=replace(bogie().wheel_rail, friction=0.2))
     assert contacts_of(rough).tables[0] is not contacts_of(bogie()).tables[0]
+
+
+def test_a_table_from_the_disk_is_the_one_that_was_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the bit; a flipped byte anywhere is no table, and it is built again."""
+    monkeypatch.setattr(contact_tables, "cache_folder", lambda: tmp_path)
+    model = load(VehicleFile, "vehicle", "two_axle_wagon").model("two_axle_wagon")
+
+    def fresh() -> ContactTable:
+        contact_tables._built.cache_clear()
+        return contacts_of(model).tables[0]
+
+    built = fresh()
+    (file,) = (tmp_path / contact_tables.FOLDER).iterdir()
+    whole = file.read_bytes()
+    builds: list[int] = []
+    build = contact_tables.build_contact
+
+    def counted(*arguments: Any, **keywords: Any) -> ContactTable:
+        builds.append(1)
+        return build(*arguments, **keywords)
+
+    monkeypatch.setattr(contact_tables, "build_contact", counted)
+    read = fresh()
+    assert not builds and read.coef.tobytes() == built.coef.tobytes()
+    assert read.const == built.const and (read.name, read.split_m) == (built.name, built.split_m)
+    for at in np.random.default_rng(1).integers(0, len(whole), 40):
+        damaged = bytearray(whole)
+        damaged[at] ^= 0x10
+        file.write_bytes(bytes(damaged))
+        found = contact_tables._read(file)
+        assert found is None or found.coef.tobytes() == built.coef.tobytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    assert fresh().coef.tobytes() == built.coef.tobytes() and builds == [1]
+    contact_tables._built.cache_clear()

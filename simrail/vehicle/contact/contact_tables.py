@@ -6,16 +6,29 @@ under a heavy engine and one under a light end need different tables. Loads with
 Not here: making one table (`simrail.vehicle.contact.contact_geometry`).
 """
 
-from dataclasses import dataclass
+import hashlib
+import json
+import math
+import zipfile
+import zlib
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 
-from simrail.core.jit import FloatArray
+from simrail.core.atomic_files import whole_file
+from simrail.core.jit import FloatArray, cache_folder
+from simrail.core.source_hash import source_hash
 from simrail.vehicle.contact.contact import static_height
 from simrail.vehicle.contact.contact_geometry import ContactTable, build_contact
 from simrail.vehicle.contact.profile_files import profiles_digest, profiles_of
 from simrail.vehicle.model import VehicleModel, WheelRail
+
+FOLDER = "contact_tables"
+"""Where tables lie in the cache."""
 
 SAME_LOAD = 0.02
 """Loads that differ by less share a table: it moves the penetration by 1.3 %, one micrometre."""
@@ -57,24 +70,75 @@ def contacts_of(model: VehicleModel, *, gravity_mps2: float = 9.81) -> WheelCont
 
 @lru_cache(maxsize=64)
 def _built(
-    pair: WheelRail, _shape: str, wheel_radius_m: float, load_n: float, grid_load_n: float
+    pair: WheelRail, shape: str, wheel_radius_m: float, load_n: float, grid_load_n: float
 ) -> ContactTable:
-    """One table. ``_shape`` is the digest of the profiles: a file that has changed is another key."""
-    table = build_contact(
-        *profiles_of(pair),
-        gauge_m=pair.gauge_m,
-        rail_inclination=pair.rail_inclination,
-        wheel_radius_m=wheel_radius_m,
-        tape_circle_half_m=pair.tape_circle_half_m,
-        static_load_n=load_n,
-        grid_load_n=grid_load_n,
-        friction=pair.friction,
-        smoothing=pair.smoothing,
-        creep_law=pair.creep,
-    )
+    """One table, from the disk if it was built before.
+
+    ``shape`` is the digest of the profiles: a file that has changed is another key.
+    """
+    file = cache_folder() / FOLDER / f"{_key(pair, shape, wheel_radius_m, load_n, grid_load_n)}.npz"
+    table = _read(file)
+    if table is None:
+        table = build_contact(
+            *profiles_of(pair),
+            gauge_m=pair.gauge_m,
+            rail_inclination=pair.rail_inclination,
+            wheel_radius_m=wheel_radius_m,
+            tape_circle_half_m=pair.tape_circle_half_m,
+            static_load_n=load_n,
+            grid_load_n=grid_load_n,
+            friction=pair.friction,
+            smoothing=pair.smoothing,
+            creep_law=pair.creep,
+        )
+        _write(file, table)
     # Many share it.
     table.coef.flags.writeable = False
     return table
+
+
+def _key(pair: WheelRail, *rest: object) -> str:
+    """All that decides a table, hashed; exact numbers."""
+    decides = [
+        asdict(pair),
+        *rest,
+        source_hash("vehicle/contact"),
+        *(version(package) for package in ("numpy", "scipy")),
+    ]
+    return hashlib.sha256(json.dumps(decides, sort_keys=True, default=str).encode()).hexdigest()[:24]
+
+
+def _read(file: Path) -> ContactTable | None:
+    """A table that was written; None where there is none, or it is damaged (the archive has checksums)."""
+    try:
+        with np.load(file, allow_pickle=False) as held:
+            split = float(held["split_m"])
+            return ContactTable(
+                name=str(held["name"]),
+                coef=held["coef"],
+                const=held["const"][0],
+                static_load_n=float(held["static_load_n"]),
+                smoothing_m=float(held["smoothing_m"]),
+                split_m=None if math.isnan(split) else split,
+            )
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+
+
+def _write(file: Path, table: ContactTable) -> None:
+    """Keep a table for other processes; where the disk does not let us, each builds its own."""
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(file) as stream:
+            np.savez(
+                stream,
+                name=table.name,
+                coef=table.coef,
+                const=np.array([table.const]),
+                static_load_n=table.static_load_n,
+                smoothing_m=table.smoothing_m,
+                split_m=math.nan if table.split_m is None else table.split_m,
+            )
 
 
 def rest_drops_m(model: VehicleModel, *, gravity_mps2: float) -> FloatArray:
