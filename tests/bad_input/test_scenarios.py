@@ -21,6 +21,13 @@ def _stop(**changes: object) -> str:
     return "\n".join(["[stop]", *lines, "", "[encoder]"])
 
 
+def _require(**changes: object) -> str:
+    """A requirement, with changes; it is put before the table ``[encoder]``."""
+    wanted: dict[str, object] = {"quantity": "roll", "limit": "0.1 deg"} | changes
+    lines = [f"{key} = {value!r}" for key, value in wanted.items()]
+    return "\n".join(["[[require]]", *lines, "", "[encoder]"])
+
+
 # name: (text of the good scenario, what stands there instead, parts of the message)
 FAULTS: dict[str, tuple[str, str, list[str]]] = {
     "unknown key": (
@@ -501,6 +508,51 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         "[encoder]",
         _stop(width=None),
         ["stop.width", "is missing", "verdicts = true", "add width"],
+    ),
+    "verdicts without a requirement": (
+        "[encoder]",
+        "[stop]\nverdicts = true\nleast_draws = 2\n\n[encoder]",
+        ["stop.verdicts", "no verdict to stop at", "add a [[require]]"],
+    ),
+    "a stop rule for verdicts and for a width": (
+        "[encoder]",
+        _stop(verdicts="true").replace("'true'", "true"),
+        ["stop.estimator", "verdicts have none", "take out estimator, or verdicts"],
+    ),
+    "a requirement on nothing that is scored": (
+        "[encoder]",
+        _require(quantity="rol"),
+        ["require[0].quantity", "'rol'", "one of roll"],
+    ),
+    "a requirement in a unit of another kind": (
+        "[encoder]",
+        _require(limit="0.1 mm"),
+        ["require[0].limit", "unit of length; roll is measured in deg", "'0.1 mm'", "mrad", "give it in deg"],
+    ),
+    "a requirement on more than all devices": (
+        "[encoder]",
+        _require(share=1.2),
+        ["require[0].share", "1.2", "< 1"],
+    ),
+    "a requirement in a window that the track has not": (
+        "[encoder]",
+        _require(window="curve:curve 99 R1"),
+        ["require[0].window", "no part of this ride", "curve 99 R1", "straight"],
+    ),
+    "a requirement in a band beyond the ride": (
+        "[encoder]",
+        _require(quantity="alignment", band="D3", limit="1 mm"),
+        ["require[0].band", "D3", "too short", "waves to 200 m"],
+    ),
+    "a requirement in a band of what has none": (
+        "[encoder]",
+        _require(band="D1"),
+        ["require[0].band", "D1", "roll has not", "alignment"],
+    ),
+    "a requirement on a metric that is not kept": (
+        "[encoder]",
+        '[score]\nmetrics = ["sd"]\n\n' + _require(),
+        ["require[0].metric", "not kept", "'rms'", "sd"],
     ),
     "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 28", "quotes"]),
     "a key twice": ("seed = 1", "seed = 1\nseed = 2", ["not valid TOML"]),
