@@ -35,3 +35,17 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder of a test, empty."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+FIRST = ("campaign/test_passes.py", "campaign/test_export.py")
+"""Modules that compile most kernels of the estimators and of the engine: others load these from the disk."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let each of two workers compile what the other need not."""
+
+    def place(item: pytest.Item) -> int:
+        ends = [i for i, name in enumerate(FIRST) if item.path.as_posix().endswith(name)]
+        return ends[0] if ends else len(FIRST)
+
+    items.sort(key=place)

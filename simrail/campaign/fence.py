@@ -60,8 +60,11 @@ def digest(recording: Recording) -> int:
         frame = getattr(recording, name)
         if frame is None:
             continue
-        for values in (frame.index.to_numpy(), *(frame[column].to_numpy() for column in frame.columns)):
-            value = zlib.crc32(np.ascontiguousarray(values).tobytes(), value)
+        alike = len(set(frame.dtypes)) == 1
+        arrays = [frame.to_numpy()] if alike else [frame[column].to_numpy() for column in frame.columns]
+        for values in (frame.index.to_numpy(), *arrays):
+            flat: Any = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+            value = zlib.crc32(flat, value)
     return value
 
 

@@ -10,6 +10,9 @@ import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+MOST_TOLD = 6
+"""Faults of one input that are told at once."""
+
 
 class InputError(ValueError):
     """Input that cannot be used, said so that its author can mend it.
@@ -49,7 +52,10 @@ class InputError(ValueError):
         return self, *self.also
 
     def __str__(self) -> str:
-        return "\n".join(one.line for one in self.each)
+        lines = [one.line for one in self.each]
+        # A file of another kind has nothing but faults: the first of them tell that.
+        more = len(lines) - MOST_TOLD
+        return "\n".join(lines if more <= 1 else [*lines[:MOST_TOLD], f"and {more} more faults"])
 
     @property
     def line(self) -> str:

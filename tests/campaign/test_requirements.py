@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from simrail import results
 from simrail.campaign import campaign as loop
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
@@ -27,7 +28,7 @@ engine = "kinematic"
 truth_rate_hz = 250.0
 odometry = "truth"
 [monte_carlo]
-sensor_draws = 60
+sensor_draws = 24
 [[ride]]
 name = "line"
 start_m = 40.0
@@ -51,9 +52,10 @@ metrics = ["rms"]
 [[require]]
 quantity = "roll"
 limit = "0.1 deg"
+share = 0.8
 [stop]
 verdicts = true
-least_draws = 20
+least_draws = 8
 """
 SHEET = """
 title = "t"
@@ -66,8 +68,8 @@ accel_turn_on_bias_mg = {:g}
 
 @pytest.fixture
 def scenario(here: Path) -> Scenario:
-    """Sheets of a bias to 0.2, 4 and 1.93 mg: all, 44 and 90 % of the devices lean by less than 0.1 deg."""
-    for name, bias in (("fine", 0.2), ("coarse", 4.0), ("middling", 1.93)):
+    """Sheets of a bias to 0.2, 4 and 2.3 mg: all, 44 and 76 % of the devices lean by less than 0.1 deg."""
+    for name, bias in (("fine", 0.2), ("coarse", 4.0), ("middling", 2.3)):
         (here / f"{name}.toml").write_text(SHEET.format(bias))
     (here / "own.toml").write_text(TEXT)
     return load_scenario("own.toml")
@@ -81,13 +83,20 @@ def test_what_is_settled_is_drawn_no_more(scenario: Scenario) -> None:
         "coarse.toml": NOT_ENOUGH,
         "middling.toml": UNDECIDED,
     }
-    assert verdicts["devices"].to_dict() == {"fine.toml": 60, "coarse.toml": 20, "middling.toml": 60}
     assert found.stopped is not None and "1 of 3 are open" in found.stopped.words
-    assert len(found.cells) == 140
+    devices = verdicts["devices"].to_dict()
+    # 0.8 to the 18th is below half of 5 %: the look at 18 is the first at which all can be enough.
+    assert devices["fine.toml"] == 18 and devices["middling.toml"] == 24
+    assert devices["coarse.toml"] in (8, 12, 18)
+    assert len(found.cells) == sum(devices.values())
+    other = run_campaign(scenario, workers=1, batch_cells=7)
+    pd.testing.assert_frame_equal(found.scores, other.scores, check_exact=True)
+    pd.testing.assert_frame_equal(found.verdicts, other.verdicts, check_exact=True)
 
 
-@pytest.mark.parametrize(("workers", "batch_cells"), [(1, 7), pytest.param(2, 3, marks=pytest.mark.slow)])
-def test_the_same_bits_whoever_runs_it(workers: int, batch_cells: int, scenario: Scenario) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize(("workers", "batch_cells"), [(2, 3), (2, None)])
+def test_the_same_bits_whoever_runs_it(workers: int, batch_cells: int | None, scenario: Scenario) -> None:
     whole = run_campaign(scenario, workers=1)
     other = run_campaign(scenario, workers=workers, batch_cells=batch_cells)
     pd.testing.assert_frame_equal(whole.scores, other.scores, check_exact=True)
@@ -106,6 +115,7 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
     scenario: Scenario, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A later start does not know what an earlier one had settled: it finds it out again."""
+    monkeypatch.setattr(results, "write_report", lambda path, **keywords: path.write_text("<html></html>"))
     whole = run("own.toml", out=here / "whole", workers=1)
     keep: Callable[[loop._Loop, BatchResult], None] = loop._Loop._keep
     left = [5]
@@ -119,8 +129,7 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
     monkeypatch.setattr(loop._Loop, "_keep", dies)
     with pytest.raises(KeyboardInterrupt):
         run("own.toml", out=here / "parts", workers=1)
-    monkeypatch.undo()
-    monkeypatch.chdir(here)
+    monkeypatch.setattr(loop._Loop, "_keep", keep)
     parts = run("own.toml", out=here / "parts", workers=1, start="resume")
     pd.testing.assert_frame_equal(whole.campaign.scores, parts.campaign.scores, check_exact=True)
     first, second = (json.loads((here / name / "manifest.json").read_text()) for name in ("whole", "parts"))
@@ -143,5 +152,6 @@ def test_five_hundred_devices_agree_with_the_closed_form(scenario: Scenario) -> 
     ):
         Path("own_sheet.toml").write_text(SHEET.format(bias))
         settings = ["imu.grade=own_sheet.toml", "monte_carlo.sensor_draws=500", "stop.least_draws=500"]
+        settings.append("require.share=0.95")
         low, high, told = shares(bias, run_campaign(load_scenario("own.toml", overrides=settings), workers=2))
         assert low <= share <= high and told == verdict

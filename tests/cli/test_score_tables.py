@@ -130,6 +130,7 @@ def shown(scenario: Scenario, table: pd.DataFrame, cells: pd.DataFrame, *, width
         plan=SimpleNamespace(warnings=[]),
         warnings=[],
         failures=[],
+        verdicts=pd.DataFrame(),
     )
     manifest = {"wall_s": {"total": 1.0}, "real_time_factor": None}
     results = SimpleNamespace(campaign=campaign, scenario=scenario, manifest=manifest, folder=Path("there"))

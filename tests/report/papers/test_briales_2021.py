@@ -213,16 +213,24 @@ def some_rides(names: tuple[str, ...], draws: int) -> Scenario:
     )
 
 
-@lru_cache
 def campaign(names: tuple[str, ...], draws: int = 1) -> tuple[Scenario, CampaignResult]:
-    """Run it."""
+    """Run it, once for the same words."""
+    return _run(names, draws)
+
+
+@lru_cache
+def _run(names: tuple[str, ...], draws: int) -> tuple[Scenario, CampaignResult]:
     scenario = some_rides(names, draws)
     return scenario, run_campaign(scenario)
 
 
-@lru_cache
 def view_of(names: tuple[str, ...], draws: int = 1) -> SimpleNamespace:
     """What the section of a campaign shows."""
+    return _view(names, draws)
+
+
+@lru_cache
+def _view(names: tuple[str, ...], draws: int) -> SimpleNamespace:
     scenario, result = campaign(names, draws)
     (made,) = section(PageData(scenario, result.scores, result.cells, result.examples, {}))
     return SimpleNamespace(**made.data)
