@@ -6,7 +6,7 @@ matched as with a wheel: the body's heading, integrated from the gyros, is the m
 which locates a train wherever the gradient changes. States beside those of the wheel's filter
 (`simrail.estimators.odometry.curve_matched`), in place of what only a wheel has:
 
-    tilt        rad, error of the reckoned acceleration over g: of the pitch, and of the accelerometer's offset
+    tilt        rad, error of the reckoned acceleration, over g: of pitch and accelerometer
     scale       relative error of the accelerometer's scale, which no stop shows
     level       rad, by how much the body leans at rest, and the accelerometer's offset over g
     bump        rad, pitch of the body in the track and of the track in the map (Markov in distance)
@@ -25,10 +25,10 @@ with P(k) = cov(e(k)) and C = cov(e(k), e(k+1)) of the filter where the filter's
 smoother where its is, whose error goes back to nothing before a stop as it grew after the last one
 (`simrail.estimators.odometry.without_wheel_kernel.neighbours`). The place has no process noise of its own.
 
-**Where the place is not known to a metre** a tangent to the map would be that of one place, a straight as well
-as a curve. There it is the line that fits best over all places where the train may be
-(`simrail.estimators.odometry.line_table.line_over`), and what that leaves over is one error for as long as the
-train runs through them.
+**Where the place is not known to a metre** a tangent to the map would be that of one place, a straight as
+well as a curve. There it is the line that fits best over all places where the train may be
+(`simrail.estimators.odometry.line_table.line_over`), and what that leaves over is one error for as long as
+the train runs through them.
 
 Not here: the loops (`simrail.estimators.odometry.without_wheel_kernel`).
 """

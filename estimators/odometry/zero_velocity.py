@@ -183,7 +183,7 @@ class ZeroVelocityOdometry:
         found = room(steps, STATES if self.smoothed else PITCH + 1)
         past = room_for_history(steps, STATES, UPDATES) if self.smoothed or remembering else None
         zero_velocity(model, x, p, found, past)
-        if self.smoothed:
+        if past is not None and self.smoothed:
             fixed_interval(past, found.states, found.covariances)
         return Trace(times[block - 1 :: block][:steps], model, found, past)
 
