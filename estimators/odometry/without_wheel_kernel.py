@@ -182,6 +182,8 @@ def predict_reckoned(
     f[TILT, V], f[TILT, TILT], f[TILT, SCALE] = a[1, 0] / gravity, a[1, 1], -a[1, 0] * old / gravity
     f[S, V], f[S, TILT], f[S, SCALE] = runs * (1.0 + f[V, V]), runs * f[V, TILT], runs * f[V, SCALE]
     f[BUMP, BUMP], f[GRADE, GRADE], f[SWAY, SWAY] = bumps, grades, sways
+    for i in (V, TILT, SCALE):
+        f[YAW, i] = astray * f[S, i]
     f[YAW, DRIFT], f[YAW, GYRO_SCALE] = -dt, dt * reckoned.turning[k]
     f[YAW, BEND], f[YAW, EVEN], f[YAW, ODD] = -way * here.bend, way * here.ramp_even, way * here.ramp_odd
     x[S] += way
