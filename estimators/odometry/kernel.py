@@ -146,9 +146,9 @@ class Scratch(NamedTuple):
     v: FloatArray
 
 
-def room_to_work() -> Scratch:
-    """Scratch, all zero."""
-    n, m = STATES, UPDATES
+def room_to_work(states: int = STATES) -> Scratch:
+    """Scratch for a filter of so many states, all zero."""
+    n, m = states, UPDATES
     return Scratch(*(np.zeros(shape) for shape in ((n, n), (n, n), (m, n), n, n)))
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from simrail.estimators.kalman import History, remember, remember_prediction, room_for_history, update
-from simrail.estimators.odometry.kernel import DRIFT, LEAD, STATES, SWAY, LineModel, S, V
+from simrail.estimators.odometry.kernel import DRIFT, LEAD, SWAY, LineModel, S, V
 from simrail.estimators.odometry.line_table import Line
 from simrail.estimators.odometry.without_wheel import process_of
 from simrail.estimators.odometry.without_wheel_kernel import (
     BUMP,
     GRADE,
     LOST_M,
+    OFFSET,
+    STATES,
     TILT,
     Reckoned,
     SlopeModel,
@@ -23,6 +25,7 @@ from simrail.estimators.odometry.without_wheel_kernel import (
 from simrail.core.seeds import stream
 
 N, K = 4, 7
+NOISE = np.array([[1e-4, 2e-5, 1e-5], [2e-5, 1e-4, -3e-5], [1e-5, -3e-5, 2e-4]])
 PICKED = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, -0.5, 0.0]])
 
 
@@ -87,52 +90,59 @@ def joint(past: History, f: np.ndarray, q: np.ndarray, smoothed: bool) -> np.nda
 
 @pytest.mark.parametrize("smoothed", [False, True])
 def test_neighbours_are_those_of_the_joint_law(smoothed: bool) -> None:
+    """Of the smoother's errors all three; of the filter's up to a step's updates, which follow from P^+."""
     past, f, q = filtered()
-    covariances, crossed = np.empty((K, 2, 2)), np.empty((K, 2, 2))
-    neighbours(past, PICKED, smoothed, covariances, crossed)
-    all_errors = joint(past, f, q, smoothed).reshape(K, N, K, N)
-    for k in range(K):
-        np.testing.assert_allclose(covariances[k], PICKED @ all_errors[k, :, k] @ PICKED.T, rtol=1e-9)
-        if k < K - 1:
-            expected = PICKED @ all_errors[k, :, k + 1] @ PICKED.T
-            np.testing.assert_allclose(crossed[k], expected, rtol=1e-9, atol=1e-12)
+    before, crossed, after = np.zeros((3, K, 2, 2))
+    neighbours(past, PICKED, smoothed, before, crossed, after)
+    errors = joint(past, f, q, smoothed).reshape(K, N, K, N)
+    for k in range(1, K):
+        last = errors[k - 1, :, k - 1]
+        np.testing.assert_allclose(before[k], PICKED @ last @ PICKED.T, rtol=1e-9)
+        across, own = (errors[k - 1, :, k], errors[k, :, k]) if smoothed else (last @ f[k].T, None)
+        own = f[k] @ last @ f[k].T + q[k] if own is None else own
+        np.testing.assert_allclose(crossed[k], PICKED @ across @ PICKED.T, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(after[k], PICKED @ own @ PICKED.T, rtol=1e-9)
 
 
 def test_a_process_is_found_from_its_covariances() -> None:
     """Of a Markov process, made with known A and Q, both come back."""
     rng = stream(4, "process")
-    a, root = rng.standard_normal((2, 20, 2, 2))
+    a, root = rng.standard_normal((2, 20, 3, 3))
     q = root @ root.transpose(0, 2, 1)
-    p, crossed = np.empty((20, 2, 2)), np.zeros((20, 2, 2))
-    p[0] = [[2.0, 0.3], [0.3, 1.0]]
+    before, crossed, after = np.zeros((3, 20, 3, 3))
+    after[0] = np.eye(3)
     for k in range(1, 20):
-        p[k] = a[k] @ p[k - 1] @ a[k].T + q[k]
-        crossed[k - 1] = p[k - 1] @ a[k].T
-    found, noises = process_of(p, crossed)
-    size = p.max(axis=(1, 2))[:, None, None]
+        before[k] = after[k - 1]
+        crossed[k] = before[k] @ a[k].T
+        after[k] = a[k] @ before[k] @ a[k].T + q[k]
+    found, noises = process_of(before, crossed, after)
+    size = after.max(axis=(1, 2))[:, None, None]
     np.testing.assert_allclose(found[1:], a[1:], rtol=1e-6, atol=1e-8)
     np.testing.assert_allclose((noises / size)[1:], (q / size)[1:], atol=1e-9)
-    np.testing.assert_array_equal(found[0], np.eye(2))
+    np.testing.assert_array_equal(found[0], np.eye(3))
     np.testing.assert_array_equal(noises[0], 0.0)
 
 
 def test_transition_is_the_derivative_of_the_step() -> None:
     """F against central differences, in a curve, at speed; a train that stands gets nowhere."""
     x = np.array([470.0, 15.0, 1e-3, 2e-3, 4e-3, 5e-4, 2e-4, 1e-3, 0.05, 0.8])
-    x = np.concatenate([x, [0.3, 5e-4, 1e-3, 1.5, 0.01, 0.4, -0.6, 3e-4]])
+    x = np.concatenate([x, [0.3, 5e-4, 1e-3, 1.5, 0.01, 0.4, -0.6, 3e-4, 0.02]])
     here = Line(-0.4, -0.004, 1e-4, -5e-5, 0.05, 0.01, 1e-4, -0.004, 0.0, 3.0, 1.0)
     model = LineModel(*[1e-6] * len(LineModel._fields))._replace(sway_length_m=4.0)
-    slopes = SlopeModel(1e-9, 1e-3, 8.0, 2e-4, 300.0, 2e-4)
+    slopes = SlopeModel(1e-3, 8.0, 2e-4, 300.0, 2e-4)
 
     def step(x: np.ndarray, rests: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         reckoned = Reckoned(
-            speed=np.array([14.7, 14.8]),
+            predicted=np.array([14.7, 14.8]),
+            speed=np.array([14.7, 14.9]),
             acceleration=np.array([1.0, 1.0]),
             pitch=np.zeros(2),
             turning=np.array([-0.06, -0.06]),
             rests=np.full(2, rests),
-            transitions=np.tile([[0.99, 0.098], [-0.01, 0.98]], (2, 1, 1)),
-            noises=np.tile([[1e-4, 2e-5], [2e-5, 1e-4]], (2, 1, 1)),
+            shifts=np.full((2, 2), 1e-3),
+            transitions=np.tile([[0.99, 0.098, 1e-3], [-0.01, 0.98, 0.02], [0.03, -0.02, 0.97]], (2, 1, 1)),
+            noises=np.tile(NOISE, (2, 1, 1)),
+            rest_variance=4e-4,
         )
         x, p, f = x.copy(), np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
         predict_reckoned(x, p, f, p.copy(), here, reckoned, 1, 0.1, model, slopes, 9.81)
@@ -147,10 +157,10 @@ def test_transition_is_the_derivative_of_the_step() -> None:
         exact = [i for i in range(STATES) if i not in (BUMP, GRADE, SWAY) or j == i]
         if j not in (S, LEAD):  # the map's derivative by place is no part of a step
             np.testing.assert_allclose(f[exact, j], slope[exact], atol=2e-6, err_msg=str(j))
-    # Noise of speed and tilt moves the place with them, half a step long.
-    noise = np.array([[1e-4, 2e-5 / 9.81], [2e-5 / 9.81, 1e-4 / 9.81**2]])
-    np.testing.assert_allclose(p[np.ix_([V, TILT], [V, TILT])], noise)
-    np.testing.assert_allclose(p[S, [S, V, TILT]], [0.05**2 * 1e-4, 0.05 * 1e-4, 0.05 * 2e-5 / 9.81])
+    # Noise of the speed moves the place with it, half a step long.
+    to = np.array([[0.05, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0 / 9.81, 0.0], [0.0, 0.0, 1.0]])
+    moved = [S, V, TILT, OFFSET]
+    np.testing.assert_allclose(p[np.ix_(moved, moved)], to @ NOISE @ to.T)
     assert f[DRIFT, DRIFT] == 1.0
     stood, p, f = step(x, rests=1.0)
     assert stood[S] == x[S]
