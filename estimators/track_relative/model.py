@@ -100,7 +100,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
         signals=mean(recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)),
         way=mean((counts * pulse_m)[:, None])[:, 0],
         odometry=odometry,
-        slipping=np.concatenate([[False], trace.slipping])[known],
+        slipping=np.concatenate([[not recording.has_wheel], trace.slipping])[known],
         resting=resting,
     )
 
