@@ -5,14 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from simrail.estimators.kalman import History, remember, remember_prediction, room_for_history, update
-from simrail.estimators.odometry.kernel import DRIFT, LEAD, SWAY, LineModel, S, V
+from simrail.estimators.odometry.kernel import (
+    DRIFT,
+    LEAD,
+    SCALE,
+    SWAY,
+    LineModel,
+    S,
+    Steps,
+    V,
+    room_to_work,
+)
 from simrail.estimators.odometry.line_table import Line
 from simrail.estimators.odometry.without_wheel import process_of
 from simrail.estimators.odometry.without_wheel_kernel import (
     BUMP,
     GRADE,
+    HEADING,
     LOST_M,
     OFFSET,
+    REST,
+    ROWS,
+    SLOPE,
     STATES,
     TILT,
     Reckoned,
@@ -20,6 +34,7 @@ from simrail.estimators.odometry.without_wheel_kernel import (
     about,
     neighbours,
     predict_reckoned,
+    without_wheel,
 )
 
 from simrail.core.seeds import stream
@@ -123,31 +138,93 @@ def test_a_process_is_found_from_its_covariances() -> None:
     np.testing.assert_array_equal(noises[0], 0.0)
 
 
+HERE = Line(-0.4, -0.004, 1e-4, -5e-5, 0.05, 0.01, 1e-4, -0.004, 0.0, 3.0, 1.0)
+MODEL = LineModel(*[1e-6] * len(LineModel._fields))._replace(sway_length_m=4.0, turn_rad=3e-4)
+SLOPES = SlopeModel(1e-3, 8.0, 2e-4, 300.0, 2e-4)
+MOVES = np.array([[0.99, 0.098, 1e-3], [-0.01, 0.98, 0.02], [0.03, -0.02, 0.97]])
+X = np.array([470.0, 15.0, 1e-3, 2e-3, 4e-3, 5e-4, 2e-4, 1e-3, 0.05, 0.8])
+X = np.concatenate([X, [0.3, 5e-4, 1e-3, 1.5, 0.01, 0.4, -0.6, 3e-4, 0.02]])
+
+
+def reckoned_steps(*, rests: float = 0.0, rest_variance: float = 4e-4) -> Reckoned:
+    """Two steps of a train that runs at 15 m/s and accelerates."""
+    return Reckoned(
+        predicted=np.array([14.7, 14.8]),
+        speed=np.array([14.7, 14.9]),
+        acceleration=np.array([1.0, 1.0]),
+        pitch=np.zeros(2),
+        turning=np.array([-0.06, -0.06]),
+        rests=np.full(2, rests),
+        shifts=np.array([[0.0, 0.0], [1e-3, -2e-3]]),
+        transitions=np.stack([np.eye(3), MOVES]),
+        noises=np.tile(NOISE, (2, 1, 1)),
+        rest_variance=rest_variance,
+    )
+
+
+def step(x: np.ndarray, rests: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """State, noise and F after the second of them."""
+    x, p, f = x.copy(), np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
+    predict_reckoned(x, p, f, p.copy(), HERE, reckoned_steps(rests=rests), 1, 0.1, MODEL, SLOPES, 9.81)
+    return x, p, f
+
+
+def test_a_step_follows_the_process_and_the_reference() -> None:
+    """The errors move by A, and lose what the updates have put right; the place gets the mean speed."""
+    after, _, _ = step(X)
+    errors = MOVES @ [X[V] - (1.0 + X[SCALE]) * 14.7, 9.81 * X[TILT], X[OFFSET]]
+    assert after[V] == pytest.approx((1.0 + X[SCALE]) * 14.8 + errors[0], rel=1e-12)
+    assert 9.81 * after[TILT] == pytest.approx(errors[1] - 1e-3, rel=1e-12)
+    assert after[OFFSET] == pytest.approx(errors[2] + 2e-3, rel=1e-12)
+    assert after[S] == pytest.approx(X[S] + 0.05 * (X[V] + after[V]), rel=1e-12)
+
+
+def innovations(x: np.ndarray, reckoned: Reckoned) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Innovations of the rows of the first step and their Jacobian; 0 where a row is not taken; the state."""
+    grid, table = np.array([0.0, 1.0]), np.zeros((900, 10))
+    place = np.arange(900.0)
+    table[:, 0], table[:, 1], table[:, 4] = -2e-6 * place**2, -4e-6 * place, 0.05
+    table[:, 5] = 1e-4 * place
+    past, states = room_for_history(2, STATES, ROWS), np.empty((2, STATES))
+    flags = np.zeros((2, 2), dtype=bool)
+    out = Steps(10.0, np.zeros(2), states, np.empty((2, 2, 2)), np.zeros(2), *flags)
+    one = reckoned._replace(
+        speed=reckoned.speed[:1], predicted=reckoned.predicted[:1], noises=0.0 * reckoned.noises
+    )
+    p = np.diag(np.full(STATES, 1e-14))
+    model = MODEL._replace(heading_sd_rad=1.0, drift_walk_rad2ps3=0.0, gyro_rad2ps=0.0)
+    slopes = SLOPES._replace(slope_sd_rad=1.0)
+    without_wheel(
+        0.1, one, model, slopes, 9.81, grid, table, x.copy(), p, out, room_to_work(STATES), past
+    )  # fmt: skip
+    made = past.inverses[0] > 0.0
+    return (
+        np.where(made, past.errors[0] / np.where(made, past.inverses[0], 1.0), 0.0),
+        past.rows[0],
+        past.states[0],
+    )
+
+
+def test_rows_are_the_derivative_of_their_innovations() -> None:
+    """Of heading, pitch and rest: e(x + d) - e(x) = -h d, x being the predicted state."""
+    running, stands = reckoned_steps(), reckoned_steps(rests=1.0)
+    for reckoned in (running, stands):
+        error, rows, predicted = innovations(X, reckoned)
+        for j in range(STATES):
+            d = np.zeros(STATES)
+            d[j] = 1e-4
+            ahead, _, moved = innovations(X + d, reckoned)
+            expected = -rows @ (moved - predicted)
+            wanted = [HEADING, SLOPE] if reckoned is running else [HEADING, SLOPE, REST]
+            np.testing.assert_allclose((ahead - error)[wanted], expected[wanted], atol=4e-8, err_msg=str(j))
+    assert innovations(X, running)[0][REST] == 0.0
+    assert innovations(X, stands)[0][REST] == pytest.approx(-innovations(X, stands)[2][V], rel=1e-6)
+    assert innovations(X, reckoned_steps(rests=1.0, rest_variance=np.inf))[0][REST] == 0.0
+
+
 def test_transition_is_the_derivative_of_the_step() -> None:
     """F against central differences, in a curve, at speed; a train that stands gets nowhere."""
-    x = np.array([470.0, 15.0, 1e-3, 2e-3, 4e-3, 5e-4, 2e-4, 1e-3, 0.05, 0.8])
-    x = np.concatenate([x, [0.3, 5e-4, 1e-3, 1.5, 0.01, 0.4, -0.6, 3e-4, 0.02]])
-    here = Line(-0.4, -0.004, 1e-4, -5e-5, 0.05, 0.01, 1e-4, -0.004, 0.0, 3.0, 1.0)
-    model = LineModel(*[1e-6] * len(LineModel._fields))._replace(sway_length_m=4.0)
-    slopes = SlopeModel(1e-3, 8.0, 2e-4, 300.0, 2e-4)
-
-    def step(x: np.ndarray, rests: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        reckoned = Reckoned(
-            predicted=np.array([14.7, 14.8]),
-            speed=np.array([14.7, 14.9]),
-            acceleration=np.array([1.0, 1.0]),
-            pitch=np.zeros(2),
-            turning=np.array([-0.06, -0.06]),
-            rests=np.full(2, rests),
-            shifts=np.full((2, 2), 1e-3),
-            transitions=np.tile([[0.99, 0.098, 1e-3], [-0.01, 0.98, 0.02], [0.03, -0.02, 0.97]], (2, 1, 1)),
-            noises=np.tile(NOISE, (2, 1, 1)),
-            rest_variance=4e-4,
-        )
-        x, p, f = x.copy(), np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
-        predict_reckoned(x, p, f, p.copy(), here, reckoned, 1, 0.1, model, slopes, 9.81)
-        return x, p, f
-
+    x = X
     _, p, f = step(x)
     for j in range(STATES):
         h = np.zeros(STATES)
