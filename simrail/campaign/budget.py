@@ -1,10 +1,10 @@
 """The budget of an error: how much of its square each term of the sensors' sheets makes.
 
 One term at a time is taken away from what is recorded, on the same ride and the same draws, and from nothing
-else: the train still believes its sheets. What the error then changes by is what the term has done to it.
-Where an estimator is linear, and the terms have nothing in common, the mean squares of these changes and of
-the error that is left without any of them add up to that of the error; what they lack or have too much stands
-in the budget as ``together``.
+else: the train still believes its sheets. What the error e then changes by, c, is what the term has done to
+it, and its share of the squared error is <c e> / <e e>. Where an estimator is linear, the changes and the
+error that is left without any term add up to e, and the shares to one; what they lack or have too much stands
+in the budget as ``together``. A term that has nothing in common with the others has the share <c c> / <e e>.
 
 The bandwidth, which delays and is no error of a draw, is part of the estimator's own floor.
 """
@@ -156,9 +156,9 @@ def error_budget(
     Returns
     -------
     pandas.DataFrame
-        One row per term that the cells have, then `FLOOR` and `TOGETHER`: ``term``, ``words``, ``rms`` in the
-        score table's unit, ``share`` of the mean square with ``low95`` and ``high95`` (bootstrap over draws;
-        NaN of one), largest share first.
+        One row per term that the cells have, largest share first, then `FLOOR` and `TOGETHER`: ``term``,
+        ``words``, ``rms`` of what it does, in the score table's unit, ``share`` of the mean square with
+        ``low95`` and ``high95`` (bootstrap over draws; NaN of one).
 
     Raises
     ------
@@ -173,30 +173,31 @@ def error_budget(
         if cell.passes:
             raise InputError("has no budget: it is fused of several rides", field="passes")
         truth = simulated(cell, parts, watcher, number + 1, len(draws))
-        rows.append(_squares(cell, truth, parts, estimator, wanted, terms))
+        rows.append(_products(cell, truth, parts, estimator, wanted, terms))
         watcher.cells_done(number + 1, len(draws), 0, "")
-    squares = np.array(rows)
+    products, squares = np.array(rows).transpose(1, 0, 2)
     names = [*(term.name for term in terms), FLOOR, TOGETHER]
     words = WORDS | {term.name: term.words for term in terms}
-    whole, parts_of_it = (
-        squares[:, 0],
-        np.column_stack([squares[:, 1:], squares[:, 0] - squares[:, 1:].sum(axis=1)]),
-    )
+    whole, made = products[:, 0], products[:, 1:]
+    made = np.column_stack([made, whole - made.sum(axis=1)])
     # A ratio of means: each draw's part counts by how large its error is.
-    share, low, high = mean_interval(parts_of_it.T, np.tile(whole, (len(names), 1)))
+    share, low, high = mean_interval(made.T, np.tile(whole, (len(names), 1)))
     table = pd.DataFrame({"term": names, "words": [words[name] for name in names]})
-    table["rms"] = np.sign(parts_of_it.mean(axis=0)) * np.sqrt(np.abs(parts_of_it.mean(axis=0)))
-    table["what"], table["unit"] = wanted.what, wanted.unit
+    table["rms"] = [*np.sqrt(squares[:, 1:].mean(axis=0)), np.nan]
+    table["what"], table["unit"] = replace(wanted, metric="rms").what, wanted.unit
     table["share"], table["low95"], table["high95"] = share, low, high
     table["rms_of_whole"], table["draws"] = float(np.sqrt(whole.mean())), len(draws)
     last = table["term"].isin((FLOOR, TOGETHER))
     return pd.concat([table[~last].sort_values("share", ascending=False), table[last]], ignore_index=True)
 
 
-def _squares(
+def _products(
     cell: Cell, truth: Truth, parts: Parts, estimator: Estimator, wanted: Requirement, terms: Sequence[Term]
-) -> list[float]:
-    """Mean squares of the error, of what each term changes it by, and of what is left without all of them."""
+) -> FloatArray:
+    """Mean products with the error, and mean squares, (2, 2 + terms).
+
+    Of the error itself, of what each term changes it by, and of what is left without all of them.
+    """
 
     def error(spared: Callable[[ResolvedCell], ResolvedCell] | None) -> "pd.Series[float]":
         recording = record_cell(cell, truth, parts, spared=spared)
@@ -208,13 +209,17 @@ def _squares(
         return told
 
     whole = error(None)
-    squares = [_mean_square(whole)]
-    squares += [_mean_square((whole - error(term.spared)).dropna()) for term in terms]
-    return [*squares, _mean_square(error(without_all))]
+    changes = [(whole - error(term.spared)).dropna() for term in terms]
+    left = error(without_all)
+    return np.array(
+        [(_mean_product(one, whole), _mean_product(one, one)) for one in (whole, *changes, left)]
+    ).T
 
 
-def _mean_square(values: "pd.Series[float]") -> float:
-    return float(np.square(values.to_numpy(dtype=np.float64)).mean()) if len(values) else 0.0
+def _mean_product(one: "pd.Series[float]", other: "pd.Series[float]") -> float:
+    """Mean product at the samples, or places, that both have."""
+    both = one.index.intersection(other.index)
+    return float((one.loc[both].to_numpy() * other.loc[both].to_numpy()).mean()) if len(both) else 0.0
 
 
 def _error(

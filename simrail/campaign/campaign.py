@@ -155,6 +155,7 @@ class _Loop:
         self.total = plan.cells if only is None else 1
         self.left = self.total - len(self.done)
         self.failed = 0
+        self.told: set[str] = set()
         self._chosen: Callable[[], Iterator[Cell]] = partial(chosen_cells, plan, only)
         self.simulated: dict[int, BatchResult] = {}
         self.ready: deque[_Batch] = deque()
@@ -267,7 +268,9 @@ class _Loop:
             return
         result = future.result()
         for note in result.notes:
-            self._tell(note)
+            if note not in self.told:
+                self.told.add(note)
+                self._tell(note)
         if result.cells:
             self._keep(result)
         else:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from simrail.campaign.fence import MOST_PRINTED, digest, fenced, handed
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
 from simrail.core.jit import FloatArray
@@ -111,6 +112,8 @@ class BatchTally:
         Figures of one estimate, and their labels.
     failures : list of Failure
         What failed.
+    printed : dict of str to str
+        What estimators printed, by their names.
     wall_s, cpu_s : dict of str to float
         Wall time, and time of this process on the processor, of the stages `STAGES`.
     """
@@ -121,6 +124,7 @@ class BatchTally:
     warm: set[str] = field(default_factory=set)
     figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
+    printed: dict[str, str] = field(default_factory=dict)
     wall_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
     cpu_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
 
@@ -133,6 +137,12 @@ class BatchTally:
         finally:
             self.wall_s[stage] += time.perf_counter() - begun
             self.cpu_s[stage] += time.process_time() - worked
+
+    def note_print(self, estimator: str, text: str) -> None:
+        """Keep what an estimator printed, once, for the log."""
+        words = " ".join(text.split())[:MOST_PRINTED]
+        if words and estimator not in self.printed:
+            self.printed[estimator] = words
 
     def fail(self, cell: Cell, estimator: str, error: Exception | str) -> None:
         """Note a failure as a row with its reason: what was raised, or words."""
@@ -153,6 +163,7 @@ class _Recorded(NamedTuple):
     cell: Cell
     recording: Recording
     reference: Reference
+    digest: int
 
 
 def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTally, check: Check) -> None:
@@ -188,9 +199,12 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
     if not recorded:
         return
     for name, estimator in tally.estimators.items():
-        outcomes = estimates_of(name, estimator, [one.recording for one in recorded], tally, check)
-        for one, outcome in zip(recorded, outcomes, strict=True):
+        outcomes = list(estimates_of(name, estimator, [one.recording for one in recorded], tally, check))
+        for i, (one, outcome) in enumerate(zip(recorded, outcomes, strict=True)):
             try:
+                if digest(one.recording) != one.digest:
+                    recorded[i] = _record(one.cell, truth, parts, tally, again=True)
+                    raise ValueError("it changed the recording that all estimators share")
                 if isinstance(outcome, Exception):
                     raise outcome
                 _score(one, name, *outcome, parts, tally)
@@ -264,8 +278,8 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     recording = record_cell(cell, truth, parts)
     estimates = {}
     for name, estimator in tally.estimators.items():
-        with suppress(Exception):
-            (estimates[name],) = estimate_many(estimator, [recording])
+        with suppress(Exception), fenced():
+            (estimates[name],) = estimate_many(estimator, [handed(recording)])
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
@@ -281,16 +295,16 @@ def _reason_of(error: Exception) -> str:
     return named[:300]
 
 
-def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> _Recorded:
-    """Record one cell and score its odometry, if it has one."""
+def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally, *, again: bool = False) -> _Recorded:
+    """Record one cell and score its odometry, if it has one; not ``again``."""
     with tally.timed("measure"):
         recording = record_cell(cell, truth, parts)
     with tally.timed("score"):
         reference = reference_of(truth, recording)
-        if recording.odometry is not None:
+        if recording.odometry is not None and not again:
             figures = score_odometry(recording, reference, **wanted_of(cell))
             tally.add(cell, f"odometry:{recording.odometry_source}", figures)
-    return _Recorded(cell, recording, reference)
+    return _Recorded(cell, recording, reference, digest(recording))
 
 
 def estimates_of(
@@ -303,17 +317,19 @@ def estimates_of(
     """
     if name not in tally.warm:
         # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
-        with tally.timed("estimate"), suppress(Exception):
+        with tally.timed("estimate"), suppress(Exception), fenced():
             estimate_many(estimator, [beginning(recordings[0], samples=64)])
         tally.warm.add(name)
     groups = [recordings] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
     while groups:
         group = groups.pop(0)
         try:
-            with tally.timed("estimate"):
+            given = [handed(one) for one in group]
+            with tally.timed("estimate"), fenced() as printed:
                 begun = time.perf_counter()
-                estimates = estimate_many(estimator, group)
+                estimates = estimate_many(estimator, given)
                 seconds = time.perf_counter() - begun
+            tally.note_print(name, printed.getvalue())
             if len(estimates) != len(group):
                 raise ValueError(f"estimate_many gave {len(estimates)} estimates of {len(group)} recordings")
         except Exception as error:

@@ -241,7 +241,7 @@ def _result(
         ride=facts,
         wall_s=tally.wall_s,
         cpu_s=tally.cpu_s,
-        notes=tuple(notes),
+        notes=(*notes, *(f"{name} printed: {text}" for name, text in tally.printed.items())),
         worker=_name(),
     )
 

@@ -13,7 +13,7 @@ from simrail.core.toml_files import parse_toml
 
 DEFAULT_SCENARIO = "which_imu"
 
-BUDGET_DRAWS = 8
+BUDGET_DRAWS = 20
 """Draws of which the error is taken apart, where one IMU is asked for."""
 
 

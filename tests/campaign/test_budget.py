@@ -82,10 +82,8 @@ def test_a_linear_estimator_has_the_closed_form() -> None:
     # Counts of 0.1 mg do not move with the bias, and their mean not quite.
     assert budget.loc["accel_turn_on_bias", "rms"] == pytest.approx(np.sqrt(np.mean(of_bias**2)), rel=2e-3)
     assert budget["share"].sum() == pytest.approx(1.0, abs=1e-9)
-    # What independent terms do together is a mean of their products, 2 c_i c_j, over the draws.
-    shares = np.maximum(budget["share"].drop(TOGETHER).to_numpy(), 0.0)
-    products = 0.5 * (shares.sum() ** 2 - np.square(shares).sum())
-    assert abs(budget.loc[TOGETHER, "share"]) < 4.0 * 2.0 * np.sqrt(products / len(listed))
+    # A linear estimator leaves nothing to terms together, but for counts that round.
+    assert abs(budget.loc[TOGETHER, "share"]) < 5e-3
     bias = budget.loc["accel_turn_on_bias", "share"]
     assert budget.loc["gyro_turn_on_bias", "share"] == pytest.approx(0.0, abs=1e-12)
     assert budget.loc["accel_turn_on_bias", "low95"] < bias < budget.loc["accel_turn_on_bias", "high95"]

@@ -30,6 +30,9 @@ from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE
 MOST_METHODS = 8
 """Methods that are drawn: those under test first."""
 
+MOST_GROUPS = 6
+"""IMUs and mounts with tables of their own on the page; the files hold all."""
+
 MOST_BOXES = 6
 """Axes along which the spread is drawn."""
 
@@ -70,9 +73,16 @@ def campaign_section(data: PageData) -> list[Section]:
         "odometry": page_tables(odometries),
         # Where no method is under test, the odometry is what the campaign is about.
         "odometry_first": all(style.baseline for style in styles),
-        "methods": _methods_table(tables["methods"], by_name),
-        "pairs": _pairs_table(tables["pairs"], by_name),
-        "consistency": _consistency_table(tables["consistency"], by_name),
+        "groups": [
+            (
+                words or "Methods",
+                _methods_table(_of(tables["methods"], words), by_name),
+                _pairs_table(_of(tables["pairs"], words), by_name),
+                _consistency_table(_of(tables["consistency"], words), by_name),
+            )
+            for words in list(dict.fromkeys(tables["methods"]["of"]))[:MOST_GROUPS]
+        ],
+        "groups_left_out": max(tables["methods"]["of"].nunique() - MOST_GROUPS, 0),
         "worst": [
             (
                 readable(row["method"]),
@@ -156,6 +166,11 @@ def _words_of(example: CellResult, axes: Sequence[CampaignAxis]) -> str:
             unit = axis.title.partition(", ")[2]
             words.append(f"{word} {unit}" if unit in ("km/h", "m", "s") else word)
     return " \u00b7 ".join(words[:3])
+
+
+def _of(frame: pd.DataFrame, words: str) -> pd.DataFrame:
+    """Rows of one IMU, mount and vehicle."""
+    return frame[frame["of"] == words] if len(frame) else frame
 
 
 def _methods_table(frame: pd.DataFrame, by_name: Mapping[str, MethodStyle]) -> Table:

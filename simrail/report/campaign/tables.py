@@ -1,14 +1,15 @@
 """Tables of a campaign as a whole: methods with their intervals, pairs of methods, worst cells.
 
-They are frames, for files (`write_tables`) and for the page alike. Means over all cells weigh every cell
-alike, and are of what a train has: cells of an ablation beside it stand on the axis of that ablation only.
+They are frames, for files (`write_tables`) and for the page alike. Means weigh every cell alike, are of one
+IMU, mount and vehicle each, and of what a train has: cells of an ablation beside it stand on the axis of that
+ablation only.
 Tracks are the clusters of every interval, the same track draw in all cases being one of them, since cases
 meet the same draws.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -29,6 +30,9 @@ HEADLINES = {
 
 TABLES = "tables"
 """Folder beside the page for the tables of a campaign, as CSV and LaTeX."""
+
+UNLIKE = ("vehicle", "mount", "imu", "odometry", "track", "engine")
+"""What somebody chooses: figures are averaged over what a ride meets alone, its speeds, rails and ways."""
 
 WORST_PER_METHOD = 3
 MOST_PAIRS = 16
@@ -60,6 +64,9 @@ def campaign_tables(
     dict of str to pandas.DataFrame
         Frames with plain columns; angles in degrees.
 
+        ``of`` of the first, third and fourth names the IMU, mount and whatever else of `UNLIKE` the rows are
+        of; it is empty where there is but one.
+
         ``methods``: one row per method and headline: mean, interval, spread by sensors and by tracks within a
         case, 95th percentile over cells, number of draws. ``axes``: one row per method, axis and value: mean
         roll error and its interval. ``pairs``: two methods over the same recordings: difference, win rate,
@@ -79,14 +86,50 @@ def campaign_tables(
     }
     roll = headlines[HEADLINES["roll"]]
     present = [style for style in styles if (roll["estimator"] == style.name).any()]
+    groups = groups_of(cells)
+
+    def in_each(make: Callable[[frozenset[int]], list[dict[str, Any]]]) -> list[dict[str, Any]]:
+        return [{"of": words} | row for words, numbers in groups.items() for row in make(numbers)]
+
     rows = {
-        "methods": _methods(headlines, present),
+        "methods": in_each(lambda numbers: _methods(_of_cells(headlines, numbers), present)),
         "axes": _along(of_all[HEADLINES["roll"]], axes, present),
-        "pairs": _pairs(roll, present),
-        "consistency": _consistency(trust, present),
+        "pairs": in_each(lambda numbers: _pairs(roll[roll["cell"].isin(numbers)], present)),
+        "consistency": in_each(lambda numbers: _consistency(_of_cells(trust, numbers), present)),
         "worst": _worst(roll, beside_ablations(axes), present, command),
     }
     return {name: pd.DataFrame(lines) for name, lines in rows.items()}
+
+
+def groups_of(cells: pd.DataFrame) -> dict[str, frozenset[int]]:
+    """Numbers of the cells of each combination of `UNLIKE` that a campaign has, by its words."""
+    kept = without_ablations(cells)
+    varying = [name for name in UNLIKE if name in kept and len(kept[name].unique()) > 1]
+    if not varying:
+        return {"": frozenset(kept["cell"])}
+    order: list[str] = [name for name in ("imu", "mount", "vehicle") if name in varying]
+    order += [name for name in varying if name not in order]
+    between = {"mount": "on", "vehicle": "of"}
+
+    def words(names: tuple[object, ...]) -> str:
+        told = [
+            f"{between.get(key, '')} {name}".strip() if i else str(name)
+            for i, (key, name) in enumerate(zip(order, names, strict=True))
+        ]
+        return " ".join(told)
+
+    return {
+        words(names if isinstance(names, tuple) else (names,)): frozenset(own["cell"])
+        for names, own in kept.groupby(order, sort=False, observed=True)
+    }
+
+
+_Key = TypeVar("_Key")
+
+
+def _of_cells(draws: Mapping[_Key, pd.DataFrame], numbers: frozenset[int]) -> dict[_Key, pd.DataFrame]:
+    """Draws of some cells."""
+    return {key: frame[frame["cell"].isin(numbers)] for key, frame in draws.items()}
 
 
 def _by_method(

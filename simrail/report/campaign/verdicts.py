@@ -169,15 +169,17 @@ def decision_chart(
         for slot, style in enumerate(methods):
             for i, imu in enumerate(imus):
                 own = finite[(finite["imu"] == imu) & (finite["estimator"] == style.name)]["value"]
-                left = i - 0.4 + (slot + 0.1) * 0.8 / len(methods)
-                _draw_devices(panel, own.to_numpy(), left, 0.64 / len(methods), style)
+                # Of few grades strokes would be long lines.
+                wide = min(0.64 / len(methods), 0.016 * len(imus) + 0.06)
+                left = i - 0.4 + (slot + 0.5) * 0.8 / len(methods) - 0.5 * wide
+                _draw_devices(panel, own.to_numpy(), left, wide, style)
         panel.axhline(wanted.limit, color=canvas.INK, lw=1.2, ls=(0, (4, 2)), zorder=1)
         low, high = finite["value"].min(), finite["value"].max()
         panel.set_ylim(0.7 * min(low, 0.8 * wanted.limit), 1.6 * max(high, 1.25 * wanted.limit))
         canvas.log_scale(panel.yaxis)
         canvas.categories(panel, [_in_lines(imu) for imu in imus], size=8.0 if len(imus) < 9 else 7.0)
         unit = "\u00b0" if wanted.unit == "deg" else wanted.unit
-        panel.set_ylabel(f"{wanted.what},\n{unit}")
+        panel.set_ylabel(f"{wanted.what}, {unit}")
         if best is not None:
             _write_shares(panel, rows[rows["estimator"] == best.name], imus)
         handles = [Line2D([], [], color=style.colour, lw=4.0) for style in methods]

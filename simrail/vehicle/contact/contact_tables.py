@@ -23,7 +23,7 @@ from simrail.core.atomic_files import whole_file
 from simrail.core.jit import FloatArray, cache_folder
 from simrail.core.source_hash import source_hash
 from simrail.vehicle.contact.contact import static_height
-from simrail.vehicle.contact.contact_geometry import ContactTable, build_contact
+from simrail.vehicle.contact.contact_geometry import CONST, ContactTable, build_contact
 from simrail.vehicle.contact.profile_files import profiles_digest, profiles_of
 from simrail.vehicle.model import VehicleModel, WheelRail
 
@@ -116,7 +116,7 @@ def _read(file: Path) -> ContactTable | None:
             return ContactTable(
                 name=str(held["name"]),
                 coef=held["coef"],
-                const=held["const"][0],
+                const=held["const"].view(CONST)[0],  # aligned, which no file tells and kernels ask for
                 static_load_n=float(held["static_load_n"]),
                 smoothing_m=float(held["smoothing_m"]),
                 split_m=None if math.isnan(split) else split,
