@@ -34,8 +34,8 @@ the radius, than at 20. What an axle's or a frame's own steering does beside tha
 another one in each curve.
 
 A wheel that slips is not believed: its innovation gives it away, the accelerometer takes over, and the
-wheel's way starts anew when both agree on the speed again. Without a wheel it is so all along, and the train
-stands where its IMU is quiet (`simrail.estimators.odometry.standstill`).
+wheel's way starts anew when both agree on the speed again. Without a wheel another filter takes its place,
+driven by the speed of the zero-velocity odometry (`simrail.estimators.odometry.without_wheel`).
 
 Of the three that an attitude filter asks for, position and speed are the filter's. The acceleration is
 made here, since a train's own acceleration changes slowly, and the accelerometer shakes with the body.
@@ -46,7 +46,6 @@ encoder alone (`simrail.estimators.odometry.encoder`).
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -81,7 +80,18 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
-from simrail.estimators.odometry.standstill import quiet_of
+from simrail.estimators.odometry.pointing import (
+    LATERAL_CREEP,
+    Pointing,
+    chainage_sd,
+    chord_of,
+    lag_of,
+    place_sd_of,
+    pointing_of,
+    sway_sd_of,
+    turn_of,
+)
+from simrail.estimators.odometry.without_wheel import steps_without_wheel
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
@@ -98,80 +108,6 @@ RATE_HZ = 50.0
 HOLD_S = 2.0
 """After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
 
-
-class Pointing(NamedTuple):
-    """How a body points against the chord of the track that it is on.
-
-    Attributes
-    ----------
-    lag_sd_m : float
-        The track that it points along lies behind its chord, in the direction of travel, by the chord's
-        `play_m` and something: the standard deviation of that between vehicles.
-    turn_sd_rad : float
-        And what it turns beside that in a curve, from curve to curve.
-    lag_walk_m : float
-        The same as a random walk of the lag, m2 per m, for an estimator that has no turn of each curve.
-    sway_sd_rad, sway_length_m : float
-        What it does beside that: standard deviation, and over what distance it changes.
-    lead_sd_m : float
-        The slope that it has is the track's so far behind its chord: the standard deviation of that.
-    attacks : bool
-        It turns with the wheels where these carry an unbalanced lateral acceleration by creep.
-    """
-
-    lag_sd_m: float
-    turn_sd_rad: float
-    lag_walk_m: float
-    sway_sd_rad: float
-    sway_length_m: float
-    lead_sd_m: float
-    attacks: bool = False
-
-
-AXLE = Pointing(0.1, 6e-4, 2e-5, 4e-4, 2.0, 1.0, attacks=True)
-"""It steers against its frame."""
-
-FRAME = Pointing(0.1, 3e-4, 1e-5, 4e-4, 2.0, 1.0, attacks=True)
-"""And any other body on axles."""
-
-ON_BOGIES = Pointing(0.06, 5e-5, 2e-6, 2.5e-4, 6.5, 1.0)
-"""A body on two bogies: what they do is the same at both ends, and 15 m apart."""
-
-OTHER_BODY = Pointing(0.6, 4e-4, 5e-5, 1e-3, 8.0, 7.0)
-"""A body on one bogie, or between other bodies: its suspension turns with it, and it swings after a
-transition. The joints of a train of such bodies pitch it with its neighbours."""
-
-TURNED = Pointing(0.5, 7e-4, 5e-5, 1.5e-3, 10.0, 1.0)
-"""On a vehicle of which rods let the axles yaw: little brings a frame back to the middle of a straight."""
-
-TURNED_AXLE = Pointing(1.5, 1e-4, 5e-5, 3e-3, 60.0, 1.0)
-"""And its axles: they turn in their rods by as much in a wide curve as in a tight one, for all its length."""
-
-UNKNOWN_BODY = Pointing(3.0, 5e-4, 5e-5, 1e-3, 4.0, 3.0)
-"""No drawing says what it rests on: half a bogie centre distance is 3 to 10 m, an IMU is seldom at its end.
-
-The sizes of all seven are synthetic: orders of what simrail's vehicles do on good track at 20 to 100 km/h."""
-
-PLAY_M = 0.012
-"""Lateral play of a wheelset in the gauge, from flange to flange: it turns a body by PLAY_M / (2 half_m) at
-most (`simrail.recording.sheets.vehicle_sheet.Chord`)."""
-
-USUAL_RADIUS_M = 400.0
-"""Of the curves that matter."""
-
-MOST_LAG_M = 1.0
-"""By play, of a body that does not stand on axles."""
-
-TOUCHING_TURN_SD = 0.35
-"""Of the angle by which flanges that touch turn a body, so much is its sd: gauge and flanges wear. And by so
-much the body sways in that play."""
-
-LATERAL_CREEP = 150.0
-"""Lateral creep force of a wheel per creepage and load: f22 / N of Kalker's linear theory (f22 = G a b C22)
-for steel wheels of 0.3 to 0.5 m in radius under 30 to 60 kN."""
-
-CUT_LAG_SD = 0.3
-"""Of what the longest lag leaves out of the play, so much is the sd of the lag."""
 
 WHEELSET_TREAD = 0.6
 """Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: its taper steers it back
@@ -257,6 +193,8 @@ class CurveMatchedOdometry:
     def trace(self, recording: Recording) -> Steps:
         """Run the filter, and the smoother if wanted; all states at its own steps."""
         recording = self._heard(recording)
+        if not recording.has_wheel:
+            return self._without_wheel(recording)
         sheet = recording.imu_sheet
         block = max(1, round(sheet.rate_hz / RATE_HZ))
         time = recording.imu.index.to_numpy(dtype=np.float64)
@@ -266,7 +204,6 @@ class CurveMatchedOdometry:
         signals = signals.reshape(n, block, 4).mean(axis=1)
         ends = np.array(time[block - 1 :: block][:n])  # a view would be compiled for anew
         counts, pulse = counts_at(recording, ends)
-        quiet = np.full(n, -1.0) if pulse else quiet_of(recording, block).astype(np.float64)
         chord = chord_of(recording)
         grid, table = line_table(
             recording.track,
@@ -279,16 +216,24 @@ class CurveMatchedOdometry:
         x[YAW] = line_at(grid, table, x[S]).heading
         spoken_of = STATES if self.smoothed else V + 1
         states, covariance = np.empty((n, STATES)), np.empty((n, spoken_of, spoken_of))
-        steps = Steps(ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
+        rate = sheet.rate_hz / block
+        steps = Steps(rate, ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
         model = self._model(recording, pulse, pointing)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
-        curve_matched(
-            dt, signals, counts, quiet, model, gravity, grid, table, x, p, steps, room_to_work(), past
-        )
+        curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
         if past is not None:
             fixed_interval(past, steps.states, steps.covariance)
         return steps
+
+    def _without_wheel(self, recording: Recording) -> Steps:
+        """The steps of the filter that has the zero-velocity odometry in place of a wheel."""
+        chord = chord_of(recording)
+        pointing = pointing_of(recording, chord)
+        x, p = self._start(recording, 0.0, chord, pointing)
+        return steps_without_wheel(
+            recording, x, p, self._model(recording, 0.0, pointing), smoothed=self.smoothed
+        )
 
     def _heard(self, recording: Recording) -> Recording:
         """What of a recording it takes: without a wheel, if it is told so."""
@@ -298,15 +243,15 @@ class CurveMatchedOdometry:
 
     def at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
         """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
-        recording = self._heard(recording)
+        recording, rate = self._heard(recording), steps.rate_hz
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
         if self.smoothed:
-            own = calm(np.gradient(steps.states[:, V], 1.0 / RATE_HZ), RATE_HZ)
+            own = calm(np.gradient(steps.states[:, V], 1.0 / rate), rate)
         else:
-            own = calm_so_far(steps.acceleration, RATE_HZ)
-        block = max(1, round(recording.imu_sheet.rate_hz / RATE_HZ))
+            own = calm_so_far(steps.acceleration, rate)
+        block = max(1, round(recording.imu_sheet.rate_hz / rate))
         left = unsteady(recording, block, len(own)) + (steps.acceleration - own) ** 2
-        shaking = power(left, RATE_HZ, both_ways=self.smoothed)
+        shaking = power(left, rate, both_ways=self.smoothed)
         values = np.column_stack([steps.states[:, [S, V]], own])
         values[steps.resting, 1:] = 0.0
         sd = np.sqrt(np.diagonal(steps.covariance, axis1=1, axis2=2)[:, [S, V]])
@@ -316,13 +261,13 @@ class CurveMatchedOdometry:
         start = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, STILL_SD_MPS, ACCELERATION_SD_MPS2]
         lines, times = np.vstack([start, lines]), np.concatenate([[-np.inf], steps.time_s])
         if self.smoothed:
-            times[0] = min(wanted[0], steps.time_s[0]) - 1.0 / RATE_HZ
+            times[0] = min(wanted[0], steps.time_s[0]) - 1.0 / rate
             values = np.column_stack([np.interp(wanted, times, column) for column in lines.T])
         else:
             last = np.searchsorted(times, wanted, side="right") - 1
             values = lines[last]
-            rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
             if recording.has_wheel:
+                rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
                 wheel = self._wheel_acceleration(recording, steps.time_s, own, shaking, last)
                 values[rolls, 2::3] = wheel[rolls]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
@@ -360,7 +305,7 @@ class CurveMatchedOdometry:
             "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
             "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
             "tread_sd": self.tread_sd * tread_share(recording),
-            "sway_sd_rad": _sway_sd_rad(yaw, turn),
+            "sway_sd_rad": sway_sd_of(yaw, turn),
             "sway_length_m": yaw.sway_length_m,
             "turn_rad": turn,
             "turn_sd_rad": turn_sd,
@@ -380,7 +325,7 @@ class CurveMatchedOdometry:
         x[LAG], chord_sd = (0.0, 0.0) if chord is None else lag_of(chord)
         x[TURN], turn_sd = turn_of(chord, yaw)
         if chord is not None and x[TURN] > 0.0:
-            x[LAG], chord_sd = 0.0, _place_sd_m(chord)
+            x[LAG], chord_sd = 0.0, place_sd_of(chord)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, float(chainage_sd(recording, x[S])))
         sd[V] = STILL_SD_MPS
@@ -393,7 +338,7 @@ class CurveMatchedOdometry:
         sd[LEAD] = yaw.lead_sd_m
         sd[YAW] = 5e-3
         sd[DRIFT] = sheet.gyro_turn_on_bias_radps / math.sqrt(3.0) + 1e-5
-        sd[SWAY] = _sway_sd_rad(yaw, x[TURN])
+        sd[SWAY] = sway_sd_of(yaw, x[TURN])
         sd[LAG] = math.hypot(yaw.lag_sd_m, chord_sd)
         sd[TURN] = turn_sd
         sd[BEND] = errors.radius_relative_sd
@@ -411,69 +356,6 @@ def counts_at(recording: Recording, times: FloatArray) -> tuple[FloatArray, floa
     read = np.searchsorted(recording.encoder.index.to_numpy(), times + 1e-9, side="right") - 1
     counts = recording.encoder["pulse_count"].to_numpy(dtype=np.float64)
     return counts[np.maximum(read, 0)] - counts[0], recording.encoder_sheet.pulse_m
-
-
-def chainage_sd(recording: Recording, place_m: FloatArray | float) -> FloatArray:
-    """How far the map's chainage may be from the line's at places (n,): what no curve can tell apart."""
-    errors = recording.map_errors
-    return np.hypot(
-        errors.chainage_offset_sd_m, errors.chainage_scale_sd * (place_m - recording.track.start_m)
-    )
-
-
-def lag_of(chord: Chord) -> tuple[float, float]:
-    """By how much the tangent lies behind the chord, m, and the sd of that by the drawing."""
-    most = _most_lag_m(chord)
-    lag = min(max(chord.play_m, -most), most)
-    return lag, math.hypot(_place_sd_m(chord), CUT_LAG_SD * (chord.play_m - lag))
-
-
-def turn_of(chord: Chord | None, yaw: Pointing) -> tuple[float, float]:
-    """What a body turns in a curve beside its lag, rad, and the sd of that.
-
-    Where flanges touch, that is all: an angle, whatever the radius, in place of a lag.
-    """
-    if chord is None or not yaw.attacks or chord.play_m <= _most_lag_m(chord):
-        return 0.0, yaw.turn_sd_rad
-    turn = 0.5 * PLAY_M / chord.half_m
-    return turn, math.hypot(yaw.turn_sd_rad, TOUCHING_TURN_SD * turn)
-
-
-def _sway_sd_rad(yaw: Pointing, turn: float) -> float:
-    """Standard deviation of the sway, of a body that flanges turn by ``turn`` in a curve."""
-    return math.hypot(yaw.sway_sd_rad, TOUCHING_TURN_SD * turn)
-
-
-def _most_lag_m(chord: Chord) -> float:
-    """Most lag that play makes, m: where a body on axles turns further, flanges touch in the usual curve."""
-    on_axles = chord.half_m > 0.0 and math.isclose(chord.play_m, chord.half_m)
-    return 0.5 * PLAY_M * USUAL_RADIUS_M / chord.half_m if on_axles else MOST_LAG_M
-
-
-def _place_sd_m(chord: Chord) -> float:
-    """Standard deviation of the middle of a chord, m."""
-    return math.hypot(chord.sd_m / math.sqrt(2.0), chord.shift_sd_m)
-
-
-def chord_of(recording: Recording) -> Chord | None:
-    """The chord along which the body of the mount points, if the train has a drawing."""
-    sheet = recording.vehicle_sheet
-    return None if sheet is None else sheet.chord(recording.mount_body)
-
-
-def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
-    """What is known of the yaw of the mount's body in the track."""
-    if recording.vehicle_sheet is None or chord is None:
-        return UNKNOWN_BODY
-    rests_on = {body.name: body.supports for body in recording.vehicle_sheet.bodies}
-    supports = rests_on[recording.mount_body]
-    if any(body.turned_by and not body.supports for body in recording.vehicle_sheet.bodies):
-        return TURNED if supports else TURNED_AXLE
-    if chord.half_wheelbase_m > 0.0:
-        return ON_BOGIES
-    if not supports:
-        return AXLE
-    return FRAME if all(not rests_on[support.on] for support in supports) else OTHER_BODY
 
 
 def wheel_ahead(recording: Recording) -> float:

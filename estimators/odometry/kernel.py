@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
-from simrail.estimators.odometry.line_table import Line, line_at, line_over, with_pitch
+from simrail.estimators.odometry.line_table import Line, line_at
 
 from simrail.core.jit import FloatArray, njit_borrowed, njit_inner
 
@@ -28,14 +28,6 @@ DIRECTION_SPEED_MPS = 0.2
 
 START_JERK_MPS3 = 0.5
 """Jerk with which a train leaves, as service traction does."""
-
-STILL_MPS2, STILL_MPS, STILL_SDS = 0.15, 0.1, 4.0
-"""A train without a wheel stands where no more force is left over, and its speed may be nothing: least speed
-that is doubted, and standard deviations of the filter's own beside it."""
-
-LOST_M, MOST_DOUBT_S = 1.0, 30.0
-"""Without a wheel: standard deviation of the place above which the map is not taken for its tangent; and for
-how long at most a wrong slope is felt."""
 
 STEADY_S, WHEEL_SPEED_SHARE = 0.5, 0.1
 """Time constant of the steady effort; share of the newest reading in the smoothed speed of the wheel. Chosen
@@ -112,8 +104,10 @@ class Steps(NamedTuple):
 
     Attributes
     ----------
+    rate_hz : float
+        Rate of the steps; given, as are
     time_s : ndarray (n,)
-        Ends of the steps; given.
+        Ends of the steps.
     states, covariance : ndarray (n, 18), (n, m, m)
         See `simrail.estimators.odometry.curve_matched`; the covariance is of the first m states. A smoother
         needs all, an odometry place and speed: of 90 minutes, 9 MB in place of 620.
@@ -123,6 +117,7 @@ class Steps(NamedTuple):
         Where the wheel was not believed, and where the train stood.
     """
 
+    rate_hz: float
     time_s: FloatArray
     states: FloatArray
     covariance: FloatArray
@@ -151,9 +146,9 @@ class Scratch(NamedTuple):
     v: FloatArray
 
 
-def room_to_work() -> Scratch:
-    """Scratch, all zero."""
-    n, m = STATES, UPDATES
+def room_to_work(states: int = STATES) -> Scratch:
+    """Scratch for a filter of so many states, all zero."""
+    n, m = states, UPDATES
     return Scratch(*(np.zeros(shape) for shape in ((n, n), (n, n), (m, n), n, n)))
 
 
@@ -311,65 +306,21 @@ def start_anew(x: FloatArray, p: FloatArray, f: FloatArray, measured: float, pul
 
 
 @njit_borrowed
-def slope_under(
-    grid: FloatArray, table: FloatArray, x: FloatArray, p: FloatArray, alone: bool, gravity: float
-) -> tuple[Line, float]:
-    """The map where the body leans, and the variance per second of the speed that its slope leaves, m2/s3.
-
-    A train without a wheel (``alone``) may be on another slope than it is held to be: what that leaves
-    lasts while it runs through the places where it may be.
-    """
-    lean, lost = line_at(grid, table, x[S] - x[LEAD]), np.sqrt(p[S, S])
-    if not alone or lost < LOST_M:
-        return lean, 0.0
-    about = line_over(grid, table, x[S] - x[LEAD], lost)
-    lasts = min(lost / max(abs(x[V]), 1.0), MOST_DOUBT_S)
-    doubt = 2.0 * gravity**2 * about.pitch_variance * lasts
-    return with_pitch(lean, about.pitch, about.pitch_slope), doubt
-
-
-@njit_borrowed
 def off_heading(
-    grid: FloatArray,
-    table: FloatArray,
-    x: FloatArray,
-    p: FloatArray,
-    direction: float,
-    alone: bool,
-    model: LineModel,
-    gravity: float,
-    h: FloatArray,
-) -> tuple[float, float]:
-    """Innovation of the heading, and its variance; writes the slopes by place, lag and turn in ``h``.
+    line: Line, x: FloatArray, direction: float, model: LineModel, gravity: float, h: FloatArray
+) -> float:
+    """Innovation of the heading; writes the slopes by place, lag and turn in ``h``.
 
-    The heading is that of the design where the body points; by how much less it turns in this curve, and by
-    how much more since the wheels carry what cant leaves of the lateral acceleration (that hardly changes
-    with place and speed); and its sway.
+    The heading is that of the design where the body points (``line``); by how much less it turns in this
+    curve, and by how much more since the wheels carry what cant leaves of the lateral acceleration (that
+    hardly changes with place and speed); and its sway.
     """
-    place, lost = x[S] - direction * x[LAG], np.sqrt(p[S, S])
-    line = line_at(grid, table, place)
-    heading, bend, variance = line.heading, line.bend, model.heading_sd_rad**2
-    if alone and lost >= LOST_M:
-        about = line_over(grid, table, place, lost)
-        heading, bend, variance = about.heading, about.bend, variance + about.heading_variance
     out = direction * flank(line.bend)
-    h[S], h[LAG], h[TURN] = -bend, direction * bend, out
+    h[S], h[LAG], h[TURN] = -line.bend, direction * line.bend, out
     unbalanced = x[V] * x[V] * line.bend + gravity * np.sin(line.roll)
     attack = direction * model.attack_s2pm * unbalanced
-    return heading + attack - out * x[TURN] - x[YAW] + x[SWAY], variance
-
-
-@njit_borrowed
-def stands(quiet: float, push: float, x: FloatArray, p: FloatArray, stood: bool) -> bool:
-    """Whether a train without a wheel stands: all is quiet, no force is left over, and it may be at rest.
-
-    What it may have run before it was heard is added to the variance of its speed.
-    """
-    slow = abs(x[V]) < STILL_MPS + STILL_SDS * np.sqrt(p[V, V])
-    still = quiet > 0.0 and abs(push) < STILL_MPS2 and slow
-    if stood and not still:
-        p[V, V] += STILL_MPS**2
-    return still
+    innovation: float = line.heading + attack - out * x[TURN] - x[YAW] + x[SWAY]
+    return innovation
 
 
 @njit_borrowed
@@ -377,7 +328,6 @@ def curve_matched(
     dt: float,
     signals: FloatArray,
     count: FloatArray,
-    quiet: FloatArray,
     model: LineModel,
     gravity: float,
     grid: FloatArray,
@@ -399,8 +349,6 @@ def curve_matched(
         that ends here, body axes.
     count : ndarray (n,)
         Last reading of the pulse counter at the end of the step.
-    quiet : ndarray (n,)
-        Where there is no wheel: 1 where the IMU shows no motion, 0 where it does. Below 0 there is a wheel.
     model : LineModel
         Noise.
     gravity : float
@@ -425,14 +373,13 @@ def curve_matched(
     before = line_at(grid, table, x[S])
     for k in range(signals.shape[0]):
         here = line_at(grid, table, x[S])
-        lean, doubt = slope_under(grid, table, x, p, quiet[k] >= 0.0, gravity)
+        lean = line_at(grid, table, x[S] - x[LEAD])
         # A body askew of the track under the mount feels a share of what pushes it around the curve.
         force = signals[k, 2] * np.cos(here.askew) - signals[k, 3] * np.sin(here.askew)
         steady += dt / STEADY_S * (force - x[PUSH] - steady)
         steps.acceleration[k], rolls = predict(
             x, p, f, work, here, lean, signals[k], force, dt, model, gravity, steady
         )
-        p[V, V] += doubt * dt
         map_ahead(x, p, f, before, here, model)
         before = here
 
@@ -466,9 +413,6 @@ def curve_matched(
         if slipping:
             start_anew(x, p, f, measured, pulse)
         resting = resting or (idle > model.still_s and abs(x[V]) * idle < 2.0 * pulse)
-        if quiet[k] >= 0.0:
-            slipping = True
-            resting = stands(quiet[k], steady + gravity * np.sin(lean.pitch), x, p, resting)
         if past is not None:
             remember_prediction(past, k, x, p, f)
 
@@ -477,10 +421,9 @@ def curve_matched(
                 error, variance = off_way, way_variance
                 wanted = not slipping and (change != 0.0 or off_way != 0.0)
             elif m == HEADING:
-                error, variance = off_heading(
-                    grid, table, x, p, direction, quiet[k] >= 0.0, model, gravity, h[HEADING]
-                )
-                wanted = True
+                line = line_at(grid, table, x[S] - direction * x[LAG])
+                error = off_heading(line, x, direction, model, gravity, h[HEADING])
+                variance, wanted = model.heading_sd_rad**2, True
             else:
                 error, variance, wanted = -x[V], REST_VARIANCE, resting
             if wanted:

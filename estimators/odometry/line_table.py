@@ -88,24 +88,6 @@ def line_at(grid: FloatArray, table: FloatArray, s: float) -> Line:
     )
 
 
-@njit_borrowed
-def with_pitch(line: Line, pitch: float, slope: float) -> Line:
-    """A line with another pitch."""
-    return Line(
-        line.heading,
-        line.bend,
-        line.ramp_even,
-        line.ramp_odd,
-        line.roll,
-        pitch,
-        slope,
-        line.curvature,
-        line.askew,
-        line.element,
-        line.curve,
-    )
-
-
 ROOTS, WEIGHTS = (
     (-2.8569700138728056, -1.355626179974266, 0.0, 1.355626179974266, 2.8569700138728056),
     (

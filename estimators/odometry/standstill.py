@@ -1,11 +1,9 @@
 """Standing or not, from an IMU alone: how quiet it is, and how likely that makes it that the train stands.
 
 A train begins its ride at rest: how quiet that is is read from its first second, and from any quieter one
-since. It stands again where, over the last `WINDOW_S`, no axis shakes by more, no axis turns, and the force
-along the track stays (`quiet_of`). Steady traction is as quiet as that for some seconds: who asks must hold
-the force against the slope of the line as well (`simrail.estimators.odometry.kernel.curve_matched` does).
-
-It says nothing false rather than all that is true: a stop of less than the window is not found.
+since. It is quiet again where, over the last `WINDOW_S`, no axis shakes by more, no axis turns, and the force
+along the track stays (`quiet_of`): what can be said without knowing anything of the ride. Steady traction is
+as quiet as that for some seconds, and a stop of less than the window is not found.
 
 The floor of a car that crawls, brakes gently or rolls smoothly shakes no more than at a platform. Who knows
 the sensors' biases and about how fast the train is can say more, and how sure that is (`rest_log_ratio`):

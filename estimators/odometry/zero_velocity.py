@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 from simrail.estimators.kalman import History, fixed_interval, room_for_history
 from simrail.estimators.odometry.calm import ACCELERATION_SD_MPS2, calm, calm_so_far, power, unsteady
-from simrail.estimators.odometry.curve_matched import chainage_sd, chord_of, lag_of
+from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of
 from simrail.estimators.odometry.standstill import require_rest_first, signs_of_rest
 from simrail.estimators.odometry.vertical import vertical_force
 from simrail.estimators.odometry.zero_velocity_kernel import (
@@ -160,22 +160,30 @@ class ZeroVelocityOdometry:
         InputError
             If there is no vertical signal, or the ride does not begin at rest.
         """
-        vertical_force(recording, tells="rest from motion")
-        require_rest_first(recording)
         trace = self.trace(recording)
         return Estimate(states=self.at_imu_times(trace, recording), mount=recording.mount)
 
-    def trace(self, recording: Recording) -> Trace:
-        """Run the filter, and the smoother if wanted; all states at its own steps."""
+    def trace(self, recording: Recording, *, remembering: bool = False) -> Trace:
+        """Run the filter, and the smoother if wanted; all states at its own steps.
+
+        What the filter leaves behind is kept for the smoother, and where it is asked for (``remembering``).
+
+        Raises
+        ------
+        InputError
+            If there is no vertical signal, or the ride does not begin at rest.
+        """
+        vertical_force(recording, tells="rest from motion")
+        require_rest_first(recording)
         block = _block(recording)
         times = recording.imu.index.to_numpy(dtype=np.float64)
         steps = len(times) // block
         model = self.model(recording)
         x, p = self.start(recording, model)
         found = room(steps, STATES if self.smoothed else PITCH + 1)
-        past = room_for_history(steps, STATES, UPDATES) if self.smoothed else None
+        past = room_for_history(steps, STATES, UPDATES) if self.smoothed or remembering else None
         zero_velocity(model, x, p, found, past)
-        if past is not None:
+        if past is not None and self.smoothed:
             fixed_interval(past, found.states, found.covariances)
         return Trace(times[block - 1 :: block][:steps], model, found, past)
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 STANDS_MPS = 0.01
 """Standard deviation of the speed of a train that stands by its IMU: some millimetres are rolled unseen."""
 
-ODOMETRY_S = 10.0
-"""Over which the errors of an odometry hang together: so much longer than a step, it says nothing new."""
+ODOMETRY_S = 100.0
+"""Over which the errors of an odometry without a wheel hang together: from one stop to the next."""
 
 
 class Rows(NamedTuple):
@@ -80,13 +80,15 @@ class Standstill:
 class OdometryPlace:
     """The place that an odometry found, where the filter has no wheel and linearises about it.
 
-    It is made of the same signals, so that it is believed as much as one that is new every `ODOMETRY_S`.
+    It is made of the same signals, so that it is believed as much as one that is new every `ODOMETRY_S`, and
+    says nothing new of a train that stands.
     """
 
     def rows(self, _recording: Recording, steps: "Steps") -> Rows:
-        """Made at every step."""
+        """Made while the train runs."""
         sd = steps.odometry[:, 3]
-        return Rows(steps.odometry[:, :1], (sd**2 * ODOMETRY_S / steps.dt)[:, None])
+        variance = np.where(steps.resting, np.inf, sd**2 * ODOMETRY_S / steps.dt)
+        return Rows(steps.odometry[:, :1], variance[:, None])
 
     def shown(self, x: list[Dual]) -> list[Dual]:
         """`S`, m."""

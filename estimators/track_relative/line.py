@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
-from simrail.estimators.odometry.curve_matched import chord_of
 from simrail.estimators.odometry.line_table import PLACES_PER_M, line_table
+from simrail.estimators.odometry.pointing import chord_of
 from simrail.estimators.track_relative.dual import Dual, Vector
 from simrail.estimators.track_relative.states import S
 

@@ -75,7 +75,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
 
     A step takes nothing from later than its last sample. The odometry is the causal one for the smoother too:
     it linearises anew about what it finds, and the history of a smoothed one would be most of its memory.
-    Without a wheel it is tens of metres off before the first curve, and no smoother is linear so far.
+    Without a wheel that is metres off between two curves, and no smoother is linear so far.
     """
     time = recording.imu.index.to_numpy(dtype=np.float64)
     block = max(1, round(recording.imu_sheet.rate_hz / rate_hz))
@@ -100,7 +100,7 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
         signals=mean(recording.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)),
         way=mean((counts * pulse_m)[:, None])[:, 0],
         odometry=odometry,
-        slipping=np.concatenate([[False], trace.slipping])[known],
+        slipping=np.concatenate([[not recording.has_wheel], trace.slipping])[known],
         resting=resting,
     )
 

@@ -8,14 +8,8 @@ import math
 from collections.abc import Collection
 
 import numpy as np
-from simrail.estimators.odometry.curve_matched import (
-    STILL_SD_MPS,
-    CurveMatchedOdometry,
-    chainage_sd,
-    chord_of,
-    lag_of,
-    pointing_of,
-)
+from simrail.estimators.odometry.curve_matched import STILL_SD_MPS, CurveMatchedOdometry
+from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of, pointing_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import Noise
 from simrail.estimators.track_relative.noise import Motion

@@ -9,15 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from simrail.estimators.kalman import fixed_interval, room_for_history
-from simrail.estimators.odometry.curve_matched import AXLE as YAW_OF_AXLE
-from simrail.estimators.odometry.curve_matched import (
-    OTHER_BODY,
-    UNKNOWN_BODY,
-    CurveMatchedOdometry,
-    lag_of,
-    turn_of,
-    wheel_ahead,
-)
+from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, wheel_ahead
 from simrail.estimators.odometry.kernel import (
     BEND,
     DRIFT,
@@ -44,6 +36,8 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import Line, line_at, line_table
+from simrail.estimators.odometry.pointing import AXLE as YAW_OF_AXLE
+from simrail.estimators.odometry.pointing import OTHER_BODY, UNKNOWN_BODY, lag_of, turn_of
 
 from simrail.campaign.cell import record_cell
 from simrail.core.columns import GYRO
@@ -410,16 +404,16 @@ def run_kernel(recording: Recording) -> tuple[np.ndarray, ...]:
     p[V, V] = 0.1
     n = STATES
     flags = np.empty((2, steps), dtype=bool)
-    out = Steps(time, np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), *flags)
+    out = Steps(50.0, time, np.empty((steps, n)), np.empty((steps, n, n)), np.empty(steps), *flags)
     past = room_for_history(steps, n, UPDATES)
     curve_matched(
-        0.02, imu[:, 1:5].copy(), counts[read], np.full(steps, -1.0),
+        0.02, imu[:, 1:5].copy(), counts[read],
         method._model(recording, pulse, YAW_OF_AXLE), 9.81,
         grid, table, x, p, out, room_to_work(), past,
     )  # fmt: skip
     smoothed, covariance = np.empty((steps, n)), np.empty((steps, n, n))
     fixed_interval(past, smoothed, covariance)
-    return (*out[1:3], *past[:3], smoothed, covariance)
+    return (out.states, out.covariance, *past[:3], smoothed, covariance)
 
 
 def test_smoother_equals_rauch_tung_striebel():
@@ -531,13 +525,14 @@ def test_finds_what_a_body_turns_in_a_curve(way: float, radius_m: float):
     x[[S, LAG, YAW]] = s[0], lag, yaw[0]
     p[TURN, TURN] = 1e-4
     flags = np.empty((2, n), dtype=bool)
-    out = Steps(dt * np.arange(1, n + 1), np.empty((n, STATES)), np.empty((n, 2, 2)), np.empty(n), *flags)
+    out = Steps(
+        1.0 / dt, dt * np.arange(1, n + 1), np.empty((n, STATES)), np.empty((n, 2, 2)), np.empty(n), *flags
+    )
     counts = np.floor((s[1:] - s[0]) / 2e-3)
     curve_matched(
         dt,
         signals,
         counts,
-        np.full(len(counts), -1.0),
         model,
         9.81,
         grid,
