@@ -22,6 +22,9 @@ from simrail.scoring.verdicts import device_figures, verdict_table
 MOST_CHARTS = 12
 """Requirements times mounts that are drawn; ``verdicts.csv`` holds all."""
 
+MANY = 3
+"""Requirements times mounts from which they are shown at a glance first, and one by one behind."""
+
 MOST_DOTS = 60
 """Devices that are drawn of an IMU with a method, evenly by rank."""
 
@@ -55,8 +58,40 @@ def verdicts_section(data: PageData) -> list[Section]:
                 "budgets": list(_budgets(data.budgets, number, vehicle, mount)),
             }
         )
-    shown = {"groups": groups, "chance": 100.0 * max(one.chance for one in wanted)}
+    shown = {
+        "groups": groups,
+        "chance": 100.0 * max(one.chance for one in wanted),
+        "overview": overview(table, data.styles) if len(groups) >= MANY else None,
+    }
     return [Section("verdict", "Verdict", "campaign/verdicts.html.j2", shown)]
+
+
+def overview(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> dict[str, Any]:
+    """All verdicts at a glance, of the best method: a row per IMU, a column per requirement and mount."""
+    columns, cells = [], {}
+    for _, vehicle, mount, rows in groups_of(table):
+        best = best_method(rows, styles)
+        if best is None:
+            continue
+        several = len(table["vehicle"].drop_duplicates()) > 1
+        columns.append(
+            (str(rows["requirement"].iloc[0]).partition(" for ")[0], mount, vehicle if several else "")
+        )
+        for imu, own in rows[rows["estimator"] == best.name].groupby("imu", sort=False):
+            worst = own.sort_values("share", na_position="first").iloc[0]
+            cells[str(imu), len(columns) - 1] = _cell(worst) | {"percent": f"{100.0 * worst['share']:.0f} %"}
+    heads: list[tuple[str, int]] = []
+    for words, _, _ in columns:
+        if heads and heads[-1][0] == words:
+            heads[-1] = words, heads[-1][1] + 1
+        else:
+            heads.append((words, 1))
+    imus = list(dict.fromkeys(table["imu"].astype(str)))
+    return {
+        "heads": heads,
+        "mounts": [" ".join(word for word in (mount, vehicle) if word) for _, mount, vehicle in columns],
+        "rows": [(imu, [cells.get((imu, i)) for i in range(len(columns))]) for imu in imus],
+    }
 
 
 def _budgets(
