@@ -112,12 +112,29 @@ def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> in
     return DONE
 
 
-def check(scenario: Scenario, seed: Seed = None, settings: Settings = None) -> int:
+def check(
+    scenario: Scenario,
+    plugins: Annotated[
+        bool,
+        typer.Option(
+            "--plugins/--no-plugins",
+            help="Load Python files that the scenario names, which runs their code; or judge the rest.",
+        ),
+    ] = True,
+    seed: Seed = None,
+    settings: Settings = None,
+) -> int:
     """Judge a scenario without running it."""
     from simrail.scenario.check import judge_scenario
     from simrail.scenario.scenario import load_scenario
 
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
+    files = read.own_files
+    if files and plugins:
+        say(f"loading {', '.join(files)}, which runs its code (--no-plugins judges without)")
+    elif files:
+        read = read.without_own_files()
+        say(f"judged without {', '.join(files)}, and without the methods in it")
     plan = judge_scenario(read)
     for warning in plan.warnings:
         say(f"warning: {warning}")

@@ -8,7 +8,7 @@ is judged by `simrail.scenario.check`, and what is run is listed by `simrail.sce
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -172,9 +172,43 @@ class Scenario:
         return self.spec.title
 
     @property
+    def own_files(self) -> tuple[str, ...]:
+        """Python files that it names: estimators and odometries of a person's own."""
+        named = [part.method for part in self.spec.estimator]
+        named += [name for name in each(self.spec.odometry) if isinstance(name, str)]
+        return tuple(dict.fromkeys(name.partition(":")[0] for name in named if _is_own(name)))
+
+    def without_own_files(self) -> "Scenario":
+        """The scenario without what stands in Python files of a person's own.
+
+        Raises
+        ------
+        InputError
+            If nothing of it is left to be judged.
+        """
+        kept = [part for part in self.spec.estimator if not _is_own(part.method)]
+        usual = [name for name in each(self.spec.odometry) if not _is_own(str(name))]
+        if not kept or not usual:
+            raise InputError(
+                "has no method but those of its own files",
+                file=self.file,
+                field="estimator" if not kept else "odometry",
+                value=", ".join(self.own_files),
+                remedy="judge it with them, or name a shipped method beside them",
+            )
+        odometry = self.spec.odometry if len(usual) == len(each(self.spec.odometry)) else Axis(usual)
+        spec = self.spec.model_copy(update={"estimator": kept, "odometry": odometry})
+        return replace(self, spec=spec)
+
+    @property
     def called(self) -> str:
         """What a command calls it: a shipped one by its name, a person's own by its file."""
         return self.name if self.folder in (None, shipped_folder()) else self.file
+
+
+def _is_own(name: str) -> bool:
+    """Whether a method is a class in a Python file, ``"file.py:Class"``."""
+    return name.partition(":")[0].endswith(".py")
 
 
 def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:

@@ -329,3 +329,28 @@ def test_interrupted_process_leaves_results_and_cache_sound(tmp_path: Path) -> N
     assert "Traceback" not in text
     assert names_in(former) == {"manifest.json"} and names_in(tmp_path / "results") == {"go20a"}
     assert not any(drafts.iterdir())
+
+
+OWN = """
+print("this ran")
+from simrail.estimators.baselines import DesignAngles as Mine
+"""
+
+
+def test_check_says_that_it_runs_a_file_and_judges_without(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "mine.py").write_text(OWN)
+    text = (
+        simrail.load_scenario("quick_kinematic").text
+        + '\n[[estimator]]\nname = "own"\nmethod = "mine.py:Mine"\n'
+    )
+    (here / "own.toml").write_text(text)
+    assert call(["check", "own.toml", *QUICK, "--no-plugins"]) == DONE
+    told = capsys.readouterr()
+    assert (
+        "this ran" not in told.out and "judged without mine.py" in told.err and "own" not in told.out.split()
+    )
+    assert call(["check", "own.toml", *QUICK]) == DONE
+    told = capsys.readouterr()
+    assert "loading mine.py, which runs its code" in told.err and "this ran" in told.out
