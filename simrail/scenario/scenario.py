@@ -47,7 +47,7 @@ class ScenarioFile(Part):
     track: Listed[str]
     vehicle: Listed[str]
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
-    step_s: Listed[Annotated[float, Field(gt=0.0, le=0.001)]] = 0.0005
+    step_s: Listed[Annotated[float, Field(ge=1e-6, le=0.001)]] = 0.0005
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=4000.0)]] = 1000.0
     contact_rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()

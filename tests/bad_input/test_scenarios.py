@@ -509,6 +509,11 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         _stop(width=None),
         ["stop.width", "is missing", "verdicts = true", "add width"],
     ),
+    "a step of a picosecond": (
+        'engine = "kinematic"',
+        'engine = "kinematic"\nstep_s = 1e-12',
+        ["step_s", "1e-12", ">= 1e-06"],
+    ),
     "verdicts without a requirement": (
         "[encoder]",
         "[stop]\nverdicts = true\nleast_draws = 2\n\n[encoder]",

@@ -310,6 +310,19 @@ _POSITIVE = ("rate_hz", "correlation_s", "bandwidth_hz", "averaging_s")
 _SMALL = ("scale_error", "nonlinearity", "misalignment_rad", "nonorthogonality_rad", "1pk", "clock_drift")
 
 
+_LARGEST = {"gyro": 100.0, "accel": 1e4}
+"""Largest bias, noise or count, rad/s and m/s2 (of noise per root of a second): a slip of units is beyond."""
+
+_MOST = {
+    "rate_hz": 1e5,
+    "oversampling": 1000.0,
+    "correlation_s": 1e9,
+    "bandwidth_hz": 1e6,
+    "dropped_burst": 1e6,
+}
+"""Largest values of others, by how their names end."""
+
+
 def _judge(grade: str, name: str, value: float) -> None:
     """Refuse a figure that no device can have."""
     limit, fine = ">= 0", value >= 0.0
@@ -321,6 +334,12 @@ def _judge(grade: str, name: str, value: float) -> None:
         limit, fine = ">= 0 and < 0.5", 0.0 <= value < 0.5
     elif name.endswith(_SMALL):
         limit, fine = ">= 0 and < 0.2", 0.0 <= value < 0.2
+    most = next((top for end, top in _MOST.items() if name.endswith(end)), math.inf)
+    if "range" not in name:
+        most = min(most, _LARGEST.get(name.partition("_")[0], math.inf))
+        most = 1e9 if name.endswith("correlation_s") else most
+    if fine and value > most:
+        limit, fine = f"{limit} and <= {most:g}", False
     if not fine or (math.isinf(value) and "range" not in name):
         raise InputError("is out of range", field=f"imu grade {grade}: {name}", value=value, limit=limit)
 
