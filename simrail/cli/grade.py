@@ -40,7 +40,7 @@ def grade(
     ] = DEFAULT_SCENARIO,
     mount: Annotated[
         str | None,
-        typer.Option("--mount", metavar="NAME", help="One [[imu]] of the scenario; all if not given."),
+        typer.Option("--mount", metavar="NAME", help="One of the mounts of the scenario; all if not given."),
     ] = None,
     out: Annotated[
         Path | None,
