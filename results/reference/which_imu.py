@@ -4,8 +4,9 @@
     python results/reference/which_imu.py DIR
 
 The table is that of the verdicts (`simrail.scoring.verdicts.verdict_table`). The picture, and the table that
-is printed, are of the method under test alone: a row per grade, a column per requirement and mount; in each
-the share of the devices that meet it, and whether that is enough.
+is printed, have a row per grade and a column per mount: of roll by the EKF, which cannot see the bias of its
+accelerometer, and of each requirement by the track-relative smoother; in each the share of the devices that
+meet it, and whether that is enough.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from simrail.report.words.verdicts import MARKS
 
 HERE = Path(__file__).parent
 TABLE, PICTURE = HERE / "which_imu.csv", HERE / "which_imu.png"
-METHOD = "track_relative"
+OURS, OTHER = "track_relative", "ekf"
 KEPT = [
     *("requirement", "mount", "imu", "estimator", "verdict", "devices", "passed", "share", "low95", "high95"),
     *("tracks", "median", "at_share", "unit"),
@@ -35,70 +36,59 @@ COLOURS = {
 }
 
 
-def shares_of(table: pd.DataFrame, method: str = METHOD) -> pd.DataFrame:
-    """Marks and shares by grade, in the order of the scenario, and by requirement and mount."""
-    own = table[table["estimator"] == method]
-    told = [
-        f"{MARKS[verdict]} {100.0 * share:.0f}"
-        for verdict, share in zip(own["verdict"], own["share"], strict=True)
-    ]
-    wide = own.assign(told=told).pivot_table(
-        index="imu", columns=["requirement", "mount"], values="told", aggfunc="first", sort=False
+def columns_of(table: pd.DataFrame) -> pd.DataFrame:
+    """The verdicts that are shown, with a title: of roll by both methods, of the rest by ours."""
+    roll = table["requirement"].str.startswith("roll")
+    shown = table[(roll & (table["estimator"] == OTHER)) | (table["estimator"] == OURS)]
+    short = (
+        shown["requirement"]
+        .str.partition(" for ")[0]
+        .str.replace(" rms", "")
+        .str.replace("cross level", "level")
     )
-    return wide.reindex(list(dict.fromkeys(own["imu"])))
+    by = shown["estimator"].map({OTHER: "\nEKF", OURS: "\ntrack-relative"})
+    order = (shown["estimator"] != OTHER).astype(int)
+    return shown.assign(title=short + by, order=order).sort_values("order", kind="stable")
+
+
+def shares_of(table: pd.DataFrame) -> pd.DataFrame:
+    """Marks and shares by grade, in the order of the scenario, and by title and mount."""
+    shown = columns_of(table)
+    marks = shown["verdict"].map(MARKS) + " " + (100.0 * shown["share"]).round().astype(int).astype(str)
+    wide = shown.assign(told=marks).pivot_table(
+        index="imu", columns=["title", "mount"], values="told", aggfunc="first", sort=False
+    )
+    return wide.reindex(list(dict.fromkeys(shown["imu"])))
 
 
 def draw(table: pd.DataFrame) -> None:
     """Draw the picture."""
-    own = table[table["estimator"] == METHOD]
-    wide = shares_of(table)
+    shown, wide = columns_of(table), shares_of(table)
+    cells = shown.set_index(["title", "mount", "imu"])
     with canvas.look():
-        figure = Figure(figsize=(10.8, 0.36 * len(wide) + 1.25), dpi=110)
-        panel = figure.add_axes((0.155, 0.02, 0.84, 0.98 - 0.98 / (0.36 * len(wide) + 1.25)))
-        for x, (requirement, mount) in enumerate(wide.columns):
+        tall = 0.36 * len(wide) + 1.2
+        figure = Figure(figsize=(11.2, tall), dpi=110)
+        panel = figure.add_axes((0.135, 0.01, 0.86, 1.0 - 1.1 / tall))
+        for x, (title, mount) in enumerate(wide.columns):
             for y, imu in enumerate(wide.index):
-                cell = own[
-                    (own["requirement"] == requirement) & (own["mount"] == mount) & (own["imu"] == imu)
-                ]
-                if cell.empty:
-                    continue
-                verdict = cell["verdict"].iloc[0]
-                panel.add_patch(Rectangle((x, y), 0.96, 0.9, color=COLOURS[verdict], lw=0))
-                ink = "white" if verdict in ("enough", "not enough") else canvas.INK
-                panel.text(
-                    x + 0.48,
-                    y + 0.47,
-                    f"{100.0 * cell['share'].iloc[0]:.0f} %",
-                    ha="center",
-                    va="center",
-                    color=ink,
-                    fontsize=8.5,
-                )
+                cell = cells.loc[(title, mount, imu)]
+                panel.add_patch(Rectangle((x, y), 0.96, 0.9, color=COLOURS[cell["verdict"]], lw=0))
+                ink = "white" if cell["verdict"] in ("enough", "not enough") else canvas.INK
+                share = f"{100.0 * cell['share']:.0f}"
+                panel.text(x + 0.48, y + 0.47, share, ha="center", va="center", color=ink, fontsize=8.5)
         panel.set_xlim(0, len(wide.columns))
         panel.set_ylim(len(wide), 0)
-        panel.set_xticks(
-            [x + 0.48 for x in range(len(wide.columns))], [mount for _, mount in wide.columns], fontsize=8
-        )
+        places = [x + 0.48 for x in range(len(wide.columns))]
+        panel.set_xticks(places, [mount for _, mount in wide.columns], fontsize=8)
         panel.set_yticks([y + 0.47 for y in range(len(wide))], wide.index, fontsize=8.5)
         panel.xaxis.tick_top()
         panel.tick_params(length=0)
         panel.grid(visible=False)
         for side in ("left", "bottom"):
             panel.spines[side].set_visible(False)
-        for requirement in dict.fromkeys(name for name, _ in wide.columns):
-            places = [x for x, (name, _) in enumerate(wide.columns) if name == requirement]
-            words = (
-                requirement.partition(" for ")[0].replace(" rms", "").replace("cross level", "cross-level")
-            )
-            panel.text(
-                sum(places) / len(places) + 0.48,
-                -0.95,
-                words,
-                ha="center",
-                va="bottom",
-                fontsize=9.5,
-                weight="bold",
-            )
+        for title in dict.fromkeys(name for name, _ in wide.columns):
+            own = [x for x, (name, _) in enumerate(wide.columns) if name == title]
+            panel.text(sum(own) / len(own) + 0.48, -0.8, title, ha="center", va="bottom", fontsize=8.6)
         figure.savefig(PICTURE)
 
 

@@ -173,10 +173,13 @@ class Scenario:
 
     @property
     def own_files(self) -> tuple[str, ...]:
-        """Python files that it names: estimators and odometries of a person's own."""
+        """Python files that it names and that there are: estimators and odometries of a person's own."""
         named = [part.method for part in self.spec.estimator]
         named += [name for name in each(self.spec.odometry) if isinstance(name, str)]
-        return tuple(dict.fromkeys(name.partition(":")[0] for name in named if _is_own(name)))
+        files = dict.fromkeys(name.partition(":")[0] for name in named if _is_own(name))
+        return tuple(
+            name for name in files if (self.folder and (self.folder / name).is_file()) or Path(name).is_file()
+        )
 
     def without_own_files(self) -> "Scenario":
         """The scenario without what stands in Python files of a person's own.

@@ -88,9 +88,9 @@ def test_usage_errors_are_bad_input_too(capsys: pytest.CaptureFixture[str]) -> N
 def test_own_estimator_that_cannot_be_imported(place: Path, message_of: Callable[[list[str]], str]) -> None:
     (place / "mine.toml").write_text(GOOD.replace('"DesignAngles"', '"mine.py:Mine"'))
     (place / "mine.py").write_text("import no_such_package\n")
-    assert "cannot be imported: ModuleNotFoundError" in message_of(["check", "mine.toml"])
+    assert "cannot be imported: ModuleNotFoundError" in message_of(["run", "mine.toml"])
     (place / "mine.py").write_text("class Other:\n    pass\n")
-    assert "no such estimator class; found 'Mine'" in message_of(["check", "mine.toml"])
+    assert "no such estimator class; found 'Mine'" in message_of(["run", "mine.toml"])
 
 
 def test_as_a_process(place: Path) -> None:

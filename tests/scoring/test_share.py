@@ -1,12 +1,22 @@
 """Shares of devices: intervals and verdicts against exact sums, and false verdicts by trial."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from simrail.scoring.share import ENOUGH, NOT_ENOUGH, UNDECIDED, decide, effective, least_devices, wilson
+
+CHANCE = 0.05
+
+
+@cache
+def verdict_of(passed: int, devices: int) -> str:
+    """Verdict at a look, worked out once."""
+    return decide(passed, devices, 0.95, chance=CHANCE, looks=LOOKS)
+
 
 LOOKS = (20, 30, 45, 60, 90, 135, 203, 305, 458, 687, 1031, 1547)
 """Of a campaign that begins with 20 devices, as `simrail.scenario.stop_rule.stages_of` has them."""
@@ -50,7 +60,7 @@ def test_false_verdicts_are_rarer_than_their_chance(true_share: float, is_false:
     false = 0
     for row in passed:
         for count, devices in zip(row, LOOKS, strict=True):
-            verdict = decide(int(count), devices, 0.95, chance=0.05, looks=LOOKS)
+            verdict = verdict_of(int(count), devices)
             if verdict != UNDECIDED:
                 false += verdict == is_false
                 break
@@ -66,7 +76,7 @@ def test_a_far_better_sheet_is_found_out() -> None:
             (
                 verdict
                 for count, devices in zip(row, LOOKS, strict=True)
-                if (verdict := decide(int(count), devices, 0.95, chance=0.05, looks=LOOKS)) != UNDECIDED
+                if (verdict := verdict_of(int(count), devices)) != UNDECIDED
             ),
             UNDECIDED,
         )
