@@ -66,8 +66,9 @@ def test_the_overview_has_a_cell_for_each_grade_and_mount() -> None:
     shown = overview(TABLE, STYLES)
     assert shown["mounts"] == ["axle", "body"]
     assert [span for _, span in shown["heads"]] == [2]
+    assert shown["sentence"].endswith("1 of 3 on the axle, 1 of 3 on the body.")
     rows = dict(shown["rows"])
-    assert [cell["percent"] for cell in rows["coarse"]] == ["50 %", "50 %"]
+    assert [cell["percent"] for cell in rows["coarse"]] == ["50", "50"]
     assert {cell["mark"] for cell in rows["fine"]} == {"\u2713"}
 
 

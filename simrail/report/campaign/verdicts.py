@@ -13,7 +13,14 @@ from simrail.core.jit import FloatArray
 from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.words.verdicts import MARKS, best_method, devices_words, judged_methods, verdict_sentence
+from simrail.report.words.verdicts import (
+    MARKS,
+    best_method,
+    devices_words,
+    glance_sentence,
+    judged_methods,
+    verdict_sentence,
+)
 from simrail.scenario.requirements import looks_of, requirements_of
 from simrail.scoring.requirement import Requirement
 from simrail.scoring.share import ENOUGH, NOT_ENOUGH
@@ -79,7 +86,7 @@ def overview(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> dict[str, An
         )
         for imu, own in rows[rows["estimator"] == best.name].groupby("imu", sort=False):
             worst = own.sort_values("share", na_position="first").iloc[0]
-            cells[str(imu), len(columns) - 1] = _cell(worst) | {"percent": f"{100.0 * worst['share']:.0f} %"}
+            cells[str(imu), len(columns) - 1] = _cell(worst) | {"percent": f"{100.0 * worst['share']:.0f}"}
     heads: list[tuple[str, int]] = []
     for words, _, _ in columns:
         if heads and heads[-1][0] == words:
@@ -88,6 +95,7 @@ def overview(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> dict[str, An
             heads.append((words, 1))
     imus = list(dict.fromkeys(table["imu"].astype(str)))
     return {
+        "sentence": glance_sentence(table, styles),
         "heads": heads,
         "mounts": [" ".join(word for word in (mount, vehicle) if word) for _, mount, vehicle in columns],
         "rows": [(imu, [cells.get((imu, i)) for i in range(len(columns))]) for imu in imus],

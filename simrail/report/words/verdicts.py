@@ -50,6 +50,23 @@ def verdict_sentence(verdicts: pd.DataFrame, styles: Sequence[MethodStyle]) -> s
     return f"{wanted}, on the {mount} with {best.label}: " + "; ".join(parts) + "."
 
 
+def glance_sentence(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> str:
+    """How many of the IMUs are enough at each mount, of each requirement, with the best method there."""
+    parts = []
+    for wanted, of_wanted in table.groupby("requirement", sort=False):
+        mounts, full, none = [], True, True
+        for mount, rows in of_wanted.groupby("mount", sort=False):
+            best = best_method(rows, styles)
+            own = rows[rows["estimator"] == best.name] if best is not None else rows[:0]
+            enough = own.loc[own["verdict"] == ENOUGH, "imu"].astype(str).unique()
+            imus = rows["imu"].astype(str).unique()
+            mounts.append(f"{len(enough)} of {len(imus)} on the {mount}")
+            full, none = full and len(enough) == len(imus), none and len(enough) == 0
+        told = "all, on every mount" if full else "none, on no mount" if none else ", ".join(mounts)
+        parts.append(f"{str(wanted).partition(' for ')[0]}: {told}")
+    return "IMUs that are enough: " + "; ".join(parts) + "."
+
+
 def devices_words(verdicts: pd.DataFrame) -> str:
     """Of how many devices on how many tracks verdicts are."""
     devices, tracks = verdicts["devices"], int(verdicts["tracks"].max())
