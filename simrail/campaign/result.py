@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import pandas as pd
@@ -64,7 +65,7 @@ class CampaignResult:
     plan: Plan
     stopped: StopState | VerdictState | None = None
 
-    @property
+    @cached_property
     def verdicts(self) -> pd.DataFrame:
         """What became of the scenario's requirements (`simrail.scoring.verdicts.verdict_table`)."""
         spec = self.plan.scenario.spec

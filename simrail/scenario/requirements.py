@@ -19,18 +19,16 @@ from simrail.scenario.distributions import sample_count
 from simrail.scenario.scenario import Scenario, ScenarioFile
 from simrail.scenario.stop_rule import (
     LEVELS,
+    Looks,
     StopRule,
     StopState,
-    draws_of,
     judge_least_draws,
     judge_stop_rule,
-    level_of,
-    stages_of,
 )
-from simrail.scenario.tables import RequirePart, StopRulePart
-from simrail.scoring.requirement import RAILS, Requirement
-from simrail.scoring.share import UNDECIDED, least_devices
-from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, FULL, QUANTITY_UNITS, WINDOWS, concat_scores
+from simrail.scenario.tables import RequirePart
+from simrail.scoring.requirement import Requirement, judge_band
+from simrail.scoring.share import UNDECIDED
+from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, QUANTITY_UNITS, WINDOWS, concat_scores
 from simrail.scoring.verdicts import settled, verdict_table
 from simrail.track.bands import TOO_SHORT, Band, why_not
 from simrail.track.design import TrackDesign
@@ -82,17 +80,8 @@ def judge_requirements(spec: ScenarioFile, estimators: Collection[str]) -> None:
 
 def _judge_words(part: RequirePart, spec: ScenarioFile, at: str) -> None:
     """Band, window and metric must be among those that the scenario scores."""
-    bands = (FULL, *spec.geometry.bands, *spec.geometry.own_bands)
-    if part.quantity in RAILS:
-        one_of(part.band, bands, "is no band that this scenario scores", field=f"{at}.band")
-    elif part.band != FULL:
-        raise InputError(
-            f"is a band of wavelengths, which {part.quantity} has not",
-            field=f"{at}.band",
-            value=part.band,
-            limit=FULL,
-            remedy="leave it out; bands are of " + ", ".join(RAILS),
-        )
+    with blame(None, at):
+        judge_band(part.requirement(), (*spec.geometry.bands, *spec.geometry.own_bands))
     kept = spec.score.windows
     if part.window.startswith(CURVE_PREFIX):
         if kept is not None and not {part.window, EVERY_CURVE}.intersection(kept):
@@ -200,26 +189,8 @@ def group_of(vehicle: object, mount: object, imu: object) -> str:
 
 
 @dataclass(frozen=True)
-class VerdictRule:
+class VerdictRule(Looks):
     """The rule that draws until every verdict of a scenario is settled, or its draws are spent."""
-
-    spec: ScenarioFile
-    asked: StopRulePart
-
-    @property
-    def level(self) -> str:
-        """What a draw is."""
-        return level_of(self.spec)
-
-    @property
-    def draws(self) -> int:
-        """Number of draws that the scenario has."""
-        return draws_of(self.spec)
-
-    @property
-    def stages(self) -> tuple[int, ...]:
-        """After how many draws the rule is asked."""
-        return stages_of(self.asked.least_draws, self.draws)
 
     def has(self, cell: Cell, draws: int, former: StopState | VerdictState | None) -> bool:
         """Whether a cell is among those of the first so many draws, or of fewer if it was settled before."""
@@ -266,8 +237,3 @@ def looks_of(spec: ScenarioFile) -> tuple[int, ...]:
         "sample": spec.monte_carlo.sensor_draws,
     }
     return tuple(stage * within.get(rule.level, 1) for stage in rule.stages)
-
-
-def least_draws_of(spec: ScenarioFile) -> int:
-    """Devices that must all pass before anything is enough, of the requirement that asks for most."""
-    return max((least_devices(one.share, one.chance) for one in requirements_of(spec)), default=0)

@@ -119,8 +119,8 @@ def stages_of(least: int, draws: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class StopRule:
-    """The stop rule of a scenario.
+class Looks:
+    """A rule that looks at fixed numbers of draws.
 
     Attributes
     ----------
@@ -147,6 +147,11 @@ class StopRule:
     def stages(self) -> tuple[int, ...]:
         """After how many draws the rule is asked."""
         return stages_of(self.asked.least_draws, self.draws)
+
+
+@dataclass(frozen=True)
+class StopRule(Looks):
+    """The rule that stops once an interval is narrow."""
 
     def has(self, cell: Cell, draws: int, _former: object) -> bool:
         """Whether a cell is among those of the first so many draws."""

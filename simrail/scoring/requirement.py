@@ -15,9 +15,6 @@ from simrail.track.bands import BANDS
 METRICS = ("rms", "sd", "p95", "p9985", "max")
 """Figures of an error that are the better the smaller."""
 
-OVERS = ("all", "each")
-"""Whether a device must meet the limit on all its rides, or each kind of ride has a verdict of its own."""
-
 _PI = 3.141592653589793
 _SI = {
     "deg": ("angle", _PI / 180.0),
@@ -92,7 +89,8 @@ class Requirement:
     share : float
         Of the devices that must meet it, in (0, 1).
     over : str
-        One of `OVERS`.
+        ``"all"``: a device must meet the limit on all its rides; ``"each"``: each kind of ride has a verdict
+        of its own.
     chance : float
         Of a false verdict: that is what a device's maker and its buyer agree to live with.
     """

@@ -229,6 +229,11 @@ def labelled(pairs: Sequence[tuple[pd.DataFrame, Mapping[str, object]]]) -> pd.D
     return pd.DataFrame(columns)
 
 
+def is_failure(scores: pd.DataFrame) -> "pd.Series[bool]":
+    """Which rows have no value for a fault, not for what a method or a ride cannot give."""
+    return ~scores["status"].isin((OK, NO_SAMPLES, *LEFT_OPEN))
+
+
 def failed_figures(reason: str) -> pd.DataFrame:
     """The one row that stands for an estimate or a cell that could not be made."""
     first = ("roll", "full", "truth", "whole", "rms", np.nan, "deg", 0, reason.strip() or "failed")

@@ -9,7 +9,7 @@ from simrail.scoring.ablations import without_ablations
 from simrail.scoring.aggregate import axis_columns
 from simrail.scoring.requirement import Requirement
 from simrail.scoring.share import ENOUGH, NOT_ENOUGH, NOT_JUDGED, UNDECIDED, decide, effective, wilson
-from simrail.scoring.table import LEFT_OPEN, NO_SAMPLES, OK
+from simrail.scoring.table import OK, is_failure
 
 CASE = ("vehicle", "mount", "imu", "odometry", "map", "vibration", "estimator", "tuning")
 """What a verdict is about, beside its requirement."""
@@ -49,19 +49,15 @@ def device_figures(scores: pd.DataFrame, cells: pd.DataFrame, wanted: Requiremen
     frame = chosen.merge(kept[["cell", "sample", *axes]], on="cell", how="inner")
     frame = frame.astype(dict.fromkeys((*CASE, "status"), str))
     value = frame["value"].where(frame["status"] == OK)
-    frame = frame.assign(value=value.mask(_is_failure(frame), np.inf))
+    frame = frame.assign(value=value.mask(is_failure(frame), np.inf))
     keys = [*CASE, *(["ride"] if wanted.over == "each" else []), *axes, *DEVICE]
     of_devices = frame.groupby(keys, observed=True, dropna=False, sort=False)
     return of_devices.agg(value=("value", "max"), status=("status", "first")).reset_index()
 
 
-def _is_failure(scores: pd.DataFrame) -> "pd.Series[bool]":
-    return ~scores["status"].isin((OK, NO_SAMPLES, *LEFT_OPEN))
-
-
 def _failed_cells(scores: pd.DataFrame, chosen: pd.DataFrame) -> pd.DataFrame:
     """Rows of cells on which a method failed altogether, that has the chosen figure on others."""
-    failed = scores[_is_failure(scores) & scores["estimator"].isin(chosen["estimator"].unique())]
+    failed = scores[is_failure(scores) & scores["estimator"].isin(chosen["estimator"].unique())]
     failed = failed.drop_duplicates(["cell", "estimator"])
     has = pd.MultiIndex.from_frame(chosen[["cell", "estimator"]].astype({"estimator": str}))
     its = pd.MultiIndex.from_frame(failed[["cell", "estimator"]].astype({"estimator": str}))

@@ -51,8 +51,9 @@ def verdicts_section(data: PageData) -> list[Section]:
     if table.empty:
         return []
     groups: list[dict[str, Any]] = []
+    figures = [device_figures(data.scores, data.cells, one) for one in wanted]
     for number, vehicle, mount, rows in groups_of(table):
-        devices = device_figures(data.scores, data.cells, wanted[number])
+        devices = figures[number]
         devices = devices[(devices["vehicle"] == vehicle) & (devices["mount"] == mount)]
         drawn = len(groups) < MOST_CHARTS
         groups.append(

@@ -33,7 +33,7 @@ from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.ablations import ABLATIONS
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
-from simrail.scoring.table import EXACT_MAP, LEFT_OPEN, NO_SAMPLES, OK
+from simrail.scoring.table import EXACT_MAP, is_failure
 from simrail.track.design import TrackDesign
 
 SETS_BESIDE = ("gonzalez_2023",)
@@ -92,7 +92,7 @@ def _section(name: str, title: str, **data: Any) -> Section:
 def _failures(data: PageData) -> list[Section]:
     """What has no value: method, IMU, reason, figures; what cannot have one is left out."""
     scores = data.scores
-    failed = scores[~scores["status"].isin((OK, NO_SAMPLES, *LEFT_OPEN))]
+    failed = scores[is_failure(scores)]
     if failed.empty:
         return []
     # One line per kind of fault: how many samples of a window it hit is in the table itself.
