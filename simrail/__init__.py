@@ -10,6 +10,7 @@ The way of the data, and the verbs between the nouns::
     rails    = fuse([result, ...])          # rails of several rides           -> Fused
     table    = score(result, truth, record) # one row per figure               -> DataFrame
     results  = run("go20a")                 # all of it, for every cell        -> Results, results/go20a/
+    figure   = show(result)                 # any of these nouns, drawn
     record   = read_ride(path)              # a ride of a real train, or one that write_ride wrote
 
 The data vocabulary
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from simrail.recording.files.ride_writer import write_ride
     from simrail.recording.recording import Recording
     from simrail.recording.sheets.grades import ImuGrade
+    from simrail.report.show import show
     from simrail.results import Results, run
     from simrail.ride.ride import Ride, simulate
     from simrail.ride.truth import Mount, Truth
@@ -94,6 +96,7 @@ _HOMES = {
     "estimators.rails.fuse": ("Fused", "fuse"),
     "recording.files.ride_writer": ("write_ride",),
     "recording.recording": ("Recording",),
+    "report.show": ("show",),
     "results": ("Results", "run"),
     "ride.ride": ("Ride", "simulate"),
     "ride.truth": ("Mount", "Truth"),
@@ -153,6 +156,7 @@ __all__ = [
     "score",
     "score_geometry",
     "score_odometry",
+    "show",
     "simulate",
     "with_odometry",
     "write_ride",

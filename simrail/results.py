@@ -32,6 +32,7 @@ from simrail.campaign.stored_results import StoredResults, read_results
 from simrail.campaign.worker import BatchResult
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
+from simrail.core.shown import Facts, Shown, names
 from simrail.core.toml_files import label
 from simrail.report.pages.page import SETS_BESIDE, write_report
 from simrail.scenario.cells import cells
@@ -54,8 +55,8 @@ PACKAGES = (
 MANIFEST = "manifest.json"
 
 
-@dataclass(frozen=True)
-class Results:
+@dataclass(frozen=True, repr=False)
+class Results(Shown):
     """What `run` returns: the campaign's tables, the manifest, and the folder that holds them.
 
     ``budgets`` say what errors are made of, where a requirement asks for it
@@ -67,6 +68,26 @@ class Results:
     campaign: CampaignResult
     manifest: dict[str, Any]
     budgets: pd.DataFrame
+
+    @property
+    def scores(self) -> pd.DataFrame:
+        """The score table, columns `simrail.scoring.table.SCORE_COLUMNS`."""
+        return self.campaign.scores
+
+    @property
+    def report(self) -> Path:
+        """The page."""
+        return self.folder / "report.html"
+
+    def _facts(self) -> Facts:
+        facts = {
+            "scenario": self.scenario.title,
+            "cells": f"{len(self.campaign.cells):,}, {len(self.campaign.failures)} failed",
+            "scores": f"{len(self.scores):,} rows",
+            "methods": names(self.scores["estimator"].unique()),
+            "report": self.report.as_posix(),
+        }
+        return self.scenario.name, facts
 
 
 def run(

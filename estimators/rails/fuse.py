@@ -37,6 +37,7 @@ from simrail.core.columns import IRREGULARITY, IRREGULARITY_SD, require
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
+from simrail.core.shown import Facts, Shown, names
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 
@@ -66,8 +67,8 @@ ROOT = 0
 """Of the streams: an estimator has no seed of its own, and the same passes give the same draws."""
 
 
-@dataclass(frozen=True)
-class Fused:
+@dataclass(frozen=True, repr=False)
+class Fused(Shown):
     """Rails from n passes.
 
     Attributes
@@ -92,6 +93,19 @@ class Fused:
     shifts: pd.DataFrame
     passes: pd.DataFrame
     mount: str
+
+    def _facts(self) -> Facts:
+        places, told = self.geometry.index, int((self.passes["told"] != "").sum())
+        drawn = 0 if self.geometry_draws is None else len(self.geometry_draws)
+        facts = {
+            "passes": f"{len(self.passes)}, something is wrong with {told or 'none'}",
+            "rails": f"s = {places[0]:g} to {places[-1]:g} m, {len(places):,} places"
+            if len(places)
+            else "none",
+            "shifts": names(f"{shift:+.2f} m" for shift in self.passes["shift_m"]),
+            "draws": str(drawn),
+        }
+        return f"of IMU {self.mount}", facts
 
     @property
     def estimate(self) -> Estimate:

@@ -9,7 +9,7 @@ import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -169,7 +169,8 @@ def _key(
     for recording in recordings:
         values = [getattr(recording, entry.name) for entry in fields(recording)]
         frames += [value for value in values if isinstance(value, pd.DataFrame)]
-        digest.update(repr([value for value in values if not isinstance(value, pd.DataFrame)]).encode())
+        plain = [value for value in values if not isinstance(value, pd.DataFrame)]
+        digest.update(repr([asdict(value) if is_dataclass(value) else value for value in plain]).encode())
     for frame in frames:
         digest.update(repr(list(frame.columns)).encode() + frame.index.to_numpy().tobytes())
         digest.update(np.ascontiguousarray(frame.to_numpy(dtype=np.float64)).tobytes())

@@ -25,17 +25,56 @@ FOLDERS = {
 """Where the shipped files of each kind lie among the scenarios."""
 
 
-def list_parts() -> int:
+def list_parts(
+    kind: Annotated[
+        str, typer.Argument(metavar="[KIND]", help=f"One of {', '.join((*FOLDERS, 'estimators'))}.")
+    ] = "",
+) -> int:
     """Show the scenarios, tracks, vehicles, IMUs, published spectra and estimators that are there."""
     from rich.console import Console
 
+    from simrail.core.errors import one_of
+
+    wanted = kind if kind in ("", *FOLDERS) or kind.endswith("s") else f"{kind}s"
+    if wanted:
+        one_of(wanted, (*FOLDERS, "estimators"), "there is no such kind", field="KIND")
     console = Console(highlight=False)
-    for kind, entries in catalogue().items():
+    shown = {name: entries for name, entries in catalogue().items() if wanted in ("", name)}
+    for kind, entries in shown.items():
         console.print(f"[bold]{kind}[/bold]")
         width = max((len(name) for name in entries), default=0)
         for name, title in entries.items():
             console.print(f"  [cyan]{name:{width}}[/cyan]  ", end="")
             console.print(title, markup=False, overflow="ignore", crop=False, no_wrap=True)
+    return DONE
+
+
+def open_page(
+    place: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[DIR|FILE]", help="Results or a page; the newest under results/ if not given."
+        ),
+    ] = None,
+) -> int:
+    """Open the page of results in the browser."""
+    from simrail.core.errors import InputError
+
+    if place is None:
+        pages = sorted(Path("results").glob("*/report.html"), key=lambda page: page.stat().st_mtime)
+        page = pages[-1] if pages else Path("results") / "report.html"
+    else:
+        page = place / "report.html" if place.is_dir() or not place.suffix else place
+    if not page.is_file():
+        raise InputError(
+            "there is no page",
+            field="DIR|FILE",
+            value=page.as_posix(),
+            limit="a folder with report.html, or a page",
+            remedy="run a scenario first, e.g. simrail run quick_kinematic",
+        )
+    print(f"opens {page}")
+    typer.launch(page.resolve().as_uri())
     return DONE
 
 

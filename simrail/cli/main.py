@@ -10,8 +10,9 @@ from typing import Annotated, Any
 
 import typer
 
+from simrail.cli.examples import below
 from simrail.cli.grade import grade
-from simrail.cli.library import cache, imu, list_parts, new, vehicle
+from simrail.cli.library import cache, imu, list_parts, new, open_page, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
 from simrail.cli.rides import estimate, export
 from simrail.cli.run import check, run
@@ -24,8 +25,8 @@ app = typer.Typer(
     name="simrail",
     help="A testbed for inertial sensors on trains: simulate a ride, record it, estimate, score.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 # typer carries its own copy of click, or not, as its version has it: find the class that it raises.
@@ -79,5 +80,6 @@ def _options(
 
 
 for _command in (run, check, grade, export, estimate, tune, sensitivity, spectra, vehicle, imu, new, cache):
-    app.command()(_command)
-app.command(name="list")(list_parts)
+    app.command(epilog=below(_command.__name__))(_command)
+app.command(name="list", epilog=below("list"))(list_parts)
+app.command(name="open", epilog=below("open"))(open_page)

@@ -101,6 +101,7 @@ def one_of(
     possible = tuple(words)
     if word not in possible:
         limit = "one of " + ", ".join(possible)
+        remedy = did_you_mean(word, possible) or remedy
         raise InputError(problem, file=file, field=field, value=word, limit=limit, remedy=remedy)
 
 

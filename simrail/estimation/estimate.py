@@ -14,11 +14,12 @@ import pandas as pd
 
 from simrail.core.errors import InputError, one_of
 from simrail.core.jit import FloatArray
+from simrail.core.shown import Facts, Shown, names
 from simrail.recording.recording import Recording
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, repr=False)
+class Estimate(Shown):
     """States over time that an estimator found.
 
     Attributes
@@ -52,6 +53,22 @@ class Estimate:
     covariance_of: tuple[str, ...] = ()
     geometry: pd.DataFrame | None = None
     geometry_draws: FloatArray | None = None
+
+    def _facts(self) -> Facts:
+        columns = [str(name) for name in self.states]
+        rails = "none"
+        if self.geometry is not None and len(self.geometry):
+            places = self.geometry.index
+            rails = f"s = {places[0]:g} to {places[-1]:g} m, {len(places):,} places"
+        drawn = 0 if self.geometry_draws is None else len(self.geometry_draws)
+        facts = {
+            "samples": f"{len(self.states):,}",
+            "states": names((name for name in columns if "_sd_" not in name), most=9),
+            "with sd": names((name for name in columns if "_sd_" in name), most=4),
+            "covariance": names(self.covariance_of),
+            "rails": rails + (f", {drawn} draws" if drawn else ""),
+        }
+        return f"of IMU {self.mount}", facts
 
 
 def states_only(recording: Recording, states: FloatArray, columns: Sequence[str]) -> Estimate:

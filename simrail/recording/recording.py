@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import pandas as pd
 
 from simrail.core.errors import InputError
+from simrail.core.shown import Facts, Shown, names
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.track.design import TrackDesign
 from simrail.track.map_errors import UNSTATED, MapErrors
@@ -172,8 +173,8 @@ class RailSensorSheet:
     noise_m: float
 
 
-@dataclass(frozen=True)
-class Recording:
+@dataclass(frozen=True, repr=False)
+class Recording(Shown):
     """Signals of one ride, and what the train knows.
 
     Attributes
@@ -250,6 +251,23 @@ class Recording:
     odometer_sheet: OdometerSheet | None = None
     map_errors: MapErrors = UNSTATED
     vehicle_sheet: VehicleSheet | None = None
+
+    def _facts(self) -> Facts:
+        aiding = {
+            "encoder": self.encoder,
+            "odometer": self.odometer,
+            "magnetometer": self.magnetometer,
+            "rail sensor": self.rail_displacement,
+        }
+        lost = 0 if self.gaps is None else int(self.gaps["missing"].sum())
+        facts = {
+            "imu": f"{len(self.imu):,} samples at {self.imu_sheet.rate_hz:g} Hz, {lost:,} lost",
+            "mount": f"{self.mount} on {self.mount_body} at {names(self.mount_position_m)} m",
+            "beside": names(name for name, frame in aiding.items() if frame is not None),
+            "map": f"{self.track.name}, begins at s = {self.start_position_m:g} m",
+            "odometry": self.odometry_source or "none yet",
+        }
+        return self.name, facts
 
     @property
     def has_wheel(self) -> bool:

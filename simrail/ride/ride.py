@@ -16,6 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
+from simrail.core.shown import Facts, Shown
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
 from simrail.ride.contact_extremes import ContactExtremes
@@ -74,8 +75,8 @@ class Kept(NamedTuple):
     wheels: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Ride:
+@dataclass(frozen=True, repr=False)
+class Ride(Shown):
     """Everything that a truth depends on.
 
     Attributes
@@ -128,6 +129,17 @@ class Ride:
     contact_rate_hz: float = 0.0
     kept: Kept | None = None
     vibration: Vibration | None = None
+
+    def _facts(self) -> Facts:
+        profile = self.profile
+        facts = {
+            "track": f"{self.track.name}, rails {self.irregularity.spectrum}, seed {self.track_seed}",
+            "vehicle": f"{self.vehicle.name} by the {self.engine} engine, steps of {1e3 * self.step_s:g} ms",
+            "way": f"s = {profile.start_m:g} to {profile.end_m:g} m at {3.6 * profile.speed_mps:.0f} km/h",
+            "time": f"{profile.duration_s:.1f} s at {self.rate_hz:g} Hz",
+            "vibration": "none" if self.vibration is None else "yes",
+        }
+        return self.name, facts
 
     @property
     def kept_bodies(self) -> list[int]:

@@ -18,6 +18,7 @@ import pandas as pd
 from simrail.core.columns import CONTACT, MOTION
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.shown import Facts, Shown, names
 from simrail.core.turning import turning_rows
 from simrail.ride.mount_motion import Remembered, mount_motion
 from simrail.ride.vibration.short_waves import ShortWaves, superposed
@@ -80,8 +81,8 @@ class BodyMotion:
     angular_acceleration: FloatArray
 
 
-@dataclass(frozen=True)
-class Truth:
+@dataclass(frozen=True, repr=False)
+class Truth(Shown):
     """Motion of a vehicle over a ride.
 
     Attributes
@@ -129,6 +130,21 @@ class Truth:
     axle_offsets_m: dict[str, float] = field(default_factory=dict)
     short_waves: ShortWaves | None = None
     _remembered: Remembered = field(default_factory=Remembered, init=False, repr=False, compare=False)
+
+    def _facts(self) -> Facts:
+        way, seconds = self.reference_position_m, self.time_s[-1] - self.time_s[0]
+        fastest = float(np.abs(self._speeds[0]).max())
+        facts = {
+            "time": f"{seconds:.1f} s at {self.rate_hz:g} Hz, {len(self.time_s):,} samples",
+            "way": f"s = {way[0]:.1f} to {way[-1]:.1f} m, up to {3.6 * fastest:.0f} km/h",
+            "bodies": names(self.body_names, most=8),
+            "wheels": names(self.wheel_names, most=8),
+            "holds": "contact forces" * bool(self.contacts)
+            + ", " * bool(self.contacts and self.short_waves)
+            + "vibration" * (self.short_waves is not None)
+            or "neither contact forces nor vibration",
+        }
+        return f"{self.manifest.get('vehicle', 'of a ride')} on {self.track.name}", facts
 
     @property
     def rate_hz(self) -> float:

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from simrail.core.errors import InputError
+from simrail.core.shown import Facts, Shown, names
 from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
 from simrail.scenario import tables
 from simrail.scenario.axes import Axis, Listed, axes_of, each
@@ -139,8 +140,8 @@ class ScenarioFile(Part):
         return self
 
 
-@dataclass(frozen=True)
-class Scenario:
+@dataclass(frozen=True, repr=False)
+class Scenario(Shown):
     """A scenario that has been read: its name, where it stood, its text and its content.
 
     Attributes
@@ -165,6 +166,17 @@ class Scenario:
     text: str
     overrides: tuple[str, ...]
     spec: ScenarioFile
+
+    def _facts(self) -> Facts:
+        spec = self.spec
+        facts = {
+            "is": self.title,
+            "rides": names(ride.name for ride in spec.ride) + f" on {names(each(spec.track))}",
+            "vehicle": f"{names(each(spec.vehicle))} by the {names(each(spec.engine))} engine",
+            "imus": names(imu.name for imu in spec.imu),
+            "estimators": names(part.name for part in spec.estimator),
+        }
+        return self.name, facts
 
     @property
     def title(self) -> str:

@@ -22,6 +22,7 @@ from scipy.interpolate import PPoly
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
+from simrail.core.shown import Facts, Shown, names
 from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
 from simrail.track.deviation import Deviation
 from simrail.track.elements import (
@@ -105,8 +106,8 @@ class _Shape(NamedTuple):
     height: tuple[PPoly, PPoly, PPoly, PPoly]
 
 
-@dataclass(frozen=True)
-class TrackDesign:
+@dataclass(frozen=True, repr=False)
+class TrackDesign(Shown):
     """A design track.
 
     Attributes
@@ -154,6 +155,21 @@ class TrackDesign:
     start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_yaw_rad: float = 0.0
     deviation: Deviation | None = None
+
+    def _facts(self) -> Facts:
+        curves = [element for element in self.elements if isinstance(element, Curve)]
+        radii = sorted({abs(curve.radius_m) for curve in curves})
+        cants = [abs(curve.cant_m) * 1000.0 for curve in curves]
+        slopes = [1000.0 * gradient.slope for gradient in self.gradients] or [0.0]
+        bends = f"{len(curves)}, R {names(f'{radius:g}' for radius in radii)} m"
+        facts = {
+            "way": f"{self.length_m:,.0f} m, from s = {self.start_m:g} m",
+            "curves": bends if curves else "none: straight",
+            "cant": f"up to {max(cants, default=0.0):.0f} mm over {self.rail_base_m:g} m",
+            "gradient": f"{min(slopes):g} to {max(slopes):g} per mille" if any(slopes) else "level",
+            "source": ("synthetic; " if self.synthetic else "") + (self.source or "not said"),
+        }
+        return self.name, facts
 
     @property
     def length_m(self) -> float:

@@ -20,6 +20,7 @@ from scipy.interpolate import CubicSpline
 from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.shown import Facts, Shown, names
 from simrail.core.toml_files import blame
 from simrail.track.defects import check_defects, deviations, shortest_wave_m
 from simrail.track.design import TrackDesign
@@ -49,8 +50,8 @@ RAILS = slice(6, 10)
 """The rail deviations among the channels."""
 
 
-@dataclass(frozen=True, eq=False)
-class LaidTrack:
+@dataclass(frozen=True, eq=False, repr=False)
+class LaidTrack(Shown):
     """A design track with one realisation of its irregularities.
 
     Attributes
@@ -78,6 +79,17 @@ class LaidTrack:
     table_step_m: float
     table: FloatArray
     conditions: tuple[RailCondition, ...] = ()
+
+    def _facts(self) -> Facts:
+        low, high = self.irregularity.wavelengths_m
+        facts = {
+            "design": f"{self.design.name}, {self.design.length_m:,.0f} m",
+            "rails": f"{self.irregularity.spectrum}, waves of {low:g} to {high:g} m, seed {self.seed}",
+            "defects": names(type(defect).__name__ for defect in self.irregularity.defects),
+            "conditions": names(type(condition).__name__ for condition in self.conditions),
+            "knots": f"{len(self.table) + 1:,} at {self.table_step_m:g} m",
+        }
+        return self.design.name, facts
 
     def channels(self, s: npt.ArrayLike, *, derivative: int = 0) -> FloatArray:
         """All channels, or their derivative with respect to s, at places s.

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.shown import Facts, Shown, names
 from simrail.vehicle.contact.creep_laws import CreepLaw
 
 Positive = Annotated[float, Field(gt=0)]
@@ -253,8 +254,8 @@ class WheelRail:
     smoothing: float = 0.22
 
 
-@dataclass(frozen=True)
-class VehicleModel:
+@dataclass(frozen=True, repr=False)
+class VehicleModel(Shown):
     """A whole vehicle.
 
     Attributes
@@ -308,6 +309,18 @@ class VehicleModel:
     arms: tuple[TrailingArms, ...] = ()
     gyroscopic: bool = True
     traction: Traction | None = None
+
+    def _facts(self) -> Facts:
+        radii = sorted({wheel.radius_m for wheel in self.wheels})
+        pair = self.wheel_rail
+        facts = {
+            "is": ("synthetic: " if self.synthetic else "") + self.title,
+            "bodies": names(self.body_names, most=8),
+            "mass": f"{sum(body.mass_kg for body in self.bodies):,.0f} kg",
+            "wheels": f"{len(self.wheels)} of {' and '.join(f'{radius:g}' for radius in radii)} m radius",
+            "contact": "linear" if pair.linear else f"{pair.wheel_profile} on {pair.rail_profile}",
+        }
+        return self.name, facts
 
     @property
     def body_names(self) -> list[str]:
