@@ -12,6 +12,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "vehicle": ("simrail vehicle metro_irw_bogie", "simrail vehicle my_vehicle.toml --out page"),
     "imu": ("simrail imu lord_3dm_gx4_25", "simrail imu my_imu.toml --out page"),
     "new": ("simrail new scenario --out my_scenario.toml", "simrail new imu --out my_imu.toml"),
+    "schema": ("simrail schema scenario", "simrail schema vehicle --out vehicle.schema.json"),
     "cache": ("simrail cache", "simrail cache --clear"),
     "list": ("simrail list", "simrail list vehicles"),
     "open": ("simrail open", "simrail open results/go20a"),

@@ -16,6 +16,7 @@ from simrail.cli.library import cache, imu, list_parts, new, open_page, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
 from simrail.cli.rides import estimate, export
 from simrail.cli.run import check, run
+from simrail.cli.schema import schema
 from simrail.cli.sensitivity import sensitivity
 from simrail.cli.spectra import spectra
 from simrail.cli.tune import tune
@@ -79,7 +80,10 @@ def _options(
     pass
 
 
-for _command in (run, check, grade, export, estimate, tune, sensitivity, spectra, vehicle, imu, new, cache):
+for _command in (
+    *(run, check, grade, export, estimate, tune, sensitivity, spectra),
+    *(vehicle, imu, new, schema, cache),
+):
     app.command(epilog=below(_command.__name__))(_command)
 app.command(name="list", epilog=below("list"))(list_parts)
 app.command(name="open", epilog=below("open"))(open_page)

@@ -12,10 +12,19 @@ from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from typing import Annotated, Any, TypeVar
 
-from pydantic import WrapValidator
+from pydantic import GetJsonSchemaHandler, WrapValidator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from simrail.core.toml_files import Part
-from simrail.scenario.distributions import Distribution, Value, distributions_of, leaves, read_distribution
+from simrail.scenario.distributions import (
+    FORMS,
+    Distribution,
+    Value,
+    distributions_of,
+    leaves,
+    read_distribution,
+)
 
 _T = TypeVar("_T")
 _Part = TypeVar("_Part", bound=Part)
@@ -40,7 +49,25 @@ def _one_or_list(value: Any, handler: Callable[[Any], Any]) -> Any:
     return items
 
 
-Listed = Annotated[_T, WrapValidator(_one_or_list)]
+class _Form:
+    """What an editor is told of such a field: one value, a list of values, or a table of a distribution."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        one = handler(schema)
+        pair = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+        several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
+        spread = {
+            "type": "object",
+            "properties": {kind: several if kind == "choice" else pair for kind in FORMS} | {"bounds": pair},
+            "additionalProperties": False,
+            "minProperties": 1,
+        }
+        return {"anyOf": [one, several, spread]}
+
+
+Listed = Annotated[_T, WrapValidator(_one_or_list), _Form()]
 """One value, a list of values that makes an axis, or a distribution that values are drawn from."""
 
 
