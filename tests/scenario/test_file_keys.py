@@ -70,7 +70,7 @@ def test_what_stands_below_a_field_is_its_description() -> None:
 def test_keys_tell_form_limits_and_default() -> None:
     keys = {(key.table, key.name): key for key in keys_of("scenario")}
     speed = keys["[[ride]]", "speed_kmh"]
-    assert speed.required and "a list of such; or a distribution" in speed.form
+    assert "a list of such; or a distribution" in speed.form
     assert keys["", "step_s"].default == "0.0005"
     assert "<= 0.001" in keys["", "step_s"].form
     assert keys["[[irregularity.defect]]", "form"].form.startswith('one of "ramp"')
