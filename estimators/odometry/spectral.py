@@ -2,7 +2,7 @@
 
 The vertical accelerometer is cut into frames, and of each the amplitudes of its spectrum are summed up:
 
-    S = sum over k of |H_k|,     v = slope sqrt(S) + intercept            (paper 003, Eqs. 1 and 2)
+    S = sum over k of abs(H_k),     v = slope sqrt(S) + intercept            (paper 003, Eqs. 1 and 2)
 
 Slope and intercept belong to a vehicle, a place on it and the rails: they are found on rides whose speed is
 known (`calibrate`), or the intercept where the train stands. Nothing but the vertical accelerometer enters,
@@ -10,8 +10,8 @@ and, for its sign, the direction of running (`simrail.estimators.odometry.direct
 
 What of the paper is mended or added (EQUATIONS 4):
 
-* The sum as printed begins with k = 0. Of 1024 samples gravity alone makes |H_0| = 5.4e3 m/s2 and, by
-  Hamming's window, |H_1| = 2.3e3, where all that a floor shakes at rest makes some 200: the sum begins at
+* The sum as printed begins with k = 0. Of 1024 samples gravity alone makes abs(H_0) = 5.4e3 m/s2 and, by
+  Hamming's window, abs(H_1) = 2.3e3, where all that a floor shakes at rest makes some 200: the sum begins at
   k = 2, and each frame's mean is taken off. ``printed = true`` leaves both in: fitted to the ride's own
   speed, on the bogie frame of a metro over 3 km and back (three draws of the rails), that leaves 1.5 to
   3.7 m/s rms in place of 1.4 to 2.7.
