@@ -1,7 +1,7 @@
 """The guide: pages written by hand, and the reference of keys, methods and names made of the package itself.
 
-    pip install -e ".[docs]"
-    sphinx-build -W --keep-going docs docs/_build
+pip install -e ".[docs]"
+sphinx-build -W --keep-going docs docs/_build
 """
 
 import sys

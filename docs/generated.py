@@ -8,12 +8,12 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from simrail.cli.library import catalogue
-from simrail.scenario.file_keys import FILES, Key, keys_of
 from sphinx.application import Sphinx
 
 import simrail
+from simrail.cli.library import catalogue
 from simrail.estimation.estimate import registered
+from simrail.scenario.file_keys import FILES, Key, keys_of
 
 WHAT = {
     "scenario": "A scenario says what is run: track, vehicle, rides, sensors, methods, and what is scored.",
@@ -24,8 +24,9 @@ WHAT = {
     "spectrum": "A published spectrum of vibration.",
 }
 
-VALIDATION = """Physics and noise are checked against closed forms, published figures and independent code, not against
-our own last output. Each line names the test, or the command, that shows it; a command's page says where a claim falls."""
+VALIDATION = """Physics and noise are checked against closed forms, published figures and independent code, not
+against our own last output. Each line names the test, or the command, that shows it; a command's page says where
+a claim falls."""
 
 
 def write(path: Path, text: str) -> None:
@@ -52,7 +53,9 @@ def table(keys: Iterable[Key]) -> str:
 def keys_page(kind: str) -> str:
     """Every key of a kind of file."""
     parts = [f"# Keys of a {kind} file", WHAT[kind]]
-    parts.append(f"`simrail new {kind} NAME` writes one to start from; `simrail schema {kind}` is for editors.")
+    parts.append(
+        f"`simrail new {kind} NAME` writes one to start from; `simrail schema {kind}` is for editors."
+    )
     for shown, keys in groupby(keys_of(kind), key=lambda key: key.table):
         parts += [f"## `{shown}`" if shown else "## Above all tables", table(keys)]
     return "\n\n".join(parts) + "\n"
@@ -124,10 +127,9 @@ def build(app: Sphinx) -> None:
     )
     public = "\n".join(f".. autoclass:: simrail.{name}\n   :no-index:\n" for name in classes())
     verbs = "\n".join(f".. autofunction:: simrail.{name}\n   :no-index:\n" for name in functions())
-    write(
-        here / "api" / "index.rst",
-        f"===\nAPI\n===\n\n.. automodule:: simrail\n   :no-members:\n\nVerbs\n=====\n\n{verbs}\nNouns\n=====\n\n{public}",
-    )
+    head = "===\nAPI\n===\n\n.. automodule:: simrail\n   :no-members:\n"
+    page = f"{head}\nVerbs\n=====\n\n{verbs}\nNouns\n=====\n\n{public}"
+    write(here / "api" / "index.rst", page)
 
 
 def classes() -> list[str]:
