@@ -24,9 +24,9 @@ WHAT = {
     "spectrum": "A published spectrum of vibration.",
 }
 
-VALIDATION = """Physics and noise are checked against closed forms, published figures and independent code, not
-against our own last output. Each line names the test, or the command, that shows it; a command's page says where
-a claim falls."""
+VALIDATION = """Physics and noise are checked against closed forms, published figures and independent code,
+not against our own last output. Each line names the test, or the command, that shows it; a command's page says
+where a claim falls."""
 
 
 def write(path: Path, text: str) -> None:

@@ -75,8 +75,8 @@ class AttitudeEkf:
         Standard deviation of one sample of specific force in place of the tuning's.
     doubt : float
         How far a specific force that is longer or shorter than gravity is doubted: adds
-        doubt (norm(z) - g)^2 to its variance. Paper 000, Fig. 3 does so after Yuan et al.; how exactly is not printed, this is our
-        reading. 0 for none.
+        doubt (norm(z) - g)^2 to its variance. Paper 000, Fig. 3 does so after Yuan et al.; how exactly is not
+        printed, this is our reading. 0 for none.
     vibration : float
         For the recommended tuning: velocity sd of the body in the track frame over train speed.
     start_sd_rad, start_yaw_sd_rad : float
