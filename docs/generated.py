@@ -25,8 +25,8 @@ WHAT = {
 }
 
 VALIDATION = """Physics and noise are checked against closed forms, published figures and independent code,
-not against our own last output. Each line names the test, or the command, that shows it; a command's page says
-where a claim falls."""
+not against our own last output. Each line names the test, or the command, that shows it; a command's page
+says where a claim falls."""
 
 
 def write(path: Path, text: str) -> None:

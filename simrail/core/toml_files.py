@@ -7,24 +7,18 @@ What the numbers mean physically is judged by the models, not here.
 
 from __future__ import annotations
 
-import ast
 import difflib
-import inspect
 import json
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from importlib.resources import files
-from itertools import pairwise
 from pathlib import Path
-from textwrap import dedent
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from simrail.core.errors import Faults, InputError, did_you_mean
 
@@ -53,44 +47,12 @@ class Part(BaseModel):
         return None
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """Schema of the table; what stands below a field in the source becomes its description."""
-        written = handler(schema)
-        properties = handler.resolve_ref_schema(written).get("properties", {})
-        for name, text in attribute_docs(cls).items():
-            properties.get(name, {}).setdefault("description", text)
-        return written
-
-    @classmethod
     def others(cls, data: Mapping[str, Any]) -> Iterable[InputError]:  # noqa: ARG003
         """Faults that only several keys have together; asked for where a file has faults already.
 
         ``data`` are those keys that have none.
         """
         return ()
-
-
-def attribute_docs(model: type[Part]) -> dict[str, str]:
-    """What the strings below the fields of a model say of them, one line each.
-
-    They are read from the source when they are asked for: no command but those that show them waits for it.
-    """
-    docs: dict[str, str] = {}
-    for base in reversed(model.__mro__):
-        if not issubclass(base, Part) or base is Part:
-            continue
-        try:
-            lines = dedent(inspect.getsource(base))
-        except (OSError, TypeError):
-            continue  # a model that was made, not written: its fields bring their descriptions
-        (definition,) = ast.parse(lines).body
-        for field, below in pairwise(getattr(definition, "body", [])):
-            is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and is_text:
-                docs[field.target.id] = " ".join(str(below.value.value).split())
-    return docs
 
 
 _Part = TypeVar("_Part", bound=Part)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from simrail.core.toml_files import Part
 from simrail.recording.files.ride_file import RideFile
 from simrail.recording.sheets.imu_file import ImuFile
+from simrail.scenario.key_words import models_in, words_of
 from simrail.scenario.scenario import ScenarioFile
 from simrail.scoring.published_spectra import SpectrumFile
 from simrail.track.file import TrackFile
@@ -61,6 +62,10 @@ class Key(NamedTuple):
 def schema_of(kind: str) -> dict[str, Any]:
     """JSON schema of a kind of file, a key of `FILES`."""
     schema = FILES[kind].model_json_schema()
+    for name, model in models_in(FILES[kind]).items():
+        table = schema if model is FILES[kind] else schema["$defs"].get(name, {})
+        for key, words in words_of(model).items():
+            table.get("properties", {}).get(key, {}).setdefault("description", words)
     return {"$schema": DIALECT, "$id": f"simrail/{kind}.schema.json", **schema}
 
 

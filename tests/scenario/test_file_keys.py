@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from simrail.core.toml_files import FOLDERS, Part, attribute_docs, shipped, shipped_folder
+from simrail.core.toml_files import FOLDERS, Part, shipped, shipped_folder
 from simrail.scenario.file_keys import FILES, keys_of, schema_of, schema_text
+from simrail.scenario.key_words import models_in, words_of
 
 
 def faults(kind: str, data: dict[str, Any]) -> list[str]:
@@ -53,18 +54,33 @@ def test_lists_and_distributions_are_accepted() -> None:
         assert faults("scenario", data) == []
 
 
+class Inner(Part):
+    """Another.
+
+    Attributes
+    ----------
+    wide, tall : float
+        How far it
+        reaches.
+    """
+
+    wide: float
+    tall: float
+
+
 class Described(Part):
     """A table."""
 
     length_m: float = 1.0
     """How long it is,
     in all."""
-    other: int
+    other: Inner | None = None
 
 
-def test_what_stands_below_a_field_is_its_description() -> None:
-    assert attribute_docs(Described) == {"length_m": "How long it is, in all."}
-    assert Described.model_json_schema()["properties"]["length_m"]["description"] == "How long it is, in all."
+def test_words_stand_below_a_field_or_among_the_attributes() -> None:
+    assert words_of(Described) == {"length_m": "How long it is, in all."}
+    assert words_of(Inner) == {"wide": "How far it reaches.", "tall": "How far it reaches."}
+    assert set(models_in(Described)) == {"Described", "Inner"}
 
 
 def test_keys_tell_form_limits_and_default() -> None:
