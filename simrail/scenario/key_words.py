@@ -53,18 +53,13 @@ def _of_section(docstring: str) -> dict[str, str]:
 
 
 def models_in(model: type) -> dict[str, type]:
-    """Every model and dataclass that a model holds, itself included, by the names that a schema gives them."""
+    """Every model and dataclass that a model holds, with itself, by the names that a schema gives them."""
     found: list[type] = []
     _gather(model, found)
     names = [one.__name__ for one in found]
-    return {
-        (
-            one.__name__
-            if names.count(one.__name__) == 1
-            else f"{one.__module__}.{one.__name__}".replace(".", "__")
-        ): one
-        for one in found
-    }
+    whole = [f"{one.__module__}.{one.__name__}".replace(".", "__") for one in found]
+    alone = [name if names.count(name) == 1 else long for name, long in zip(names, whole, strict=True)]
+    return dict(zip(alone, found, strict=True))
 
 
 def _gather(kind: Any, found: list[type]) -> None:

@@ -43,35 +43,67 @@ class ScenarioFile(Part):
     """
 
     title: str
+    """One line: what is run, as pages and lists show it."""
     paper: Literal["briales_2021", "gonzalez_2023", "veillard_2016", "hidalgo"] | None = None
+    """The publication whose tables and figures the page sets beside the scenario's own."""
     seed: Annotated[int, Field(ge=0, lt=2**63)]
+    """Root of all chance: the same seed gives the same rails, sensors and scores."""
     track: Listed[str]
+    """A shipped track, or the path of a track file."""
     vehicle: Listed[str]
+    """A shipped vehicle, or the path of a vehicle file."""
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
+    """What moves the vehicle: Exudyn, our compiled integrator of the same equations, or, exactly on the
+    rails and without dynamics, the kinematic one."""
     step_s: Listed[Annotated[float, Field(ge=1e-6, le=0.001)]] = 0.0005
+    """Step of the integration, s; it divides 1 ms."""
     truth_rate_hz: Listed[Annotated[float, Field(ge=10.0, le=4000.0)]] = 1000.0
+    """Rate at which the true motion is kept, Hz: 1000 over a whole number, 2000 or 4000."""
     contact_rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    """Rate at which forces between wheels and rails are kept, Hz; 0 keeps none."""
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
+    """How often chance is asked."""
     passes: Listed[Annotated[int, Field(ge=1, le=1000)]] | None = None
+    """Over how many of the rides the rails are fused; scores are then of the rails alone."""
     odometry: Listed[str] = ""
+    """The odometry that the methods work with, by its short name, class or file; with an [encoder]
+    curve_matched if left out, else none."""
     irregularity: tables.IrregularityPart | None = None
+    """How the rails deviate from the design; without it they do not."""
     vibration: VibrationPart | None = None
+    """What shakes the vehicle beyond its multibody ride; without it, nothing."""
     map: tables.MapPart | None = None
+    """How the map that the train carries differs from what was laid; without it, not at all."""
     rail_condition: tuple[tables.RailConditionPart, ...] = ()
+    """What lies on the rails, stretch by stretch; dry without it."""
     ride: Annotated[list[tables.RidePart], Field(min_length=1)]
+    """The rides; at least one."""
     imu: Annotated[list[tables.ImuPart], Field(min_length=1)]
+    """The IMUs; at least one."""
     encoder: EncoderPart | None = None
+    """A wheel encoder; without it the train has none."""
     magnetometer: MagnetometerPart | None = None
+    """A magnetometer in the housing of each IMU; without it there is none."""
     rail_sensor: RailSensorPart | None = None
+    """A sensor beside each IMU that sees both rails; without it there is none."""
     earth: tables.EarthPart | None = None
+    """The Earth turns; without it, it is at rest."""
     temperature: tables.TemperaturePart | None = None
+    """Temperature of the IMUs; without it, that of their calibration."""
     estimator: Annotated[list[tables.EstimatorPart], Field(min_length=1)]
+    """The methods under test and their baselines; at least one."""
     score: tables.ScorePart = tables.ScorePart()
+    """What of the score table is kept; everything without it."""
     require: tuple[tables.RequirePart, ...] = ()
+    """What is asked of an IMU: each has a verdict on the page."""
     stop: tables.StopRulePart | None = None
+    """When to draw no more; without it every draw is made."""
     geometry: tables.GeometryPart = tables.GeometryPart()
+    """Wavelength bands and base of twist in which rails are scored."""
     running_safety: tables.RunningSafetyPart | None = None
+    """Score the forces between wheels and rails after EN 14363."""
     ride_comfort: tables.RideComfortPart | None = None
+    """Score N_MV (EN 12299) and Sperling's Wz where each IMU sits."""
 
     @field_validator("step_s")
     @classmethod

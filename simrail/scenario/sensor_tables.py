@@ -27,9 +27,13 @@ class SlipPart(Part):
     """``[[encoder.slip]]``: a slide (creepage < 0) or a spin of the encoder's wheel."""
 
     start_s: NotNegative
+    """When it begins, s."""
     duration_s: Positive
+    """How long it lasts, s."""
     creepage: Annotated[float, Field(ge=-1.0, le=10.0)]
+    """Relative slip: below 0 it slides, above it spins."""
     ramp_s: NotNegative = 0.25
+    """Time in which it rises and falls, s."""
 
     @model_validator(mode="after")
     def _ramps_fit(self) -> SlipPart:
@@ -48,19 +52,34 @@ class EncoderPart(Part):
     """
 
     wheel: Listed[str]
+    """The wheel that it counts: its name, or its place in the direction of travel, e.g. trailing.left."""
     radius: Listed[Literal["drawing", "calibrated"]] = "drawing"
+    """What the nominal radius is near to: the drawing's, or the mean on which it rolled, as an operator
+    calibrates it."""
     pulses_per_revolution: Listed[Annotated[int, Field(ge=1, le=1_000_000)]] = 1024
+    """Pulses of a turn."""
     rate_hz: Listed[Annotated[float, Field(gt=0.0, le=1000.0)]] = 250.0
+    """Rate at which the logger reads the counter, Hz."""
     radius_error_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.0
+    """Relative standard deviation of the nominal radius; one draw for each device."""
     rolling_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.004
+    """Relative standard deviation of the rolling radius, as the train believes."""
     radius_error: Listed[Annotated[float, Field(ge=-0.2, le=0.2)]] | None = None
+    """Fixed relative error of the radius in place of a draw."""
     quadrature: Listed[bool] = False
+    """True: two channels, four counts of a pulse, and the direction told."""
     edge_pattern_sd: Listed[Fraction] = 0.0
+    """Standard deviation of the disc's edges from their places, the same each turn, in pulses."""
     edge_jitter_sd: Listed[Fraction] = 0.0
+    """Standard deviation of each edge of each turn beyond that, in pulses."""
     missed_rate: Listed[Fraction] = 0.0
+    """Probability that a pulse goes uncounted."""
     edge_times: Listed[bool] = False
+    """True records the time of the last edge as well."""
     timer_hz: Listed[Positive] = 1e6
+    """Frequency of the timer of the edges, Hz."""
     slip: tuple[SlipPart, ...] = ()
+    """Slides and spins on top of the creep of the contact."""
 
     def spec(self) -> EncoderSpec:
         """The encoder, with no axis left."""
@@ -72,31 +91,45 @@ class IronPart(Part):
     """``[magnetometer.iron]``: hard and soft iron of the vehicle; synthetic."""
 
     hard_iron_ut: tuple[float, float, float] = (6.0, -4.0, 8.0)
+    """Largest field of the vehicle itself along an axis, uT."""
     soft_iron: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]] = (
         VehicleIron.soft_iron
     )
+    """Largest share by which it bends the Earth's."""
 
 
 class TractionPart(Part):
     """``[magnetometer.traction]``: currents of the line that feeds the vehicle; synthetic."""
 
     supply: Listed[Literal["catenary", "third_rail"]] = "catenary"
+    """Where the current comes from."""
     voltage_v: Listed[Annotated[float, Field(gt=0.0, le=30e3)]] = 750.0
+    """Voltage of the line, V."""
     efficiency: Listed[Annotated[float, Field(gt=0.0, le=1.0)]] = 0.85
+    """Share of the power that reaches the rims."""
     auxiliary_kw: Listed[NotNegative] = 30.0
+    """What light and air take, kW."""
     mass_t: Listed[Positive] = 42.0
+    """Mass of the train, t."""
     resistance_kn: Listed[NotNegative] = 2.5
+    """Running resistance, kN."""
     regenerative: Listed[bool] = True
+    """True: braking feeds the line."""
     share: Listed[Annotated[float, Field(gt=0.0, le=1.0)]] = 0.5
+    """Share of the current that flows by the sensor."""
 
 
 class SteelPart(Part):
     """``[magnetometer.steel]``: structures along the track; synthetic."""
 
     spacing_m: Listed[Annotated[float, Field(ge=1.0)]] = 20.0
+    """Mean distance between them, m."""
     moment_sd_am2: Listed[NotNegative] = 1500.0
+    """Standard deviation of their magnetic moment, A m2."""
     beside_m: tuple[float, float] = (1.8, 4.0)
+    """Least and largest distance from the track, m."""
     height_m: tuple[float, float] = (-0.5, 5.0)
+    """Least and largest height above the rails, m."""
 
     @model_validator(mode="after")
     def _ordered(self) -> SteelPart:
@@ -115,16 +148,27 @@ class MagnetometerPart(Part):
     """
 
     intensity_ut: Listed[Annotated[float, Field(gt=0.0, lt=100.0)]] = 45.0
+    """The Earth's field, uT."""
     inclination_deg: Listed[Annotated[float, Field(ge=-89.0, le=89.0)]] = 55.0
+    """How far it points down, degrees."""
     declination_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    """How far magnetic north lies east of north, degrees."""
     x_axis_deg: Listed[Annotated[float, Field(ge=-360.0, le=360.0)]] = 0.0
+    """Direction of the track's X axis, degrees counter-clockwise from east."""
     noise_ntpsqrthz: Listed[NotNegative] = 10.0
+    """White noise, nT/sqrt(Hz)."""
     bias_nt: Listed[NotNegative] = 300.0
+    """Largest bias of an axis, nT; one draw for each device."""
     range_ut: Listed[Positive] = 250.0
+    """Range, uT."""
     resolution_nt: Listed[NotNegative] = 0.0
+    """Step of a reading, nT."""
     iron: IronPart | None = None
+    """Hard and soft iron of the vehicle."""
     traction: TractionPart | None = None
+    """Currents of the line that feeds the vehicle."""
     steel: SteelPart | None = None
+    """Structures along the track."""
 
     def spec(self, track_seed: int) -> MagnetometerSpec:
         """The magnetometer on the track of a seed, with no axis left."""
@@ -164,8 +208,11 @@ class RailSensorPart(Part):
     """``[rail_sensor]``: a sensor beside each IMU that sees both rails from its body."""
 
     noise_mm: Listed[Annotated[float, Field(ge=0.0, lt=100.0)]] = 0.1
+    """Standard deviation of a reading, mm."""
     outlier_fraction: Listed[Annotated[float, Field(ge=0.0, le=0.2)]] = 0.01
+    """Share of readings that are false."""
     outlier_mm: Listed[Annotated[float, Field(ge=0.0, lt=1000.0)]] = 5.0
+    """Standard deviation of those, mm."""
 
     def spec(self) -> RailSensorSpec:
         """The sensor, with no axis left."""

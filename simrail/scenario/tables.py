@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
 from simrail.recording.sheets.figures import FIGURES
-from simrail.recording.sheets.imu_file import ImuHead, limited
+from simrail.recording.sheets.imu_file import ImuHead, described, limited
 from simrail.scenario.axes import Listed, each
 from simrail.scenario.designs import DESIGNS
 from simrail.scenario.measured_file import MeasuredPart
@@ -63,12 +63,19 @@ class DefectPart(Part):
     """``[[irregularity.defect]]``: a discrete defect by form and place (`simrail.track.defects`)."""
 
     form: Literal["ramp", "step", "dip", "joint", "twist"]
+    """Its form."""
     at_m: float
+    """Where it begins or, for a dip, lies, s along the track, m."""
     length_m: Positive
+    """Length of the form, m."""
     size_mm: float
+    """Its height, or its depth where negative, mm."""
     direction: Literal["vertical", "lateral"] = "vertical"
+    """Whether rails leave their place up and down, or aside."""
     rails: Literal["both", "left", "right"] = "both"
+    """Which of the rails have it."""
     hold_m: Annotated[float, Field(ge=0.0)] | None = None
+    """How far a ramp or a twist keeps its height before it returns, m."""
 
     def defect(self) -> Defect:
         """The defect that it describes."""
@@ -91,17 +98,29 @@ class IrregularityPart(Part):
     """
 
     spectrum: Listed[str] = "none"
+    """Spectrum that the rails are drawn from, by its name."""
     wavelengths_m: Wavelengths = (1.5, 100.0)
+    """Shortest and longest wavelength, m."""
     fade_m: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 40.0
+    """Length over which irregularities rise at their beginning and fall at their end, m."""
     scale: Listed[Scale] = 1.0
+    """Factor on all amplitudes."""
     alignment_scale: Listed[Scale] = 1.0
+    """Factor on the amplitudes of the alignment, beside scale."""
     vertical_profile_scale: Listed[Scale] = 1.0
+    """Factor on the amplitudes of the vertical profile, beside scale."""
     cross_level_scale: Listed[Scale] = 1.0
+    """Factor on the amplitudes of the cross-level, beside scale."""
     gauge_scale: Listed[Scale] = 1.0
+    """Factor on the amplitudes of the gauge, beside scale."""
     start_m: Listed[float] | None = None
+    """Where what the spectrum gives begins, s along the track, m; with the track if left out."""
     end_m: Listed[float] | None = None
+    """Where it ends, m; with the track if left out."""
     measured: MeasuredPart | None = None
+    """Rails from a file, in place of the spectrum or beside it."""
     defect: tuple[DefectPart, ...] = ()
+    """Discrete defects, added to it."""
 
     def irregularity(self, measured: MeasuredRails | None) -> Irregularity:
         """The irregularity that it describes, with the rails of its file; nothing in it is a list."""
@@ -113,22 +132,29 @@ class StopPart(Part):
     """A stop on the way: where the reference point of the vehicle stands, and for how long."""
 
     position_m: float
+    """Where the reference point of the vehicle stands, s along the track, m."""
     dwell_s: Annotated[float, Field(ge=0.0, le=3600.0)]
+    """For how long, s."""
 
 
 class RunPart(Part):
     """One of the ``runs`` of a ride: where it ends, and how long the train stands before the next one."""
 
     end_m: float
+    """Where the run ends, m."""
     turn_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
+    """How long the train stands before the next one, s."""
 
 
 class RestrictionPart(Part):
     """``[[ride.restriction]]``: a stretch of the line that is passed more slowly, in either direction."""
 
     start_m: float
+    """Where it begins, m."""
     end_m: float
+    """Where it ends, m."""
     speed_kmh: Annotated[float, Field(gt=0.0, le=400.0)]
+    """Highest speed there, km/h."""
 
     @model_validator(mode="after")
     def _has_a_length(self) -> Self:
@@ -147,7 +173,9 @@ class CoastingPart(Part):
     """``[ride.coasting]``: at its speed the train rolls, until it brakes or is as slow as ``least_kmh``."""
 
     deceleration_mps2: Annotated[float, Field(gt=0.0, le=0.5)]
+    """How much a rolling train slows down, m/s2."""
     least_kmh: Annotated[float, Field(gt=0.0, le=400.0)]
+    """Speed at which it holds its speed again, km/h."""
 
 
 class RidePart(Part):
@@ -164,21 +192,37 @@ class RidePart(Part):
     """
 
     name: Name
+    """Name of the ride in tables."""
     start_m: Listed[float]
+    """Where the vehicle's reference point stands at first, s along the track, m."""
     end_m: Listed[float] | None = None
+    """Where it stands at last, m; with smaller s than at the start it runs backwards."""
     speed_kmh: Listed[Annotated[float, Field(gt=0.0, le=400.0)]] | None = None
+    """Cruise speed, km/h."""
     acceleration_mps2: Listed[Annotated[float, Field(gt=0.0, le=3.0)]] = 0.6
+    """Most that it accelerates, and brakes unless braking_mps2 is given, m/s2."""
     jerk_mps3: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = 0.4
+    """Most that the acceleration changes, m/s3."""
     rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 20.0
+    """Time at rest before the first start, s."""
     final_rest_s: Listed[Annotated[float, Field(ge=0.0, le=3600.0)]] = 5.0
+    """Time at rest after the last stop, s."""
     stops: tuple[StopPart, ...] = ()
+    """Stops on the way."""
     drive: Listed[Literal["guide", "wheels"]] = "guide"
+    """Who moves the vehicle: a guide at its centre, or its own wheels."""
     reverse: Listed[bool] = False
+    """True rides it the other way, from end_m to start_m; [false, true] both ways."""
     kick_end_m: float | None = None
+    """Where a kick of the rails ends, m: it is scored whether the wheelsets' motion decays behind it."""
     runs: tuple[RunPart, ...] = ()
+    """Several runs in place of end_m; the train is not turned between them."""
     braking_mps2: Listed[Annotated[float, Field(gt=0.0, le=3.0)]] | None = None
+    """Most that it brakes, m/s2."""
     restriction: tuple[RestrictionPart, ...] = ()
+    """Stretches of the line that are passed more slowly."""
     coasting: CoastingPart | None = None
+    """At its speed the train rolls; without it, it holds its speed."""
 
     @model_validator(mode="after")
     def _goes_or_stands(self) -> RidePart:
@@ -255,10 +299,15 @@ class RailConditionPart(Part):
     """``[[rail_condition]]``: what lies on the rails, by a name or by its friction coefficient."""
 
     start_m: float
+    """Where it begins, s along the track, m."""
     end_m: float
+    """Where it ends, m."""
     condition: Literal["dry", "wet", "leaves"] | None = None
+    """What lies there, by its name."""
     friction: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    """Friction coefficient of one's own, in place of a name."""
     rails: Literal["both", "left", "right"] = "both"
+    """Which rails it lies on."""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
@@ -295,7 +344,10 @@ class _SheetPart(Part):
 if TYPE_CHECKING:
     SheetPart = _SheetPart
 else:
-    _figures: dict[str, Any] = {name: (Listed[limited(name)] | None, None) for name in FIGURES}
+    _figures: dict[str, Any] = {
+        name: (Listed[limited(name)] | None, Field(default=None, description=described(name)))
+        for name in FIGURES
+    }
     SheetPart = create_model("SheetPart", __base__=_SheetPart, __module__=__name__, **_figures)
 
 
@@ -313,15 +365,26 @@ class ImuPart(Part):
     """
 
     name: Name
+    """Name of the IMU in tables."""
     grade: Listed[str]
+    """A shipped IMU, or the path of an IMU file."""
     vehicle: str | None = None
+    """The vehicle that it is on, where a scenario has several with bodies of other names."""
     body: Listed[str]
+    """The body that carries it."""
     position_m: tuple[OnBoard, OnBoard, OnBoard]
+    """Where, m: ahead of the body's reference point, left of the track's centre, above the rails, as it
+    stands on level track."""
     roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    """How it is turned on the body about X, degrees; the train knows it."""
     pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
+    """The same about Y, degrees."""
     yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    """The same about Z, degrees."""
     sensor_draws: Draws | None = None
+    """Fewer draws than those of [monte_carlo], for one that has no errors to be drawn."""
     sheet: SheetPart | None = None
+    """Figures in the place of those of the grade's data sheet."""
 
     def is_on(self, vehicle: str) -> bool:
         """Whether it is on a vehicle."""
@@ -340,10 +403,16 @@ class MapDefectPart(Part):
     """
 
     kind: Literal["missing_transition", "straightened_transition", "coarse_curve", "settled"]
+    """What is wrong: a transition that is missing or straight, a curve drawn by chords, ground that has
+    settled."""
     at_m: float
+    """In the transition or curve that is wrong, or the middle of what has settled, m."""
     chord_m: Annotated[float, Field(ge=1.0, le=200.0)] = 20.0
+    """Length of the chords of a coarse curve, m."""
     depth_mm: Annotated[float, Field(ge=-500.0, le=500.0)] = 20.0
+    """How deep the ground has settled, mm."""
     length_m: Annotated[float, Field(ge=20.0, le=1000.0)] = 60.0
+    """Over which length it has, m."""
 
 
 class MapPart(Part):
@@ -354,15 +423,25 @@ class MapPart(Part):
     """
 
     exact: Listed[bool] = False
+    """True is an ablation: a map without errors, and a train that knows it to be so."""
     cant_sd_mm: Listed[CantSd] = 3.0
+    """Standard deviation of the cant of a curve, one error for each, mm."""
     cant_along_sd_mm: Listed[CantSd] = 1.0
+    """Standard deviation of the cant that wanders along the line, mm."""
     cant_along_length_m: Listed[CorrelationLength] = 100.0
+    """Distance at which the correlation of that has fallen to 1/e, m."""
     radius_sd_percent: Listed[RadiusSd] = 1.0
+    """Relative standard deviation of the curvature of a curve, one error for each, percent."""
     place_sd_m: Listed[PlaceSd] = 0.5
+    """Standard deviation of the place of each joint of two segments, m."""
     gradient_sd_permil: Listed[GradientSd] = 0.2
+    """Standard deviation of the slope of each gradient, per mille."""
     chainage_scale_sd_percent: Listed[ScaleSd] = 0.0
+    """Relative standard deviation of all lengths, percent."""
     chainage_offset_sd_m: Listed[OffsetSd] = 0.0
+    """Standard deviation of a shift of all places, m."""
     defect: tuple[MapDefectPart, ...] = ()
+    """Single faults of the map that the train does not know of."""
 
     def errors(self) -> MapErrors:
         """The sizes in SI."""
@@ -390,15 +469,20 @@ class EarthPart(Part):
     """
 
     latitude_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]]
+    """Latitude, degrees north."""
     x_axis_deg: Listed[Annotated[float, Field(ge=-360.0, le=360.0)]] = 0.0
+    """Direction of the track's X axis, degrees counter-clockwise from east."""
 
 
 class TemperaturePart(Part):
     """``[temperature]``: of the IMUs, from ``start_c`` to ``ambient_c``. Without it, that of calibration."""
 
     start_c: Listed[Annotated[float, Field(ge=-60.0, le=120.0)]]
+    """At the start of the recording, degrees Celsius."""
     ambient_c: Listed[Annotated[float, Field(ge=-60.0, le=120.0)]]
+    """What it goes to."""
     time_constant_s: Listed[Positive] = 600.0
+    """How fast, s."""
 
 
 class EstimatorPart(Part):
@@ -409,9 +493,13 @@ class EstimatorPart(Part):
     """
 
     name: Name
+    """Name of the method in tables."""
     method: str
+    """Its class by name, or FILE.py:CLASS for one of your own."""
     stands_for: Name | None = None
+    """The row of the paper's table that it is set beside."""
     options: dict[str, Any] = Field(default_factory=dict)
+    """Arguments of the class; a list of one makes an axis."""
 
 
 class MonteCarloPart(Part):
@@ -428,10 +516,15 @@ class MonteCarloPart(Part):
     """
 
     samples: Draws = 1
+    """How many values each distribution of the scenario draws, all of them jointly."""
     method: Literal["latin_hypercube", "sobol", "morris", "saltelli"] = "latin_hypercube"
+    """How they fill the space: Latin hypercube, Sobol points, or the design of a sensitivity analysis."""
     track_draws: Draws = 1
+    """How often the rails are laid anew, for each sample."""
     map_draws: Draws = 1
+    """How many maps are drawn for each laying of the rails."""
     sensor_draws: Draws = 1
+    """How many devices record each ride."""
 
     @model_validator(mode="after")
     def _fills_the_space(self) -> MonteCarloPart:
@@ -466,15 +559,25 @@ class RequirePart(Part):
     """
 
     quantity: str
+    """What is asked for, e.g. roll or alignment."""
     limit: float | str
+    """The figure that it must stay below, with its unit, e.g. 0.1 deg."""
     metric: Literal["rms", "sd", "p95", "p9985", "max"] = "rms"
+    """Which figure of the error: rms, p95 or max."""
     band: str = "full"
+    """Wavelength band, for rails."""
     window: str = "whole"
+    """Stretch of the line that counts."""
     reference: Literal["truth", "design"] = "truth"
+    """What the error is held against; the truth if left out."""
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    """Share of devices that must meet it."""
     over: Literal["all", "each"] = "all"
+    """all: a device must meet it on every ride; each: every kind of ride has a verdict of its own."""
     chance: Annotated[float, Field(ge=1e-4, le=0.2)] = 0.05
+    """Chance of a false verdict that is accepted."""
     budget_draws: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Over how many draws it is found out what the error is made of; 0 for not at all."""
 
     def requirement(self) -> Requirement:
         """The requirement, in the unit of the score table."""
@@ -492,14 +595,23 @@ class StopRulePart(Part):
     """
 
     estimator: str = ""
+    """Method whose mean is waited for."""
     quantity: str = ""
+    """Its quantity."""
     metric: str = ""
+    """Its figure."""
     width: Annotated[float, Field(gt=0.0)] = math.inf
+    """Width of the 95 % interval of the mean that is narrow enough, in the unit of the score table."""
     window: str = "whole"
+    """Stretch of the line that counts."""
     reference: Literal["truth", "design"] = "truth"
+    """What the error is held against."""
     band: str = "full"
+    """Wavelength band, for rails."""
     least_draws: Annotated[int, Field(ge=2, le=1_000_000)] = 10
+    """Draws that are made in any case."""
     verdicts: bool = False
+    """True: draw until every [[require]] is settled."""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
@@ -523,7 +635,9 @@ class ScorePart(Part):
     """
 
     windows: tuple[str, ...] | None = None
+    """Stretches that are kept, e.g. whole, curve, straight; curve:* keeps every single curve."""
     metrics: tuple[str, ...] | None = None
+    """Figures that are kept, e.g. rms, p95, max."""
 
 
 class RunningSafetyPart(Part):
@@ -534,7 +648,9 @@ class RunningSafetyPart(Part):
     """
 
     vehicle: Literal["passenger", "freight"] = "passenger"
+    """Kind of vehicle, which says the limit of Prud'homme's that counts."""
     derailment_limit: Annotated[float, Field(gt=0.0, le=3.0)] = 0.8
+    """What Y/Q is held against."""
 
 
 class RideComfortPart(Part):
@@ -548,8 +664,11 @@ class GeometryLimitsPart(Part):
     """
 
     sd_mm: Positive | None = None
+    """Standard deviation of the rails over 200 m, mm."""
     defect_mm: Positive | None = None
+    """Single value, mm."""
     error_sd_mm: Positive | None = None
+    """Standard deviation of the estimate's error in D1, mm."""
 
 
 class GeometryPart(Part):
@@ -560,11 +679,15 @@ class GeometryPart(Part):
     """
 
     bands: tuple[Literal["D0", "D1", "D2", "D3"], ...] = ("D0", "D1", "D2", "D3")
+    """Wavelength bands by name, e.g. D1."""
     own_bands: dict[Name, Wavelengths] = Field(default_factory=dict)
+    """Others: name = [shortest, longest], m."""
     twist_base_m: Annotated[float, Field(gt=0.0, le=50.0)] = 3.0
+    """Base of the twist, m."""
     limits: dict[Literal["alignment", "vertical_profile", "cross_level"], GeometryLimitsPart] = Field(
         default_factory=dict
     )
+    """What the page marks where it is exceeded, by quantity; no score changes."""
 
     @field_validator("own_bands")
     @classmethod

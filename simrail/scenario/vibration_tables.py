@@ -39,11 +39,17 @@ class RoughnessPart(Part):
     """
 
     on: Listed[bool] = True
+    """False switches this source off."""
     table: Listed[Literal["eu_2021_1226_m", "iso_3095", "own"]] = "eu_2021_1226_m"
+    """Levels by a table's name; own for those below."""
     offset_db: Listed[Annotated[float, Field(ge=-40.0, le=40.0)]] = 0.0
+    """Added to all levels, dB."""
     shortest_m: Listed[Annotated[float, Field(ge=0.04, le=1.0)]] = 0.05
+    """Shortest wave, m."""
     wavelengths_m: tuple[Positive, ...] = ()
+    """Centres of one-third octave bands, from the longest on, m, of a table of one's own."""
     levels_db: tuple[Level, ...] = ()
+    """Their levels, dB re 1 um."""
 
     @model_validator(mode="after")
     def _bands(self) -> RoughnessPart:
@@ -99,9 +105,13 @@ class SectionGainPart(Part):
     """
 
     on: Listed[bool] = True
+    """False switches this source off."""
     sd: Listed[Annotated[float, Field(ge=0.0, le=2.0)]] = 0.4
+    """Standard deviation of the logarithm of the gain on the roughness."""
     long_waves_sd: Listed[Annotated[float, Field(ge=0.0, le=2.0)]] = 0.35
+    """The same of what [irregularity] draws."""
     lengths_m: tuple[Positive, Positive] = (100.0, 400.0)
+    """Shortest and longest section, m."""
 
     @model_validator(mode="after")
     def _lengths(self) -> SectionGainPart:
@@ -120,11 +130,17 @@ class DipsPart(Part):
     """``[vibration.welds]``, ``[vibration.joints]``: dips of the rails at even distances."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     spacing_m: Listed[Annotated[float, Field(ge=2.0, le=1000.0)]] = 18.0
+    """Distance between them, m."""
     depth_mm: Listed[Annotated[float, Field(ge=-5.0, le=5.0)]] = 0.15
+    """Mean depth, mm."""
     depth_sd_mm: Listed[Annotated[float, Field(ge=0.0, le=5.0)]] = 0.1
+    """Standard deviation of the depth, mm."""
     decay_m: Listed[Annotated[float, Field(ge=0.02, le=2.0)]] = 0.12
+    """Length over which a dip decays, m."""
     reach_m: Listed[Annotated[float, Field(ge=0.1, le=5.0)]] = 0.8
+    """How far it reaches to either side, m."""
 
     def dips(self) -> Dips | None:
         """The dips; None if they are off."""
@@ -138,78 +154,111 @@ class SleepersPart(Part):
     """``[vibration.sleepers]``: passing over sleepers, as an equivalent wave of both rails."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     spacing_m: Listed[Annotated[float, Field(ge=0.2, le=2.0)]] = 0.6
+    """Mean distance, m."""
     spacing_sd: Listed[Annotated[float, Field(ge=0.0, le=0.1)]] = 0.01
+    """Relative standard deviation of the distance."""
     amplitude_um: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 10.0
+    """Amplitude of the equivalent wave, um."""
     amplitude_sd: Listed[Annotated[float, Field(ge=0.0, le=1.0)]] = 0.25
+    """Relative standard deviation of the amplitude."""
 
 
 class CorrugationPart(Part):
     """``[vibration.corrugation]``: one wave on the inner rail of curves sharper than ``radius_m``."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     wavelength_m: Listed[Annotated[float, Field(ge=0.04, le=1.0)]] = 0.08
+    """Its wavelength, m."""
     amplitude_um: Listed[Annotated[float, Field(ge=0.0, le=1000.0)]] = 15.0
+    """Its amplitude, um."""
     radius_m: Listed[Annotated[float, Field(gt=0.0, le=5000.0)]] = 450.0
+    """Curves sharper than this have it, m."""
 
 
 class WheelsPart(Part):
     """``[vibration.wheels]``: wheels out of round by orders; order n has ``amplitude_um n^-exponent``."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     amplitude_um: Listed[Annotated[float, Field(ge=0.0, le=2000.0)]] = 60.0
+    """Amplitude of the first order, um."""
     exponent: Listed[Annotated[float, Field(ge=0.0, le=4.0)]] = 1.3
+    """Order n has amplitude_um n^-exponent."""
     spread: Listed[Annotated[float, Field(ge=0.0, le=2.0)]] = 0.4
+    """Standard deviation of the logarithm of a wheel's amplitudes."""
     orders: Listed[Annotated[int, Field(ge=1, le=60)]] = 20
+    """How many orders."""
 
 
 class FlexibleTrackPart(Part):
     """``[vibration.track]``: mass, stiffness and damping of the rail under one wheel; off, it is rigid."""
 
     on: Listed[bool] = True
+    """False makes it rigid."""
     mass_kg: Listed[Annotated[float, Field(gt=0.0, le=1e4)]] = 150.0
+    """Mass of the rail that moves under one wheel, kg."""
     stiffness_npm: Listed[Annotated[float, Field(gt=0.0, le=1e10)]] = 7.0e7
+    """Stiffness below it, N/m."""
     damping_nspm: Listed[Annotated[float, Field(ge=0.0, le=1e7)]] = 1.0e5
+    """Damping below it, N s/m."""
 
 
 class BendingPart(Part):
     """``[vibration.bending]``: first vertical bending of car bodies."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     frequency_hz: Listed[Annotated[float, Field(gt=1.0, le=100.0)]] = 10.0
+    """Natural frequency, Hz."""
     damping_ratio: Listed[Annotated[float, Field(gt=0.0, lt=1.0)]] = 0.02
+    """Share of critical damping."""
 
 
 class StructureBornePart(Part):
     """``[vibration.structure_borne]``: share of the frames' vertical motion that reaches the floor."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     share: Listed[Share] = 0.02
+    """Share of the frames' vertical motion that reaches the floor."""
 
 
 class EquipmentPart(Part):
     """``[vibration.equipment]``: equipment under the floor: lines of half the power, noise of the rest."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     rms_mps2: Listed[Acceleration] = 0.03
+    """Root mean square on the floor, m/s2."""
     lines_hz: tuple[Frequency, ...] = (24.6, 49.2, 98.4)
+    """Frequencies of its lines, which have half of the power, Hz."""
     band_hz: tuple[Frequency, Frequency] = (15.0, 180.0)
+    """Band of the noise that has the rest, Hz."""
 
 
 class TractionPart(Part):
     """``[vibration.traction]``: noise of motors and gears, rms ``share`` of the acceleration along."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     share: Listed[Share] = 0.04
+    """Root mean square over the acceleration along the track."""
     band_hz: tuple[Frequency, Frequency] = (30.0, 180.0)
+    """Band of the noise, Hz."""
 
 
 class PassengersPart(Part):
     """``[vibration.passengers]``: doors and passengers, while the train stands."""
 
     on: Listed[bool] = True
+    """False switches this source off."""
     rms_mps2: Listed[Acceleration] = 0.0125
+    """Root mean square while the train stands, m/s2."""
     band_hz: tuple[Frequency, Frequency] = (0.5, 4.0)
+    """Band of the noise, Hz."""
 
 
 class VibrationPart(Part):
@@ -222,22 +271,39 @@ class VibrationPart(Part):
     """
 
     off: Listed[bool] = False
+    """True is an ablation: the same ride in silence."""
     rate_hz: Listed[Annotated[float, Field(ge=500.0, le=8000.0)]] = 2000.0
+    """Rate at which the short waves are computed, Hz."""
     join: Listed[bool] = False
+    """Scale the roughness so that it meets the spectrum of [irregularity] at its shortest wave."""
     lateral_creep: Listed[bool] = False
+    """Let axles sway and yaw in the creep of their contacts."""
     roughness: RoughnessPart = RoughnessPart()
+    """Roughness of rails and wheels."""
     section_gain: SectionGainPart = SectionGainPart()
+    """Sections of the line are rougher and smoother."""
     welds: DipsPart = DipsPart()
+    """Dips at welds."""
     joints: DipsPart = DipsPart(on=False, spacing_m=36.0, depth_mm=0.5, depth_sd_mm=0.25)
+    """Dips at joints."""
     sleepers: SleepersPart = SleepersPart()
+    """Passing over sleepers."""
     corrugation: CorrugationPart = CorrugationPart()
+    """Corrugation of the inner rail in curves."""
     wheels: WheelsPart = WheelsPart()
+    """Wheels out of round."""
     track: FlexibleTrackPart = FlexibleTrackPart()
+    """The track gives under each wheel."""
     bending: BendingPart = BendingPart()
+    """First vertical bending of car bodies."""
     structure_borne: StructureBornePart = StructureBornePart()
+    """What of the frames' motion reaches the floor."""
     equipment: EquipmentPart = EquipmentPart()
+    """Equipment under the floor."""
     traction: TractionPart = TractionPart()
+    """Motors and gears."""
     passengers: PassengersPart = PassengersPart()
+    """Doors and passengers at stops."""
 
     @model_validator(mode="after")
     def _bands_in_order(self) -> VibrationPart:

@@ -59,13 +59,21 @@ class SpectrumFile(Part):
     """A published spectrum as a file: ``octaves_hz`` are of `OCTAVES_HZ`, each with its ``rms_mps2``."""
 
     title: str
+    """One line: what was measured."""
     source: str
+    """Where it was published, or that it is synthetic."""
     kind: Literal["operating", "test"]
+    """What carried the sensor: axle box, frame or floor."""
     vehicle: str
+    """The vehicle."""
     mount: MountKind
+    """Where on it."""
     speed_mps: Annotated[float, Field(ge=0.0, le=150.0)] | None = None
+    """Speed of the train, m/s."""
     octaves_hz: Annotated[tuple[float, ...], Field(min_length=1)]
+    """Centres of the octaves, Hz."""
     rms_mps2: tuple[Annotated[float, Field(gt=0.0, le=1e4)], ...]
+    """Root mean square in each, m/s2."""
 
     @model_validator(mode="after")
     def _fits(self) -> SpectrumFile:

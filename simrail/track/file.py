@@ -36,9 +36,13 @@ class SegmentPart(Part):
     """``[[segment]]``: a straight, a curve, or a transition that joins its two neighbours."""
 
     kind: Literal["straight", "transition", "curve"]
+    """straight, curve or transition."""
     length_m: Length
+    """Length of its horizontal projection, m."""
     radius_m: float | None = None
+    """Radius of a curve, m, positive to the left."""
     cant_mm: float | None = None
+    """Cant of a curve, mm, positive with the outer rail raised."""
 
     @model_validator(mode="after")
     def _radius_and_cant_of_curves_only(self) -> Self:
@@ -73,7 +77,9 @@ class GradientPart(Part):
     """``[[gradient]]``: holds from a place on."""
 
     from_m: float
+    """Where it begins, s along the track, m."""
     permil: float
+    """Slope, per mille, positive uphill."""
 
     def gradient(self) -> Gradient:
         """The gradient that it describes."""
@@ -87,9 +93,13 @@ class DeviationPart(Part):
     """
 
     from_m: float
+    """Where the first value stands, s along the track, m."""
     step_m: Length
+    """Distance of the values, m."""
     cant_mm: tuple[float, ...]
+    """Added to the cant, mm."""
     height_mm: tuple[float, ...]
+    """Added to the height, mm."""
 
     def deviation(self) -> Deviation:
         """The deviation that it describes."""

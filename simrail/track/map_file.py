@@ -45,13 +45,21 @@ class MapErrorsPart(Part):
 
     exact: bool = False
     cant_sd_mm: CantSd | None = None
+    """Standard deviation of the cant of a curve, one error for each, mm."""
     cant_along_sd_mm: CantSd | None = None
+    """Standard deviation of the cant that wanders along the line, mm."""
     cant_along_length_m: CorrelationLength | None = None
+    """Distance at which the correlation of that has fallen to 1/e, m."""
     radius_sd_percent: RadiusSd | None = None
+    """Relative standard deviation of the curvature of a curve, one error for each, percent."""
     place_sd_m: PlaceSd | None = None
+    """Standard deviation of the place of each joint of two segments, m."""
     gradient_sd_permil: GradientSd | None = None
+    """Standard deviation of the slope of each gradient, per mille."""
     chainage_scale_sd_percent: ScaleSd | None = None
+    """Relative standard deviation of all lengths, percent."""
     chainage_offset_sd_m: OffsetSd | None = None
+    """Standard deviation of a shift of all places, m."""
 
     def errors(self) -> MapErrors:
         """The sizes in SI."""

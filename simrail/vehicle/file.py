@@ -42,25 +42,40 @@ class AxleEntry(Part):
     """
 
     name: str
+    """Name of the axle."""
     x_m: float
+    """Ahead of the vehicle's reference point, m."""
     wheels: Literal["independent", "fixed"]
+    """Whether its wheels turn on their own, or as one wheelset."""
     wheel_radius_m: Annotated[float, Field(ge=0.01, le=1.0)]
+    """Radius at the tape circle, m."""
     wheel_y_m: tuple[float, float] = (0.75, -0.75)
+    """Distance of the tape circle from the centre, m."""
     bridge_mass_kg: Positive
+    """Mass of what does not turn, kg."""
     bridge_inertia_kgm2: Inertia
+    """Its inertias in roll, pitch and yaw, kg m2."""
     wheel_mass_kg: Positive
+    """Mass of a wheel, kg."""
     wheel_spin_inertia_kgm2: Positive
+    """Inertia of a wheel about its axis, kg m2."""
     wheel_transverse_inertia_kgm2: Positive
+    """Inertia of a wheel about its diameters, kg m2."""
 
 
 class SuspensionEntry(Part):
     """Equal springs at one or several points between two bodies."""
 
     name: str
+    """Its name."""
     between: tuple[str, str]
+    """The two that it joins, inner first."""
     positions_m: Annotated[list[Point], Field(min_length=1)]
+    """Where, m: one spring at each point."""
     stiffness_npm: Triple
+    """Of one spring along, across and upright, N/m."""
     damping_nspm: Triple
+    """Of one damper along, across and upright, N s/m."""
     series_stiffness_npm: Triple = (0.0, 0.0, 0.0)
     """Stiffness in series with the damper of each axis; 0: the damper is mounted rigidly."""
 
@@ -69,67 +84,109 @@ class RotationEntry(Part):
     """Springs and dampers of the rotation between two bodies (roll, pitch, yaw)."""
 
     name: str
+    """Its name."""
     between: tuple[str, str]
+    """The two that it joins, inner first."""
     stiffness_nmprad: Triple
+    """In roll, pitch and yaw, N m/rad."""
     damping_nmsprad: Triple
+    """In roll, pitch and yaw, N m s/rad."""
 
 
 class TabledEntry(Part):
     """Equal bump stops or nonlinear dampers at one or several points: force over deflection or speed."""
 
     name: str
+    """Its name."""
     between: tuple[str, str]
+    """The two that it joins, inner first."""
     positions_m: Annotated[list[Point], Field(min_length=1)]
+    """Where, m: one at each point."""
     axis: Literal["x", "y", "z"]
+    """Along which axis it works."""
     over: Literal["deflection_m", "speed_mps"]
+    """Whether its force depends on deflection or speed."""
     points: Annotated[list[tuple[Positive, NotNegative]], Field(min_length=2)]
+    """Pairs of deflection (m) or speed (m/s) and force (N), rising; the same to either side."""
 
 
 class RodEntry(Part):
     """Equal rods between two bodies: the first end of each is on the first body."""
 
     name: str
+    """Its name."""
     between: tuple[str, str]
+    """The two that it joins."""
     ends_m: Annotated[list[tuple[Point, Point]], Field(min_length=1)]
+    """Both ends of each rod, m; the first end is on the first body."""
     stiffness_npm: Positive
+    """Along the rod, N/m."""
     damping_nspm: NotNegative
+    """Along the rod, N s/m."""
 
 
 class TrailingArmEntry(Part):
     """Left and right trailing arm of an axle: bushings on the frame; along the arm, lateral, across it."""
 
     name: str
+    """Its name."""
     between: tuple[str, str]
+    """The axle and the frame."""
     bushings_m: tuple[Point, Point]
+    """Left and right bushing on the frame, m."""
     stiffness_npm: Triple
+    """Of one bushing along the arm, lateral, and across it, N/m."""
     damping_nspm: Triple
+    """The same of its damping, N s/m."""
 
 
 class VehicleFile(Part):
     """A whole vehicle file; profiles that it names by a relative path lie beside it."""
 
     title: str
+    """One line: what it is."""
     source: str
+    """Where its figures come from."""
     synthetic: bool
+    """True if they are not those of a real vehicle."""
     gauge_m: Annotated[float, Field(gt=0.1, lt=2.0)]
+    """Gauge of the track that it runs on, m."""
     rail_inclination: Annotated[float, Field(ge=0, le=0.1)]
+    """Inclination of the rails towards each other, e.g. 0.025 for 1:40."""
     wheel_profile: str
+    """A profile by name, or the path of a file."""
     rail_profile: str
+    """A profile by name, or the path of a file."""
     profile_scale: Annotated[float, Field(ge=0.02, le=1.0)] = 1.0
+    """Size of the profiles on this vehicle; 0.1 on one of 1:10."""
     contact_smoothing: Annotated[float, Field(ge=0.1, le=5.0)] = 0.22
+    """How far contact is smeared out along the profile, mm."""
     friction: Annotated[float, Field(gt=0, le=1.0)]
+    """Friction coefficient of wheel and rail."""
     axle: Annotated[list[AxleEntry], Field(min_length=1)]
+    """The axles, with their wheels."""
     body: tuple[Body, ...] = ()
+    """Frames and bodies."""
     suspension: tuple[SuspensionEntry, ...] = ()
+    """Springs and dampers between two bodies, or axles."""
     rotation: tuple[RotationEntry, ...] = ()
+    """Springs and dampers of rotations."""
     tabled: tuple[TabledEntry, ...] = ()
+    """Bump stops and nonlinear dampers."""
     rod: tuple[RodEntry, ...] = ()
+    """Rods from point to point."""
     trailing_arm: tuple[TrailingArmEntry, ...] = ()
+    """Trailing arms of axles."""
     creep: CreepLaw = CreepLaw()
+    """Law of the creep forces."""
     linear_contact: LinearContact | None = None
+    """Linear contact of the textbooks, in place of the profiles."""
     gyroscopic: bool = True
+    """Whether spinning wheels resist being turned."""
     guide: Guide
+    """The driver: what pulls the vehicle to where it should be."""
     traction: Traction | None = None
+    """Motors and brakes, where the wheels drive."""
     _folder: Path | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")

@@ -35,9 +35,13 @@ class Body:
     """
 
     name: str
+    """Its name."""
     mass_kg: Positive
+    """Mass, kg."""
     inertia_kgm2: Inertia
+    """Inertias in roll, pitch and yaw about the centre of gravity, kg m2."""
     position_m: Point
+    """Centre of gravity, m: ahead of the reference point, left, above the rails."""
 
 
 @dataclass(frozen=True)
@@ -166,18 +170,31 @@ class Guide:
     """
 
     body: str
+    """The body that it holds."""
     stiffness_npm: Positive
+    """Along the track, N/m."""
     damping_nspm: NotNegative
+    """Along the track, N s/m."""
     pitch_stiffness_nmprad: NotNegative
+    """In pitch, N m/rad."""
     pitch_damping_nmsprad: NotNegative
+    """In pitch, N m s/rad."""
     yaw_stiffness_nmprad: NotNegative
+    """In yaw, N m/rad."""
     yaw_damping_nmsprad: NotNegative
+    """In yaw, N m s/rad."""
     lateral_stiffness_npm: NotNegative = 0.0
+    """Across the track, N/m."""
     lateral_damping_nspm: NotNegative = 0.0
+    """Across the track, N s/m."""
     vertical_stiffness_npm: NotNegative = 0.0
+    """Upright, N/m."""
     vertical_damping_nspm: NotNegative = 0.0
+    """Upright, N s/m."""
     roll_stiffness_nmprad: NotNegative = 0.0
+    """In roll, N m/rad."""
     roll_damping_nmsprad: NotNegative = 0.0
+    """In roll, N m s/rad."""
 
 
 @dataclass(frozen=True)
@@ -223,14 +240,23 @@ class LinearContact:
     """
 
     f11_n: Positive
+    """Kalker's coefficient along, N."""
     f22_n: Positive
+    """Kalker's coefficient across, N."""
     f23_nm: float = 0.0
+    """Kalker's coefficient of lateral force and spin, N m."""
     f33_nm2: NotNegative = 0.0
+    """Kalker's coefficient of spin, N m2."""
     conicity: Annotated[float, Field(ge=0.0, le=0.5)]
+    """Change of the rolling radius over displacement."""
     vertical_stiffness_npm: Positive
+    """Of the spring that carries a wheel, N/m."""
     vertical_damping_nspm: NotNegative
+    """Of its damper, N s/m."""
     gravitational_stiffness_npm: float = 0.0
+    """Lateral, of a wheelset, N/m."""
     gravitational_yaw_stiffness_nmprad: float = 0.0
+    """In yaw, of a wheelset, N m/rad."""
 
 
 @dataclass(frozen=True)

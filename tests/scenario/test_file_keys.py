@@ -90,3 +90,8 @@ def test_keys_tell_form_limits_and_default() -> None:
     assert keys["", "step_s"].default == "0.0005"
     assert "<= 0.001" in keys["", "step_s"].form
     assert keys["[[irregularity.defect]]", "form"].form.startswith('one of "ramp"')
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_every_key_is_described(kind: str) -> None:
+    assert [(key.table, key.name) for key in keys_of(kind) if not key.meaning] == []

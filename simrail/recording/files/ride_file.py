@@ -213,6 +213,7 @@ class OdometrySignalPart(SignalPart):
     signal: ClassVar[Signal] = ODOMETRY_SIGNAL
 
     source: str
+    """Who made it, as pages call it."""
 
 
 class GapsPart(SignalPart):

@@ -44,12 +44,19 @@ class SpringsPart(Part):
     """``[[vehicle_sheet.body.springs]]``: between a body and one of those that it rests on, as `Springs`."""
 
     lateral_npm: Stiffness
+    """Lateral stiffness of all of them together, N/m."""
     vertical_npm: Annotated[float, Field(ge=1e3, le=1e10)]
+    """Vertical stiffness, N/m."""
     roll_nmprad: Stiffness
+    """Stiffness in roll beyond that of the vertical springs, N m/rad."""
     lateral_nspm: PrimaryDamping
+    """Lateral damping, N s/m."""
     vertical_nspm: PrimaryDamping
+    """Vertical damping, N s/m."""
     roll_nmsprad: PrimaryDamping
+    """Damping in roll, N m s/rad."""
     height_m: Height
+    """Height above the rails at which the lateral springs act, m."""
 
 
 class SheetBodyPart(Part):
