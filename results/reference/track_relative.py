@@ -1,6 +1,8 @@
-"""Make ``track_relative.csv`` of the results of ``simrail run track_relative``.
+"""Make ``track_relative.csv`` of the results of ``simrail run track_relative``, and likewise of its parts.
 
     simrail run track_relative --out DIR
+    python results/reference/track_relative.py DIR
+    simrail run track_relative_parts --out DIR
     python results/reference/track_relative.py DIR
 
 One row per vehicle, mount, method and quantity: the root of the mean square error over all rides with its
@@ -11,6 +13,7 @@ the error is beyond the method's bound, that bound's median, and the share of th
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -19,7 +22,6 @@ import pandas as pd
 
 from simrail.scoring.bootstrap import interval
 
-TABLE = Path(__file__).with_name("track_relative.csv")
 QUANTITIES = ("roll", "pitch", "yaw_debiased", "position", "speed")
 TOLD = (
     *("coverage50", "coverage90", "coverage95", "coverage99", "coverage999"),
@@ -56,8 +58,10 @@ def main() -> None:
     """Read the results named on the command line, and write the table."""
     folder = Path(sys.argv[1])
     table = table_of(pd.read_parquet(folder / "scores.parquet"), pd.read_parquet(folder / "cells.parquet"))
-    table.to_csv(TABLE, index=False, float_format="%.4g")
-    print(f"wrote {TABLE}: {len(table)} rows")
+    name = json.loads((folder / "manifest.json").read_text())["scenario"]
+    path = Path(__file__).with_name(f"{name}.csv")
+    table.to_csv(path, index=False, float_format="%.4g")
+    print(f"wrote {path}: {len(table)} rows")
 
 
 if __name__ == "__main__":
