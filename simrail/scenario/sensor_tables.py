@@ -91,32 +91,32 @@ class IronPart(Part):
     """``[magnetometer.iron]``: hard and soft iron of the vehicle; synthetic."""
 
     hard_iron_ut: tuple[float, float, float] = (6.0, -4.0, 8.0)
-    """Largest field of the vehicle itself along an axis, uT."""
+    """Remanent field of the vehicle on the axes of the sensor, uT."""
     soft_iron: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]] = (
         VehicleIron.soft_iron
     )
-    """Largest share by which it bends the Earth's."""
+    """Induced field over the outer one, 3 x 3."""
 
 
 class TractionPart(Part):
     """``[magnetometer.traction]``: currents of the line that feeds the vehicle; synthetic."""
 
     supply: Listed[Literal["catenary", "third_rail"]] = "catenary"
-    """Where the current comes from."""
+    """A contact wire above the track, or a conductor rail on its left."""
     voltage_v: Listed[Annotated[float, Field(gt=0.0, le=30e3)]] = 750.0
     """Voltage of the line, V."""
     efficiency: Listed[Annotated[float, Field(gt=0.0, le=1.0)]] = 0.85
-    """Share of the power that reaches the rims."""
+    """Efficiency of the drive."""
     auxiliary_kw: Listed[NotNegative] = 30.0
     """What light and air take, kW."""
     mass_t: Listed[Positive] = 42.0
-    """Mass of the train, t."""
+    """Mass of the whole train that is fed here, t."""
     resistance_kn: Listed[NotNegative] = 2.5
     """Running resistance, kN."""
     regenerative: Listed[bool] = True
     """True: braking feeds the line."""
     share: Listed[Annotated[float, Field(gt=0.0, le=1.0)]] = 0.5
-    """Share of the current that flows by the sensor."""
+    """Field over that of an endless line; one half where the line ends at the train."""
 
 
 class SteelPart(Part):
@@ -125,9 +125,9 @@ class SteelPart(Part):
     spacing_m: Listed[Annotated[float, Field(ge=1.0)]] = 20.0
     """Mean distance between them, m."""
     moment_sd_am2: Listed[NotNegative] = 1500.0
-    """Standard deviation of their magnetic moment, A m2."""
+    """Standard deviation of each component of their magnetic moment, A m2."""
     beside_m: tuple[float, float] = (1.8, 4.0)
-    """Least and largest distance from the track, m."""
+    """Least and largest distance from the centre of the track, either side, m."""
     height_m: tuple[float, float] = (-0.5, 5.0)
     """Least and largest height above the rails, m."""
 
@@ -150,7 +150,7 @@ class MagnetometerPart(Part):
     intensity_ut: Listed[Annotated[float, Field(gt=0.0, lt=100.0)]] = 45.0
     """The Earth's field, uT."""
     inclination_deg: Listed[Annotated[float, Field(ge=-89.0, le=89.0)]] = 55.0
-    """How far it points down, degrees."""
+    """Dip below the horizontal, degrees; positive in the northern hemisphere."""
     declination_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
     """How far magnetic north lies east of north, degrees."""
     x_axis_deg: Listed[Annotated[float, Field(ge=-360.0, le=360.0)]] = 0.0
@@ -158,11 +158,11 @@ class MagnetometerPart(Part):
     noise_ntpsqrthz: Listed[NotNegative] = 10.0
     """White noise, nT/sqrt(Hz)."""
     bias_nt: Listed[NotNegative] = 300.0
-    """Largest bias of an axis, nT; one draw for each device."""
+    """Bound of the bias of an axis, nT; uniform, one draw for each device."""
     range_ut: Listed[Positive] = 250.0
-    """Range, uT."""
+    """Largest magnitude that is measured, uT."""
     resolution_nt: Listed[NotNegative] = 0.0
-    """Step of a reading, nT."""
+    """Size of one count, nT; 0 for none."""
     iron: IronPart | None = None
     """Hard and soft iron of the vehicle."""
     traction: TractionPart | None = None
@@ -212,7 +212,7 @@ class RailSensorPart(Part):
     outlier_fraction: Listed[Annotated[float, Field(ge=0.0, le=0.2)]] = 0.01
     """Share of readings that are false."""
     outlier_mm: Listed[Annotated[float, Field(ge=0.0, lt=1000.0)]] = 5.0
-    """Standard deviation of those, mm."""
+    """Standard deviation of what a false one adds, mm."""
 
     def spec(self) -> RailSensorSpec:
         """The sensor, with no axis left."""

@@ -65,11 +65,11 @@ class DefectPart(Part):
     form: Literal["ramp", "step", "dip", "joint", "twist"]
     """Its form."""
     at_m: float
-    """Where it begins or, for a dip, lies, s along the track, m."""
+    """Where it begins, s along the track, m."""
     length_m: Positive
-    """Length of the form, m."""
+    """Length of the form, of a ramp, step or twist that of its rise, m."""
     size_mm: float
-    """Its height, or its depth where negative, mm."""
+    """Its size, mm: up or to the left positive, of a dip or joint down or to the right, of a twist left rail up."""
     direction: Literal["vertical", "lateral"] = "vertical"
     """Whether rails leave their place up and down, or aside."""
     rails: Literal["both", "left", "right"] = "both"
@@ -305,7 +305,7 @@ class RailConditionPart(Part):
     condition: Literal["dry", "wet", "leaves"] | None = None
     """What lies there, by its name."""
     friction: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
-    """Friction coefficient of one's own, in place of a name."""
+    """Friction coefficient there, in place of a name."""
     rails: Literal["both", "left", "right"] = "both"
     """Which rails it lies on."""
 
@@ -408,7 +408,7 @@ class MapDefectPart(Part):
     at_m: float
     """In the transition or curve that is wrong, or the middle of what has settled, m."""
     chord_m: Annotated[float, Field(ge=1.0, le=200.0)] = 20.0
-    """Length of the chords of a coarse curve, m."""
+    """Distance of the vertices by which a coarse curve is known, m."""
     depth_mm: Annotated[float, Field(ge=-500.0, le=500.0)] = 20.0
     """How deep the ground has settled, mm."""
     length_m: Annotated[float, Field(ge=20.0, le=1000.0)] = 60.0

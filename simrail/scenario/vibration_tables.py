@@ -140,7 +140,7 @@ class DipsPart(Part):
     decay_m: Listed[Annotated[float, Field(ge=0.02, le=2.0)]] = 0.12
     """Length over which a dip decays, m."""
     reach_m: Listed[Annotated[float, Field(ge=0.1, le=5.0)]] = 0.8
-    """How far it reaches to either side, m."""
+    """Half of the length of a dip, m."""
 
     def dips(self) -> Dips | None:
         """The dips; None if they are off."""
@@ -184,13 +184,13 @@ class WheelsPart(Part):
     on: Listed[bool] = True
     """False switches this source off."""
     amplitude_um: Listed[Annotated[float, Field(ge=0.0, le=2000.0)]] = 60.0
-    """Amplitude of the first order, um."""
+    """Median amplitude of the first order, um."""
     exponent: Listed[Annotated[float, Field(ge=0.0, le=4.0)]] = 1.3
     """Order n has amplitude_um n^-exponent."""
     spread: Listed[Annotated[float, Field(ge=0.0, le=2.0)]] = 0.4
-    """Standard deviation of the logarithm of a wheel's amplitudes."""
+    """Standard deviation of the logarithm of an amplitude, each wheel's and order's by itself."""
     orders: Listed[Annotated[int, Field(ge=1, le=60)]] = 20
-    """How many orders."""
+    """Highest order."""
 
 
 class FlexibleTrackPart(Part):
@@ -223,7 +223,7 @@ class StructureBornePart(Part):
     on: Listed[bool] = True
     """False switches this source off."""
     share: Listed[Share] = 0.02
-    """Share of the frames' vertical motion that reaches the floor."""
+    """Share of the vertical motion of what carries a body that its floor has besides its own."""
 
 
 class EquipmentPart(Part):
@@ -245,7 +245,7 @@ class TractionPart(Part):
     on: Listed[bool] = True
     """False switches this source off."""
     share: Listed[Share] = 0.04
-    """Root mean square over the acceleration along the track."""
+    """Vertical root mean square over the acceleration along the track."""
     band_hz: tuple[Frequency, Frequency] = (30.0, 180.0)
     """Band of the noise, Hz."""
 
@@ -256,7 +256,7 @@ class PassengersPart(Part):
     on: Listed[bool] = True
     """False switches this source off."""
     rms_mps2: Listed[Acceleration] = 0.0125
-    """Root mean square while the train stands, m/s2."""
+    """Vertical root mean square while the train stands, m/s2."""
     band_hz: tuple[Frequency, Frequency] = (0.5, 4.0)
     """Band of the noise, Hz."""
 
@@ -273,7 +273,7 @@ class VibrationPart(Part):
     off: Listed[bool] = False
     """True is an ablation: the same ride in silence."""
     rate_hz: Listed[Annotated[float, Field(ge=500.0, le=8000.0)]] = 2000.0
-    """Rate at which the short waves are computed, Hz."""
+    """Rate at which the short waves are worked out, Hz; a whole multiple of that of the truth."""
     join: Listed[bool] = False
     """Scale the roughness so that it meets the spectrum of [irregularity] at its shortest wave."""
     lateral_creep: Listed[bool] = False

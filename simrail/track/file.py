@@ -122,8 +122,12 @@ class TrackFile(Part):
         s at the start of the first segment.
     start_position_m, start_yaw_rad
         Global place and heading there, as in `TrackDesign`.
-    cant_ramp, vertical_radius_m, vertical_ramp_m
-        As in `TrackDesign`.
+    cant_ramp : str
+        How cant rises in a transition: ``"smooth"`` (quintic) or ``"linear"``.
+    vertical_radius_m : float or list of float
+        Radius of the vertical curves, m: one for all, or one for each change of gradient.
+    vertical_ramp_m : float
+        Length over which the bend of a vertical curve rises and falls, m; 0 for bare parabolas.
     rail_base_mm : float
         Lateral distance of the running tables, which cant and cross-level are heights over; 1500 mm at normal
         gauge.

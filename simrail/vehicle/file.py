@@ -160,7 +160,7 @@ class VehicleFile(Part):
     profile_scale: Annotated[float, Field(ge=0.02, le=1.0)] = 1.0
     """Size of the profiles on this vehicle; 0.1 on one of 1:10."""
     contact_smoothing: Annotated[float, Field(ge=0.1, le=5.0)] = 0.22
-    """How far contact is smeared out along the profile, mm."""
+    """Smoothing of the contact over its static elastic approach; below 0.1 it chatters like a rigid one."""
     friction: Annotated[float, Field(gt=0, le=1.0)]
     """Friction coefficient of wheel and rail."""
     axle: Annotated[list[AxleEntry], Field(min_length=1)]

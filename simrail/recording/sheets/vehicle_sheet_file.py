@@ -67,19 +67,22 @@ class SheetBodyPart(Part):
     name : str
         Its name.
     x_m : float
-        As `SheetBody.x_m`.
+        Where its reference point is along the vehicle, m, forward from any point that all bodies share.
     rests_on : tuple of str
         Names of those below it; none for an axle.
     pivots_m : tuple of float
         Where it rests on each of them, in its own coordinates.
-    ends_m, primary_stiffness_npm, primary_damping_nspm : optional
-        As in `SheetBody`.
+    ends_m : tuple of float, optional
+        Its rear and its front end, in its own coordinates, m.
+    primary_stiffness_npm, primary_damping_nspm : float, optional
+        Of an axle: vertical stiffness and damping of its suspension, both sides together.
     turned_by, turned_by_1pm : tuple of str, tuple of float
-        As `SheetBody.turned_by`: names of axles, and the weight of each.
+        Where it does not point from support to support: names of axles, and by how much its heading follows
+        the lateral offset of each, 1/m (`SheetBody.turned_by`).
     wheelset : bool, optional
-        Of an axle, as in `SheetBody`.
+        Of an axle: whether its wheels turn as one.
     mass_kg, roll_inertia_kgm2, pitch_inertia_kgm2, height_m : float, optional
-        As in `SheetBody`.
+        Mass, inertia about the centre of gravity, and its height over the rails.
     springs : tuple of SpringsPart
         One for each of rests_on, or none.
     """
