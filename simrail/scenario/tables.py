@@ -69,7 +69,7 @@ class DefectPart(Part):
     length_m: Positive
     """Length of the form, of a ramp, step or twist that of its rise, m."""
     size_mm: float
-    """Its size, mm: up or to the left positive, of a dip or joint down or to the right, of a twist left rail up."""
+    """Its size, mm: up or left positive, of a dip or joint down or right, of a twist with the left rail up."""
     direction: Literal["vertical", "lateral"] = "vertical"
     """Whether rails leave their place up and down, or aside."""
     rails: Literal["both", "left", "right"] = "both"

@@ -38,11 +38,11 @@ class ImuSignalPart(VectorPart):
     name, body : str
         Name of the IMU, and of the body that carries it.
     position_m : tuple of float
-        Where it sits as the vehicle stands centred on level track, m: ahead of the body's reference point, left
-        of the track's centre, above the rails.
+        Where it sits as the vehicle stands centred on level track, m: ahead of the body's reference point,
+        left of the track's centre, above the rails.
     delay_s : float
-        How much later than its time stamp a sample leaves the sensor, s, where the sheet does not say it; time
-        stamps are already corrected for it.
+        How much later than its time stamp a sample leaves the sensor, s, where the sheet does not say it;
+        time stamps are already corrected for it.
     grade : str, optional
         A shipped IMU, or the path of an IMU file.
     datasheet : ImuFile, optional
