@@ -22,29 +22,31 @@ from scipy.interpolate import PPoly
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
-from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
+from simrail.track.alignment import Plan, build_cant, build_plan, cant_of_stations, element_starts
 from simrail.track.deviation import Deviation
 from simrail.track.elements import (
     CURVE,
     RAIL_BASE_M,
     STRAIGHT,
     TRANSITION,
+    CantStation,
     Curve,
     Element,
     Gradient,
     Straight,
     Transition,
-    check_elements,
     element_from_dict,
     element_to_dict,
     require_number,
 )
+from simrail.track.joints import check_elements, check_stations
 from simrail.track.vertical import build_vertical, check_gradients
 
 __all__ = [
     "CURVE",
     "STRAIGHT",
     "TRANSITION",
+    "CantStation",
     "Curve",
     "Element",
     "Gradient",
@@ -116,8 +118,8 @@ class TrackDesign:
     start_m : float
         s at the start of the first element.
     elements : tuple of Straight, Curve, Transition
-        The plan, in the order of s. A transition joins its neighbours; without one, curvature and cant
-        may not step.
+        The plan, in the order of s. A transition joins its neighbours, or has ends of its own; without one,
+        curvature and cant may not step.
     gradients : tuple of Gradient
         In the order of s; level before the first.
     vertical_radius_m : float or tuple of float
@@ -139,6 +141,11 @@ class TrackDesign:
         Yaw at `start_m`.
     deviation : Deviation, optional
         Cant and height that are added to those of the elements and gradients.
+    cant_stations : tuple of CantStation
+        Cant beside the plan, in the order of s, in the place of that of the elements; linear between, level
+        before the first and after the last.
+    step_smoothing_m : float
+        Length over which curvature and cant rise where they step, centred on the step; 0 refuses steps.
     """
 
     name: str
@@ -154,6 +161,8 @@ class TrackDesign:
     start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_yaw_rad: float = 0.0
     deviation: Deviation | None = None
+    cant_stations: tuple[CantStation, ...] = ()
+    step_smoothing_m: float = 0.0
 
     @property
     def length_m(self) -> float:
@@ -186,13 +195,29 @@ class TrackDesign:
             raise InputError(
                 "is out of range", field="rail_base_m", value=self.rail_base_m, limit=f"{low:g} to {high:g} m"
             )
-        check_elements(self.elements, rail_base_m=self.rail_base_m)
+        check_elements(
+            self.elements,
+            rail_base_m=self.rail_base_m,
+            step_smoothing_m=self.step_smoothing_m,
+            has_stations=bool(self.cant_stations),
+        )
+        check_stations(self.cant_stations, rail_base_m=self.rail_base_m)
         check_gradients(self.gradients, end_m=self.end_m)
         if self.deviation is not None:
             self.deviation.check()
         x, y, z = self.start_position_m
-        plan = build_plan(self.elements, self.start_m, position_m=(x, y), yaw_rad=self.start_yaw_rad)
-        cant = build_cant(self.elements, self.start_m, ramp=self.cant_ramp)
+        smoothing = self.step_smoothing_m
+        plan = build_plan(
+            self.elements,
+            self.start_m,
+            position_m=(x, y),
+            yaw_rad=self.start_yaw_rad,
+            step_smoothing_m=smoothing,
+        )
+        if self.cant_stations:
+            cant = cant_of_stations(self.cant_stations, self.start_m, self.end_m)
+        else:
+            cant = build_cant(self.elements, self.start_m, ramp=self.cant_ramp, step_smoothing_m=smoothing)
         height = build_vertical(
             self.gradients,
             self.start_m,
@@ -278,6 +303,8 @@ class TrackDesign:
         values = dict(data)
         values["elements"] = tuple(element_from_dict(element) for element in data["elements"])
         values["gradients"] = tuple(Gradient(**gradient) for gradient in data["gradients"])
+        stations = data.get("cant_stations", ())
+        values["cant_stations"] = tuple(CantStation(**station) for station in stations)
         values["start_position_m"] = tuple(data["start_position_m"])
         if isinstance(data["vertical_radius_m"], list):
             values["vertical_radius_m"] = tuple(data["vertical_radius_m"])
