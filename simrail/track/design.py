@@ -30,6 +30,7 @@ from simrail.track.elements import (
     STRAIGHT,
     TRANSITION,
     CantStation,
+    ChainageBreak,
     Curve,
     Element,
     Gradient,
@@ -47,6 +48,7 @@ __all__ = [
     "STRAIGHT",
     "TRANSITION",
     "CantStation",
+    "ChainageBreak",
     "Curve",
     "Element",
     "Gradient",
@@ -146,6 +148,8 @@ class TrackDesign:
         before the first and after the last.
     step_smoothing_m : float
         Length over which curvature and cant rise where they step, centred on the step; 0 refuses steps.
+    chainage_breaks : tuple of ChainageBreak
+        Where the kilometre posts jump, in the order of s: see `chainage_m`.
     """
 
     name: str
@@ -163,6 +167,7 @@ class TrackDesign:
     deviation: Deviation | None = None
     cant_stations: tuple[CantStation, ...] = ()
     step_smoothing_m: float = 0.0
+    chainage_breaks: tuple[ChainageBreak, ...] = ()
 
     @property
     def length_m(self) -> float:
@@ -202,6 +207,11 @@ class TrackDesign:
             has_stations=bool(self.cant_stations),
         )
         check_stations(self.cant_stations, rail_base_m=self.rail_base_m)
+        before = -np.inf
+        for i, mark in enumerate(self.chainage_breaks):
+            require_number(mark.at_m, f"chainage_break[{i}].at_m", above=before)
+            require_number(mark.ahead_m, f"chainage_break[{i}].ahead_m")
+            before = mark.at_m
         check_gradients(self.gradients, end_m=self.end_m)
         if self.deviation is not None:
             self.deviation.check()
@@ -275,6 +285,15 @@ class TrackDesign:
         """Plan curvature d yaw / ds at places s, 1/m, positive to the left; shaped like s."""
         return self._shape.plan.state(self.on_track(s))[1]
 
+    def chainage_m(self, s: npt.ArrayLike) -> FloatArray:
+        """What the kilometre posts say at places s, m; at a break what begins there; shaped like s."""
+        places = self.on_track(s)
+        if not self.chainage_breaks:
+            return places
+        starts = np.array([mark.at_m for mark in self.chainage_breaks])
+        shifts = np.array([0.0, *(mark.ahead_m - mark.at_m for mark in self.chainage_breaks)])
+        return np.asarray(places + shifts[np.searchsorted(starts, places, side="right")])
+
     def segment(self, s: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Index of the element at places s; at a joint, of the one that begins there."""
         starts = self._shape.starts_m
@@ -305,6 +324,8 @@ class TrackDesign:
         values["gradients"] = tuple(Gradient(**gradient) for gradient in data["gradients"])
         stations = data.get("cant_stations", ())
         values["cant_stations"] = tuple(CantStation(**station) for station in stations)
+        marks = data.get("chainage_breaks", ())
+        values["chainage_breaks"] = tuple(ChainageBreak(**mark) for mark in marks)
         values["start_position_m"] = tuple(data["start_position_m"])
         if isinstance(data["vertical_radius_m"], list):
             values["vertical_radius_m"] = tuple(data["vertical_radius_m"])

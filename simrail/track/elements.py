@@ -159,6 +159,22 @@ class CantStation:
     cross_slope_m: float
 
 
+@dataclass(frozen=True)
+class ChainageBreak:
+    """A place where the kilometre posts jump: s goes on, the chainage does not.
+
+    Attributes
+    ----------
+    at_m : float
+        Where it is, s along the track.
+    ahead_m : float
+        Chainage that begins there; before the first break chainage is s.
+    """
+
+    at_m: float
+    ahead_m: float
+
+
 _ELEMENTS: dict[str, type[Straight] | type[Curve] | type[Transition]] = {
     cls.word: cls for cls in (Straight, Curve, Transition)
 }

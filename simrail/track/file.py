@@ -6,7 +6,7 @@ positive uphill in the direction of s. On a straight no rail is the outer one: t
 the right rail, as in a curve to the left, unless ``raised`` says which.
 """
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -18,6 +18,7 @@ from simrail.core.toml_files import Part, load, toml_text
 from simrail.track.design import (
     RAIL_BASE_LIMITS_M,
     CantStation,
+    ChainageBreak,
     Curve,
     Element,
     Gradient,
@@ -169,6 +170,13 @@ class GradientPart(Part):
         return Gradient(self.from_m, self.permil / 1000.0)
 
 
+class ChainageBreakPart(Part):
+    """``[[chainage_break]]``: a place where the kilometre posts jump."""
+
+    at_m: float
+    ahead_m: float
+
+
 class DeviationPart(Part):
     """``[deviation]``: cant and height beside those of segments and gradients, at equal steps along the line.
 
@@ -213,6 +221,8 @@ class TrackFile(Part):
     step_smoothing_m : float
         Length over which curvature and cant rise where they step, about that of a vehicle's base; a track
         whose curvature or cant steps needs it.
+    chainage_break : tuple
+        Where the kilometre posts jump, in the order of s; s itself goes on.
     deviation : DeviationPart, optional
         What is added to them.
     """
@@ -234,6 +244,7 @@ class TrackFile(Part):
     gradient: tuple[GradientPart, ...] = ()
     cant: tuple[CantPart, ...] = ()
     step_smoothing_m: float = Field(default=0.0, ge=0.0)
+    chainage_break: tuple[ChainageBreakPart, ...] = ()
     deviation: DeviationPart | None = None
 
     @model_validator(mode="after")
@@ -277,6 +288,7 @@ class TrackFile(Part):
             elements=tuple(part.element() for part in self.segment),
             gradients=tuple(part.gradient() for part in self.gradient),
             rail_base_m=self.rail_base_mm / 1000.0,
+            chainage_breaks=tuple(ChainageBreak(mark.at_m, mark.ahead_m) for mark in self.chainage_break),
             deviation=None if self.deviation is None else self.deviation.deviation(),
             **{field: getattr(self, field) for field in _SHARED},
         )
@@ -337,6 +349,8 @@ def track_text(design: TrackDesign) -> str:
             }
             for i, station in enumerate(design.cant_stations)
         ]
+    if design.chainage_breaks:
+        tables["chainage_break"] = [asdict(mark) for mark in design.chainage_breaks]
     if design.deviation is not None:
         beside = design.deviation
         tables["deviation"] = {
