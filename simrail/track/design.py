@@ -45,6 +45,7 @@ from simrail.track.vertical import build_vertical, check_gradients
 
 __all__ = [
     "CURVE",
+    "NO_MAP",
     "STRAIGHT",
     "TRANSITION",
     "CantStation",
@@ -170,6 +171,11 @@ class TrackDesign:
     chainage_breaks: tuple[ChainageBreak, ...] = ()
 
     @property
+    def is_map(self) -> bool:
+        """Whether there is a line: false for `NO_MAP` alone, since every file has a segment."""
+        return self != NO_MAP
+
+    @property
     def length_m(self) -> float:
         """Length of the horizontal projection."""
         return self.end_m - self.start_m
@@ -191,6 +197,13 @@ class TrackDesign:
 
     @cached_property
     def _shape(self) -> _Shape:
+        if not self.is_map:
+            raise InputError(
+                "the method needs a map of the track, and the ride names none",
+                field="track",
+                remedy='name one in the ride file, e.g. track = "./my_line.toml" (simrail new track), or '
+                "choose a method that needs none",
+            )
         require_number(self.start_m, "start_m")
         require_number(self.vertical_ramp_m, "vertical_ramp_m", least=0.0)
         if self.cant_ramp not in ("smooth", "linear"):
@@ -338,6 +351,8 @@ class TrackDesign:
     def on_track(self, s: npt.ArrayLike) -> FloatArray:
         """The places s as an array of floats; refused with an `InputError` if one is off the track."""
         s = np.asarray(s, dtype=float)
+        if not self.is_map:
+            _ = self._shape
         off = ~((s >= self.start_m) & (s <= self.end_m))  # also true for NaN
         if off.any():
             first = float(s[off].flat[0])
@@ -349,6 +364,10 @@ class TrackDesign:
                 remedy="shorten the ride or lengthen the track",
             )
         return s
+
+
+NO_MAP = TrackDesign("no map", 0.0, ())
+"""What a ride has in the place of a map if it names no track: whoever asks it for the line is refused."""
 
 
 def _stack(*parts: FloatArray) -> FloatArray:
