@@ -15,7 +15,7 @@ import numpy as np
 from simrail.core.columns import ACCEL
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording, odometry_of
-from simrail.track.design import TrackFrame
+from simrail.track.design import Straight, TrackDesign, TrackFrame
 
 
 class Compensating(Protocol):
@@ -51,8 +51,16 @@ def design_frame(recording: Recording) -> TrackFrame:
     return _frame(recording, odometry_of(recording)["position_m"].to_numpy(dtype=np.float64))
 
 
+_LEVEL = TrackDesign("level", 0.0, (Straight(1.0),))
+
+
 def start_frame(recording: Recording) -> TrackFrame:
-    """Design track frame, of one row, where the ride begins: by the odometry, or the platform known."""
+    """Design track frame, of one row, where the ride begins: by the odometry, or the platform known.
+
+    Without a map it is level, and yaw counts from there.
+    """
+    if not recording.track.is_map:
+        return _LEVEL.frame(np.zeros(1))
     known = np.array([recording.start_position_m])
     if recording.odometry is not None:
         known = recording.odometry["position_m"].to_numpy(dtype=np.float64)[:1]

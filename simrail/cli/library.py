@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from simrail.cli.options import DONE, number
+from simrail.core.errors import InputError
 
 FOLDERS = {
     "scenarios": "",
@@ -181,10 +182,41 @@ def new(
     ],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Its name, e.g. my_filter.")],
     folder: Annotated[Path, typer.Option("--in", metavar="DIR", help="Where to write it.")] = Path(),
+    source: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", metavar="FILE", help="Of a track: LandXML, or a CSV of curvature over distance."
+        ),
+    ] = None,
+    alignment: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which one, of a LandXML file with several.")
+    ] = None,
+    step_smoothing: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="Length over which its steps of curvature are smoothed; 5 m if not said."
+        ),
+    ] = None,
 ) -> int:
     """Write a working template: one file, to be changed into your own part."""
-    from simrail.cli.templates import write_template
+    from simrail.cli.templates import write_template, write_track
 
+    if kind == "track" and source is not None:
+        path, notes = write_track(
+            name, source, folder=folder, alignment=alignment, step_smoothing_m=step_smoothing
+        )
+        print(
+            "\n".join([f"wrote {path}", *notes, f'use it in a scenario beside it: track = "./{path.name}"'])
+        )
+        return DONE
+    for option, value in (
+        ("--from", source),
+        ("--alignment", alignment),
+        ("--step-smoothing", step_smoothing),
+    ):
+        if value is not None:
+            remedy = "simrail new track NAME --from FILE"
+            raise InputError("belongs to a track from a file", field=option, value=str(value), remedy=remedy)
     written, next_step = write_template(kind, name, folder=folder)
     print(f"wrote {written}\n{next_step}")
     return DONE

@@ -91,7 +91,7 @@ def estimate(
     for fact in ride_facts(recording):
         print(fact)
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in estimated.states and recording.odometry is not None:
+        if angle in estimated.states and recording.odometry is not None and recording.track.is_map:
             rms = design_difference_deg(recording, estimated, angle)
             print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
     print("there is no truth beside a recording, hence no scores")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -66,23 +67,8 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     """
     guess = did_you_mean(kind, KINDS)
     one_of(kind, KINDS, "there is no template of this kind", field="KIND", remedy=guess)
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise InputError(
-            "is no name for a file",
-            field="NAME",
-            value=name,
-            limit="letters, digits and _, a letter first",
-            remedy="e.g. my_filter",
-        )
-    if not folder.is_dir():
-        raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
-    path = folder / f"{name}.{'py' if kind in ('estimator', 'odometry') else 'toml'}"
-    data = folder / f"{name}.csv" if kind == "ride" else None
-    for file in (path, data):
-        if file is not None and file.exists():
-            raise InputError(
-                "the file exists", file=label(file), remedy="choose another name, or move the file away"
-            )
+    path = _place(name, folder, ".py" if kind in ("estimator", "odometry") else ".toml")
+    data = _place(name, folder, ".csv") if kind == "ride" else None
     if data is not None:
         text, logged = ride_template(name)
         data.write_text(logged, encoding="utf-8")
@@ -98,6 +84,69 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
         next_step += f"use it in a scenario beside it: {use.format(file=path.name)}"
     path.write_text(text, encoding="utf-8")
     return path, next_step
+
+
+def _place(name: str, folder: Path, ending: str) -> Path:
+    """The file that a part of this name is written to; refuses names that are none, and files that exist."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise InputError(
+            "is no name for a file",
+            field="NAME",
+            value=name,
+            limit="letters, digits and _, a letter first",
+            remedy="e.g. my_filter",
+        )
+    if not folder.is_dir():
+        raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
+    path = folder / f"{name}{ending}"
+    if path.exists():
+        raise InputError(
+            "the file exists", file=label(path), remedy="choose another name, or move the file away"
+        )
+    return path
+
+
+def write_track(
+    name: str,
+    source: Path,
+    *,
+    folder: Path = Path(),
+    alignment: str | None = None,
+    step_smoothing_m: float | None = None,
+) -> tuple[Path, list[str]]:
+    """Write a track file of what another program's file says.
+
+    Parameters
+    ----------
+    name : str
+        Name of the track.
+    source : Path
+        LandXML, or a table of curvature over distance.
+    folder : Path, optional
+        Where to write it.
+    alignment : str, optional
+        Which one, of a LandXML file with several.
+    step_smoothing_m : float, optional
+        Length over which steps of curvature are smoothed.
+
+    Returns
+    -------
+    Path, list of str
+        The file, and what is to be told; it stands at the head of the file too.
+
+    Raises
+    ------
+    InputError
+        As of `write_template`, or if the file describes no line.
+    """
+    from simrail.track.file import track_text
+    from simrail.track.foreign_file import design_from_file
+
+    path = _place(name, folder, ".toml")
+    design, notes = design_from_file(source, alignment=alignment, step_smoothing_m=step_smoothing_m)
+    text = track_text(replace(design, name=name))
+    path.write_text("".join(f"# {note}\n" for note in notes) + text, encoding="utf-8")
+    return path, notes
 
 
 def _of_class(kind: str, name: str, path: Path) -> tuple[str, str]:

@@ -46,7 +46,7 @@ def check_plausible(recording: Recording) -> None:
     The specific force is judged at rest, where the ride begins with a second of it, else by its median.
     Where the ride has them, its curves are compared with the gyro's Z (the track's yaw rate, d yaw / ds times
     speed), its setting off and braking with the accelerometer's X and Y, by least squares. A ride on the
-    straight at constant speed says nothing of either, nor does one without odometry.
+    straight at constant speed says nothing of either, nor does one without odometry or without a map.
 
     Raises
     ------
@@ -57,6 +57,8 @@ def check_plausible(recording: Recording) -> None:
     """
     _check_gravity(recording)
     _check_turning(recording)
+    if not recording.track.is_map:
+        return
     if recording.odometry is not None:
         _check_motion(recording, recording.odometry)
     else:

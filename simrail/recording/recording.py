@@ -193,6 +193,7 @@ class Recording(Shown):
         (x, y, z) of the IMU in its body when it stands centred on level track: x forward from the
         body's reference point, y left of the track centre, z above the rail plane.
     track : TrackDesign
+        `simrail.track.design.NO_MAP` where the train carries no map.
         The map of the line that the train carries: its design, with the errors of a survey.
     map_errors : MapErrors
         How wrong that map may be; wide where nobody has said.

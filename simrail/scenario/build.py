@@ -202,7 +202,7 @@ class Parts:
                 self._rides.clear()
             spec, vehicle, profile = cell.spec, self.vehicle(cell), _profile(cell.ride)
             rough, shaken = spec.irregularity, spec.vibration
-            irregularity = NO_IRREGULARITY if rough is None else self._irregularity(rough)
+            irregularity = NO_IRREGULARITY if rough is None else self._irregularity(rough, cell)
             if shaken is not None:
                 irregularity = replace(irregularity, section_gain=shaken.long_wave_gain())
             self._rides[key] = Ride(
@@ -242,8 +242,10 @@ class Parts:
             wheels = set(vehicle.wheel_names)
         return Kept(tuple(sorted(bodies)), tuple(sorted(wheels)))
 
-    def _irregularity(self, part: IrregularityPart) -> Irregularity:
+    def _irregularity(self, part: IrregularityPart, cell: Cell) -> Irregularity:
         """Irregularity of a cell; a file of measured rails is read once."""
+        with blame(self.scenario.file, "irregularity"):
+            part = part.with_file(self.scenario.folder, start_m=lambda: self.track(cell).start_m)
         if part.measured is None:
             return part.irregularity(None)
         key = ("measured", part.measured.model_dump_json())

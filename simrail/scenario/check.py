@@ -26,6 +26,7 @@ from simrail.scenario.scenario import Scenario
 from simrail.scoring.ride_figures import RIDE
 from simrail.scoring.table import CURVE_PREFIX, METRICS, ON_REQUEST, WINDOWS
 from simrail.track.laid_track import LaidTrack
+from simrail.vehicle.contact.profile_files import profile_notes
 
 MOST_CELLS = 1_000_000
 
@@ -147,6 +148,9 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             judge_requirements_of_ride(scenario.spec, ride.track, resolved.bands, cell.ride.reach_m)
             warnings += unusual
             notes += [f"vibration: {words}" for words in [step_words(ride)] if words]
+            notes += profile_notes(ride.vehicle.wheel_rail)
+            measured = ride.irregularity.measured
+            notes += [] if measured is None else [f"{measured.name}: {words}" for words in measured.notes]
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number
             simulated += durations[ride_key] * scenario.spec.monte_carlo.track_draws

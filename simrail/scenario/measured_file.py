@@ -2,11 +2,13 @@
 
 CSV or Parquet, as a recording car or a trolley wrote it: alignment, vertical profile, cross-level and gauge,
 or levels and alignments of both rails, over a distance in one or more columns that are added up (kilometre
-and metre). What the values may be is judged by `simrail.track.measured`.
+and metre). Columns that are not said are known by their names (`simrail.scenario.measured_header`). What the
+values may be is judged by `simrail.track.measured`.
 """
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -18,9 +20,13 @@ from simrail.core.toml_files import blame, existing_file, label
 from simrail.recording.files.data_file import DataPart, line_of, near, read_columns
 from simrail.recording.files.signal_part import Names
 from simrail.scenario.axes import Listed
+from simrail.scenario.measured_header import recognise
+from simrail.track.bands import BANDS
 from simrail.track.measured import MeasuredRails, measured_rails
 
 LENGTHS_M = {"m": 1.0, "km": 1000.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+
+NORMAL_GAUGE_M = 1.435
 
 BOTH_RAILS = {
     "vertical_profile": ("left_level", "right_level"),
@@ -43,8 +49,12 @@ class MeasuredPart(DataPart):
     ----------
     columns : dict
         Quantity (`QUANTITIES`) or ``position`` -> column name; of ``position`` also several, to be added.
+        Left out, with ``units``, what the file's names say.
     units : dict
         Quantity -> unit (`LENGTHS_M`), for each that has a column; ``"-mm"`` for a file of the other sign.
+    band : str or pair of float, optional
+        The wavelengths that the file was filtered to: a name (``"D1"``) or the shortest and the longest, m.
+        It changes nothing in the rails; of other wavelengths nothing is claimed, which is told.
     start_m : float, optional
         Where the first sample lies, s along the track; if not given, positions are places on the track.
     scale : float
@@ -61,8 +71,9 @@ class MeasuredPart(DataPart):
         Whether the file's cross-level is that of the rails as they lie; the design's cant is then taken off.
     """
 
-    columns: dict[str, Names]
-    units: dict[str, Names]
+    columns: dict[str, Names] = Field(default_factory=dict)
+    units: dict[str, Names] = Field(default_factory=dict)
+    band: Literal["D0", "D1", "D2", "D3"] | tuple[Annotated[float, Field(gt=0.0)], float] | None = None
     start_m: Listed[float] | None = None
     scale: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = 1.0
     nominal_gauge_mm: Annotated[float, Field(gt=0.0)] | None = None
@@ -73,6 +84,10 @@ class MeasuredPart(DataPart):
 
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
+        if isinstance(self.band, tuple) and not self.band[0] < self.band[1]:
+            raise InputError("is not (shortest, longest), m", field="band", value=self.band)
+        if not self.columns and not self.units:
+            return self
         for table, given in (("columns", self.columns), ("units", self.units)):
             for key in given:
                 if key not in ("position", *QUANTITIES):
@@ -138,6 +153,9 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
     """
     with blame(None, "irregularity.measured.file"):
         path = existing_file(part.file, folder)
+    notes: list[str] = []
+    if not part.columns:
+        part = _by_name(part, path, notes)
     here = part.model_copy(update={"file": path.name})
     names = [name for column in part.columns.values() for name in column]
     columns = read_columns(here, path.parent, names, table="irregularity.measured")
@@ -145,7 +163,8 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
     with blame(label(path)):
         if not len(read[names[0]]):
             raise InputError("holds no samples", remedy="write one line per place")
-        return measured_rails(
+        part = _less_nominal(part, read, notes)
+        rails = measured_rails(
             label(path),
             _metres(part, "position", read),
             _channels(part, read),
@@ -157,6 +176,49 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
             has_cant=part.cross_level_has_cant,
             where=lambda i: line_of(here, i),
         )
+    return replace(rails, notes=(*notes, *_band_notes(part, rails)))
+
+
+def _by_name(part: MeasuredPart, path: Path, notes: list[str]) -> MeasuredPart:
+    """The part with what the names of the file's columns say."""
+    known = recognise(path)
+    notes += known.notes
+    found: dict[str, object] = {"columns": known.columns, "units": known.units}
+    layout = {"separator": known.separator, "decimal": known.decimal, "band": known.band}
+    found |= {key: value for key, value in layout.items() if key not in part.model_fields_set}
+    return part.model_copy(update=found)
+
+
+def _less_nominal(part: MeasuredPart, read: dict[str, FloatArray], notes: list[str]) -> MeasuredPart:
+    """The part with the nominal gauge of a file that holds the gauge itself, where nothing says it."""
+    if (
+        "gauge" not in part.columns
+        or part.nominal_gauge_mm is not None
+        or "nominal_gauge_mm" in (part.model_fields_set)
+    ):
+        return part
+    values = _metres(part, "gauge", read)
+    finite = values[np.isfinite(values)]
+    if not (notes and finite.size) or abs(float(np.median(finite)) - NORMAL_GAUGE_M) > 0.03:
+        return part
+    notes.append(f"the file holds the gauge itself: {1e3 * NORMAL_GAUGE_M:g} mm are taken off")
+    return part.model_copy(update={"nominal_gauge_mm": 1e3 * NORMAL_GAUGE_M})
+
+
+def _band_notes(part: MeasuredPart, rails: MeasuredRails) -> list[str]:
+    """What the rails do not have: wavelengths outside of their band."""
+    words = f"lies from {rails.start_m:g} to {rails.end_m:g} m, samples {rails.step_m:g} m apart"
+    if part.band is None:
+        return [words + "; nothing says to which wavelengths it was filtered"]
+    if isinstance(part.band, str):
+        low, high = BANDS[part.band].shortest_m, BANDS[part.band].longest_m
+        name = f"{part.band}, {low:g} to {high:g} m"
+    else:
+        low, high = part.band
+        name = f"{low:g} to {high:g} m"
+    return [
+        f"{words}; it holds waves of {name}: others are not in these rails, and nothing is claimed of them"
+    ]
 
 
 def _metres(part: MeasuredPart, key: str, read: dict[str, FloatArray]) -> FloatArray:

@@ -7,17 +7,21 @@ the scenario itself, and the reading of it, in `simrail.scenario.scenario`.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
 from simrail.core.errors import InputError
-from simrail.core.toml_files import Part
+from simrail.core.toml_files import Part, blame, existing_file
+from simrail.recording.files.data_file import TABLES, TEXTS
 from simrail.recording.sheets.figures import FIGURES
 from simrail.recording.sheets.imu_file import ImuHead, described, limited
 from simrail.scenario.axes import Listed, each
 from simrail.scenario.designs import DESIGNS
 from simrail.scenario.measured_file import MeasuredPart
+from simrail.scenario.measured_header import recognise
 from simrail.scoring.requirement import Requirement, limit_of
 from simrail.track.defects import Defect
 from simrail.track.irregularity import Irregularity
@@ -69,7 +73,7 @@ class DefectPart(Part):
     length_m: Positive
     """Length of the form, of a ramp, step or twist that of its rise, m."""
     size_mm: float
-    """Its size, mm: up or left positive, of a dip or joint down or right, of a twist with the left rail up."""
+    """Its size, mm: up or left positive, of a dip or joint down or right, of a twist left rail up."""
     direction: Literal["vertical", "lateral"] = "vertical"
     """Whether rails leave their place up and down, or aside."""
     rails: Literal["both", "left", "right"] = "both"
@@ -95,6 +99,9 @@ class IrregularityPart(Part):
 
     What the spectrum gives lies from ``start_m`` to ``end_m``, or along the whole track; rails from a file
     and defects are added.
+
+    In the place of a spectrum's name may stand the path of a measuring car's export, whose columns are known
+    by their names: its rails are laid from ``start_m`` or the start of the track on, as far as they reach.
     """
 
     spectrum: Listed[str] = "none"
@@ -121,6 +128,32 @@ class IrregularityPart(Part):
     """Rails from a file, in place of the spectrum or beside it."""
     defect: tuple[DefectPart, ...] = ()
     """Discrete defects, added to it."""
+
+    @classmethod
+    def explained(cls, key: str, value: object) -> str | None:  # noqa: ARG003
+        """Where keys of measured rails belong."""
+        own = set(MeasuredPart.model_fields) - set(cls.model_fields)
+        if key in own or key == "start":
+            name = key if key in own else "start_m"
+            return f"put it into a table of its own: [irregularity.measured] {name} = ..."
+        return None
+
+    def with_file(self, folder: Path | None, *, start_m: Callable[[], float]) -> IrregularityPart:
+        """The part with the rails of a file that stands in the place of a spectrum's name; else itself."""
+        if Path(str(self.spectrum)).suffix.lower() not in TEXTS + TABLES:
+            return self
+        with blame(None, "spectrum"):
+            path = existing_file(str(self.spectrum), folder)
+            if self.measured is not None:
+                raise InputError(
+                    "is a file beside that of [irregularity.measured]",
+                    value=str(self.spectrum),
+                    remedy="keep one of them",
+                )
+            recognise(path)
+        place = start_m() if self.start_m is None else float(cast(float, self.start_m))
+        measured = MeasuredPart(file=str(self.spectrum), start_m=place, partial=True)
+        return self.model_copy(update={"spectrum": "none", "measured": measured, "start_m": None})
 
     def irregularity(self, measured: MeasuredRails | None) -> Irregularity:
         """The irregularity that it describes, with the rails of its file; nothing in it is a list."""

@@ -4,8 +4,12 @@ Plan: curvature is piecewise linear, so yaw is piecewise quadratic; x and y are 
 straights and arcs and Gauss-Legendre quadrature (to rounding) on clothoids. Cant: height of the left
 above the right rail, a polynomial per element.
 
+Where curvature or cant step, the step is smoothed over a length L, centred on it: curvature rises in
+proportion, as in a clothoid of length L, which keeps the turn and shifts the line by step L^2/24; cant rises
+as in every other ramp.
+
 This module knows nothing of gradients (`simrail.track.vertical`), angles or irregularities. It takes
-elements that `check_elements` has passed.
+elements that `simrail.track.joints.check_elements` has passed.
 """
 
 import math
@@ -17,7 +21,8 @@ import numpy.typing as npt
 from scipy.interpolate import PPoly
 
 from simrail.core.jit import FloatArray
-from simrail.track.elements import SMOOTH_STEP, Element, Transition
+from simrail.track.elements import SMOOTH_STEP, CantStation, Element
+from simrail.track.joints import EVEN_1PM, EVEN_M, end_values, steps
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
@@ -62,19 +67,23 @@ class Plan:
 
 
 def build_plan(
-    elements: Sequence[Element], start_m: float, *, position_m: tuple[float, float], yaw_rad: float
+    elements: Sequence[Element],
+    start_m: float,
+    *,
+    position_m: tuple[float, float],
+    yaw_rad: float,
+    step_smoothing_m: float = 0.0,
 ) -> Plan:
     """Chain the elements from a start."""
-    ends = _end_values(elements)
     rows: list[tuple[float, float, float]] = []
     s = start_m
-    for element, ((k0, _), (k1, _)) in zip(elements, ends, strict=True):
-        rate = (k1 - k0) / element.length_m
+    for length, k0, k1 in _pieces(elements, start_m, step_smoothing_m):
+        rate = (k1 - k0) / length
         # Ten nodes are exact to rounding while a piece turns by no more than a radian.
-        n = max(1, math.ceil(max(abs(k0), abs(k1)) * element.length_m)) if rate else 1
-        step = element.length_m / n
+        n = max(1, math.ceil(max(abs(k0), abs(k1)) * length)) if rate else 1
+        step = length / n
         rows += [(s + i * step, k0 + i * step * rate, rate) for i in range(n)]
-        s += element.length_m
+        s += length
     starts, curvature, rates = (np.array(column) for column in zip(*rows, strict=True))
     lengths = np.diff(starts, append=s)
     turns = lengths * (curvature + 0.5 * lengths * rates)
@@ -83,6 +92,66 @@ def build_plan(
     x = position_m[0] + np.concatenate([[0.0], np.cumsum(east)[:-1]])
     y = position_m[1] + np.concatenate([[0.0], np.cumsum(north)[:-1]])
     return Plan(starts, x, y, yaws, curvature, rates)
+
+
+def _pieces(
+    elements: Sequence[Element], start_m: float, smoothing_m: float
+) -> list[tuple[float, float, float]]:
+    """Length and curvature at both ends of every piece: of every element, and of what smooths a step."""
+    ends = end_values(elements)
+    pieces = [
+        (element.length_m, first.curvature_1pm, last.curvature_1pm)
+        for element, (first, last) in zip(elements, ends, strict=True)
+    ]
+    at = [(step.index, step.curvature_1pm) for step in steps(elements) if abs(step.curvature_1pm) > EVEN_1PM]
+    if not at:
+        return pieces
+    starts = element_starts(elements, start_m)
+    linear = np.array([[(k1 - k0) / length, k0] for length, k0, k1 in pieces]).T
+    smooth = _smoothed(PPoly(linear, starts), [(starts[i], size) for i, size in at], smoothing_m, _LINEAR)
+    lengths = np.diff(smooth.x)
+    return [
+        (float(length), float(k0), float(k0 + rate * length))
+        for length, rate, k0 in zip(lengths, *smooth.c, strict=True)
+    ]
+
+
+_LINEAR = np.array([1.0, 0.0])
+"""The straight line from 0 to 1, highest power first."""
+
+
+def _smoothed(base: PPoly, at: Sequence[tuple[float, float]], length_m: float, ramp: FloatArray) -> PPoly:
+    """A piecewise polynomial whose steps, by place and size, rise over a length in the shape of a ramp.
+
+    Each adds size times (ramp - unit step), which is nothing outside of the length: smoothings that overlap
+    add up, so that a kink of half a metre becomes one low bend of the same turn.
+    """
+    order = max(len(ramp), base.c.shape[0])
+    half = 0.5 * length_m
+    marks = [place + shift for place, _ in at for shift in (-half, 0.0, half)]
+    breaks = np.unique(np.concatenate([base.x, marks]))
+    total = _refined(base, breaks, order)
+    for place, size in at:
+        rise = size * ramp / length_m ** np.arange(len(ramp) - 1.0, -1.0, -1.0)
+        upper = np.array(PPoly(rise[:, None], [place - half, place + half]).c[:, 0])
+        bridge = PPoly(
+            np.column_stack([np.zeros_like(rise), upper, np.zeros_like(rise)]),
+            [breaks[0] - length_m, place - half, place + half, breaks[-1] + length_m],
+        )
+        total += _refined(bridge, breaks, order)
+        inside = (breaks[:-1] >= place) & (breaks[:-1] < place + half)
+        total[-1, inside] -= size
+    return PPoly(total, breaks)
+
+
+def _refined(polynomial: PPoly, breaks: FloatArray, order: int) -> FloatArray:
+    """Coefficients (order, n) of a piecewise polynomial about the starts of finer pieces (n + 1,)."""
+    rows = [
+        polynomial.derivative(k)(breaks[:-1]) / math.factorial(k) if k else polynomial(breaks[:-1])
+        for k in range(polynomial.c.shape[0])
+    ]
+    rows += [np.zeros(breaks.size - 1)] * (order - len(rows))
+    return np.array(rows[::-1])
 
 
 def _advance(
@@ -106,7 +175,9 @@ def _advance(
     return east, north
 
 
-def build_cant(elements: Sequence[Element], start_m: float, *, ramp: str) -> PPoly:
+def build_cant(
+    elements: Sequence[Element], start_m: float, *, ramp: str, step_smoothing_m: float = 0.0
+) -> PPoly:
     """Height of the left above the right rail over s, m.
 
     Parameters
@@ -115,31 +186,33 @@ def build_cant(elements: Sequence[Element], start_m: float, *, ramp: str) -> PPo
         ``"smooth"``: a quintic with zero slope and bend at both ends of a transition.
         ``"linear"``: in proportion to the curvature, as most real track has it; the twist then steps,
         so its derivative is an impulse, which `TrackDesign.frame` leaves out.
+    step_smoothing_m : float
+        Length over which a step of cant rises.
     """
     coefficients = np.zeros((6, len(elements)))
-    for i, (element, ((_, h0), (_, h1))) in enumerate(zip(elements, _end_values(elements), strict=True)):
+    for i, (element, ((_, h0), (_, h1))) in enumerate(zip(elements, end_values(elements), strict=True)):
         if ramp == "smooth":
             coefficients[:, i] = (h1 - h0) * SMOOTH_STEP / element.length_m ** np.arange(5.0, -1.0, -1.0)
         else:
             coefficients[-2, i] = (h1 - h0) / element.length_m
         coefficients[-1, i] += h0
-    return PPoly(coefficients, element_starts(elements, start_m))
+    starts = element_starts(elements, start_m)
+    cant = PPoly(coefficients, starts)
+    at = [(starts[step.index], step.cross_slope_m) for step in steps(elements)]
+    at = [(place, size) for place, size in at if abs(size) > EVEN_M]
+    shape = SMOOTH_STEP if ramp == "smooth" else _LINEAR
+    return _smoothed(cant, at, step_smoothing_m, shape) if at else cant
+
+
+def cant_of_stations(stations: Sequence[CantStation], start_m: float, end_m: float) -> PPoly:
+    """Height of the left above the right rail over s, m: linear between stations, level outside of them."""
+    places = np.array([station.at_m for station in stations])
+    levels = np.array([station.cross_slope_m for station in stations])
+    breaks = np.unique(np.concatenate([[start_m, end_m], places]))
+    values = np.interp(breaks, places, levels)
+    return PPoly(np.array([np.diff(values) / np.diff(breaks), values[:-1]]), breaks)
 
 
 def element_starts(elements: Sequence[Element], start_m: float) -> FloatArray:
     """Start of every element, and the end of the last, (n + 1,)."""
     return start_m + np.concatenate([[0.0], np.cumsum([element.length_m for element in elements])])
-
-
-def _end_values(elements: Sequence[Element]) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Curvature and cross slope at both ends of every element."""
-    values = []
-    for i, element in enumerate(elements):
-        before, after = (
-            (elements[i - 1], elements[i + 1]) if isinstance(element, Transition) else (element,) * 2
-        )
-        assert not isinstance(before, Transition) and not isinstance(after, Transition)
-        values.append(
-            ((before.curvature_1pm, before.cross_slope_m), (after.curvature_1pm, after.cross_slope_m))
-        )
-    return values

@@ -23,29 +23,34 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
 from simrail.core.shown import Facts, Shown, names
-from simrail.track.alignment import Plan, build_cant, build_plan, element_starts
+from simrail.track.alignment import Plan, build_cant, build_plan, cant_of_stations, element_starts
 from simrail.track.deviation import Deviation
 from simrail.track.elements import (
     CURVE,
     RAIL_BASE_M,
     STRAIGHT,
     TRANSITION,
+    CantStation,
+    ChainageBreak,
     Curve,
     Element,
     Gradient,
     Straight,
     Transition,
-    check_elements,
     element_from_dict,
     element_to_dict,
     require_number,
 )
+from simrail.track.joints import check_elements, check_stations
 from simrail.track.vertical import build_vertical, check_gradients
 
 __all__ = [
     "CURVE",
+    "NO_MAP",
     "STRAIGHT",
     "TRANSITION",
+    "CantStation",
+    "ChainageBreak",
     "Curve",
     "Element",
     "Gradient",
@@ -117,8 +122,8 @@ class TrackDesign(Shown):
     start_m : float
         s at the start of the first element.
     elements : tuple of Straight, Curve, Transition
-        The plan, in the order of s. A transition joins its neighbours; without one, curvature and cant
-        may not step.
+        The plan, in the order of s. A transition joins its neighbours, or has ends of its own; without one,
+        curvature and cant may not step.
     gradients : tuple of Gradient
         In the order of s; level before the first.
     vertical_radius_m : float or tuple of float
@@ -140,6 +145,13 @@ class TrackDesign(Shown):
         Yaw at `start_m`.
     deviation : Deviation, optional
         Cant and height that are added to those of the elements and gradients.
+    cant_stations : tuple of CantStation
+        Cant beside the plan, in the order of s, in the place of that of the elements; linear between, level
+        before the first and after the last.
+    step_smoothing_m : float
+        Length over which curvature and cant rise where they step, centred on the step; 0 refuses steps.
+    chainage_breaks : tuple of ChainageBreak
+        Where the kilometre posts jump, in the order of s: see `chainage_m`.
     """
 
     name: str
@@ -155,6 +167,14 @@ class TrackDesign(Shown):
     start_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_yaw_rad: float = 0.0
     deviation: Deviation | None = None
+    cant_stations: tuple[CantStation, ...] = ()
+    step_smoothing_m: float = 0.0
+    chainage_breaks: tuple[ChainageBreak, ...] = ()
+
+    @property
+    def is_map(self) -> bool:
+        """Whether there is a line: false for `NO_MAP` alone, since every file has a segment."""
+        return self != NO_MAP
 
     def _facts(self) -> Facts:
         curves = [element for element in self.elements if isinstance(element, Curve)]
@@ -193,6 +213,13 @@ class TrackDesign(Shown):
 
     @cached_property
     def _shape(self) -> _Shape:
+        if not self.is_map:
+            raise InputError(
+                "the method needs a map of the track, and the ride names none",
+                field="track",
+                remedy='name one in the ride file, e.g. track = "./my_line.toml" (simrail new track), or '
+                "choose a method that needs none",
+            )
         require_number(self.start_m, "start_m")
         require_number(self.vertical_ramp_m, "vertical_ramp_m", least=0.0)
         if self.cant_ramp not in ("smooth", "linear"):
@@ -202,13 +229,34 @@ class TrackDesign(Shown):
             raise InputError(
                 "is out of range", field="rail_base_m", value=self.rail_base_m, limit=f"{low:g} to {high:g} m"
             )
-        check_elements(self.elements, rail_base_m=self.rail_base_m)
+        check_elements(
+            self.elements,
+            rail_base_m=self.rail_base_m,
+            step_smoothing_m=self.step_smoothing_m,
+            has_stations=bool(self.cant_stations),
+        )
+        check_stations(self.cant_stations, rail_base_m=self.rail_base_m)
+        before = -np.inf
+        for i, mark in enumerate(self.chainage_breaks):
+            require_number(mark.at_m, f"chainage_break[{i}].at_m", above=before)
+            require_number(mark.ahead_m, f"chainage_break[{i}].ahead_m")
+            before = mark.at_m
         check_gradients(self.gradients, end_m=self.end_m)
         if self.deviation is not None:
             self.deviation.check()
         x, y, z = self.start_position_m
-        plan = build_plan(self.elements, self.start_m, position_m=(x, y), yaw_rad=self.start_yaw_rad)
-        cant = build_cant(self.elements, self.start_m, ramp=self.cant_ramp)
+        smoothing = self.step_smoothing_m
+        plan = build_plan(
+            self.elements,
+            self.start_m,
+            position_m=(x, y),
+            yaw_rad=self.start_yaw_rad,
+            step_smoothing_m=smoothing,
+        )
+        if self.cant_stations:
+            cant = cant_of_stations(self.cant_stations, self.start_m, self.end_m)
+        else:
+            cant = build_cant(self.elements, self.start_m, ramp=self.cant_ramp, step_smoothing_m=smoothing)
         height = build_vertical(
             self.gradients,
             self.start_m,
@@ -266,6 +314,15 @@ class TrackDesign(Shown):
         """Plan curvature d yaw / ds at places s, 1/m, positive to the left; shaped like s."""
         return self._shape.plan.state(self.on_track(s))[1]
 
+    def chainage_m(self, s: npt.ArrayLike) -> FloatArray:
+        """What the kilometre posts say at places s, m; at a break what begins there; shaped like s."""
+        places = self.on_track(s)
+        if not self.chainage_breaks:
+            return places
+        starts = np.array([mark.at_m for mark in self.chainage_breaks])
+        shifts = np.array([0.0, *(mark.ahead_m - mark.at_m for mark in self.chainage_breaks)])
+        return np.asarray(places + shifts[np.searchsorted(starts, places, side="right")])
+
     def segment(self, s: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Index of the element at places s; at a joint, of the one that begins there."""
         starts = self._shape.starts_m
@@ -294,6 +351,10 @@ class TrackDesign(Shown):
         values = dict(data)
         values["elements"] = tuple(element_from_dict(element) for element in data["elements"])
         values["gradients"] = tuple(Gradient(**gradient) for gradient in data["gradients"])
+        stations = data.get("cant_stations", ())
+        values["cant_stations"] = tuple(CantStation(**station) for station in stations)
+        marks = data.get("chainage_breaks", ())
+        values["chainage_breaks"] = tuple(ChainageBreak(**mark) for mark in marks)
         values["start_position_m"] = tuple(data["start_position_m"])
         if isinstance(data["vertical_radius_m"], list):
             values["vertical_radius_m"] = tuple(data["vertical_radius_m"])
@@ -306,6 +367,8 @@ class TrackDesign(Shown):
     def on_track(self, s: npt.ArrayLike) -> FloatArray:
         """The places s as an array of floats; refused with an `InputError` if one is off the track."""
         s = np.asarray(s, dtype=float)
+        if not self.is_map:
+            _ = self._shape
         off = ~((s >= self.start_m) & (s <= self.end_m))  # also true for NaN
         if off.any():
             first = float(s[off].flat[0])
@@ -317,6 +380,10 @@ class TrackDesign(Shown):
                 remedy="shorten the ride or lengthen the track",
             )
         return s
+
+
+NO_MAP = TrackDesign("no map", 0.0, ())
+"""What a ride has in the place of a map if it names no track: whoever asks it for the line is refused."""
 
 
 def _stack(*parts: FloatArray) -> FloatArray:

@@ -1,12 +1,11 @@
-"""The elements that a track is designed from: straights, curves, transitions, gradients.
+"""The elements that a track is designed from: straights, curves, transitions, gradients, stations of cant.
 
-Plain values in metres, and the check that they can be joined without a step. How they are joined to a
-line is the matter of `simrail.track.alignment` and `simrail.track.vertical`; what the line looks like
-at a place is that of `simrail.track.design`.
+Plain values in metres. At what curvature and cant they meet is the matter of `simrail.track.joints`; how they
+are joined to a line is that of `simrail.track.alignment` and `simrail.track.vertical`; what the line looks
+like at a place is that of `simrail.track.design`.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -29,22 +28,40 @@ SMOOTH_STEP = np.array([6.0, -15.0, 10.0, 0.0, 0.0, 0.0])
 """The quintic from 0 to 1 with zero slope and bend at both ends, highest power first."""
 
 
+def cross_slope(cant_m: float, curvature_1pm: float) -> float:
+    """Height of the left above the right rail; a left curve and a straight have the right one raised.
+
+    On a straight no rail is the outer one: there a positive cant is that of a curve to the left.
+    """
+    if curvature_1pm == 0.0 and cant_m == 0.0:
+        return 0.0
+    return -cant_m if curvature_1pm >= 0.0 else cant_m
+
+
 @dataclass(frozen=True)
 class Straight:
-    """A straight without cant.
+    """A straight.
 
     Attributes
     ----------
     length_m : float
         Length of the horizontal projection.
+    cant_m : float
+        Height of the right above the left rail, as in a curve to the left; over the track's rail base, turned
+        about the centreline.
     """
 
     length_m: float
+    cant_m: float = 0.0
 
     kind = STRAIGHT
     word = "straight"
     curvature_1pm = 0.0
-    cross_slope_m = 0.0
+
+    @property
+    def cross_slope_m(self) -> float:
+        """Height of the left above the right rail."""
+        return cross_slope(self.cant_m, 0.0)
 
 
 @dataclass(frozen=True)
@@ -76,20 +93,32 @@ class Curve:
     @property
     def cross_slope_m(self) -> float:
         """Height of the left above the right rail; a left curve has its right rail raised."""
-        return -self.cant_m if self.radius_m > 0 else self.cant_m
+        return cross_slope(self.cant_m, self.radius_m)
 
 
 @dataclass(frozen=True)
 class Transition:
     """A clothoid with a cant ramp: it joins whatever stands before it to whatever follows.
 
+    An end may have a radius and a cant of its own. One that has none takes them from the straight, the curve
+    or the end of the transition beside it; the end of a track, and the place where two
+    transitions of opposite curves meet, is straight and level then.
+
     Attributes
     ----------
     length_m : float
         Length of the horizontal projection.
+    start_radius_m, end_radius_m : float, optional
+        Radius at either end, positive to the left; infinite where it is straight.
+    start_cant_m, end_cant_m : float, optional
+        Cant at an end that has a radius of its own, signed as in `Curve` and `Straight`; 0 if not given.
     """
 
     length_m: float
+    start_radius_m: float | None = None
+    end_radius_m: float | None = None
+    start_cant_m: float | None = None
+    end_cant_m: float | None = None
 
     kind = TRANSITION
     word = "transition"
@@ -114,62 +143,55 @@ class Gradient:
     slope: float
 
 
+@dataclass(frozen=True)
+class CantStation:
+    """Cant at a place, beside the plan; between two stations it changes linearly.
+
+    Attributes
+    ----------
+    at_m : float
+        Where it is, s along the track.
+    cross_slope_m : float
+        Height of the left above the right rail over the track's rail base.
+    """
+
+    at_m: float
+    cross_slope_m: float
+
+
+@dataclass(frozen=True)
+class ChainageBreak:
+    """A place where the kilometre posts jump: s goes on, the chainage does not.
+
+    Attributes
+    ----------
+    at_m : float
+        Where it is, s along the track.
+    ahead_m : float
+        Chainage that begins there; before the first break chainage is s.
+    """
+
+    at_m: float
+    ahead_m: float
+
+
 _ELEMENTS: dict[str, type[Straight] | type[Curve] | type[Transition]] = {
     cls.word: cls for cls in (Straight, Curve, Transition)
 }
 
 
 def element_to_dict(element: Element) -> dict[str, Any]:
-    """Plain data of an element; `element_from_dict` is the inverse."""
-    return {"kind": element.word, **asdict(element)}
+    """Plain data of an element, without what it does not say; `element_from_dict` is the inverse."""
+    said = {key: value for key, value in asdict(element).items() if value is not None}
+    if isinstance(element, Straight) and not element.cant_m:
+        del said["cant_m"]
+    return {"kind": element.word, **said}
 
 
 def element_from_dict(data: dict[str, Any]) -> Element:
     """Element from the plain data that `element_to_dict` makes."""
     values = dict(data)
     return _ELEMENTS[values.pop("kind")](**values)
-
-
-def check_elements(elements: Sequence[Element], *, rail_base_m: float = RAIL_BASE_M) -> None:
-    """Refuse elements that cannot be joined to a line of continuous curvature and cant.
-
-    Parameters
-    ----------
-    elements : sequence of Straight, Curve, Transition
-        The plan, in the order of s.
-    rail_base_m : float
-        What cant is a height over.
-
-    Raises
-    ------
-    InputError
-        Naming the element (counted from 0, as in ``segment[3]``) and its field.
-    """
-    if not elements:
-        raise InputError("has no elements", field="segment", remedy="add a straight")
-    for i, element in enumerate(elements):
-        here = f"segment[{i}]"
-        require_number(element.length_m, f"{here}.length_m", above=0.0)
-        if isinstance(element, Curve):
-            require_number(element.radius_m, f"{here}.radius_m", zero=False)
-            require_number(element.cant_m, f"{here}.cant_m", within=MAX_CANT_PER_BASE * rail_base_m)
-        after = elements[i + 1] if i + 1 < len(elements) else None
-        if isinstance(element, Transition):
-            if i == 0 or after is None or isinstance(after, Transition):
-                raise InputError(
-                    "a transition joins two neighbours, each a straight or a curve",
-                    field=here,
-                    remedy="put a straight or a curve before and after it",
-                )
-        elif after is not None and not isinstance(after, Transition):
-            ends = ((part.curvature_1pm, part.cross_slope_m) for part in (element, after))
-            if len(set(ends)) > 1:
-                raise InputError(
-                    "curvature or cant steps between two elements",
-                    field=f"segment[{i + 1}]",
-                    value=after,
-                    remedy="put a transition between them",
-                )
 
 
 def require_number(

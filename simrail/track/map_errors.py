@@ -19,9 +19,10 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 from simrail.track.alignment import element_starts
-from simrail.track.design import Curve, Element, Straight, TrackDesign, Transition
+from simrail.track.design import CantStation, Curve, Element, Straight, TrackDesign, Transition
 from simrail.track.deviation import Deviation
-from simrail.track.elements import SMOOTH_STEP, require_number
+from simrail.track.elements import SMOOTH_STEP, cross_slope, require_number
+from simrail.track.joints import end_values
 
 STEP_M = 5.0
 """Distance of the values of cant and height along the line; twenty of them in a correlation length."""
@@ -162,7 +163,10 @@ def draw_map(
     moved = _moved_joints(design, errors, seed, draw)
     elements = _with_defects(design, _wrong_curves(moved.elements, errors, seed, draw), defects)
     known = replace(
-        moved, elements=elements, deviation=_deviation(design, errors, defects, seed=seed, draw=draw)
+        moved,
+        elements=elements if not design.cant_stations else _without_cant(elements),
+        cant_stations=_wrong_stations(design, moved, errors, seed=seed, draw=draw),
+        deviation=_deviation(design, errors, defects, seed=seed, draw=draw),
     )
     known.check()
     return known
@@ -202,9 +206,57 @@ def _moved_joints(design: TrackDesign, errors: MapErrors, seed: int, draw: int) 
         )
     elements = [
         replace(element, length_m=float(length))
-        for element, length in zip(design.elements, lengths, strict=True)
+        for element, length in zip(_with_neighbours(design.elements), lengths, strict=True)
     ]
-    return replace(design, elements=tuple(elements), gradients=tuple(gradients))
+    stations = tuple(
+        replace(station, at_m=float(design.start_m + scale * (station.at_m - design.start_m) + offset))
+        for station in design.cant_stations
+    )
+    return replace(design, elements=tuple(elements), gradients=tuple(gradients), cant_stations=stations)
+
+
+def _with_neighbours(elements: Sequence[Element]) -> list[Element]:
+    """Transitions that say of an end what the straight or curve beside it is take it from there instead.
+
+    Else a curve of another radius would step against its own transition.
+    """
+    ends = end_values(elements)
+    around = [None, *elements, None]
+    found = []
+    for i, element in enumerate(elements):
+        if isinstance(element, Transition):
+            for end, there in (("start", i - 1), ("end", i + 1)):
+                beside = around[there + 1]
+                if beside is not None and not isinstance(beside, Transition):
+                    meets = ends[there][end == "start"] == ends[i][end == "end"]
+                    changes = {f"{end}_radius_m": None, f"{end}_cant_m": None} if meets else {}
+                    element = replace(element, **changes)
+        found.append(element)
+    return found
+
+
+def _without_cant(elements: Sequence[Element]) -> tuple[Element, ...]:
+    """Elements of a line whose cant stands beside the plan."""
+    return tuple(
+        element if isinstance(element, Transition) else replace(element, cant_m=0.0) for element in elements
+    )
+
+
+def _wrong_stations(
+    design: TrackDesign, moved: TrackDesign, errors: MapErrors, *, seed: int, draw: int
+) -> tuple[CantStation, ...]:
+    """Stations of cant, those of a curve with the error of its cant."""
+    wrong = errors.cant_sd_m * _normals(seed, draw, "cant", len(design.elements))
+    starts = element_starts(design.elements, design.start_m)
+    found = []
+    for station, placed in zip(design.cant_stations, moved.cant_stations, strict=True):
+        error = 0.0
+        for i, element in enumerate(design.elements):
+            # Where a curve ends, its cant does.
+            if isinstance(element, Curve) and starts[i] - SHORT_M <= station.at_m <= starts[i + 1] + SHORT_M:
+                error = cross_slope(wrong[i], element.curvature_1pm)
+        found.append(replace(placed, cross_slope_m=_in_mm(placed.cross_slope_m + error)))
+    return tuple(found)
 
 
 def _wrong_curves(
@@ -254,7 +306,14 @@ def _with_defects(
             require_number(defect.size_m, "chord_m", least=1.0)
             changed[index - 2 : index + 3] = _polyline(design, changed[index - 2 : index + 3], defect.size_m)
         else:
-            before, after = changed[index - 1], changed[index + 1]
+            neighbours = [changed[i] for i in (index - 1, index + 1) if 0 <= i < len(changed)]
+            if len(neighbours) < 2 or any(isinstance(beside, Transition) for beside in neighbours):
+                raise InputError(
+                    "needs a straight or a curve before and after the transition",
+                    field="at_m",
+                    value=defect.at_m,
+                )
+            before, after = neighbours
             spare = element.length_m - min(SHORT_M, element.length_m)
             first = spare if defect.kind == "straightened_transition" else 0.5 * spare
             changed[index - 1] = replace(before, length_m=before.length_m + first)

@@ -81,6 +81,8 @@ class MeasuredRails:
         Places on the track, rising.
     values_m : ndarray (n, 4)
         In the order of `simrail.core.columns.IRREGULARITY`.
+    notes : tuple of str
+        What was taken for what, and what they do not hold.
     """
 
     name: str = field(compare=False)
@@ -91,6 +93,7 @@ class MeasuredRails:
     has_cant: bool
     position_m: FloatArray = field(compare=False, repr=False)
     values_m: FloatArray = field(compare=False, repr=False)
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def start_m(self) -> float:

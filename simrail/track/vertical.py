@@ -11,6 +11,9 @@ from scipy.interpolate import PPoly
 from simrail.core.errors import InputError
 from simrail.track.elements import MAX_SLOPE, SMOOTH_STEP, Gradient, require_number
 
+_TOUCHING_M = 1e-6
+"""Overlap of two vertical curves that is rounding."""
+
 
 def build_vertical(
     gradients: Sequence[Gradient],
@@ -41,6 +44,9 @@ def build_vertical(
             continue
         length = max(radius * abs(change), ramp_m)
         first, last = centre - 0.5 * (length + ramp_m), centre + 0.5 * (length + ramp_m)
+        # Curves that touch do so to rounding.
+        first = breaks[-1] if breaks[-1] - _TOUCHING_M < first < breaks[-1] else first
+        last = end_m if end_m < last < end_m + _TOUCHING_M else last
         if first < breaks[-1] or last > end_m:
             raise InputError(
                 "vertical curve overlaps the one before or reaches beyond the track",

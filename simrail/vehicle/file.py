@@ -157,6 +157,8 @@ class VehicleFile(Part):
     """A profile by name, or the path of a file."""
     rail_profile: str
     """A profile by name, or the path of a file."""
+    tape_circle_mm: Annotated[float, Field(ge=-200.0, le=200.0)] | None = None
+    """Where the tape circle stands in the file of the wheel profile, mm, e.g. 70 behind the flange's back."""
     profile_scale: Annotated[float, Field(ge=0.02, le=1.0)] = 1.0
     """Size of the profiles on this vehicle; 0.1 on one of 1:10."""
     contact_smoothing: Annotated[float, Field(ge=0.1, le=5.0)] = 0.22
@@ -248,8 +250,12 @@ class VehicleFile(Part):
                 )
         self._check_rods()
         # Each says itself what it cannot read.
-        wheel_profile(self.wheel_profile, self._folder)
+        wheel_profile(self.wheel_profile, self._folder, tape_circle_m=self._tape_circle_m)
         rail_profile(self.rail_profile, self._folder)
+
+    @property
+    def _tape_circle_m(self) -> float | None:
+        return None if self.tape_circle_mm is None else self.tape_circle_mm / 1000.0
 
     def _check_rods(self) -> None:
         for i, rod in enumerate(self.rod):
@@ -411,6 +417,7 @@ class VehicleFile(Part):
                 wheel_profile=profile_place(self.wheel_profile, self._folder),
                 rail_profile=profile_place(self.rail_profile, self._folder),
                 profile_scale=self.profile_scale,
+                wheel_file_tape_circle_m=self._tape_circle_m,
                 smoothing=self.contact_smoothing,
                 gauge_m=self.gauge_m,
                 rail_inclination=self.rail_inclination,

@@ -265,6 +265,7 @@ class WheelRail:
 
     Profiles are names or the paths of files (`simrail.vehicle.contact.profile_files`); ``profile_scale`` is
     the size that they have on this vehicle, 0.1 on one of 1:10 whose profiles are full-size ones made small.
+    ``wheel_file_tape_circle_m`` is where the tape circle lies in the wheel's file, if not where that has it.
     ``smoothing`` is that of `simrail.vehicle.contact.contact_geometry.build_contact`.
     """
 
@@ -278,6 +279,7 @@ class WheelRail:
     linear: LinearContact | None = None
     profile_scale: float = 1.0
     smoothing: float = 0.22
+    wheel_file_tape_circle_m: float | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -123,7 +123,18 @@ def test_condequinto_olivar_is_the_line_of_the_station_coordinates() -> None:
         ("cant_mm = 60.0", "cant_mm = nan", ("segment[2].cant_mm", "not a finite number")),
         ("cant_mm = 60.0", "cant_m = 0.06", ("segment[2].cant_m", "unknown key", "did you mean cant_mm?")),
         ("length_m = 30.0", "length_m = -30.0", ("segment[1].length_m", "found -30.0", "> 0")),
-        ("length_m = 50.0", "length_m = 50.0\ncant_mm = 5.0", ("segment[0].cant_mm", "belongs to a curve")),
+        ("length_m = 50.0", "length_m = 50.0\nradius_m = 5.0", ("segment[0].radius_m", "belongs to a curve")),
+        ("length_m = 30.0", "length_m = 30.0\ncant_mm = 5.0", ("segment[1].cant_mm", "start_radius_m")),
+        ("length_m = 30.0", "length_m = 30.0\nend_cant_mm = 5.0", ("end_cant_mm", "add end_radius_m")),
+        (
+            "length_m = 50.0",
+            "length_m = 50.0\nend_radius_m = 5.0",
+            ("end_radius_m", "belongs to a transition"),
+        ),
+        ("length_m = 50.0", 'length_m = 50.0\nraised = "left"', ("cant_mm", "needs a positive cant")),
+        ("length_m = 50.0", "length_m = 50.0\ncant_mm = -5.0", ("segment[0].raised", "changes sides")),
+        ("length_m = 30.0", "length_m = 30.0\nend_radius_m = 150.0", ("segment[2]", "step_smoothing_m")),
+        ("start_m = -10.0", "step_smoothing_m = 31.0", ("step_smoothing_m", "<= 30")),
         ('kind = "transition"', 'kind = "straight"', ("segment[2]", "put a transition between")),
         ('kind = "transition"', 'kind = "clothoid"', ("segment[1].kind", "clothoid", "transition")),
         ("from_m = 20.0", "from_m = 200.0", ("gradient[0].from_m", "found 200.0", "110")),
@@ -144,3 +155,53 @@ def test_one_message_says_what_is_wrong(tmp_path: Path, old: str, new: str, word
     assert "mine.toml" in message
     for word in words:
         assert word in message
+
+
+STATIONS = """
+[[cant]]
+at_m = 50.0
+mm = 0.0
+[[cant]]
+at_m = 70.0
+mm = 60.0
+[[cant]]
+from_m = 110.0
+mm = 40.0
+"""
+
+
+def test_cant_by_stations_is_linear_between_them(tmp_path: Path) -> None:
+    by_stations = GOOD.replace("cant_mm = 60.0\n", "") + STATIONS
+    design = track_by_name(write(tmp_path, by_stations))
+    s = np.array([-10.0, 50.0, 60.0, 70.0, 90.0, 110.0])
+    # A left curve has its right rail raised; the cant changes within the arc.
+    expected = -np.array([0.0, 0.0, 30.0, 60.0, 50.0, 40.0])
+    np.testing.assert_allclose(1500.0 * np.sin(design.frame(s).roll_rad), expected, atol=1e-10)
+    right = track_by_name(write(tmp_path, by_stations.replace("radius_m = 200.0", "radius_m = -200.0")))
+    np.testing.assert_allclose(1500.0 * np.sin(right.frame(s).roll_rad), -expected, atol=1e-10)
+    (tmp_path / "again.toml").write_text(track_text(design), encoding="utf-8")
+    assert track_by_name(str(tmp_path / "again.toml")) == design
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("at_m = 70.0", "at_m = 50.0", ("cant[1].at_m", "> 50")),
+        ("mm = 40.0", "mm = 4000.0", ("cant[2].mm", "0.75")),
+        ("at_m = 50.0\nmm = 0.0", "at_m = 30.0\nmm = -5.0", ("cant[0].raised", "left or right")),
+        ("mm = 0.0", 'mm = -5.0\nraised = "left"', ("cant[0].mm", ">= 0 mm")),
+        ("[[cant]]\nat_m = 50.0", "[[cant]]\nplace_m = 50.0", ("cant[0].place_m", "unknown key")),
+    ],
+)
+def test_stations_that_are_none(tmp_path: Path, old: str, new: str, words: tuple[str, ...]) -> None:
+    assert old in STATIONS
+    text = GOOD.replace("cant_mm = 60.0\n", "") + STATIONS.replace(old, new)
+    with pytest.raises(InputError) as caught:
+        track_by_name(write(tmp_path, text))
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_cant_is_said_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"segment\[2\].cant_mm: the cant is said twice"):
+        track_by_name(write(tmp_path, GOOD + STATIONS))

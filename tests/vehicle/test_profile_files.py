@@ -169,7 +169,7 @@ NAN = np.where(np.arange(Y.size) == 7, np.nan, Z)
         (rows(Y[:7], Z[:7]), ["too few points", "found 7", "at least 8"]),
         ("# unit = m\n" + rows(Y, Z), ["unit", "wide", "limit: 0.005 to 0.25 m", "# unit = m"]),
         (rows(Y * 1e-3, Z * 1e-3), ["unit", "wide", "remedy"]),
-        ("# unit = inch\n" + rows(Y, Z), ["unknown unit", "inch", "m or mm"]),
+        ("# unit = cm\n" + rows(Y, Z), ["unknown unit", "cm", "m, mm or in"]),
         (rows(Y, -Z), ["no flange", "depth is positive downward"]),
         (rows(Y + 80.0, Z), ["tape circle"]),
         (rows(Y, Z).replace("\n", "\n1,5 2,5\n", 1), ["line 2", "2 numbers"]),

@@ -231,10 +231,10 @@ class RideFile(Part):
     ----------
     name : str
         Name of the ride.
-    track : str
-        A shipped track, or the path of a track file.
-    start_position_m : float
-        s of the IMU at its first sample.
+    track : str, optional
+        A shipped track, or the path of a track file; without it only methods that need no map run.
+    start_position_m : float, optional
+        s of the IMU at its first sample; 0 if not given, which only a ride without a track may leave out.
     gravity_mps2 : float
         Local gravity.
     longest_gap_s : float
@@ -249,8 +249,8 @@ class RideFile(Part):
     """
 
     name: str = Field(min_length=1, max_length=200)
-    track: str
-    start_position_m: float
+    track: str | None = None
+    start_position_m: float | None = None
     gravity_mps2: Annotated[float, Field(ge=9.7, le=9.9)] = 9.81
     longest_gap_s: Annotated[float, Field(gt=0.0, le=10.0)] = LONGEST_GAP_S
     map: MapErrorsPart = MapErrorsPart()
@@ -275,6 +275,14 @@ class RideFile(Part):
                 remedy="remove it, or exact = true",
             )
         return value
+
+    @model_validator(mode="after")
+    def _with_a_track_or_without(self) -> Self:
+        if self.track is not None and self.start_position_m is None:
+            raise InputError("is required", field="start_position_m", remedy="add it")
+        if self.track is None and "map" in self.model_fields_set:
+            raise InputError("belongs to a track", field="map", remedy="add track, or remove it")
+        return self
 
     @model_validator(mode="after")
     def _on_the_drawing(self) -> Self:

@@ -34,6 +34,7 @@ from simrail.recording.files.signal_reader import SignalReader
 from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording
 from simrail.recording.sheets.grades import imu_sheet
 from simrail.recording.sheets.imu_file import load_grade
+from simrail.track.design import NO_MAP
 from simrail.track.file import TrackFile
 
 RIDE_FILE = "ride.toml"
@@ -71,8 +72,10 @@ def ride_file(path: Path) -> Path:
 
 
 def _recording(spec: RideFile, folder: Path) -> Recording:
-    with blame(None, "track"):
-        track = load(TrackFile, "track", spec.track, folder=folder).design(Path(spec.track).stem)
+    track = NO_MAP
+    if spec.track is not None:
+        with blame(None, "track"):
+            track = load(TrackFile, "track", spec.track, folder=folder).design(Path(spec.track).stem)
     reader = SignalReader(folder)
     imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu"), spec)
     if spec.gaps is not None:
@@ -101,7 +104,7 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
         vehicle_sheet=None if spec.vehicle_sheet is None else spec.vehicle_sheet.sheet(spec.imu.body),
         encoder=None,
         encoder_sheet=None,
-        start_position_m=spec.start_position_m,
+        start_position_m=spec.start_position_m or 0.0,
         odometry_source="" if spec.odometry is None else spec.odometry.source,
         gravity_mps2=spec.gravity_mps2,
         gaps=gaps,

@@ -98,9 +98,12 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         "gravity_mps2": recording.gravity_mps2,
         "map": map_table(recording.map_errors),
     }
+    if not recording.track.is_map:
+        del head["track"], head["map"]
     if recording.vehicle_sheet is not None:
         head["vehicle_sheet"] = vehicle_sheet_table(recording.vehicle_sheet)
-    (folder / TRACK_FILE).write_text(track_text(recording.track), encoding="utf-8")
+    if recording.track.is_map:
+        (folder / TRACK_FILE).write_text(track_text(recording.track), encoding="utf-8")
     (folder / RIDE_FILE).write_text(toml_text({**head, **tables}), encoding="utf-8")
 
 

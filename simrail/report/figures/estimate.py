@@ -34,8 +34,10 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
     with canvas.look():
         x = _axis(recording)
         bins = Bins(x)
-        frame = recording.track.frame_extended(place_of(recording)[bins.first])
-        design = tuple(bins.parted(angle) for angle in (frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
+        design: tuple[FloatArray, ...] = ()
+        if recording.track.is_map:
+            frame = recording.track.frame_extended(place_of(recording)[bins.first])
+            design = tuple(bins.parted(angle) for angle in (frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
         drawn = [name for name in ATTITUDE if name in estimate.states]
         figure, axes = canvas.panels([1.9] * len(drawn))
         for axis, name in zip(axes, drawn, strict=True):
@@ -48,7 +50,7 @@ def estimated_attitude_figure(recording: Recording, estimate: Estimate, *, label
                 axis.fill_between(bins.x, low, high, color=BAND, alpha=0.16, lw=0, label="its own 95 % band")
             axis.plot(place, line, color=ESTIMATE, lw=1.05, zorder=12, label=label)
             lines = [line]
-            if recording.odometry is not None:
+            if recording.odometry is not None and design:
                 lines.append(canvas.draw_design(axis, bins.x, design[ATTITUDE.index(name)]))
             canvas.fit_limits(axis, lines, top=0.16)
             axis.set_ylabel(f"{name.removesuffix('_rad')}, \u00b0")

@@ -68,6 +68,7 @@ def ride_facts(recording: Recording) -> list[str]:
         lost = f"{missing} of them lost and interpolated, in {len(recording.gaps)} gaps"
     track = recording.track
     named = f"track '{track.name}'{' (synthetic)' if track.synthetic else ''}"
+    named = named if track.is_map else "a line without a map"
     way = f"from s = {position[0]:.1f} m of {named}"
     if recording.odometry is not None:
         speed = 3.6 * float(np.abs(recording.odometry["speed_mps"].to_numpy()).max())
@@ -94,7 +95,7 @@ def _tiles(recording: Recording, estimate: Estimate, us_per_sample: float) -> li
     if recording.odometry is None:
         tiles = [("duration", duration, "no odometry tells the way")]
     for angle in ("roll_rad", "pitch_rad"):
-        if angle in estimate.states and recording.odometry is not None:
+        if angle in estimate.states and recording.odometry is not None and recording.track.is_map:
             word = angle.removesuffix("_rad")
             difference = design_difference_deg(recording, estimate, angle)
             tiles.append(

@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from simrail.vehicle.contact.profile_files import profile_notes
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import CriticalSpeed, Mode
 from simrail.vehicle.study import VehicleStudy
@@ -89,6 +90,7 @@ def _contact_lines(study: VehicleStudy) -> list[str]:
         f"wheel {Path(pair.wheel_profile).name} on rail {Path(pair.rail_profile).name}{size}, "
         f"gauge {1e3 * pair.gauge_m:g} mm, inclination {_ratio(pair.rail_inclination)}, under static load"
     ]
+    lines += profile_notes(pair)
     if not contact.steers:
         return [*lines, "equivalent conicity: not given (the wheels turn independently)"]
     at_amplitudes = ", ".join(

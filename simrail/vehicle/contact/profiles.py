@@ -39,12 +39,15 @@ class WheelProfile:
         ``wheel_radius_m + depth_m``. It ends at the flange tip, the deepest point.
     source : str
         Where the shape comes from.
+    notes : tuple of str
+        What was done with the points of a file, and what is to be known of them.
     """
 
     name: str
     lateral_m: FloatArray
     depth_m: FloatArray
     source: str
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,12 +63,15 @@ class RailProfile:
         along the list, depth from the head's top.
     source : str
         Where the shape comes from.
+    notes : tuple of str
+        As of `WheelProfile`.
     """
 
     name: str
     lateral_m: FloatArray
     depth_m: FloatArray
     source: str
+    notes: tuple[str, ...] = ()
 
 
 _Profile = TypeVar("_Profile", WheelProfile, RailProfile)

@@ -1,0 +1,51 @@
+"""A design from a file of another program: by its ending, LandXML or a table of curvature over distance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from simrail.core.errors import InputError
+from simrail.core.toml_files import blame, label
+from simrail.track.curvature_csv import read_curvature_csv
+from simrail.track.design import TrackDesign
+from simrail.track.drawn import drawn_design
+from simrail.track.landxml import read_landxml
+
+LANDXML, TABLES = (".xml", ".landxml"), (".csv", ".txt", ".tsv")
+
+
+def design_from_file(
+    path: Path, *, alignment: str | None = None, step_smoothing_m: float | None = None
+) -> tuple[TrackDesign, list[str]]:
+    """The design that a file describes, and what is to be told of it.
+
+    Parameters
+    ----------
+    path : Path
+        LandXML or a table, by its ending.
+    alignment : str, optional
+        Name of the alignment, for a file with several.
+    step_smoothing_m : float, optional
+        As in `simrail.track.drawn.drawn_design`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it describes no line.
+    """
+    ending = path.suffix.lower()
+    if ending not in LANDXML + TABLES:
+        raise InputError(
+            "is of no kind that is read",
+            field="--from",
+            value=str(path),
+            limit="LandXML (.xml) or a table of curvature over distance (.csv)",
+            remedy="export IFC as LandXML" if ending == ".ifc" else "export it as one of these",
+        )
+    if not path.is_file():
+        raise InputError("there is no such file", field="--from", value=str(path))
+    if alignment is not None and ending not in LANDXML:
+        raise InputError("belongs to LandXML: a table has one line", field="--alignment", value=alignment)
+    with blame(label(path)):
+        drawn = read_landxml(path, alignment=alignment) if ending in LANDXML else read_curvature_csv(path)
+        return drawn_design(drawn, step_smoothing_m=step_smoothing_m), drawn.notes
