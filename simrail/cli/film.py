@@ -59,15 +59,15 @@ def film(
             scenario, cell=cell, from_m=from_m, to_m=to_m, method=method, forces=forces, watcher=watcher
         )
     if gif is not None:
-        from simrail.report.film.gif import write_gif
+        from simrail.report.film.gif import pace, write_gif
 
-        path = write_gif(gif, made)
+        path, plays = write_gif(gif, made), f", plays {pace(made):.3g} times as fast"
     else:
-        path = write_film(out or Path(f"{scenario.name}_film.html"), made)
+        path, plays = write_film(out or Path(f"{scenario.name}_film.html"), made), ""
     first, last = made.reference_m[0], made.reference_m[-1]
     print(
         f"wrote {path}: {made.duration_s:.0f} s of ride {made.ride}, "
-        f"{first:.0f} to {last:.0f} m, {path.stat().st_size / 1e6:.1f} MB"
+        f"{first:.0f} to {last:.0f} m, {path.stat().st_size / 1e6:.1f} MB{plays}"
     )
     return DONE
 
