@@ -12,6 +12,7 @@ import typer
 
 from simrail.cli.film import film
 from simrail.cli.grade import grade
+from simrail.cli.lesson import lesson
 from simrail.cli.library import cache, imu, list_parts, new, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
 from simrail.cli.rides import estimate, export
@@ -89,6 +90,7 @@ for _command in (
     sensitivity,
     spectra,
     film,
+    lesson,
     vehicle,
     imu,
     new,
