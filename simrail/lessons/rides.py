@@ -80,7 +80,13 @@ def one_curve(speed_kmh: float = 50.0, rough: float = 1.0, seed: int = 1, rest_s
     design = load(TrackFile, "track", "smooth_curve").design("smooth_curve")
     laid = lay(design, Irregularity("erri_b176_low", (1.5, 100.0), 40.0, scale=max(rough, 1e-9)), seed=seed)
     profile = SpeedProfile(
-        start_m=10.0, end_m=590.0, speed_mps=speed_kmh / 3.6, rest_s=rest_s, final_rest_s=2.0
+        start_m=10.0,
+        end_m=590.0,
+        speed_mps=speed_kmh / 3.6,
+        acceleration_mps2=1.0,
+        jerk_mps3=0.8,
+        rest_s=rest_s,
+        final_rest_s=2.0,
     )
     truth = kinematic_truth(
         design,
