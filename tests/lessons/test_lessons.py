@@ -3,6 +3,7 @@
 import importlib.util
 import subprocess
 import sys
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
@@ -110,3 +111,72 @@ def test_shipped_ride_is_small_and_of_its_scenario():
     moving = slice(2000, -500)
     follows = np.corrcoef((height - cant)[moving], 0.5 * (left + right)[moving])[0, 1]
     assert follows > 0.99
+
+
+@pytest.mark.slow
+def test_curve_with_the_sign_of_the_compensation_turned_is_no_longer_true(monkeypatch):
+    import simrail.estimators.attitude.ekf as ekf
+
+    right = ekf.gravity_force
+
+    def turned(recording, frame, **options):
+        felt = recording.imu[["accel_x_mps2", "accel_y_mps2", "accel_z_mps2"]].to_numpy()
+        return 2.0 * felt - right(recording, frame, **options)
+
+    monkeypatch.setattr(ekf, "gravity_force", turned)
+    assert any("compensated EKF in the curve" in words for words in broken("curve"))
+
+
+@pytest.mark.slow
+def test_baseline_that_reads_the_cant_the_wrong_way_is_no_longer_true(monkeypatch):
+    from simrail.estimators.baselines import DesignAngles
+
+    right = DesignAngles.estimate
+
+    def turned(self, recording):
+        estimate = right(self, recording)
+        return replace(estimate, states=estimate.states.assign(roll_rad=-estimate.states["roll_rad"]))
+
+    monkeypatch.setattr(DesignAngles, "estimate", turned)
+    assert len(broken("baseline")) >= 2
+
+
+@pytest.mark.slow
+def test_slip_that_the_encoder_does_not_count_is_no_longer_true(monkeypatch):
+    import simrail.sensors.measure as measure
+
+    right = measure.sample_encoder
+    monkeypatch.setattr(
+        measure,
+        "sample_encoder",
+        lambda t, angle, spec, **more: right(t, angle, replace(spec, slip=()), **more),
+    )
+    assert any("lost by creepage times way" in words for words in broken("slip"))
+
+
+@pytest.mark.slow
+def test_interval_of_half_the_size_is_no_longer_true(monkeypatch):
+    from simrail.estimators.attitude.ekf import AttitudeEkf
+
+    right = AttitudeEkf.estimate
+
+    def halved(self, recording):
+        estimate = right(self, recording)
+        states = estimate.states.assign(roll_sd_rad=0.5 * estimate.states["roll_sd_rad"])
+        return replace(estimate, states=states)
+
+    monkeypatch.setattr(AttitudeEkf, "estimate", halved)
+    assert any("NEES within the bounds" in words for words in broken("interval"))
+
+
+@pytest.mark.slow
+def test_rails_by_a_smoother_that_does_not_smooth_are_no_longer_true(monkeypatch):
+    from simrail.estimators.trajectory.smoother import TrajectorySmoother
+
+    right = TrajectorySmoother.estimate
+    monkeypatch.setattr(
+        TrajectorySmoother,
+        "estimate",
+        lambda self, recording: right(replace(self, smoothed=False), recording),
+    )
+    assert any("halves a filter's error" in words for words in broken("rails"))

@@ -8,10 +8,10 @@ app = marimo.App(width="medium", app_title="simrail: no IMU at all")
 with app.setup:
     import marimo as mo
     import numpy as np
-
-    from simrail import measure, score, with_odometry
     from simrail.estimators.attitude.ekf import AttitudeEkf
     from simrail.estimators.baselines import DesignAngles
+
+    from simrail import measure, score, with_odometry
     from simrail.lessons.claims import Claim, about, insist, table
     from simrail.lessons.figures import Line, Panel, draw
     from simrail.lessons.rides import ON_BODY, one_curve
@@ -47,7 +47,9 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
-    rough = mo.ui.slider(0.0, 6.0, 0.5, value=1.0, label="roughness of the rails, × ERRI low", show_value=True)
+    rough = mo.ui.slider(
+        0.0, 6.0, 0.5, value=1.0, label="roughness of the rails, × ERRI low", show_value=True
+    )
     imu = mo.ui.dropdown(GRADES, value="lord_3dm_gx4_25", label="IMU")
     surveyed = mo.ui.switch(value=False, label="the map has the errors of a survey")
     mo.vstack([rough, mo.hstack([imu, surveyed], justify="start", gap=3)])
@@ -218,7 +220,13 @@ def _():
         cross = np.rad2deg((z[:, 1] - z[:, 3]) / line.truth.track.rail_base_m)
         found = [
             # By the odometry's place, some decimetres off, the design is read at another place of the transition.
-            about("no IMU: its error is the cross-level of the rails, rms", truth, np.sqrt(np.mean(cross**2)), 0.1, "°"),
+            about(
+                "no IMU: its error is the cross-level of the rails, rms",
+                truth,
+                np.sqrt(np.mean(cross**2)),
+                0.1,
+                "°",
+            ),
             Claim(
                 "against the design it would score (almost) nothing: rms",
                 rms_deg(design, recording, reference, against="design"),
@@ -230,7 +238,12 @@ def _():
         smooth = paired(0.5, "lord_3dm_gx4_25", 6)
         rough = paired(6.0, "lord_3dm_gx4_25", 6)
         found.append(
-            Claim("on smooth rails the IMU wins on few devices: share", float(np.mean(smooth[:, 0] < smooth[:, 1])), 0.0, 0.35)
+            Claim(
+                "on smooth rails the IMU wins on few devices: share",
+                float(np.mean(smooth[:, 0] < smooth[:, 1])),
+                0.0,
+                0.35,
+            )
         )
         found.append(
             Claim("on rough rails on all: share", float(np.mean(rough[:, 0] < rough[:, 1])), 0.99, 1.0)

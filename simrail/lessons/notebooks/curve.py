@@ -8,10 +8,10 @@ app = marimo.App(width="medium", app_title="simrail: a curve felt as a slope")
 with app.setup:
     import marimo as mo
     import numpy as np
-
-    from simrail import measure, score, with_odometry
     from simrail.estimators.attitude.complementary import ComplementaryFilter
     from simrail.estimators.attitude.ekf import AttitudeEkf
+
+    from simrail import measure, score, with_odometry
     from simrail.lessons.claims import Claim, about, insist, table
     from simrail.lessons.figures import Line, Panel, draw
     from simrail.lessons.rides import ON_BODY, one_curve
@@ -244,7 +244,9 @@ def _():
         # The bias of this accelerometer is at most 2 mg, 0.115°; the rails' own cross-level adds about 0.05°.
         found.append(Claim("compensated EKF in the curve: rms error", with_it, 0.0, 0.16, "°"))
         found.append(
-            Claim("uncompensated it is drawn to what is felt: rms error", without, 0.5 * expected, expected, "°")
+            Claim(
+                "uncompensated it is drawn to what is felt: rms error", without, 0.5 * expected, expected, "°"
+            )
         )
         found.append(Claim("compensation takes most of it away: ratio", with_it / without, 0.0, 0.1))
         return found

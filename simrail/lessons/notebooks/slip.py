@@ -68,7 +68,9 @@ def ridden(creepage: float, duration_s: float, radius_percent: float, odometry: 
 @app.function
 def lost_m(line, creepage: float, duration_s: float) -> float:
     """Way that the wheel counts too much: creepage times what is run meanwhile, half of each ramp taken off."""
-    place = np.interp([START_S + 0.5 * RAMP_S, START_S + duration_s - 0.5 * RAMP_S], line.truth.time_s, line.place_m)
+    place = np.interp(
+        [START_S + 0.5 * RAMP_S, START_S + duration_s - 0.5 * RAMP_S], line.truth.time_s, line.place_m
+    )
     return creepage * float(place[1] - place[0])
 
 
@@ -90,7 +92,13 @@ def _(creepage, duration, method, radius):
                         Panel(
                             "speed, km/h",
                             [
-                                Line("true", _t, 3.6 * _motion["speed_mps"].to_numpy()[_every], "true", width=2.0),
+                                Line(
+                                    "true",
+                                    _t,
+                                    3.6 * _motion["speed_mps"].to_numpy()[_every],
+                                    "true",
+                                    width=2.0,
+                                ),
                                 Line(method.value, _t, 3.6 * _told["speed_mps"].to_numpy()[_every], "first"),
                             ],
                             spans=_slid,
@@ -98,7 +106,15 @@ def _(creepage, duration, method, radius):
                         Panel(
                             "error of place, m",
                             [Line("error", _t, _error[_every], "second", width=1.8)],
-                            bands=[Band(_t, -1.96 * _sd[_every], 1.96 * _sd[_every], "first", "its own 95 % interval")],
+                            bands=[
+                                Band(
+                                    _t,
+                                    -1.96 * _sd[_every],
+                                    1.96 * _sd[_every],
+                                    "first",
+                                    "its own 95 % interval",
+                                )
+                            ],
                             spans=_slid,
                         ),
                     ],
@@ -144,7 +160,9 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
-    mo.md("## A sweep: how much slip is too much?\n\nError at the end over the creepage, for the duration chosen above.")
+    mo.md(
+        "## A sweep: how much slip is too much?\n\nError at the end over the creepage, for the duration chosen above."
+    )
     return
 
 
@@ -184,15 +202,30 @@ def _():
         found = [
             # Counts are 1.8 mm; the odometry smooths over a second, which moves ends, not the way between.
             about("the wheel alone is lost by creepage times way", alone, expected, 0.02, "m"),
-            Claim("with accelerometer and line it is not: size of the error", abs(matched), 0.0, 0.1 * abs(expected), "m"),
+            Claim(
+                "with accelerometer and line it is not: size of the error",
+                abs(matched),
+                0.0,
+                0.1 * abs(expected),
+                "m",
+            ),
         ]
         way = float(line.place_m[-1] - line.place_m[0])
         found.append(
-            about("a radius 1 % too large: error over way", final_error_m(0.0, 1.0, "encoder", 1.0) / way, 0.01, 0.02)
+            about(
+                "a radius 1 % too large: error over way",
+                final_error_m(0.0, 1.0, "encoder", 1.0) / way,
+                0.01,
+                0.02,
+            )
         )
         recording = ridden(-0.3, 4.0, 0.0, "encoder")[1]
         own = 1.96 * float(recording.odometry["position_sd_m"].iloc[-1])
-        found.append(Claim("the wheel alone does not know it: error over its own interval", abs(alone) / own, 1.5, 100.0))
+        found.append(
+            Claim(
+                "the wheel alone does not know it: error over its own interval", abs(alone) / own, 1.5, 100.0
+            )
+        )
         return found
 
     claims = _claims()
