@@ -11,7 +11,9 @@ from typing import Annotated, Any
 import typer
 
 from simrail.cli.examples import below
+from simrail.cli.film import film
 from simrail.cli.grade import grade
+from simrail.cli.lesson import lesson
 from simrail.cli.library import cache, imu, list_parts, new, open_page, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
 from simrail.cli.rides import estimate, export
@@ -82,7 +84,7 @@ def _options(
 
 for _command in (
     *(run, check, grade, export, estimate, tune, sensitivity, spectra),
-    *(vehicle, imu, new, schema, cache),
+    *(film, lesson, vehicle, imu, new, schema, cache),
 ):
     app.command(epilog=below(_command.__name__))(_command)
 app.command(name="list", epilog=below("list"))(list_parts)

@@ -1,0 +1,77 @@
+"""``simrail lesson``: serve a lesson on this machine, or tell which there are."""
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from typing import Annotated
+
+import typer
+
+from simrail.cli.options import DONE
+from simrail.core.errors import InputError, did_you_mean, one_of
+from simrail.lessons import LESSONS, notebook, teacher_page
+
+
+def lesson(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Which one; lists them if not given.")
+    ] = None,
+    edit: Annotated[
+        bool, typer.Option("--edit", help="Open its code, too, in a copy in this folder.")
+    ] = False,
+    headless: Annotated[
+        bool, typer.Option("--headless", help="Open no browser: only say where it is served.")
+    ] = False,
+    port: Annotated[
+        int | None, typer.Option("--port", metavar="NUMBER", min=1, max=65535, help="Port of the server.")
+    ] = None,
+    teacher: Annotated[bool, typer.Option("--teacher", help="Show what a teacher wants to know.")] = False,
+) -> int:
+    """Serve a lesson: a page with sliders, in the browser; it needs no network."""
+    if teacher:
+        from rich.console import Console
+        from rich.markdown import Markdown
+
+        Console().print(Markdown(teacher_page().read_text(encoding="utf-8")))
+        return DONE
+    if name is None:
+        for number, (key, title) in enumerate(LESSONS.items(), start=1):
+            print(f"{number}  {key:9}  {title}")
+        return DONE
+    one_of(name, LESSONS, "there is no such lesson", field="NAME", remedy=did_you_mean(name, LESSONS))
+    if find_spec("marimo") is None:
+        raise InputError(
+            "lessons are served by marimo, which is not installed",
+            field="NAME",
+            value=name,
+            remedy="pip install 'simrail[lessons]'",
+        )
+    return serve(name, edit=edit, headless=headless, port=port)
+
+
+def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
+    """Serve a lesson until it is stopped; returns the exit code of the server."""
+    path = notebook(name)
+    if edit:
+        from pathlib import Path
+
+        # The lesson of the package stays as it is: what is changed is a copy.
+        own = Path(f"lesson_{name}.py")
+        if not own.exists():
+            own.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+        path = own
+    command = [
+        sys.executable,
+        "-m",
+        "marimo",
+        "-q" if headless else "-y",
+        "edit" if edit else "run",
+        str(path),
+    ]
+    command += ["--headless"] if headless else []
+    command += ["--port", str(port)] if port is not None else []
+    if headless and port is not None:
+        print(f"serving {name} at http://127.0.0.1:{port}", flush=True)
+    # No question whether there is a newer marimo leaves the machine.
+    return subprocess.call(command, env={**os.environ, "MARIMO_SKIP_UPDATE_CHECK": "1"}) or DONE

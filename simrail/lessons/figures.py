@@ -1,0 +1,105 @@
+"""Figures of lessons in the look of the reports, as inline SVG that a notebook shows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from simrail.core.jit import FloatArray
+from simrail.report.figures.canvas import INK, MUTED, look, panels, to_svg
+
+COLOURS = {
+    "true": "#0b7a55",
+    "first": "#0072B2",
+    "second": "#D55E00",
+    "third": "#8a3ffc",
+    "fourth": "#009E73",
+    "faint": "#b8c1cc",
+    "ink": INK,
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a panel: its name (none without a label), places and values, and how it is drawn."""
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    colour: str = "first"
+    dashed: bool = False
+    marks: bool = False
+    width: float = 1.4
+
+
+@dataclass(frozen=True)
+class Band:
+    """An area between two lines."""
+
+    x: FloatArray
+    low: FloatArray
+    high: FloatArray
+    colour: str = "first"
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel: what stands on its y axis, and what is in it."""
+
+    label: str
+    lines: Sequence[Line]
+    bands: Sequence[Band] = ()
+    spans: Sequence[tuple[float, float]] = field(default=())
+    log: bool = False
+    limits: tuple[float, float] | None = None
+
+
+def draw(
+    parts: Sequence[Panel], *, x_label: str, description: str, log_x: bool = False, tall_in: float = 1.7
+) -> str:
+    """Draw panels above each other over one x axis; returns SVG.
+
+    Parameters
+    ----------
+    parts : sequence of Panel
+        From above; ``spans`` of a panel are shaded, curves for instance.
+    x_label, description : str
+        Words below, and for those who do not see it.
+    log_x : bool
+        Logarithmic x axis.
+    tall_in : float
+        Height of a panel.
+    """
+    with look():
+        figure, axes = panels([tall_in] * len(parts))
+        for axis, panel in zip(axes, parts, strict=True):
+            for low, high in panel.spans:
+                axis.axvspan(low, high, color="#eef1e6", lw=0, zorder=-5)
+            for band in panel.bands:
+                colour = COLOURS[band.colour]
+                axis.fill_between(
+                    band.x, band.low, band.high, color=colour, alpha=0.18, lw=0, label=band.name or None
+                )
+            for line in panel.lines:
+                axis.plot(
+                    line.x,
+                    line.y,
+                    color=COLOURS[line.colour],
+                    lw=0.0 if line.marks else line.width,
+                    ls=(0, (4, 3)) if line.dashed else "-",
+                    marker="o" if line.marks else None,
+                    ms=4,
+                    label=line.name or None,
+                )
+            if log_x:
+                axis.set_xscale("log")
+            if panel.log:
+                axis.set_yscale("log")
+            else:
+                axis.axhline(0.0, color=MUTED, lw=0.6, zorder=-1)
+            if panel.limits is not None:
+                axis.set_ylim(*panel.limits)
+            axis.set_ylabel(panel.label)
+            if axis.get_legend_handles_labels()[1]:
+                axis.legend(loc="upper left", ncols=4)
+        axes[-1].set_xlabel(x_label)
+        return str(to_svg(figure, description=description))

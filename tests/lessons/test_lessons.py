@@ -1,0 +1,182 @@
+"""Lessons as scripts: their claims hold, and do not where what they speak of is made wrong."""
+
+import importlib.util
+import subprocess
+import sys
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from simrail.cli.main import call
+from simrail.lessons import LESSONS, notebook, teacher_page
+from simrail.lessons.claims import Claim, ClaimError, about, insist, table
+
+pytest.importorskip("marimo")
+
+OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift"]
+
+
+def module_of(name: str) -> ModuleType:
+    """A notebook as a module of its own, read anew."""
+    spec = importlib.util.spec_from_file_location(f"lesson_{name}", notebook(name))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def claims_of(name: str) -> list[Claim]:
+    """What a lesson claims when it is run, whether it holds or not."""
+    with pytest.MonkeyPatch.context() as patch:
+        # The notebook's last cell would end the run; here all claims are wanted.
+        patch.setattr("simrail.lessons.claims.insist", lambda claims: None)
+        _, names = module_of(name).app.run()
+    return list(names["claims"])
+
+
+@pytest.mark.parametrize("name", ["drift", *OTHERS])
+def test_claims_hold(name):
+    claims = claims_of(name)
+    assert len(claims) >= 3
+    assert [claim.line for claim in claims if not claim.holds] == []
+    # A bound that nothing could miss claims nothing.
+    assert all(claim.high - claim.low < 1e3 * max(abs(claim.value), 1e-3) for claim in claims)
+
+
+def broken(name: str) -> list[str]:
+    return [claim.words for claim in claims_of(name) if not claim.holds]
+
+
+def test_drift_with_half_the_noise_is_no_longer_true(monkeypatch):
+    import simrail.sensors.imu as imu
+
+    whole = imu.add_noise
+
+    def halved(samples, grade, kind, streams):
+        before = samples.copy()
+        whole(samples, grade, kind, streams)
+        samples[:] = before + 0.5 * (samples - before)
+
+    monkeypatch.setattr(imu, "add_noise", halved)
+    assert any("Allan deviation at 1 s is N" in words for words in broken("drift"))
+
+
+def test_a_claim_that_does_not_hold_ends_the_script(capsys):
+    good, bad = about("two and two", 4.0, 4.0, 0.01), Claim("a third", 0.5, 0.3, 0.4, "m")
+    insist([good])
+    with pytest.raises(ClaimError, match="a third"):
+        insist([good, bad])
+    assert "DOES NOT HOLD: a third: 0.5 m" in capsys.readouterr().out
+    assert table([good, bad]).count("\n") == 3
+
+
+@pytest.mark.slow
+def test_runs_as_a_script():
+    run = subprocess.run([sys.executable, notebook("drift")], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("holds:") >= 3
+
+
+def test_command_lists_and_refuses(capsys):
+    assert call(["lesson"]) == 0
+    assert all(title in capsys.readouterr().out for title in ["Why a filter drifts"])
+    assert call(["lesson", "drfit"]) == 2
+    err = capsys.readouterr().err
+    assert "did you mean drift?" in err
+    assert err.count("\n") == 1
+
+
+def test_every_lesson_has_its_notebook_and_a_place_on_the_teachers_page():
+    words = teacher_page().read_text(encoding="utf-8")
+    for name in LESSONS:
+        assert notebook(name).is_file()
+        assert f"simrail lesson {name}" in words
+
+
+def test_shipped_ride_is_small_and_of_its_scenario():
+    from simrail.lessons.rides import MOST_SHIPPED_BYTES, SHIPPED, short_ride
+
+    assert sum(file.stat().st_size for file in SHIPPED.iterdir()) < MOST_SHIPPED_BYTES
+    line = short_ride()
+    assert set(line.truth.bodies) == {"front", "frame"}
+    # The rails are laid again: the axle runs on them, so its height follows them.
+    axle = line.truth.bodies["front"]
+    place = line.place_m + axle.offset_m
+    left, right = line.rails.rails(place)[:, [1, 3]].T
+    height = axle.position[:, 2] - axle.height_m
+    cant = line.truth.track.frame(place).position[:, 2]
+    moving = slice(2000, -500)
+    follows = np.corrcoef((height - cant)[moving], 0.5 * (left + right)[moving])[0, 1]
+    assert follows > 0.99
+
+
+@pytest.mark.slow
+def test_curve_with_the_sign_of_the_compensation_turned_is_no_longer_true(monkeypatch):
+    import simrail.estimators.attitude.ekf as ekf
+
+    right = ekf.gravity_force
+
+    def turned(recording, frame, **options):
+        felt = recording.imu[["accel_x_mps2", "accel_y_mps2", "accel_z_mps2"]].to_numpy()
+        return 2.0 * felt - right(recording, frame, **options)
+
+    monkeypatch.setattr(ekf, "gravity_force", turned)
+    assert any("compensated EKF in the curve" in words for words in broken("curve"))
+
+
+@pytest.mark.slow
+def test_baseline_that_reads_the_cant_the_wrong_way_is_no_longer_true(monkeypatch):
+    from simrail.estimators.baselines import DesignAngles
+
+    right = DesignAngles.estimate
+
+    def turned(self, recording):
+        estimate = right(self, recording)
+        return replace(estimate, states=estimate.states.assign(roll_rad=-estimate.states["roll_rad"]))
+
+    monkeypatch.setattr(DesignAngles, "estimate", turned)
+    assert len(broken("baseline")) >= 2
+
+
+@pytest.mark.slow
+def test_slip_that_the_encoder_does_not_count_is_no_longer_true(monkeypatch):
+    import simrail.sensors.measure as measure
+
+    right = measure.sample_encoder
+    monkeypatch.setattr(
+        measure,
+        "sample_encoder",
+        lambda t, angle, spec, **more: right(t, angle, replace(spec, slip=()), **more),
+    )
+    assert any("lost by creepage times way" in words for words in broken("slip"))
+
+
+@pytest.mark.slow
+def test_interval_of_half_the_size_is_no_longer_true(monkeypatch):
+    from simrail.estimators.attitude.ekf import AttitudeEkf
+
+    right = AttitudeEkf.estimate
+
+    def halved(self, recording):
+        estimate = right(self, recording)
+        states = estimate.states.assign(roll_sd_rad=0.5 * estimate.states["roll_sd_rad"])
+        return replace(estimate, states=states)
+
+    monkeypatch.setattr(AttitudeEkf, "estimate", halved)
+    assert any("NEES within the bounds" in words for words in broken("interval"))
+
+
+@pytest.mark.slow
+def test_rails_by_a_smoother_that_does_not_smooth_are_no_longer_true(monkeypatch):
+    from simrail.estimators.trajectory.smoother import TrajectorySmoother
+
+    right = TrajectorySmoother.estimate
+    monkeypatch.setattr(
+        TrajectorySmoother,
+        "estimate",
+        lambda self, recording: right(replace(self, smoothed=False), recording),
+    )
+    assert any("halves a filter's error" in words for words in broken("rails"))

@@ -1,0 +1,166 @@
+"""What a film holds: poses by an independent oracle, ranges, methods, faulty input; page and picture."""
+
+import base64
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from simrail import InputError, load_scenario
+from simrail.cli.main import call
+from simrail.report.film.film import FRAME_HZ, Film, film_of, scenario_of
+from simrail.report.film.gif import GIF_HZ, pace, write_gif
+from simrail.report.film.page import film_data, write_film
+from simrail.report.film.shapes import boxes_of, discs_of, profile_lines
+
+SHORT = ["ride.end_m=190.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "monte_carlo.sensor_draws=1"]
+
+
+@pytest.fixture(scope="module")
+def film(own_cache: None) -> Film:
+    return film_of(load_scenario("quick_kinematic", overrides=SHORT))
+
+
+def unpacked(text: str, columns: int) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype="<f4").reshape(-1, columns)
+
+
+def test_poses_are_those_of_bodies_that_follow_the_rails(film):
+    """The kinematic engine's bodies keep to the rails at their own place: the film must find them there."""
+    for name, pose in film.poses.items():
+        left_y, left_z, right_y, right_z = film.rails.rails(pose[:, 0]).T
+        body = film.vehicle.body(name)
+        roll = (left_z - right_z) / film.rails.design.rail_base_m
+        lateral = 0.5 * (left_y + right_y) - body.position_m[2] * roll
+        # First order in the roll; a place beside would be off by the irregularity, millimetres.
+        np.testing.assert_allclose(pose[:, 1], lateral, atol=2e-6)
+        np.testing.assert_allclose(pose[:, 2], body.position_m[2] + 0.5 * (left_z + right_z), atol=1e-5)
+        np.testing.assert_allclose(pose[:, 3], roll, atol=1e-7)
+        np.testing.assert_allclose(pose[:, 0] - film.reference_m, body.position_m[0], atol=2e-3)
+
+
+def test_frames_are_uniform_and_wheels_roll(film):
+    np.testing.assert_allclose(np.diff(film.time_s), 1.0 / FRAME_HZ, atol=1e-9)
+    way = film.reference_m - film.reference_m[0]
+    turned = next(iter(film.turns_rad.values()))
+    np.testing.assert_allclose(turned * film.vehicle.wheels[0].radius_m, way, rtol=1e-3, atol=1e-3)
+
+
+def test_page_carries_what_the_film_holds_and_fetches_nothing(film, tmp_path):
+    page = write_film(tmp_path / "new" / "film.html", film)
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r"""(src|href)=|https?://|@import|fetch\(""", text)
+    assert page.stat().st_size < 5e6 * max(film.duration_s, 10.0) / 60.0
+    data = film_data(film)
+    for body in data["bodies"]:
+        pose = unpacked(body["pose"], 6)
+        pose_there = film.poses[body["name"]] - [data["origin_m"], 0, 0, 0, 0, 0]
+        np.testing.assert_allclose(pose, pose_there, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(unpacked(data["attitude"]["true"], 2), film.true_rad, rtol=1e-6)
+    rails = data["rails"]
+    place = rails["from"] + data["origin_m"] + rails["step"] * np.arange(len(unpacked(rails["rows"], 4)))
+    np.testing.assert_allclose(unpacked(rails["rows"], 4), film.rails.rails(place), atol=1e-9)
+
+
+def test_range_is_where_the_vehicle_is_first(film, own_cache):
+    scenario = load_scenario("quick_kinematic", overrides=SHORT)
+    piece = film_of(scenario, from_m=150.0, to_m=60.0, method="design_angles")
+    assert piece.reference_m.min() >= 60.0
+    assert piece.reference_m.max() <= 150.0
+    speed = 50.0 / 3.6
+    # It drives at its full speed there: the frames at either end are within one frame of the places.
+    assert piece.reference_m[0] - 60.0 < speed / FRAME_HZ
+    assert 150.0 - piece.reference_m[-1] < speed / FRAME_HZ
+    assert next(iter(piece.estimated_rad)) == "design_angles"
+    at = round(piece.time_s[0] * FRAME_HZ)
+    np.testing.assert_allclose(piece.time_s[0], film.time_s[at], atol=0.5 / FRAME_HZ)
+
+
+def test_signals_of_the_imu_do_not_fold(own_cache):
+    """A tone faster than the frames is averaged away, not shown as a slow one."""
+    import pandas as pd
+
+    from simrail.report.film.film import _mean_at
+
+    when = np.arange(0.0, 10.0, 0.001)
+    slow = np.sin(2.0 * np.pi * 0.5 * when)
+    signal = pd.Series(slow + np.sin(2.0 * np.pi * 251.0 * when), index=when)
+    wanted = np.arange(0.1, 9.9, 1.0 / FRAME_HZ)
+    # 251 Hz leaves at most 1/(pi f T) = 3 % in a mean over 40 ms; a sample each frame would leave all.
+    np.testing.assert_allclose(_mean_at(signal, wanted), np.sin(np.pi * wanted), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "limit"),
+    [
+        ({"from_m": -50.0}, "--from", "10.0 to 190.0 m"),
+        ({"to_m": 900.0}, "--to", "10.0 to 190.0 m"),
+        ({"from_m": float("nan")}, "--from", "finite"),
+        ({"from_m": 100.0, "to_m": 101.0}, "--to", "10.0 to 190.0 m"),
+        ({"method": "ekf"}, "--method", "one of ekf_compensated"),
+        ({"cell": 9}, "--cell", "0 to 1"),
+    ],
+)
+def test_faulty_input_is_one_line(own_cache, options, field, limit):
+    scenario = load_scenario("quick_kinematic", overrides=SHORT)
+    with pytest.raises(InputError) as caught:
+        film_of(scenario, **options)
+    assert caught.value.field == field
+    assert limit in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_command_refuses_before_it_writes(here, capsys):
+    assert call(["film", "quick_kinematic", "--out", "film.txt"]) == 2
+    assert call(["film", "quick_kinematic", "--gif", "a.gif", "--out", "a.html"]) == 2
+    assert call(["film", "no_such"]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 3
+    assert not list(here.iterdir())
+
+
+def test_results_have_their_own_settings(here):
+    folder = here / "results"
+    folder.mkdir()
+    (folder / "manifest.json").write_text("{}")
+    with pytest.raises(InputError, match="settings that they were made with"):
+        scenario_of(str(folder), overrides=["seed=2"])
+    with pytest.raises(InputError, match="no finished results"):
+        scenario_of(str(folder))
+
+
+def test_picture_for_slides(film, tmp_path):
+    short = replace(
+        film,
+        time_s=film.time_s[:20],
+        reference_m=film.reference_m[100:120],
+        poses={name: pose[100:120] for name, pose in film.poses.items()},
+        turns_rad={name: turn[100:120] for name, turn in film.turns_rad.items()},
+        true_rad=film.true_rad[100:120],
+        estimated_rad={name: values[100:120] for name, values in film.estimated_rad.items()},
+    )
+    path = write_gif(tmp_path / "film.gif", short)
+    with Image.open(path) as picture:
+        assert picture.n_frames == len(range(0, 20, round(pace(short) * FRAME_HZ / GIF_HZ)))
+        assert picture.info["duration"] == 1000 / GIF_HZ
+        first = np.asarray(picture.convert("RGB"), dtype=float)
+        picture.seek(picture.n_frames - 1)
+        assert np.mean(np.abs(np.asarray(picture.convert("RGB"), dtype=float) - first)) > 0.5
+
+
+def test_shapes_are_made_of_the_model(film):
+    vehicle = film.vehicle
+    car = next(box for box in boxes_of(vehicle) if box.kind == "car")
+    body = vehicle.body("body")
+    long = np.ptp(car.corners[:, 0])
+    # A uniform box: Iyy + Izz - Ixx = m L^2 / 6.
+    roll, pitch, yaw = body.inertia_kgm2
+    assert body.mass_kg * long**2 / 6.0 == pytest.approx(pitch + yaw - roll)
+    floor = body.position_m[2] + car.corners[:, 2].min()
+    assert floor > 2.0 * max(disc.radius_m for disc in discs_of(vehicle))
+    wheel, rail, offset = profile_lines(vehicle)
+    # Set down in the middle, the wheel just touches its rail: they meet within 0.2 mm, and nowhere deeper.
+    gap = np.interp(rail[:, 0] - offset, wheel[:, 0], wheel[:, 1]) - rail[:, 1]
+    assert abs(gap.min()) < 2e-4
