@@ -136,8 +136,7 @@ def sample_imu(
         felt = felt + _earth_terms(motion, earth)
     del motion, of_imu
     shaken = np.ascontiguousarray(felt[:, 3:]) if rectifies else None
-    if grade.bandwidth_hz is not None:
-        felt = second_order(felt, bandwidth_hz=grade.bandwidth_hz, rate_hz=truth_rate)
+    felt = _responded(felt, grade, truth_rate)
     if errors and (grade.clock_jitter_s > 0.0 or grade.clock_drift > 0.0):
         samples, first, places = sample_by_clock(
             felt, sampling, grade, truth_rate_hz=truth_rate, streams=streams
@@ -159,6 +158,18 @@ def sample_imu(
             )
     index = pd.Index(stamps, name="time_s")
     return pd.DataFrame(samples, index=index, columns=list(IMU)), sampling.delay / truth_rate
+
+
+def _responded(felt: FloatArray, grade: ImuGrade, rate_hz: float) -> FloatArray:
+    """What the response of the device makes of rates and forces (n, 6), each triad with its own bandwidth."""
+    gyro, accel = grade.bandwidth_of("gyro"), grade.bandwidth_of("accel")
+    if gyro == accel:
+        return felt if gyro is None else second_order(felt, bandwidth_hz=gyro, rate_hz=rate_hz)
+    triads = [
+        part if band is None else second_order(part, bandwidth_hz=band, rate_hz=rate_hz)
+        for part, band in ((felt[:, :3], gyro), (felt[:, 3:], accel))
+    ]
+    return np.hstack(triads)
 
 
 def arrived(imu: pd.DataFrame, grade: ImuGrade, *, seed: int, draw: int, name: str) -> pd.DataFrame:

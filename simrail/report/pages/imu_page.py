@@ -10,8 +10,9 @@ from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.core.jit import FloatArray
 from simrail.recording.sheets.allan import overlapping_allan
 from simrail.recording.sheets.figures import FIGURES
-from simrail.recording.sheets.grades import ImuGrade, silent_noise
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuHead
+from simrail.recording.sheets.usual import sheet_warnings
 from simrail.report.figures.canvas import INK, legend_above, log_scale, look, panels, to_svg
 from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.imu_text import device_rows, triad_rows
@@ -29,7 +30,7 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
         grade=grade,
         device=device_rows(grade),
         triads=triad_rows(grade),
-        warnings=silent_noise(grade),
+        warnings=sheet_warnings(grade),
         allan=allan_figure(grade, seed=seed),
     )
     return write_page(folder, grade.name, text)
@@ -37,7 +38,15 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
 
 def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
     """Samples of a device at rest and level, response and clock left out: they do not show at rest."""
-    resting = replace(grade, bandwidth_hz=None, oversampling=1, clock_jitter_s=0.0, clock_drift=0.0)
+    resting = replace(
+        grade,
+        bandwidth_hz=None,
+        gyro_bandwidth_hz=None,
+        accel_bandwidth_hz=None,
+        oversampling=1,
+        clock_jitter_s=0.0,
+        clock_drift=0.0,
+    )
     index = pd.Index(np.arange(round(seconds * grade.rate_hz)) / grade.rate_hz, name="time_s")
     motion = pd.DataFrame(0.0, index=index, columns=list(IMU))
     motion[ACCEL[2]] = 9.81
