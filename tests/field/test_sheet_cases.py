@@ -94,3 +94,19 @@ def test_noise_that_no_gyro_has_is_refused_with_the_unit_that_was_meant(
 def test_noise_of_each_axis_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["imu", str(SHEETS / "axis_noise.toml")]) == DONE
     assert "160, 160, 190 ug/sqrt(Hz)" in capsys.readouterr().out
+
+
+RATES = CASES / "33-rates-of-real-imus"
+
+
+@pytest.mark.parametrize("rate", [400, 416])
+def test_rates_of_devices_are_fine(rate: int, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["check", str(RATES / f"s{rate}.toml")]) == DONE
+    assert "fine" in capsys.readouterr().out
+
+
+def test_a_rate_above_the_truth_is_told_the_rate_that_it_needs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["check", str(RATES / "s1667.toml")]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "imu[0].grade.rate_hz" in said and "1667" in said and "truth_rate_hz = 2000" in said
+    assert call(["check", str(RATES / "s1667.toml"), "--set", "truth_rate_hz=2000"]) == DONE
