@@ -22,8 +22,14 @@ HOUR_S = 3600.0
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 
 
-def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 1) -> Path:
-    """Write ``<folder>/<grade>.html`` and return its path; the folder is made if it is not there."""
+def write_imu_page(
+    folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 1, rest: pd.DataFrame | None = None
+) -> Path:
+    """Write ``<folder>/<grade>.html`` and return its path; the folder is made if it is not there.
+
+    With a recording at ``rest``, its Allan deviation stands beside the closed form in the place of a
+    simulated one.
+    """
     text = page_text(
         "pages/imu.html.j2",
         file=file,
@@ -31,7 +37,8 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
         device=device_rows(grade),
         triads=triad_rows(grade),
         warnings=sheet_warnings(grade),
-        allan=allan_figure(grade, seed=seed),
+        allan=allan_figure(grade, seed=seed, rest=rest),
+        measured=rest is not None,
     )
     return write_page(folder, grade.name, text)
 
@@ -53,12 +60,13 @@ def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
     return sample_imu(motion, resting, seed=seed, draw=0, name="imu")[0]
 
 
-def allan_figure(grade: ImuGrade, *, seed: int) -> str:
-    """Allan deviation of one simulated hour, each axis, beside the closed form; "" if it shows nothing."""
-    whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * HOUR_S * grade.rate_hz, 36)))
+def allan_figure(grade: ImuGrade, *, seed: int, rest: pd.DataFrame | None = None) -> str:
+    """Allan deviation of a rest, or of one simulated hour, beside the closed form; "" if it shows nothing."""
+    seconds = HOUR_S if rest is None else len(rest) / grade.rate_hz
+    whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * seconds * grade.rate_hz, 36)))
     tau: FloatArray = whole / grade.rate_hz
     analytic = grade.allan(tau)
-    frame = at_rest(grade, seconds=HOUR_S, seed=seed)
+    frame = at_rest(grade, seconds=HOUR_S, seed=seed) if rest is None else rest
     if not (frame[list(IMU)].to_numpy() != frame[list(IMU)].iloc[0].to_numpy()).any():
         return ""
     units = {"gyro": FIGURES["gyro_bias_instability_degph"], "accel": FIGURES["accel_bias_instability_ug"]}
@@ -77,4 +85,5 @@ def allan_figure(grade: ImuGrade, *, seed: int) -> str:
             axis.set_ylabel(f"{'gyro' if kind == 'gyro' else 'accelerometer'}, {unit.unit}")
         legend_above(axes[0])
         axes[1].set_xlabel("averaging time, s")
-        return to_svg(figure, description=f"Allan deviation of {grade.name}, simulated and analytic")
+        how = "simulated" if rest is None else "measured"
+        return to_svg(figure, description=f"Allan deviation of {grade.name}, {how} and analytic")
