@@ -46,6 +46,9 @@ LIVING = 0.5
 """Standard deviation of second differences, over the noise of the sheet, of a device that measures: sqrt(6)
 where it has the noise of its sheet."""
 
+SHORT_ZEROS = 3
+"""Zeros in a row of a gyro that may be markers; a specific force is never zero, however long."""
+
 _STILL = {"gyro": 0.01, "accel": 0.2, "field": 1e-6}
 """What counts as nothing beside a marker, in SI: a perfect sensor at rest moves by nothing at all."""
 
@@ -179,9 +182,9 @@ def markers(
     widest = int(np.argmax(steps))
     if steps[widest] < APART_BEYOND:
         return none
-    apart = off >= top[widest]
+    apart: npt.NDArray[np.bool_] = np.greater_equal(off, top[widest])
     found = values[apart]
-    if limit is not None and np.all(np.abs(found) > SLACK * limit):
+    if limit is not None and bool(np.all(np.abs(found) > SLACK * limit)):
         return apart
     marked = np.isin(np.round(np.abs(found / unit_si), 6), MARKERS)
     if limit is not None:
@@ -236,7 +239,7 @@ def _check_zeros(
 ) -> None:
     """Refuse zeros on all axes at once, where the samples before and after are far from zero."""
     values = np.column_stack([channel.values for channel in channels])
-    empty = ~values.any(axis=1)
+    empty: npt.NDArray[np.bool_] = np.all(values == 0.0, axis=1)
     if len(values) < 3 or not empty.any() or empty.all():
         return
     # What one sample adds to the mean of its neighbours, beside the markers themselves.
@@ -247,6 +250,9 @@ def _check_zeros(
     before, after = full[np.maximum(around - 1, 0)], full[np.minimum(around, len(full) - 1)]
     expected = np.linalg.norm(0.5 * (values[before] + values[after]), axis=1)
     wrong = expected > APART * max(usual, _STILL[kind])
+    if kind == "gyro":
+        # A perfect gyro is at zero between two curves; it does not get there and back in a moment.
+        wrong &= (around > 0) & (around < len(full)) & (after - before <= SHORT_ZEROS + 1)
     if wrong.any():
         first, count = int(np.flatnonzero(empty)[int(np.argmax(wrong))]), int(wrong.sum())
         more = f" (and {count - 1} more such samples)" if count > 1 else ""

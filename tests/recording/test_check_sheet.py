@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.core.errors import InputError
-from simrail.recording.check_sheet import Bounds, Channel, check_counts, check_samples, markers
-from simrail.recording.recording import EncoderSheet
+from simrail.recording.check_sheet import (
+    Bounds,
+    Channel,
+    check_counts,
+    check_ranges,
+    check_samples,
+    markers,
+    noise_warnings,
+)
+from simrail.recording.recording import EncoderSheet, ImuSheet, Recording
+from simrail.track.design import Straight, TrackDesign
 
 RATE = 100.0
 SHEET = Bounds(range=50.0, noise=0.01, sheet="mine")
@@ -112,6 +124,57 @@ def test_zeros_on_all_axes_are_no_measurement() -> None:
     assert (
         "ax, ay, az" in said and "line 1202 " in said and "and 1 more" in said and "zero on all axes" in said
     )
+
+
+def test_a_perfect_gyro_between_two_kinks_is_no_marker() -> None:
+    """Curves of a tram without transitions: zeros for seconds; but one sample of zeros in a curve is none."""
+    rate = np.where(np.arange(3000) // 500 % 2 == 1, 0.3, 0.0)
+    values = np.column_stack([0.0 * rate, 0.0 * rate, rate])
+
+    def gyro(values: np.ndarray) -> None:
+        channels = tuple(Channel(name, values[:, i], "rad/s", 1.0) for i, name in enumerate("xyz"))
+        check_samples(channels, "gyro", Bounds(5.0, 0.0, "ideal"), time=np.arange(3000.0), where=str)
+
+    gyro(values)
+    values[700] = 0.0
+    with pytest.raises(InputError, match="zero on all axes in 700 "):
+        gyro(values)
+
+
+def test_noise_at_rest_is_held_against_the_sheet() -> None:
+    draw = np.random.default_rng(2)
+    time = pd.Index(np.arange(1000) / RATE, name="time_s")
+    imu = pd.DataFrame(draw.standard_normal((1000, 6)), index=time, columns=list(IMU))
+    sheet = ImuSheet("mine", RATE, 0.0, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0)
+    encoder = pd.DataFrame({"pulse_count": np.zeros(1000, dtype=np.int64)}, index=time)
+    ride = Recording(
+        name="rest",
+        imu=imu,
+        imu_sheet=sheet,
+        mount="imu",
+        mount_body="front",
+        mount_position_m=(0.0, 0.0, 0.6),
+        track=TrackDesign("line", 0.0, (Straight(100.0),)),
+        encoder=encoder,
+        encoder_sheet=EncoderSheet("front.left", 1024, 0.29, RATE),
+        start_position_m=10.0,
+    )
+    assert noise_warnings(ride) == ()
+    for factor, kind, words in ((20.0, "gyro", "20 times"), (0.02, "accel", "smoothed")):
+        columns = list(GYRO if kind == "gyro" else ACCEL)
+        (told,) = noise_warnings(replace(ride, imu=imu.assign(**{c: imu[c] * factor for c in columns})))
+        assert f"imu.{kind}" in told and words in told and "mine" in told
+
+
+def test_a_signal_beyond_its_range_throughout_is_the_sheet_of_another() -> None:
+    time = pd.Index(np.arange(100) / RATE, name="time_s")
+    imu = pd.DataFrame(0.0, index=time, columns=list(IMU)).assign(**{ACCEL[0]: np.linspace(0.0, 90.0, 100)})
+    sheet = ImuSheet("mine", RATE, 0.0, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, accel_range_mps2=50.0)
+    track = TrackDesign("line", 0.0, (Straight(100.0),))
+    ride = Recording("ride", imu, sheet, "imu", "front", (0.0, 0.0, 0.6), track, None, None, 10.0)
+    with pytest.raises(InputError, match=r"accel_x_mps2: is beyond the range.*found 90.0; limit: 50 m/s2"):
+        check_ranges(ride)
+    check_ranges(replace(ride, imu=imu * 0.9))
 
 
 def test_a_stuck_axis_is_named_with_its_time() -> None:
