@@ -154,15 +154,37 @@ def vehicle(
 
 def imu(
     name: Annotated[
-        str, typer.Argument(metavar="NAME|FILE", help="A shipped IMU, or the path of a TOML file.")
-    ],
+        str | None, typer.Argument(metavar="NAME|FILE", help="A shipped IMU, or the path of a TOML file.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Write an HTML page with its Allan deviation there, too."),
     ] = None,
+    from_rest: Annotated[
+        Path | None,
+        typer.Option(
+            "--from-rest",
+            metavar="RECORDING",
+            help="Fit noise, bias instability, random walk and counts to your own recording at rest: a ride "
+            "file (its [imu] alone counts) or a CSV. With --out, the sheet is written there, too.",
+        ),
+    ] = None,
 ) -> int:
-    """Show an IMU grade in the units of data sheets, and what was assumed."""
+    """Show an IMU grade in the units of data sheets, and what was assumed; or fit one to a rest."""
     from rich.console import Console
+
+    if (name is None) == (from_rest is None):
+        raise InputError(
+            "needs either a name or a recording",
+            field="NAME",
+            value=name,
+            remedy="e.g. simrail imu lord_3dm_gx4_25, or simrail imu --from-rest rest.csv",
+        )
+    if from_rest is not None:
+        from simrail.cli.imu_from_rest import imu_from_rest
+
+        return imu_from_rest(from_rest, out)
+    assert name is not None
 
     from simrail.recording.sheets.imu_file import load_imu
     from simrail.report.tables.imu_text import print_imu

@@ -1,5 +1,6 @@
 """``simrail export | estimate``: recordings as files."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -83,11 +84,15 @@ def estimate(
             remedy="give one, or add --fuse to fuse their rails",
         )
     from simrail.cli.estimate_ride import estimate_ride
+    from simrail.recording.check_field import field_warnings
+    from simrail.recording.check_sheet import noise_warnings
     from simrail.report.pages.estimate_page import design_difference_deg, ride_facts
 
     recording, estimated = estimate_ride(
         ride, estimator, folder, settings=settings or [], format=_format(form)
     )
+    for warning in (*noise_warnings(recording), *field_warnings(recording)):
+        print(f"warning: {warning}", file=sys.stderr)
     for fact in ride_facts(recording):
         print(fact)
     for angle in ("roll_rad", "pitch_rad"):

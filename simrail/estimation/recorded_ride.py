@@ -4,7 +4,9 @@ from pathlib import Path
 
 from simrail.core.toml_files import blame, label
 from simrail.estimation.choose_odometry import with_odometry
+from simrail.recording.check_field import check_hard_iron
 from simrail.recording.check_physics import check_plausible
+from simrail.recording.check_sheet import check_ranges
 from simrail.recording.files.ride_reader import read_signals, ride_file
 from simrail.recording.recording import Recording
 
@@ -24,7 +26,7 @@ def read_ride(path: Path) -> Recording:
     ------
     InputError
         If a file is missing or unreadable, or says something impossible, or the recording passes neither
-        `check_recording` nor `check_plausible`.
+        `check_recording` nor `check_plausible`, or its samples are not those of its sheets.
     """
     recording = read_signals(path)
     if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
@@ -32,4 +34,6 @@ def read_ride(path: Path) -> Recording:
         recording = with_odometry(recording, "encoder", source=source)
     with blame(label(ride_file(path))):
         check_plausible(recording)
+        check_ranges(recording)
+        check_hard_iron(recording)
     return recording

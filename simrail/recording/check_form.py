@@ -24,6 +24,8 @@ from simrail.core.columns import (
 )
 from simrail.core.errors import InputError
 from simrail.core.resample import check_stamps
+from simrail.recording.check_field import check_field
+from simrail.recording.check_sheet import markers
 from simrail.recording.recording import AT_IMU_TIMES, Recording
 
 
@@ -44,6 +46,9 @@ LIMITS = (
     _Limit("magnetometer", MAGNETIC, 1e-2, "T", "microtesla or gauss"),
     _Limit("rail_displacement", RAIL_DISPLACEMENT, 10.0, "m", "millimetres"),
 )
+
+STILL_SHARE = 1e-3
+"""Share of a limit that counts as nothing beside it."""
 
 COLUMNS_OF = {
     "imu": IMU,
@@ -85,8 +90,8 @@ def check_recording(recording: Recording) -> None:
     InputError
         At the first of: a missing column; a value that is no number; time stamps that are not
         increasing, or not uniform in the IMU; a device without its sheet; values beyond `LIMITS`
-        (degrees?); an IMU rate other than its sheet's; a frame at other times than the IMU's that
-        belongs there.
+        (degrees?); a field that is not as large as the Earth's; an IMU rate other than its sheet's; a frame
+        at other times than the IMU's that belongs there.
     """
     frames = {name: getattr(recording, name) for name in COLUMNS_OF}
     frames = {name: frame for name, frame in frames.items() if frame is not None}
@@ -101,6 +106,7 @@ def check_recording(recording: Recording) -> None:
     for limit in LIMITS:
         if limit.frame in frames:
             _check_size(frames[limit.frame], limit)
+    check_field(recording)
     for name in AT_IMU_TIMES:
         if name in frames and not np.array_equal(
             frames[name].index.to_numpy(), recording.imu.index.to_numpy()
@@ -149,15 +155,22 @@ def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str) -
 def _check_size(frame: pd.DataFrame, bound: _Limit) -> None:
     """Refuse values beyond a limit."""
     for column in bound.columns:
-        values = np.abs(frame[column].to_numpy(dtype=np.float64))
+        signal = frame[column].to_numpy(dtype=np.float64)
+        values = np.abs(signal)
         if values.max() > bound.limit:
             worst = int(np.argmax(values))
+            # Units are judged by the whole: what stands apart from it is no measurement in any unit.
+            apart = markers(signal, still=STILL_SHARE * bound.limit, limit=bound.limit)
+            remedy = f"convert to {bound.unit}; the values look like {bound.suspect}"
+            if apart[worst]:
+                remedy = "drop the sample, so that it is a gap: it stands apart from all others"
             raise InputError(
-                f"is beyond what a train does at time_s = {float(frame.index[worst]):.6g}",
+                f"is beyond what a train does at time_s = {float(frame.index[worst]):.6g}"
+                + (f" ({int(apart.sum())} such samples); it is no measurement" if apart[worst] else ""),
                 field=f"{bound.frame}.{column}",
                 value=float(frame[column].iloc[worst]),
                 limit=f"{bound.limit:g} {bound.unit}",
-                remedy=f"convert to {bound.unit}; the values look like {bound.suspect}",
+                remedy=remedy,
             )
 
 

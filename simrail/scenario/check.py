@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator
-from simrail.recording.sheets.grades import silent_noise
+from simrail.recording.sheets.usual import sheet_warnings
 from simrail.ride.vibration.sources import Vibration
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import count, first_cells
@@ -159,7 +159,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
         if sensor_key not in judged_sensors:
             judged_sensors.add(sensor_key)
             judge_sensors(resolved)
-            warnings += silent_noise(resolved.grade)
+            warnings += sheet_warnings(resolved.grade)
     return simulated, warnings, notes
 
 

@@ -60,8 +60,10 @@ def _judge_imu(resolved: ResolvedCell) -> None:
             )
     with blame(None, f"{field}.grade"):
         sampling_of(truth_rate, grade.rate_hz, grade.oversampling)
-        if grade.bandwidth_hz is not None:
-            check_bandwidth(grade.bandwidth_hz, truth_rate)
+        for kind in ("gyro", "accel"):
+            bandwidth = grade.bandwidth_of(kind)
+            if bandwidth is not None:
+                check_bandwidth(bandwidth, truth_rate)
 
 
 def _judge_encoder(resolved: ResolvedCell) -> None:

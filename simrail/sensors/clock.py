@@ -1,6 +1,7 @@
 """A device's clock: samples taken at the wrong times, stamped with the right ones, and samples that get lost.
 
-The clock agrees with the truth's at time 0, runs fast or slow from then on, and jitters at each sample.
+The clock agrees with the truth's at time 0, runs fast or slow from then on, and jitters at each sample. A
+right clock whose rate does not divide the truth's is one of these, without drift and jitter.
 The motion at the true time is that behind the sampling filter, interpolated by a windowed sinc. What is lost
 is lost on the way to the logger: `lose_samples` says which samples those are, it fills nothing in.
 """
@@ -26,7 +27,13 @@ band: true to 1e-4 up to 0.4 times that rate. Behind a low-pass, half as long do
 
 
 def sample_by_clock(
-    samples: FloatArray, sampling: Sampling, grade: ImuGrade, *, truth_rate_hz: float, streams: Streams
+    samples: FloatArray,
+    sampling: Sampling,
+    grade: ImuGrade,
+    *,
+    truth_rate_hz: float,
+    streams: Streams,
+    errors: bool = True,
 ) -> tuple[FloatArray, int, FloatArray]:
     """Sample with a clock that drifts and jitters.
 
@@ -45,13 +52,15 @@ def sample_by_clock(
         Rate of the truth.
     streams : callable
         Random streams by the name of the term.
+    errors : bool
+        False for a right clock.
 
     Returns
     -------
     output : ndarray (k, 6)
-        Output sample j is stamped at input sample ``first + j * factor``.
+        Output sample j is stamped at the input's place ``(first + j) * factor``.
     first : int
-        The first stamp: a sample more than without clock errors is lost at either end.
+        Number of the first stamp: a sample more than without clock errors is lost at either end.
     places : ndarray (k,)
         Where the samples were really taken, in input samples.
 
@@ -63,16 +72,22 @@ def sample_by_clock(
     factor = sampling.factor
     table, behind = _shifted_taps(sampling)
     ahead = table.shape[1] - 1 - behind
-    first = factor * (-(-behind // factor) + 1)
-    drift = grade.clock_drift * streams("clock_drift").uniform(-1.0, 1.0)
-    count = int(np.floor(((len(samples) - 1 - ahead - factor) / (1.0 + drift) - first) / factor)) + 1
+    inner = factor / sampling.averaged
+    reach = behind + (sampling.averaged - 1) * inner
+    first = int(np.ceil(reach / factor)) + 1
+    drift = grade.clock_drift * streams("clock_drift").uniform(-1.0, 1.0) if errors else 0.0
+    last = (len(samples) - 1 - ahead - factor) / (1.0 + drift)
+    count = int(np.floor((last - first * factor) / factor)) + 1
     if count < 1:
-        raise too_short(len(samples), first + ahead + factor + 2)
-    places: FloatArray = (first + factor * np.arange(count, dtype=np.float64)) * (1.0 + drift)
-    if grade.clock_jitter_s > 0.0:
+        raise too_short(len(samples), int(np.ceil((first + 1) * factor)) + ahead + 2)
+    places: FloatArray = factor * np.arange(first, first + count, dtype=np.float64) * (1.0 + drift)
+    if errors and grade.clock_jitter_s > 0.0:
         places += streams("clock_jitter").standard_normal(count) * (grade.clock_jitter_s * truth_rate_hz)
-    output = _evaluate(np.ascontiguousarray(samples), table, behind, places)
-    return output, first, places
+    truth = np.ascontiguousarray(samples)
+    output = _evaluate(truth, table, behind, places)
+    for earlier in range(1, sampling.averaged):
+        output += _evaluate(truth, table, behind, places - earlier * inner)
+    return output / sampling.averaged if sampling.averaged > 1 else output, first, places
 
 
 def _shifted_taps(sampling: Sampling) -> tuple[FloatArray, int]:
@@ -81,7 +96,9 @@ def _shifted_taps(sampling: Sampling) -> tuple[FloatArray, int]:
     Row r holds the weights of the samples i - behind, ..., i - behind + m - 1 for the place i + r / SHIFTS:
     those of the filter, spread over the neighbours by the interpolator.
     """
-    half = SINC_HALF if len(sampling.taps) == 1 or sampling.delay == 0 else SINC_HALF // 2
+    # A low-pass near the truth's own rate leaves more for the interpolator to do.
+    sharp = len(sampling.taps) == 1 or sampling.delay == 0 or (not sampling.whole and sampling.factor < 3.0)
+    half = SINC_HALF if sharp else SINC_HALF // 2
     table = np.array([np.convolve(row, sampling.taps[::-1]) for row in _interpolator(half)])
     return table, half + len(sampling.taps) - 1 - sampling.delay
 

@@ -1,4 +1,7 @@
-"""From the truth's rate to a sensor's rate without aliasing: linear-phase low-pass, then every M-th sample.
+"""From the truth's rate to a sensor's rate without aliasing: linear-phase low-pass, then the samples.
+
+Where the rate divides the truth's, they are every M-th; at any other rate up to the truth's (104, 416,
+833 Hz) they lie between its samples and are interpolated behind the same low-pass (`simrail.sensors.clock`).
 
 The filter is a Kaiser-windowed FIR: flat to 0.1 % up to 0.3 times the output rate, below 0.1 % from
 0.6 times the output rate on. A tone between 0.5 and 0.6 folds back to between 0.4 and 0.5, above
@@ -26,15 +29,22 @@ PASS_EDGE, STOP_EDGE = 0.3, 0.6
 STOP_DB = 63.0
 
 
+TRUTH_RATES_HZ = (1000.0, 2000.0, 4000.0)
+"""Rates of the truth that a scenario may have for fast sensors."""
+
+
 @lru_cache(maxsize=32)
-def decimation_taps(factor: int) -> FloatArray:
-    """Coefficients of the filter before taking every `factor`-th sample; odd in number, sum 1, read-only."""
+def decimation_taps(factor: float) -> FloatArray:
+    """Coefficients of the filter before sampling at the rate over `factor`; odd in number, sum 1, read-only.
+
+    Of a whole factor, half their number is a multiple of it.
+    """
     if factor == 1:
         return np.ones(1)
     width = (STOP_EDGE - PASS_EDGE) / factor
     order = (STOP_DB - 7.95) / (2.285 * 2.0 * np.pi * width)
-    # Half the length is a whole number of output samples: the delay is one, too.
-    half = factor * int(np.ceil(0.5 * order / factor))
+    # Half the length is a whole number of output samples, where there is one: the delay is one, too.
+    half = round(factor * int(np.ceil(0.5 * order / factor)))
     taps = signal.firwin(
         2 * half + 1,
         PASS_EDGE + STOP_EDGE,
@@ -73,23 +83,32 @@ class Sampling:
 
     Attributes
     ----------
-    factor : int
+    factor : float
         Truth's rate over output rate.
     taps : ndarray (m,)
         Coefficients of a causal filter: its output at truth sample i is the output sample stamped i - delay.
     delay : int
         Truth samples after its stamp that an output sample needs.
+    averaged : int
+        How many outputs of the filter, evenly over the time since the last output sample, are averaged for
+        one; 1 where the taps do that already, as they do for whole factors.
     """
 
-    factor: int
+    factor: float
     taps: FloatArray
     delay: int
+    averaged: int = 1
+
+    @property
+    def whole(self) -> int:
+        """The factor, where it is a whole number; 0 where output samples lie between those of the truth."""
+        return int(self.factor) if self.factor == round(self.factor) and self.averaged == 1 else 0
 
     @property
     def first(self) -> int:
-        """First truth sample, a multiple of the factor, at which an output sample is complete."""
+        """First truth sample, a multiple of a whole factor, at which an output sample is complete."""
         behind = len(self.taps) - 1 - self.delay
-        return self.factor * -(-behind // self.factor)
+        return self.whole * -(-behind // self.whole)
 
 
 def sampling_of(truth_rate_hz: float, output_rate_hz: float, oversampling: int = 1) -> Sampling:
@@ -101,17 +120,26 @@ def sampling_of(truth_rate_hz: float, output_rate_hz: float, oversampling: int =
     Raises
     ------
     InputError
-        If the truth's rate is not a multiple of the internal rate.
+        If the internal rate is above the truth's.
     """
-    factor = decimation_factor(truth_rate_hz, output_rate_hz)
-    if factor % oversampling:
+    ratio = truth_rate_hz / output_rate_hz
+    inner_rate = output_rate_hz * oversampling
+    if inner_rate > truth_rate_hz * (1.0 + 1e-9):
+        fast = next((rate for rate in TRUTH_RATES_HZ if rate >= inner_rate), None)
+        times = f", {oversampling} times averaged: {inner_rate:g} Hz" if oversampling > 1 else ""
         raise InputError(
-            "does not divide the number of samples of the truth between two of the device",
-            field="oversampling",
-            value=oversampling,
-            limit=f"a divisor of {factor}",
-            remedy="choose another oversampling, or another rate",
+            f"is above the rate of the truth{times}",
+            field="rate_hz",
+            value=output_rate_hz,
+            limit=f"{truth_rate_hz:g} Hz",
+            remedy=f"choose a slower output, up to {TRUTH_RATES_HZ[-1]:g} Hz"
+            if fast is None
+            else f"set truth_rate_hz = {fast:g} in the scenario",
         )
+    factor = round(ratio)
+    if abs(ratio - factor) > 1e-6 * factor or factor % oversampling:
+        inner_taps = decimation_taps(ratio / oversampling)
+        return Sampling(ratio, inner_taps, len(inner_taps) // 2, oversampling)
     inner = factor // oversampling
     taps = decimation_taps(inner)
     delay = len(taps) // 2
@@ -130,7 +158,7 @@ def sample_on_time(samples: FloatArray, sampling: Sampling) -> tuple[FloatArray,
     samples : ndarray (n, m)
         Uniform samples of m channels of the truth.
     sampling : Sampling
-        How the device samples.
+        How the device samples; its factor is whole.
 
     Returns
     -------
@@ -144,7 +172,7 @@ def sample_on_time(samples: FloatArray, sampling: Sampling) -> tuple[FloatArray,
     InputError
         If the input is shorter than the filter.
     """
-    taps, factor = sampling.taps, sampling.factor
+    taps, factor = sampling.taps, sampling.whole
     if len(taps) == 1 and factor == 1:
         return samples.copy(), 0
     first = sampling.first

@@ -99,7 +99,7 @@ def sample_imu(
         Indexed by ``time_s`` (uniform), with columns `simrail.core.columns.IMU` of a perfect sensor; with
         `earth` also attitude and velocity.
     grade : ImuGrade
-        The device. Its rate, times its oversampling, must divide the rate of the motion.
+        The device. Its rate, times its oversampling, is at most the rate of the motion.
     seed, draw : int
         Seed of the scenario and number of the sensor draw.
     name : str
@@ -114,15 +114,17 @@ def sample_imu(
     Returns
     -------
     imu : pandas.DataFrame
-        Indexed by ``time_s``, a subset of the motion's own time stamps; columns `simrail.core.columns.IMU`.
+        Indexed by ``time_s``, whole intervals of the device from the motion's first stamp on: a subset of the
+        motion's own time stamps where its rate divides that of the motion; columns
+        `simrail.core.columns.IMU`.
     delay_s : float
         How much later than its time stamp a sample leaves the sensor's filter.
 
     Raises
     ------
     InputError
-        If the rates do not divide, the bandwidth is not below half the rate of the motion, or the motion
-        is shorter than the filter.
+        If its rate is above the motion's, the bandwidth is not below half the rate of the motion, or the
+        motion is shorter than the filter.
     """
     time = motion.index.to_numpy(dtype=np.float64)
     truth_rate = float(round((len(time) - 1) / (time[-1] - time[0]), 6))
@@ -136,16 +138,21 @@ def sample_imu(
         felt = felt + _earth_terms(motion, earth)
     del motion, of_imu
     shaken = np.ascontiguousarray(felt[:, 3:]) if rectifies else None
-    if grade.bandwidth_hz is not None:
-        felt = second_order(felt, bandwidth_hz=grade.bandwidth_hz, rate_hz=truth_rate)
-    if errors and (grade.clock_jitter_s > 0.0 or grade.clock_drift > 0.0):
-        samples, first, places = sample_by_clock(
-            felt, sampling, grade, truth_rate_hz=truth_rate, streams=streams
+    felt = _responded(felt, grade, truth_rate)
+    wrong_clock = errors and (grade.clock_jitter_s > 0.0 or grade.clock_drift > 0.0)
+    if wrong_clock or not sampling.whole:
+        samples, number, places = sample_by_clock(
+            felt, sampling, grade, truth_rate_hz=truth_rate, streams=streams, errors=wrong_clock
         )
+        first = number * sampling.whole
     else:
         samples, first = sample_on_time(felt, sampling)
+        number = first // sampling.whole
         places = first + sampling.factor * np.arange(len(samples), dtype=np.float64)
-    stamps = time[first : first + sampling.factor * len(samples) : sampling.factor]
+    if sampling.whole:
+        stamps = time[first : first + sampling.whole * len(samples) : sampling.whole]
+    else:
+        stamps = time[0] + np.arange(number, number + len(samples)) / grade.rate_hz
     if errors:
         vibration = None
         if shaken is not None:
@@ -159,6 +166,18 @@ def sample_imu(
             )
     index = pd.Index(stamps, name="time_s")
     return pd.DataFrame(samples, index=index, columns=list(IMU)), sampling.delay / truth_rate
+
+
+def _responded(felt: FloatArray, grade: ImuGrade, rate_hz: float) -> FloatArray:
+    """What the response of the device makes of rates and forces (n, 6), each triad with its own bandwidth."""
+    gyro, accel = grade.bandwidth_of("gyro"), grade.bandwidth_of("accel")
+    if gyro == accel:
+        return felt if gyro is None else second_order(felt, bandwidth_hz=gyro, rate_hz=rate_hz)
+    triads = [
+        part if band is None else second_order(part, bandwidth_hz=band, rate_hz=rate_hz)
+        for part, band in ((felt[:, :3], gyro), (felt[:, 3:], accel))
+    ]
+    return np.hstack(triads)
 
 
 def arrived(imu: pd.DataFrame, grade: ImuGrade, *, seed: int, draw: int, name: str) -> pd.DataFrame:

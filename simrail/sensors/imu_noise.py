@@ -44,17 +44,18 @@ def add_noise(samples: FloatArray, grade: ImuGrade, kind: str, streams: Streams)
     decay = np.exp(-1.0 / (correlation * grade.rate_hz))
     drive = sd * np.sqrt(1.0 - decay**2)
     stages = len(sd)
-    density = terms.noise * np.sqrt(grade.rate_hz)
+    density = terms.noise * np.sqrt(grade.rate_hz) * np.array(getattr(grade, f"{kind}_axis_noise"))
+    noisy = bool(density.any())
     step = terms.random_walk / np.sqrt(grade.rate_hz)
     walking = step > 0.0
     flicker = "flicker" if grade.bias_process == "flicker" else "bias_instability"
     bias_stream = streams(f"{kind}_{flicker}") if stages else None
     walk_stream = streams(f"{kind}_random_walk") if walking else None
-    white_stream = streams(f"{kind}_white") if density > 0.0 else None
+    white_stream = streams(f"{kind}_white") if noisy else None
     rows = min(BLOCK, count)
     wander = np.zeros((rows, 3 * stages))
     walk = np.zeros((rows, 3 if walking else 0))
-    white = np.zeros((rows, 3 if density > 0.0 else 0))
+    white = np.zeros((rows, 3 if noisy else 0))
     state = np.zeros(3 * stages)
     walked = np.zeros(3)
     for begin in range(0, count, BLOCK):
@@ -85,7 +86,7 @@ def _add(
     step: float,
     walked: FloatArray,
     white: FloatArray,
-    density: float,
+    density: FloatArray,
 ) -> None:
     """One pass over a block (n, 3): bias, stages (3 axes x m), walk and white noise; keeps the states."""
     stages = len(decay)
@@ -105,5 +106,5 @@ def _add(
                 walked[axis] += step * walk[k, axis]
                 total += walked[axis]
             if noisy:
-                total += white[k, axis] * density
+                total += white[k, axis] * density[axis]
             samples[k, axis] += total

@@ -11,7 +11,7 @@ import pandas as pd
 
 from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD, VELOCITY
 from simrail.core.errors import InputError
-from simrail.core.resample import resample
+from simrail.core.resample import interpolated, resample
 from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
 from simrail.recording.sheets.grades import ImuGrade, imu_sheet
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
@@ -92,8 +92,8 @@ def measure(
     Raises
     ------
     InputError
-        If body or wheel is unknown, a rate does not divide the truth's, or a rail sensor has no rails to see;
-        or if another odometry than the true one is asked for.
+        If body or wheel is unknown, a rate is above the truth's (of an encoder: does not divide it), or a
+        rail sensor has no rails to see; or if another odometry than the true one is asked for.
     """
     # Held by nobody else: of a long ride it is the largest array there is.
     imu, delay_s = sample_imu(
@@ -188,11 +188,16 @@ def _place(truth: Truth, mount: Mount, row: int) -> float:
     return float(truth.motion(mount, range(row, row + 1), ("position_m",)).to_numpy()[0, 0])
 
 
-def _rows_of(truth: Truth, imu: pd.DataFrame) -> range:
-    """Samples of the truth at the stamps of an IMU, which are some of its own."""
+def _rows_of(truth: Truth, imu: pd.DataFrame) -> range | None:
+    """Samples of the truth at the stamps of an IMU; None (all) where these lie between its own."""
     first, second = np.searchsorted(truth.time_s, imu.index[:2].to_numpy())
     step = int(second - first)
-    return range(int(first), int(first) + step * len(imu), step)
+    rows = range(int(first), int(first) + step * len(imu), step)
+    if rows[-1] >= len(truth.time_s) or not np.array_equal(
+        truth.time_s[rows.start : rows.stop : rows.step], imu.index.to_numpy()
+    ):
+        return None
+    return rows
 
 
 def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:
@@ -206,7 +211,11 @@ def magnetometer_sheet(spec: MagnetometerSpec) -> MagnetometerSheet:
 
 
 def true_odometry(motion: pd.DataFrame, times: pd.Index) -> pd.DataFrame:
-    """The true odometry of a mount at times of its motion, with standard deviations of zero."""
-    frame = motion.loc[times, list(ODOMETRY)].copy()
+    """The true odometry of a mount, with standard deviations of zero; interpolated between its own times."""
+    if times.isin(motion.index).all():
+        frame = motion.loc[times, list(ODOMETRY)].copy()
+    else:
+        values = interpolated(motion, times.to_numpy(dtype=np.float64), *ODOMETRY)
+        frame = pd.DataFrame(values, index=times, columns=list(ODOMETRY))
     frame[list(ODOMETRY_SD)] = np.zeros((len(frame), len(ODOMETRY_SD)))
     return frame

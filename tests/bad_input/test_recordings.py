@@ -131,8 +131,12 @@ FAULTS: dict[str, tuple[Callable[[Recording], Recording], list[str]]] = {
         ["odometry", "speed_sd_mps [m/s]"],
     ),
     "degrees": (
-        lambda r: replace(r, imu=with_value(r.imu, "gyro_z_radps", 40, -20.5)),
+        lambda r: replace(r, imu=r.imu.assign(gyro_z_radps=np.linspace(0.0, -20.5, 1000))),
         ["imu.gyro_z_radps", "-20.5", "20 rad/s", "degrees"],
+    ),
+    "one_sample_beyond": (
+        lambda r: replace(r, imu=with_value(r.imu, "gyro_z_radps", 40, -20.5)),
+        ["imu.gyro_z_radps", "-20.5", "20 rad/s", "no measurement", "drop"],
     ),
     "milli_g": (
         lambda r: replace(r, imu=r.imu.assign(accel_z_mps2=1000.0)),

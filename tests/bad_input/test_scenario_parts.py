@@ -68,12 +68,12 @@ PART_FAULTS: dict[str, tuple[str, str, str, str, list[str]]] = {
         "gyro_noise_degpsqrthz = -",
         ["gyro_noise_degpsqrthz", ">= 0"],
     ),
-    "an IMU rate that does not divide": (
+    "an IMU rate above the truth's": (
         "imu",
         "lord_3dm_gx4_25",
         "rate_hz = 250",
-        "rate_hz = 333",
-        ["333"],
+        "rate_hz = 1333",
+        ["1333", "truth_rate_hz = 2000"],
     ),
 }
 

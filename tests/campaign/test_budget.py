@@ -115,6 +115,7 @@ def test_an_ekf_that_cannot_see_the_bias_errs_by_it() -> None:
 def test_every_term_of_a_sheet_is_in_the_budget_or_named_as_left_out() -> None:
     taken = {name for term in TERMS for name in term.grade}
     left = {"name", "rate_hz", "bias_process", "flicker_range_s", "vibration_averaging_s", "bandwidth_hz"}
+    left |= {"gyro_bandwidth_hz", "accel_bandwidth_hz", "gyro_axis_noise", "accel_axis_noise"}
     left |= {"oversampling", "output", "dropped_fraction", "dropped_burst", "source", "assumed"}
     left |= {"gyro_bias_correlation_s", "accel_bias_correlation_s", "gyro_range_radps", "accel_range_mps2"}
     assert taken | left == set(ImuGrade.__dataclass_fields__)

@@ -116,3 +116,77 @@ def test_wrong_grades_are_refused_with_one_message(
 def test_a_name_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["imu", "lord_3dm_gx4_52"]) == BAD_INPUT
     assert "lord_3dm_gx4_25" in capsys.readouterr().err
+
+
+def rest(path: Path, seconds: float = 120.0) -> Path:
+    """A logger's file of a resting device, in deg/s and g, at 50 Hz with stamps that jitter."""
+    grade = load_grade("lord_3dm_gx4_25")
+    frame = at_rest(grade, seconds=seconds, seed=1).iloc[::5]
+    logged = np.column_stack([np.degrees(frame.to_numpy()[:, :3]), frame.to_numpy()[:, 3:] / 9.80665])
+    time = np.round(frame.index.to_numpy() + np.random.default_rng(1).normal(0.0, 2e-3, len(frame)), 4)
+    with path.with_suffix(".csv").open("w", encoding="utf-8") as stream:
+        stream.write("t,wx,wy,wz,ax,ay,az\n")
+        for stamp, row in zip(time, logged, strict=True):
+            stream.write(",".join([f"{stamp}", *(f"{value:.5f}" for value in row)]) + "\n")
+    path.write_text(
+        f'[imu]\nfile = "{path.with_suffix(".csv").name}"\n'
+        'columns = { time = "t", gyro = ["wx", "wy", "wz"], accel = ["ax", "ay", "az"] }\n'
+        'units = { gyro = "deg/s", accel = "g" }\n',
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_a_sheet_is_made_from_a_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every fifth sample of the device: its noise per sample, so the density of a rate five times lower."""
+    mine, out = rest(tmp_path / "mine.toml"), tmp_path / "out"
+    assert call(["imu", "--from-rest", str(mine), "--out", str(out)]) == DONE
+    said = capsys.readouterr().out
+    assert "gyro noise N: x" in said and "not shown:" in said and "mine_fitted.toml" in said
+    grade, true = load_grade(str(tmp_path / "out" / "mine_fitted.toml")), load_grade("lord_3dm_gx4_25")
+    assert grade.rate_hz == pytest.approx(50.0, rel=1e-3)
+    assert grade.gyro_noise_radpsqrts == pytest.approx(5**0.5 * true.gyro_noise_radpsqrts, rel=0.05)
+    assert grade.accel_noise_mpsqrts == pytest.approx(5**0.5 * true.accel_noise_mpsqrts, rel=0.05)
+    page = (tmp_path / "out" / "mine_fitted.html").read_text(encoding="utf-8")
+    assert "<svg" in page and "of the recording at rest" in page
+    assert call(["imu", str(tmp_path / "out" / "mine_fitted.toml")]) == DONE
+
+
+def test_a_ride_is_no_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The encoder of a ride tells of the motion; without it, the IMU does."""
+    case = Path(__file__).parents[1] / "field" / "cases" / "00-base"
+    for words in ("the wheel turns from time_s =", "not at rest"):
+        out = tmp_path / "out"
+        text = (case / "ride.toml").read_text(encoding="utf-8")
+        (tmp_path / "ride.csv").write_bytes((case / "ride.csv").read_bytes())
+        (tmp_path / "ride.toml").write_text(
+            text if "wheel" in words else text.partition("[encoder]")[0], encoding="utf-8"
+        )
+        assert call(["imu", "--from-rest", str(tmp_path / "ride.toml"), "--out", str(out)]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert len(said.splitlines()) == 1 and words in said and not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["imu"], "either a name or a recording"),
+        (["imu", "ideal", "--from-rest", "x.csv"], "either a name or a recording"),
+        (["imu", "--from-rest", "none.toml"], "none.toml"),
+        (["imu", "--from-rest", "none.csv"], "no such file"),
+    ],
+)
+def test_what_cannot_be_fitted_is_told(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(arguments) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1 and words in said
+
+
+def test_samples_that_are_missing_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = rest(tmp_path / "mine.toml")
+    lines = path.with_suffix(".csv").read_text(encoding="utf-8").splitlines()
+    path.with_suffix(".csv").write_text("\n".join(lines[:1000] + lines[1100:]) + "\n", encoding="utf-8")
+    assert call(["imu", "--from-rest", str(path)]) == BAD_INPUT
+    assert "lacks samples in 1 places" in capsys.readouterr().err

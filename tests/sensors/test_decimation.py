@@ -138,10 +138,3 @@ def test_averaging_is_the_plain_mean_of_internal_samples(factor, times):
     # Every sample that is complete is there, and no other.
     end = first + len(output) * factor + sampling.delay
     assert len(samples) - 1 < end
-
-
-def test_averaging_that_does_not_divide_is_refused():
-    with pytest.raises(InputError, match="does not divide") as caught:
-        sampling_of(1000.0, 250.0, 3)
-    assert "oversampling" in str(caught.value)
-    assert "divisor of 4" in str(caught.value)

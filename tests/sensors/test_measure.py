@@ -12,6 +12,7 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
 from simrail.recording.files.ride_writer import write_parts
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.standstill import GUARD_S, at_rest_initially, first_motion_s, rest_periods
 from simrail.ride.kinematic import kinematic_truth
@@ -19,6 +20,7 @@ from simrail.ride.truth import Mount
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.imu import EarthRate, streams_of
 from simrail.sensors.imu_response import Temperature
+from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.measure import measure
 from simrail.track.design import Straight, TrackDesign
 from simrail.vehicle.speed_profile import SpeedProfile
@@ -195,6 +197,17 @@ def test_a_turned_package_is_a_turned_mount(truth):
     np.testing.assert_allclose(one.imu, other.imu, atol=1e-12)
 
 
+def test_a_rate_between_the_samples_of_the_truth_is_measured_whole(truth):
+    """Beside it a magnetometer, the true odometry: all at the device's own stamps."""
+    grade = ImuGrade("odd", 416.0)
+    recording = record(truth, grade=grade, odometry="truth", magnetometer=MagnetometerSpec())
+    check_recording(recording)
+    motion = truth.motion(MOUNT)
+    odometry = recording.odometry
+    expected = np.interp(odometry.index.to_numpy(), motion.index.to_numpy(), motion["position_m"].to_numpy())
+    np.testing.assert_allclose(odometry["position_m"].to_numpy(), expected, atol=1e-12)
+
+
 def test_temperature_acts_only_if_given(truth):
     grade = replace(LORD, gyro_bias_temperature_radpspk=1e-4)
     cold = record(truth, grade=grade)
@@ -236,7 +249,7 @@ def test_rest_without_an_encoder_or_without_motion(truth):
         ({"odometry": "encoder"}, "odometry: no such thing is measured"),
         ({"encoder": EncoderSpec("front.left")}, "wheel"),
         ({"mount": replace(MOUNT, body="bogie")}, "body"),
-        ({"grade": replace(LORD, rate_hz=300.0)}, "rate_hz"),
+        ({"grade": replace(LORD, rate_hz=1300.0)}, "rate_hz"),
         ({"encoder": EncoderSpec("wheel", rate_hz=301.0)}, "rate_hz"),
     ],
 )

@@ -181,11 +181,13 @@ def fitted(frame: pd.DataFrame, frequency_hz: float) -> complex:
 
 
 def check_bandwidth(claimed, real, kind):
-    corner = claimed.bandwidth_hz
-    assert abs(fitted(sampled(real, tone(corner, 1000.0, 2.0)), corner)) == pytest.approx(
+    triad = kind or "gyro"
+    corner = claimed.bandwidth_of(triad)
+    columns = list(ACCEL if triad == "accel" else GYRO)
+    assert abs(fitted(sampled(real, tone(corner, 1000.0, 2.0))[columns], corner)) == pytest.approx(
         math.sqrt(0.5), rel=1e-3
     )
-    slow = fitted(sampled(real, tone(2.0, 1000.0, 4.0)), 2.0)
+    slow = fitted(sampled(real, tone(2.0, 1000.0, 4.0))[columns], 2.0)
     # Of second order in f / corner: below 1 % at 2 of 50 Hz.
     assert -np.angle(slow) / (2.0 * np.pi * 2.0) == pytest.approx(claimed.lag_s, rel=0.01)
 
@@ -305,6 +307,8 @@ TERMS: dict[str, tuple[ImuGrade, Callable[..., None], str]] = {
     "gyro_scale_temperature_1pk": (both(scale_temperature_1pk=1e-4), check_scale_temperature, "gyro"),
     "accel_scale_temperature_1pk": (both(scale_temperature_1pk=1e-4), check_scale_temperature, "accel"),
     "bandwidth_hz": (replace(PLAIN, bandwidth_hz=50.0), check_bandwidth, ""),
+    "gyro_bandwidth_hz": (replace(PLAIN, gyro_bandwidth_hz=50.0), check_bandwidth, "gyro"),
+    "accel_bandwidth_hz": (replace(PLAIN, accel_bandwidth_hz=50.0), check_bandwidth, "accel"),
     "oversampling": (ImuGrade("mean", 250.0, oversampling=4), check_oversampling, ""),
     "clock_jitter_s": (replace(PLAIN, clock_jitter_s=2e-5), check_jitter, ""),
     "clock_drift": (replace(PLAIN, clock_drift=1e-4), check_drift, ""),
@@ -329,7 +333,14 @@ def test_term_is_what_the_grade_claims(term):
     check(claimed, claimed, kind)
 
 
-WITHOUT = {"bandwidth_hz": None, "oversampling": 1, "dropped_burst": 1.0, "vibration_averaging_s": 1e-9}
+WITHOUT = {
+    "bandwidth_hz": None,
+    "gyro_bandwidth_hz": None,
+    "accel_bandwidth_hz": None,
+    "oversampling": 1,
+    "dropped_burst": 1.0,
+    "vibration_averaging_s": 1e-9,
+}
 
 
 def mutations():

@@ -10,6 +10,7 @@ Not here: an odometry, where the file has none, and whether the ride can be true
 """
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ from simrail.core.resample import (
 )
 from simrail.core.toml_files import blame, judge, label, load, read_toml
 from simrail.recording.check_form import SHEETS, check_recording
+from simrail.recording.check_sheet import check_counts, field_bounds, imu_bounds
+from simrail.recording.files.data_file import line_of
 from simrail.recording.files.ride_file import ImuSignalPart, RideFile
 from simrail.recording.files.signal_reader import SignalReader
 from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording
@@ -77,7 +80,8 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
         with blame(None, "track"):
             track = load(TrackFile, "track", spec.track, folder=folder).design(Path(spec.track).stem)
     reader = SignalReader(folder)
-    imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu"), spec)
+    sheet = _sheet(spec.imu, folder)
+    imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu", imu_bounds(sheet)), spec)
     if spec.gaps is not None:
         noted = reader.frame(spec.gaps, "gaps")
         gaps = noted if gaps is None else pd.concat([noted, gaps], ignore_index=True)
@@ -89,13 +93,14 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
     ):
         part = getattr(spec, name)
         if part is not None:
-            others[name] = _at(reader.frame(part, name), imu.index.to_numpy(), longest_gap_s, name)
+            bounds = field_bounds(part.sheet) if name == "magnetometer" else None
+            others[name] = _at(reader.frame(part, name, bounds), imu.index.to_numpy(), longest_gap_s, name)
             if name in SHEETS:
                 others[SHEETS[name][0]] = part.sheet
     recording = Recording(
         name=spec.name,
         imu=imu,
-        imu_sheet=replace(_sheet(spec.imu, folder), rate_hz=rate_hz),
+        imu_sheet=replace(sheet, rate_hz=rate_hz),
         mount=spec.imu.name,
         mount_body=spec.imu.body,
         mount_position_m=spec.imu.position_m,
@@ -180,6 +185,12 @@ def _with_way(recording: Recording, spec: RideFile, reader: SignalReader) -> Rec
         if spec.encoder.reverse:
             counts["pulse_count"] = -counts["pulse_count"]
         _judge_way(counts, "encoder", recording.imu, 1.0)
+        check_counts(
+            counts["pulse_count"],
+            spec.encoder.known,
+            where=partial(line_of, spec.encoder),
+            file=label(reader.folder / spec.encoder.file),
+        )
         return replace(recording, encoder=counts, encoder_sheet=spec.encoder.known)
     part = spec.odometer
     if part is None:

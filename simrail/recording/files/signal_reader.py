@@ -4,6 +4,8 @@ Nothing is resampled or filled in: a missing value is refused with its line. How
 together is the matter of `simrail.recording.files.ride_reader`.
 """
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from simrail.core.jit import FloatArray
 from simrail.core.resample import check_stamps
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import blame, label
+from simrail.recording.check_sheet import Bounds, Channel, check_samples
 from simrail.recording.files.data_file import column_names, line_of, read_columns
 from simrail.recording.files.signal_part import DATE_TIMES, SignalPart, VectorPart
 from simrail.recording.signals import TIMES, Quantity
@@ -29,11 +32,11 @@ class SignalReader:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._zero_s: int | None = None
         self._dated: bool | None = None
 
-    def frame(self, part: SignalPart, table: str) -> pd.DataFrame:
+    def frame(self, part: SignalPart, table: str, bounds: Mapping[str, Bounds] | None = None) -> pd.DataFrame:
         """Frame of a signal: its columns in SI and in the body's axes, indexed by ``time_s``.
 
         Parameters
@@ -42,15 +45,18 @@ class SignalReader:
             What the ride file says of it.
         table : str
             Table of the ride file, for messages.
+        bounds : mapping of str to Bounds, optional
+            What the sheet of its device says, by quantity.
 
         Raises
         ------
         InputError
             If its file, a column or a value is missing or bad, its times do not rise, or its clock is
-            another than that of the first signal read.
+            another than that of the first signal read; if a sample is none of its device
+            (`simrail.recording.check_sheet`).
         """
         signal = part.signal
-        found = column_names(part, self._folder, table=table)
+        found = column_names(part, self.folder, table=table)
         names: dict[str, list[str]] = {}
         for quantity in signal.quantities:
             named = list(part.columns.get(quantity.key, quantity.columns))
@@ -60,14 +66,16 @@ class SignalReader:
         stamped = signal.timed and ("time" in part.columns or time_name in found or part.rate_hz is None)
         wanted = [*([time_name] if stamped else []), *(name for group in names.values() for name in group)]
         text = [time_name] if stamped and unit == "iso" else []
-        read = read_columns(part, self._folder, wanted, table=table, text=text)
+        read = read_columns(part, self.folder, wanted, table=table, text=text)
         columns: dict[str, FloatArray] = {}
+        device: dict[str, list[FloatArray]] = {}
         for quantity in signal.quantities:
             if quantity.key in names:
                 values = [
-                    _si(np.asarray(read[name]), quantity, part, name, label(self._folder / part.file))
+                    _si(np.asarray(read[name]), quantity, part, name, label(self.folder / part.file))
                     for name in names[quantity.key]
                 ]
+                device[quantity.key] = values
                 if isinstance(part, VectorPart) and len(values) == 3:
                     values = _turned(values, part)
                 columns.update(zip(quantity.columns, values, strict=True))
@@ -76,7 +84,7 @@ class SignalReader:
             if len(frame) < 3:
                 raise InputError(
                     "is too short",
-                    file=label(self._folder / part.file),
+                    file=label(self.folder / part.file),
                     value=f"{len(frame)} samples",
                     limit=">= 3",
                 )
@@ -85,9 +93,19 @@ class SignalReader:
             else:
                 assert part.rate_hz is not None
                 time = part.start_s + np.arange(len(frame)) / part.rate_hz
-            with blame(label(self._folder / part.file)):
+            with blame(label(self.folder / part.file)):
                 check_stamps(time, field=f"{table}.{time_name}")
             frame.index = pd.Index(time, name="time_s")
+            for quantity in signal.quantities:
+                if bounds is not None and quantity.key in bounds:
+                    check_samples(
+                        _channels(device[quantity.key], names[quantity.key], quantity, part),
+                        quantity.key,
+                        bounds[quantity.key],
+                        time=time,
+                        where=partial(line_of, part),
+                        file=label(self.folder / part.file),
+                    )
         return frame
 
     def _times(self, raw: FloatArray | pd.Series, unit: str, part: SignalPart, table: str) -> FloatArray:
@@ -110,7 +128,7 @@ class SignalReader:
             except (ValueError, TypeError) as error:
                 raise InputError(
                     f"holds no date-time ({error})",
-                    file=label(self._folder / part.file),
+                    file=label(self.folder / part.file),
                     field=part.columns.get("time", ("time_s",))[0],
                     limit="e.g. 2024-05-31T12:00:00.123",
                 ) from None
@@ -152,6 +170,17 @@ def _si(values: FloatArray, quantity: Quantity, part: SignalPart, name: str, fil
     multiply, divide = quantity.units[unit.removeprefix("-")]
     scaled = values if multiply == divide else values * multiply / divide
     return -scaled if unit.startswith("-") else scaled
+
+
+def _channels(
+    values: list[FloatArray], names: list[str], quantity: Quantity, part: SignalPart
+) -> tuple[Channel, ...]:
+    """Columns as the device logged them, in SI."""
+    unit = part.units.get(quantity.key, next(iter(quantity.units))).removeprefix("-")
+    multiply, divide = quantity.units[unit]
+    return tuple(
+        Channel(name, column, unit, multiply / divide) for name, column in zip(names, values, strict=True)
+    )
 
 
 def _turned(device: list[FloatArray], part: VectorPart) -> list[FloatArray]:

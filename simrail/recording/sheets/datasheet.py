@@ -15,7 +15,15 @@ from simrail.recording.sheets.units import STANDARD_GRAVITY_MPS2
 
 _G = STANDARD_GRAVITY_MPS2
 
-_OPTIONS = ("source", "bias_process", "flicker_range_s", "oversampling", "output")
+_OPTIONS = (
+    "source",
+    "bias_process",
+    "flicker_range_s",
+    "oversampling",
+    "output",
+    "gyro_axis_noise",
+    "accel_axis_noise",
+)
 """What a grade says beside its figures."""
 
 _DENSITIES = ("gyro_noise_degpsqrthz", "accel_noise_ugpsqrthz")
@@ -44,8 +52,9 @@ def grade_from_datasheet(
     assumed : str
         What else was assumed.
     **figures : float, optional
-        ``source``, ``bias_process``, ``flicker_range_s``, ``oversampling`` and ``output`` as in `ImuGrade`,
-        and keys of `FIGURES`, e.g. ``gyro_noise_degpsqrthz=0.005``; None is a figure that is not printed.
+        ``source``, ``bias_process``, ``flicker_range_s``, ``oversampling``, ``output``, ``gyro_axis_noise``
+        and ``accel_axis_noise`` as in `ImuGrade`, and keys of `FIGURES`, e.g.
+        ``gyro_noise_degpsqrthz=0.005``; None is a figure that is not printed.
 
     Returns
     -------

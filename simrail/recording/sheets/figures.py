@@ -71,6 +71,8 @@ FIGURES: dict[str, Figure] = {
     "accel_resolution_mg": Figure("accel_resolution_mps2", 1e-3 * _G, "mg"),
     "vibration_averaging_s": Figure("vibration_averaging_s", 1.0, "s"),
     "bandwidth_hz": Figure("bandwidth_hz", 1.0, "Hz"),
+    "gyro_bandwidth_hz": Figure("gyro_bandwidth_hz", 1.0, "Hz"),
+    "accel_bandwidth_hz": Figure("accel_bandwidth_hz", 1.0, "Hz"),
     "clock_jitter_us": Figure("clock_jitter_s", 1e-6, "us"),
     "clock_drift_ppm": Figure("clock_drift", 1e-6, "ppm"),
     "dropped_percent": Figure("dropped_fraction", 1e-2, "%"),
@@ -103,11 +105,12 @@ _MEANT = {
     "scale_temperature": "bound of the error of the scale factor per kelvin away from 25 degrees Celsius",
     "range": "largest magnitude that is measured",
     "resolution": "size of one count",
+    "bandwidth": "-3 dB frequency of its response of second order, where it has one of its own",
 }
 _MEANT_OF_DEVICE = {
     "package_misalignment": "bound of the angles between package and axes of the sensors, both triads alike",
     "vibration_averaging": "time constant over which vibration is averaged",
-    "bandwidth": "-3 dB frequency of the response of second order, one for both triads",
+    "bandwidth": "-3 dB frequency of the response of second order, of both triads",
     "clock_jitter": "standard deviation of the time at which a sample is really taken",
     "clock_drift": "bound of the relative error of the device's clock",
     "dropped": "share of the samples that never arrive",

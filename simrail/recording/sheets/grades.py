@@ -108,6 +108,10 @@ class ImuGrade:
         sample interval.
     bandwidth_hz : float, optional
         -3 dB frequency of the device's own second-order response (Butterworth), before sampling.
+    gyro_bandwidth_hz, accel_bandwidth_hz : float, optional
+        The same of one triad, where it has one of its own; see `bandwidth_of`.
+    gyro_axis_noise, accel_axis_noise : tuple of float
+        White noise of the axes x, y, z over that of the triad, at most 1.
     oversampling : int
         The device samples this many times as fast and averages over each interval; 1 for no averaging.
     output : {"rates", "increments"}
@@ -160,6 +164,10 @@ class ImuGrade:
     gyro_resolution_radps: float = 0.0
     accel_resolution_mps2: float = 0.0
     bandwidth_hz: float | None = None
+    gyro_bandwidth_hz: float | None = None
+    accel_bandwidth_hz: float | None = None
+    gyro_axis_noise: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    accel_axis_noise: tuple[float, float, float] = (1.0, 1.0, 1.0)
     oversampling: int = 1
     output: Literal["rates", "increments"] = "rates"
     clock_jitter_s: float = 0.0
@@ -184,7 +192,7 @@ class ImuGrade:
             with faults.gathered():
                 judge_choice(here + name, getattr(self, name), choices)
         if not faults.found:
-            for judged in (_judge_nonlinearity, _judge_jitter, _judge_flicker):
+            for judged in (_judge_nonlinearity, _judge_jitter, _judge_flicker, _judge_axis_noise):
                 with faults.gathered():
                     judged(self)
         faults.refuse()
@@ -204,14 +212,20 @@ class ImuGrade:
         values = {term: getattr(self, name) for term, name in _FIELDS[kind].items()}
         return Triad(**dict.fromkeys(_TERMS, 0.0) | values)
 
+    def bandwidth_of(self, kind: str) -> float | None:
+        """-3 dB frequency of the triad ``"gyro"`` or ``"accel"``: its own, or that of the device."""
+        own: float | None = getattr(self, f"{kind}_bandwidth_hz")
+        return self.bandwidth_hz if own is None else own
+
     @property
     def lag_s(self) -> float:
         """Age of what a sample says at its time stamp, for slow motion: response and averaging.
 
-        sqrt(2) / (2 pi bandwidth), and half the time over which the device averages. Like a real device,
-        the simulated one does not correct it.
+        sqrt(2) / (2 pi bandwidth), and half the time over which the device averages; of two bandwidths, the
+        larger age. Like a real device, the simulated one does not correct it.
         """
-        response = math.sqrt(2.0) / (2.0 * math.pi * self.bandwidth_hz) if self.bandwidth_hz else 0.0
+        bandwidths = [band for kind in ("gyro", "accel") if (band := self.bandwidth_of(kind))]
+        response = math.sqrt(2.0) / (2.0 * math.pi * min(bandwidths)) if bandwidths else 0.0
         return response + 0.5 * (self.oversampling - 1) / (self.oversampling * self.rate_hz)
 
     def bias_stages(self, kind: str) -> tuple[FloatArray, FloatArray]:
@@ -273,6 +287,8 @@ def imu_sheet(grade: ImuGrade, *, delay_s: float) -> ImuSheet:
     shared = {
         field.name: getattr(grade, field.name) for field in fields(ImuSheet) if hasattr(grade, field.name)
     }
+    bandwidths = [band for kind in ("gyro", "accel") if (band := grade.bandwidth_of(kind)) is not None]
+    shared["bandwidth_hz"] = min(bandwidths, default=None)
     unlimited = {name: None for name, value in shared.items() if value == math.inf}
     return ImuSheet(grade=grade.name, delay_s=delay_s, **shared | unlimited)
 
@@ -335,7 +351,7 @@ def _judge(grade: str, name: str, value: float) -> None:
     elif name.endswith(_SMALL):
         limit, fine = ">= 0 and < 0.2", 0.0 <= value < 0.2
     most = next((top for end, top in _MOST.items() if name.endswith(end)), math.inf)
-    if "range" not in name:
+    if "range" not in name and not name.endswith("bandwidth_hz"):
         most = min(most, _LARGEST.get(name.partition("_")[0], math.inf))
         most = 1e9 if name.endswith("correlation_s") else most
     if fine and value > most:
@@ -363,6 +379,23 @@ def _judge_nonlinearity(grade: ImuGrade) -> None:
                     field=f"imu grade {grade.name}: {kind}_nonlinearity",
                     value=terms.nonlinearity,
                     remedy=f"give {kind}_range_{unit} as well",
+                )
+    faults.refuse()
+
+
+def _judge_axis_noise(grade: ImuGrade) -> None:
+    """Refuse axes that are noisier than their triad."""
+    faults = Faults()
+    for kind in ("gyro", "accel"):
+        shares = getattr(grade, f"{kind}_axis_noise")
+        with faults.gathered():
+            if len(shares) != 3 or not all(0.0 <= share <= 1.0 for share in shares):
+                raise InputError(
+                    "is not the share of each axis in the noise of the triad",
+                    field=f"imu grade {grade.name}: {kind}_axis_noise",
+                    value=list(shares),
+                    limit="three numbers from 0 to 1",
+                    remedy="give the figures of the axes x, y, z as a list in the place of that of the triad",
                 )
     faults.refuse()
 

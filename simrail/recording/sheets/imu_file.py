@@ -12,15 +12,16 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, create_model
+from pydantic import Field, create_model, model_validator
 
 from simrail.core.errors import InputError, did_you_mean
 from simrail.core.toml_files import Part, blame, find, judge, label, read_toml
 from simrail.recording.sheets.datasheet import grade_from_datasheet
 from simrail.recording.sheets.figures import FIGURES, MEANINGS
 from simrail.recording.sheets.grades import ImuGrade
-from simrail.recording.sheets.sheet_words import explain
+from simrail.recording.sheets.sheet_words import explain, in_own_units
 from simrail.recording.sheets.units import read_measured
+from simrail.recording.sheets.usual import refuse_unusual
 
 _HEAD = ("title", "synthetic")
 _TEXTS = (
@@ -34,8 +35,13 @@ _TEXTS = (
     "flicker_range_s",
     "oversampling",
     "output",
+    "gyro_axis_noise",
+    "accel_axis_noise",
 )
 """Keys of `ImuHead`: what a misspelt key may have been to be that is no figure."""
+
+
+_LISTS = ("flicker_range_s", "gyro_axis_noise", "accel_axis_noise")
 
 
 class ImuHead(Part):
@@ -64,6 +70,31 @@ class ImuHead(Part):
     output: Literal["rates", "increments"] = Field(
         default="rates", description="whether the device sends rates, or angle and velocity increments"
     )
+    gyro_axis_noise: tuple[float, float, float] = Field(
+        default=(1.0, 1.0, 1.0),
+        description="white noise of the gyro's axes x, y, z over its figure; or give that as a list of three",
+    )
+    accel_axis_noise: tuple[float, float, float] = Field(
+        default=(1.0, 1.0, 1.0),
+        description="white noise of the accelerometer's axes x, y, z over its figure; or as a list of three",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_units_of_its_own(cls, data: Any) -> Any:
+        """Figures in units that the table has not, and noise given for each axis, as the table has them."""
+        if not isinstance(data, dict):
+            return data
+        # What a validator returns is no longer JSON, in which arrays stand for tuples.
+        return {
+            key: tuple(value) if key in _LISTS and isinstance(value, list) else value
+            for key, value in in_own_units(data).items()
+        }
+
+    @model_validator(mode="after")
+    def _as_sensors_are(self) -> Self:
+        refuse_unusual(dict(self))
+        return self
 
     def grade(self, name: str) -> ImuGrade:
         """The grade in SI units; `name` is the stem of the file."""

@@ -12,9 +12,9 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from simrail.recording.sheets.figures import FIGURES, MEANINGS, QUANTITIES, Figure
 from simrail.recording.sheets.units import Dimension, Measured, Unit, read_measured, read_unit
@@ -137,6 +137,7 @@ _TRIAD_WORDS = {
     "gyro": "gyro",
     "gyros": "gyro",
     "gyroscope": "gyro",
+    "gyr": "gyro",
     "gyroscopes": "gyro",
     "angular": "gyro",
     "rate": "gyro",
@@ -165,6 +166,21 @@ _BY_SUFFIX = {
 """Units as the keys of IMU files spell them."""
 
 _ANGLE, _NUMBER = Dimension(radian=Fraction(1)), Dimension()
+_ANGLE_PER_ROOT_HERTZ = Dimension(radian=Fraction(1), second=Fraction(1, 2))
+
+_COUNTS_PER = re.compile(r"(?:lsbs?|counts?|digits?) *(?:/|p|per) *(.*)")
+"""A sensitivity as counts per unit: one count is the inverse."""
+
+_ANALOGUE = re.compile(r"(?:sensitivity|scale).*[\s_(0-9][mu]?v(?:olts?)?(?:/|p| *per |_per_)")
+
+_TOOLS = {
+    "gyroscope_noise_density": "rad/s/sqrt(Hz)",
+    "gyroscope_random_walk": "rad/s^2/sqrt(Hz)",
+    "accelerometer_noise_density": "m/s^2/sqrt(Hz)",
+    "accelerometer_random_walk": "m/s^3/sqrt(Hz)",
+}
+"""Units of the keys of kalibr and of the Allan tools that write files for it: SI, by their definition
+(github.com/ethz-asl/kalibr/wiki/IMU-Noise-Model, by memory)."""
 
 
 class Spoken(NamedTuple):
@@ -209,6 +225,13 @@ def explain(key: str, value: object) -> str | None:
     if isinstance(value, dict):
         remedies = [explain(f"{key}_{inner}", item) for inner, item in value.items()]
         return "; ".join(remedy for remedy in remedies if remedy) or None
+    if key in _TOOLS and isinstance(value, int | float):
+        value = f"{value} {_TOOLS[key]}"
+    if _ANALOGUE.search(f"{key} {value if isinstance(value, str) else ''}".lower()):
+        return (
+            "remove it: volts per unit are the gain of an analogue output; of its digits the size of one is "
+            "wanted, gyro_resolution_degps or accel_resolution_mg"
+        )
     spoken = interpret(key)
     if spoken is None:
         return None
@@ -227,11 +250,64 @@ def explain(key: str, value: object) -> str | None:
         return _choose(key, _figures(own) if own and said else fitting, spoken, said)
     same = {name: figure for name, figure in fitting.items() if _fits(figure, unit)}
     if not same:
-        return _no_such_unit(spoken, said, unit, fitting)
+        return _no_such_unit(spoken, said, unit, fitting, measured)
     plain = isinstance(value, int | float)
     lines = [_line(names, unit, measured, spoken, plain=plain) for names in _by_quantity(same)]
     guess = spoken.misspelt and plain
     return f"did you mean {' or '.join(lines)}?" if guess else f"write {' or '.join(lines)}"
+
+
+def in_own_units(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys whose meaning is certain, with the keys and numbers of the table in their place.
+
+    Certain is a key that names its quantity as IMU files do, with another unit behind it, e.g.
+    ``gyro_noise_mdpspsqrthz``; and a noise that is given for each axis. All else stays as it is, to be
+    refused and explained.
+
+    Parameters
+    ----------
+    data : mapping
+        What a file says.
+    """
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        name, number = key, value
+        if key not in FIGURES:
+            name, factor = _known(key)
+            plain = value if isinstance(value, list | tuple) else [value]
+            taken = any(other in data for other in _figures([name.rpartition("_")[0]])) if factor else True
+            if taken or not all(_is_number(one) for one in plain):
+                found[key] = value
+                continue
+            number = [one * factor for one in plain] if isinstance(value, list | tuple) else value * factor
+        triad, _, term = name.rpartition("_")[0].partition("_")
+        shares = f"{triad}_axis_noise"
+        if term == "noise" and isinstance(number, list | tuple) and shares not in data and _are_axes(number):
+            found[shares] = tuple(one / max(number) for one in number)
+            number = max(number)
+        found[name] = number
+    return found
+
+
+def _known(key: str) -> tuple[str, float]:
+    """The key of the table that says the same in another unit, and the factor to it; 0 for none."""
+    for quantity in sorted(QUANTITIES, key=len, reverse=True):
+        unit = _unit_of(key.removeprefix(f"{quantity}_")) if key.startswith(f"{quantity}_") else None
+        if unit is not None:
+            names = [name for name in QUANTITIES[quantity] if _fits(FIGURES[name], unit)]
+            if names:
+                name = _best(names, unit, None)
+                return name, unit.si / FIGURES[name].si
+    return key, 0.0
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _are_axes(values: Sequence[object]) -> bool:
+    numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    return len(numbers) == len(values) == 3 and min(numbers) >= 0.0 < max(numbers) < math.inf
 
 
 def interpret(key: str) -> Spoken | None:
@@ -291,6 +367,10 @@ def _quantities(words: list[str]) -> tuple[tuple[str, ...], str] | None:
 def _with_triads(quantities: Iterable[str], triads: set[str]) -> Iterator[str]:
     """Quantities of the triads that are spoken of, or of both; those of the device have none."""
     for quantity in quantities:
+        # A device has a bandwidth, and each of its triads may have its own.
+        if quantity in QUANTITIES and any(f"{triad}_{quantity}" in QUANTITIES for triad in triads):
+            yield from (f"{triad}_{quantity}" for triad in sorted(triads))
+            continue
         if quantity in QUANTITIES or quantity == "rate":
             own = quantity.split("_")[0]
             if own not in ("gyro", "accel") or not triads or own in triads:
@@ -306,13 +386,20 @@ def _figures(quantities: Iterable[str]) -> dict[str, Figure]:
 
 
 def _unit_of(text: str) -> Unit | None:
-    return _BY_SUFFIX.get(text) or (read_unit(text) if text else None)
+    unit = _BY_SUFFIX.get(text) or (read_unit(text) if text else None)
+    if unit is not None and unit.per_root_hertz and unit.dimension == _ANGLE_PER_ROOT_HERTZ:
+        # As keys of IMU files write deg/s/sqrt(Hz): degpsqrthz. No sheet prints an angle per root of hertz.
+        second = unit.dimension.second - 1
+        return unit._replace(dimension=unit.dimension._replace(second=second))
+    return unit
 
 
 def _fits(figure: Figure, unit: Unit) -> bool:
     """Whether a figure can be given in a unit; an angle between axes also as its sine (cross-axis)."""
-    if figure.dimension == unit.dimension:
-        return True
+    return figure.dimension == unit.dimension or _is_sine(figure, unit)
+
+
+def _is_sine(figure: Figure, unit: Unit) -> bool:
     return "nonorthogonality" in figure.field and figure.dimension == _ANGLE and unit.dimension == _NUMBER
 
 
@@ -330,8 +417,8 @@ def _line(names: list[str], unit: Unit, measured: Measured | None, spoken: Spoke
     notes = [MEANINGS[name.rpartition("_")[0]]]
     if spoken.of_axis:
         notes.append("the axes have one figure: the largest of theirs")
-    if name == "bandwidth_hz":
-        notes.append("of two, the lower")
+    if _is_sine(FIGURES[name], unit):
+        notes.append("where that holds the mounting of the package as well, package_misalignment_mrad too")
     return f"{name} = {number} ({'; '.join(notes)})"
 
 
@@ -360,13 +447,27 @@ def _choose(key: str, figures: dict[str, Figure], spoken: Spoken, said: str) -> 
     return f"write {listed}"
 
 
-def _no_such_unit(spoken: Spoken, said: str, unit: Unit, figures: dict[str, Figure]) -> str:
-    """Say that a unit is of another quantity than the words."""
+def _no_such_unit(
+    spoken: Spoken, said: str, unit: Unit, figures: dict[str, Figure], measured: Measured | None
+) -> str:
+    """Say that a unit is of another quantity than the words, and what can be made of it."""
+    counted = _COUNTS_PER.fullmatch(said.lower())
+    one = _unit_of(counted[1].strip("() ")) if counted else None
+    inverse = [name for name in figures if "resolution" in name and one and _fits(FIGURES[name], one)]
+    if inverse and one is not None and measured is not None and measured.number > 0.0:
+        name = inverse[0]
+        number = _number(one.si / (measured.number * FIGURES[name].si))
+        return f"write {name} = {number} ({MEANINGS[name.rpartition('_')[0]]}, one over counts per unit)"
     units = ", ".join(dict.fromkeys(figure.unit for figure in figures.values()))
     text = f"{spoken.words} has the unit {units}, and {said} is of another quantity"
     rms = [name for name in figures if name.endswith("sqrthz") and _is_over_root_hertz(FIGURES[name], unit)]
     if rms:
-        text += f"; of a noise over a bandwidth of B Hz write {rms[0]} = noise / sqrt(1.57 B)"
+        figure = FIGURES[rms[0]]
+        noise = "noise" if measured is None else _number(measured.number * unit.si / figure.si)
+        text += f"; of a noise over a bandwidth of B Hz write {rms[0]} = {noise} / sqrt(1.57 B)"
+        if measured is not None:
+            over = measured.number * unit.si / figure.si / math.sqrt(1.57 * 100.0)
+            text += f", which is {_number(over)} where B is 100 Hz"
     return text
 
 

@@ -93,7 +93,7 @@ _REWRITTEN = (
     (r"º", "°"),
     (r"²", "2"),
     (r"[·\u00d7*]", " "),
-    (r"\bof\b|\bfull[ _-]?scale\b|\brms\b", " "),
+    (r"\bof\b|\bfull[ _-]?scale\b|(?<![a-z])rms(?![a-z])|rms$", " "),
     (r"(?<![a-z])per(?![a-z])", "/"),
     (r"√|(?<![a-z])(?:square[ _-]?)?root(?![a-z])|(?<![a-z])sqr(?:t|)(?![a-z])", "sqrt"),
     (r"(?<![a-z])rt[ _-]?(?=[(]?(?:h|s))", "sqrt"),

@@ -10,8 +10,9 @@ from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.core.jit import FloatArray
 from simrail.recording.sheets.allan import overlapping_allan
 from simrail.recording.sheets.figures import FIGURES
-from simrail.recording.sheets.grades import ImuGrade, silent_noise
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuHead
+from simrail.recording.sheets.usual import sheet_warnings
 from simrail.report.figures.canvas import INK, legend_above, log_scale, look, panels, to_svg
 from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.imu_text import device_rows, triad_rows
@@ -21,35 +22,51 @@ HOUR_S = 3600.0
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 
 
-def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 1) -> Path:
-    """Write ``<folder>/<grade>.html`` and return its path; the folder is made if it is not there."""
+def write_imu_page(
+    folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 1, rest: pd.DataFrame | None = None
+) -> Path:
+    """Write ``<folder>/<grade>.html`` and return its path; the folder is made if it is not there.
+
+    With a recording at ``rest``, its Allan deviation stands beside the closed form in the place of a
+    simulated one.
+    """
     text = page_text(
         "pages/imu.html.j2",
         file=file,
         grade=grade,
         device=device_rows(grade),
         triads=triad_rows(grade),
-        warnings=silent_noise(grade),
-        allan=allan_figure(grade, seed=seed),
+        warnings=sheet_warnings(grade),
+        allan=allan_figure(grade, seed=seed, rest=rest),
+        measured=rest is not None,
     )
     return write_page(folder, grade.name, text)
 
 
 def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
     """Samples of a device at rest and level, response and clock left out: they do not show at rest."""
-    resting = replace(grade, bandwidth_hz=None, oversampling=1, clock_jitter_s=0.0, clock_drift=0.0)
+    resting = replace(
+        grade,
+        bandwidth_hz=None,
+        gyro_bandwidth_hz=None,
+        accel_bandwidth_hz=None,
+        oversampling=1,
+        clock_jitter_s=0.0,
+        clock_drift=0.0,
+    )
     index = pd.Index(np.arange(round(seconds * grade.rate_hz)) / grade.rate_hz, name="time_s")
     motion = pd.DataFrame(0.0, index=index, columns=list(IMU))
     motion[ACCEL[2]] = 9.81
     return sample_imu(motion, resting, seed=seed, draw=0, name="imu")[0]
 
 
-def allan_figure(grade: ImuGrade, *, seed: int) -> str:
-    """Allan deviation of one simulated hour, each axis, beside the closed form; "" if it shows nothing."""
-    whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * HOUR_S * grade.rate_hz, 36)))
+def allan_figure(grade: ImuGrade, *, seed: int, rest: pd.DataFrame | None = None) -> str:
+    """Allan deviation of a rest, or of one simulated hour, beside the closed form; "" if it shows nothing."""
+    seconds = HOUR_S if rest is None else len(rest) / grade.rate_hz
+    whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * seconds * grade.rate_hz, 36)))
     tau: FloatArray = whole / grade.rate_hz
     analytic = grade.allan(tau)
-    frame = at_rest(grade, seconds=HOUR_S, seed=seed)
+    frame = at_rest(grade, seconds=HOUR_S, seed=seed) if rest is None else rest
     if not (frame[list(IMU)].to_numpy() != frame[list(IMU)].iloc[0].to_numpy()).any():
         return ""
     units = {"gyro": FIGURES["gyro_bias_instability_degph"], "accel": FIGURES["accel_bias_instability_ug"]}
@@ -68,4 +85,5 @@ def allan_figure(grade: ImuGrade, *, seed: int) -> str:
             axis.set_ylabel(f"{'gyro' if kind == 'gyro' else 'accelerometer'}, {unit.unit}")
         legend_above(axes[0])
         axes[1].set_xlabel("averaging time, s")
-        return to_svg(figure, description=f"Allan deviation of {grade.name}, simulated and analytic")
+        how = "simulated" if rest is None else "measured"
+        return to_svg(figure, description=f"Allan deviation of {grade.name}, {how} and analytic")

@@ -7,8 +7,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from simrail.recording.sheets.figures import FIGURES
-from simrail.recording.sheets.grades import ImuGrade, silent_noise
+from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuHead
+from simrail.recording.sheets.usual import sheet_warnings
 
 _ROWS = (
     ("noise density", "gyro_noise_degpsqrthz", "accel_noise_ugpsqrthz"),
@@ -27,6 +28,7 @@ _ROWS = (
     ),
     ("bias per kelvin, ±", "gyro_bias_temperature_degphpk", "accel_bias_temperature_mgpk"),
     ("scale per kelvin, ±", "gyro_scale_temperature_ppmpk", "accel_scale_temperature_ppmpk"),
+    ("bandwidth of its own", "gyro_bandwidth_hz", "accel_bandwidth_hz"),
     ("range, ±", "gyro_range_degps", "accel_range_g"),
     ("resolution", "gyro_resolution_degps", "accel_resolution_mg"),
 )
@@ -72,6 +74,10 @@ def _words(grade: ImuGrade, key: str) -> str:
     value = getattr(grade, figure.field)
     if value is None or value == 0.0 or math.isinf(value):
         return ""
+    shares = getattr(grade, f"{key.partition('_')[0]}_axis_noise", (1.0,)) if "_noise_" in key else (1.0,)
+    if len(set(shares)) > 1:
+        # Noise of the axes x, y, z, where they differ.
+        return f"{', '.join(f'{share * value / figure.si:.5g}' for share in shares)} {figure.unit}"
     return f"{value / figure.si:.5g} {figure.unit}"
 
 
@@ -94,7 +100,7 @@ def print_imu(console: Console, file: ImuHead, grade: ImuGrade) -> None:
         console.print(table)
     else:
         console.print("no error terms: it records the true motion, filtered and sampled at its rate")
-    for warning in silent_noise(grade):
+    for warning in sheet_warnings(grade):
         console.print(f"warning: {warning}", highlight=False, markup=False, soft_wrap=True)
     for sentence in grade.assumed:
         console.print(f"assumed: {' '.join(sentence.split())}", highlight=False, markup=False)

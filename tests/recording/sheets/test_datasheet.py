@@ -58,6 +58,7 @@ BY_HAND = {
         "nonorthogonality_mrad": 1e-3,
         "scale_temperature_ppmpk": 1e-6,
         "bias_correlation_s": 1.0,
+        "bandwidth_hz": 1.0,
     }.items()
 }
 

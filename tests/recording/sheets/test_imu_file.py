@@ -34,7 +34,8 @@ def test_a_sheet_in_its_own_words_is_told_every_line(
     """What is written after the message is a file that is fine, and means what the sheet says."""
     sheet = (
         'angle_random_walk = "0.34 deg/sqrt(h)"\n"velocity random walk" = "0.18 m/s/√h"\n'
-        'gyro_in_run_bias_stability = "8 °/h"\naccel_bias_repeatability = "±3 mg"\ngyro_bandwidth_hz = 40.0\n'
+        'gyro_in_run_bias_stability = "8 °/h"\naccel_bias_repeatability = "±3 mg"\n'
+        "gyro_cutoff_frequency_hz = 40.0\n"
     )
     mine = tmp_path / "mine.toml"
     mine.write_text(HEAD + sheet, encoding="utf-8")
@@ -54,7 +55,7 @@ def test_a_sheet_in_its_own_words_is_told_every_line(
         accel_noise_mpspsqrth=0.18,
         gyro_bias_instability_degph=8.0,
         accel_turn_on_bias_mg=3.0,
-        bandwidth_hz=40.0,
+        gyro_bandwidth_hz=40.0,
     )
 
 

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from simrail.recording.sheets.figures import FIGURES, MEANINGS, QUANTITIES
-from simrail.recording.sheets.sheet_words import ALIASES, explain
+from simrail.recording.sheets.sheet_words import ALIASES, explain, in_own_units
 
 G = 9.80665
 
@@ -52,8 +52,16 @@ def keys(remedy: str) -> set[str]:
         ("sensitivity", "8 mdps/LSB", "gyro_resolution_degps", 0.008),
         ("full_scale_range", "±2000 dps", "gyro_range_degps", 2000.0),
         ("range", "±5 g", "accel_range_g", 5.0),
-        ("gyro_bandwidth_hz", 255.0, "bandwidth_hz", 255.0),
-        ("accelerometer bandwidth", "0.324 kHz", "bandwidth_hz", 324.0),
+        ("bandwidth", "255 Hz", "bandwidth_hz", 255.0),
+        ("gyro_cutoff_frequency_hz", 255.0, "gyro_bandwidth_hz", 255.0),
+        ("accelerometer bandwidth", "0.324 kHz", "accel_bandwidth_hz", 324.0),
+        ("gyroscope_noise_density", 4.9e-5, "gyro_noise_degpsqrthz", math.degrees(4.9e-5)),
+        ("gyroscope_random_walk", 2.5e-6, "gyro_random_walk_degphpsqrth", math.degrees(2.5e-6) * 3600 * 60),
+        ("accelerometer_noise_density", 6e-4, "accel_noise_ugpsqrthz", 6e-4 / G * 1e6),
+        ("accelerometer_random_walk", 1e-5, "accel_random_walk_mgpsqrth", 1e-5 / G * 1e3 * 60.0),
+        ("gyro_sensitivity", "131 LSB/(deg/s)", "gyro_resolution_degps", 1.0 / 131.0),
+        ("accel_sensitivity", "2048 LSB/g", "accel_resolution_mg", 1000.0 / 2048.0),
+        ("accel_bias_over_temperature", "0.5 mg/degC", "accel_bias_temperature_mgpk", 0.5),
         ("bias tempco", "0.02 dps/°C", "gyro_bias_temperature_degpspk", 0.02),
         ("gyro_sensitivity", "0.01 %/K", "gyro_scale_temperature_ppmpk", 100.0),
         ("linear acceleration effect on bias", "0.003 deg/s/g", "gyro_g_sensitivity_degpspg", 0.003),
@@ -102,8 +110,87 @@ def test_a_unit_of_another_quantity_is_said_so(key: str, value: str) -> None:
 
 def test_noise_over_a_bandwidth_is_told_from_its_density() -> None:
     remedy = explain("gyro_rms_noise", "0.05 deg/s") or ""
-    assert "gyro_noise_degpsqrthz = noise / sqrt(1.57 B)" in remedy
+    assert "gyro_noise_degpsqrthz = 0.05 / sqrt(1.57 B)" in remedy
     assert "accel" not in remedy
+
+
+def test_noise_in_its_key_is_told_as_a_density_for_a_bandwidth() -> None:
+    """0.7 mg over 100 Hz of a response of first order: 700 ug over the root of 157 Hz."""
+    remedy = explain("accel_noise_mgrms", 0.7) or ""
+    assert "accel_noise_ugpsqrthz = 700.0 / sqrt(1.57 B)" in remedy
+    assert f"{700.0 / math.sqrt(157.0):.6g} where B is 100 Hz" in remedy
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("accel_sensitivity_mvpg", 660.0), ("gyro_sensitivity", "0.67 mV/(deg/s)"), ("scale_factor", "1 V/g")],
+)
+def test_volts_are_no_figure_here(key: str, value: object) -> None:
+    remedy = explain(key, value) or ""
+    assert "analogue" in remedy and lines(remedy) == {}
+
+
+def test_cross_axis_names_both_angles_that_it_may_be() -> None:
+    remedy = explain("gyro_cross_axis_percent", 1.25) or ""
+    assert lines(remedy) == {"gyro_nonorthogonality_mrad": 12.5}
+    assert "package_misalignment_mrad" in remedy and "scale" not in remedy
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "line", "number"),
+    [
+        ("gyro_noise_mdpspsqrthz", 2.8, "gyro_noise_degpsqrthz", 0.0028),
+        ("gyro_noise_radpsqrthz", 4.9e-5, "gyro_noise_degpsqrthz", math.degrees(4.9e-5)),
+        ("gyro_noise_radpspsqrthz", 4.9e-5, "gyro_noise_degpsqrthz", math.degrees(4.9e-5)),
+        ("gyro_noise_dpspsqrthz", 0.0028, "gyro_noise_degpsqrthz", 0.0028),
+        ("gyro_noise_degphpsqrthz", 10.08, "gyro_noise_degpsqrthz", 0.0028),
+        ("accel_noise_mgpsqrthz", 0.07, "accel_noise_ugpsqrthz", 70.0),
+        ("accel_noise_mps2psqrthz", 6e-4, "accel_noise_ugpsqrthz", 6e-4 / G * 1e6),
+        ("gyro_scale_temperature_percentpk", 0.03, "gyro_scale_temperature_ppmpk", 300.0),
+        ("accel_scale_temperature_%/degC", 0.03, "accel_scale_temperature_ppmpk", 300.0),
+        ("gyro_turn_on_bias_mdps", 500.0, "gyro_turn_on_bias_degps", 0.5),
+        ("gyro_turn_on_bias_radps", 0.01, "gyro_turn_on_bias_degps", math.degrees(0.01)),
+        ("gyro_bias_instability_mdps", 1.0, "gyro_bias_instability_degph", 3.6),
+        ("gyro_range_radps", 5.0, "gyro_range_degps", math.degrees(5.0)),
+        ("accel_range_mps2", 49.0, "accel_range_g", 49.0 / G),
+        ("accel_bias_temperature_ugpk", 150.0, "accel_bias_temperature_mgpk", 0.15),
+        ("gyro_nonorthogonality_percent", 1.0, "gyro_nonorthogonality_mrad", 10.0),
+        ("bandwidth_khz", 0.25, "bandwidth_hz", 250.0),
+    ],
+)
+def test_a_quantity_in_another_unit_is_accepted(key: str, value: float, line: str, number: float) -> None:
+    found = in_own_units({"title": "mine", key: value})
+    assert found.pop("title") == "mine"
+    assert {FIGURES[name].field for name in found} == {FIGURES[line].field}
+    ((name, size),) = found.items()
+    assert size * FIGURES[name].si == pytest.approx(number * FIGURES[line].si, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"gyro_noise_g": 1.0},
+        {"gyro_noise_mgpsqrthz": 1.0},
+        {"angle_random_walk_degpsqrth": 1.0},
+        {"gyro_noise_mdpspsqrthz": "2.8"},
+        {"gyro_noise_mdpspsqrthz": True},
+        {"gyro_noise_mdpspsqrthz": 2.8, "gyro_noise_degpsqrthz": 0.0028},
+        {"gyro_noise_density_mdps": 1.0},
+        {"accel_noise_ugpsqrthz": [1.0, 2.0]},
+        {"accel_noise_ugpsqrthz": [1.0, 2.0, "3"]},
+        {"accel_turn_on_bias_mg": [1.0, 2.0, 3.0]},
+    ],
+)
+def test_what_is_not_certain_stays_to_be_explained(data: dict[str, object]) -> None:
+    assert in_own_units(data) == data
+
+
+def test_noise_of_each_axis_is_the_largest_and_shares_of_it() -> None:
+    found = in_own_units({"accel_noise_mgpsqrthz": [0.16, 0.16, 0.2]})
+    assert found == {
+        "accel_noise_ugpsqrthz": pytest.approx(200.0),
+        "accel_axis_noise": pytest.approx((0.8, 0.8, 1.0)),
+    }
 
 
 @pytest.mark.parametrize(
