@@ -21,6 +21,7 @@ exclude_patterns = ["_build"]
 html_theme = "pydata_sphinx_theme"
 html_title = "simrail"
 html_show_sourcelink = False
+html_sidebars = {"*": []}  # pages that stand alone; those in folders list their neighbours
 html_theme_options = {
     "show_prev_next": True,
     "navigation_with_keys": True,
