@@ -247,13 +247,13 @@ class Parts:
         with blame(self.scenario.file, "irregularity"):
             part = part.with_file(self.scenario.folder, start_m=lambda: self.track(cell).start_m)
         if part.measured is None:
-            return part.irregularity(None)
+            return part.irregularity(None, folder=self.scenario.folder)
         key = ("measured", part.measured.model_dump_json())
         if key not in self._nouns:
             with blame(self.scenario.file):
                 self._nouns[key] = read_measured(part.measured, self.scenario.folder)
             self._content[" ".join(key)] = self._nouns[key].digest
-        return part.irregularity(self._nouns[key])
+        return part.irregularity(self._nouns[key], folder=self.scenario.folder)
 
     def rails(self, cell: Cell) -> LaidTrack:
         """The rails of a cell's ride; the last ones are remembered, since cells come ride by ride."""

@@ -149,8 +149,8 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             warnings += unusual
             notes += [f"vibration: {words}" for words in [step_words(ride)] if words]
             notes += profile_notes(ride.vehicle.wheel_rail)
-            measured = ride.irregularity.measured
-            notes += [] if measured is None else [f"{measured.name}: {words}" for words in measured.notes]
+            for file in (ride.irregularity.measured, ride.irregularity.own_spectrum):
+                notes += [] if file is None else [f"{file.name}: {words}" for words in file.notes]
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number
             simulated += durations[ride_key] * scenario.spec.monte_carlo.track_draws

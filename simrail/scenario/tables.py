@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
@@ -22,9 +22,10 @@ from simrail.scenario.axes import Listed, each
 from simrail.scenario.designs import DESIGNS
 from simrail.scenario.measured_file import MeasuredPart
 from simrail.scenario.measured_header import recognise
+from simrail.scenario.spectrum_file import is_spectrum, read_spectrum
 from simrail.scoring.requirement import Requirement, limit_of
 from simrail.track.defects import Defect
-from simrail.track.irregularity import Irregularity
+from simrail.track.irregularity import OWN, Irregularity
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors
 from simrail.track.map_file import (
     CantSd,
@@ -101,7 +102,8 @@ class IrregularityPart(Part):
     and defects are added.
 
     In the place of a spectrum's name may stand the path of a measuring car's export, whose columns are known
-    by their names: its rails are laid from ``start_m`` or the start of the track on, as far as they reach.
+    by their names: its rails are laid from ``start_m`` or the start of the track on, as far as they reach;
+    or that of a table of densities (`simrail.scenario.spectrum_file`).
     """
 
     spectrum: Listed[str] = "none"
@@ -140,25 +142,37 @@ class IrregularityPart(Part):
 
     def with_file(self, folder: Path | None, *, start_m: Callable[[], float]) -> IrregularityPart:
         """The part with the rails of a file that stands in the place of a spectrum's name; else itself."""
-        if Path(str(self.spectrum)).suffix.lower() not in TEXTS + TABLES:
+        if not self._names_file:
             return self
         with blame(None, "spectrum"):
             path = existing_file(str(self.spectrum), folder)
-            if self.measured is not None:
+            if self.measured is not None and not is_spectrum(path):
                 raise InputError(
                     "is a file beside that of [irregularity.measured]",
                     value=str(self.spectrum),
                     remedy="keep one of them",
                 )
+            if is_spectrum(path):
+                return self
             recognise(path)
-        place = start_m() if self.start_m is None else float(cast(float, self.start_m))
+        place = start_m() if self.start_m is None else float(self.start_m)
         measured = MeasuredPart(file=str(self.spectrum), start_m=place, partial=True)
         return self.model_copy(update={"spectrum": "none", "measured": measured, "start_m": None})
 
-    def irregularity(self, measured: MeasuredRails | None) -> Irregularity:
+    def irregularity(self, measured: MeasuredRails | None, *, folder: Path | None = None) -> Irregularity:
         """The irregularity that it describes, with the rails of its file; nothing in it is a list."""
         own = self.model_dump(exclude={"defect", "measured"})
-        return Irregularity(**own, defects=tuple(part.defect() for part in self.defect), measured=measured)
+        defects = tuple(part.defect() for part in self.defect)
+        if not self._names_file:
+            return Irregularity(**own, defects=defects, measured=measured)
+        with blame(None, "irregularity.spectrum"):
+            spectrum = read_spectrum(existing_file(str(self.spectrum), folder))
+        own |= {"spectrum": OWN, "own_spectrum": spectrum}
+        return Irregularity(**own, defects=defects, measured=measured)
+
+    @property
+    def _names_file(self) -> bool:
+        return Path(str(self.spectrum)).suffix.lower() in TEXTS + TABLES
 
 
 class StopPart(Part):

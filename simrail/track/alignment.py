@@ -103,7 +103,9 @@ def _pieces(
         (element.length_m, first.curvature_1pm, last.curvature_1pm)
         for element, (first, last) in zip(elements, ends, strict=True)
     ]
-    at = [(step.index, step.curvature_1pm) for step in steps(elements) if abs(step.curvature_1pm) > EVEN_1PM]
+    at = [
+        (step.element, step.curvature_1pm) for step in steps(elements) if abs(step.curvature_1pm) > EVEN_1PM
+    ]
     if not at:
         return pieces
     starts = element_starts(elements, start_m)
@@ -198,7 +200,7 @@ def build_cant(
         coefficients[-1, i] += h0
     starts = element_starts(elements, start_m)
     cant = PPoly(coefficients, starts)
-    at = [(starts[step.index], step.cross_slope_m) for step in steps(elements)]
+    at = [(starts[step.element], step.cross_slope_m) for step in steps(elements)]
     at = [(place, size) for place, size in at if abs(size) > EVEN_M]
     shape = SMOOTH_STEP if ramp == "smooth" else _LINEAR
     return _smoothed(cant, at, step_smoothing_m, shape) if at else cant

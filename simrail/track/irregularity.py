@@ -31,7 +31,7 @@ from simrail.track.defects import Defect
 from simrail.track.elements import require_number
 from simrail.track.measured import MeasuredRails
 from simrail.track.sections import SectionGain
-from simrail.track.spectra import SPECTRA
+from simrail.track.spectra import SPECTRA, OwnSpectrum, Spectrum
 
 PERIOD_M = 65536.0
 """Length after which a realisation repeats itself."""
@@ -42,6 +42,9 @@ SHORTEST_WAVELENGTH_M = 0.25
 SAMPLES_PER_WAVE = 8
 """Knots that the shortest wave needs to be carried by a cubic spline (to 0.2 % of its amplitude)."""
 
+
+OWN = "own"
+"""Name of the spectrum of a file."""
 
 SCALES = ("scale", *(f"{column.removesuffix('_m')}_scale" for column in IRREGULARITY))
 """Names of the factors on the amplitudes."""
@@ -54,7 +57,7 @@ class Irregularity:
     Attributes
     ----------
     spectrum : str
-        A key of `simrail.track.spectra.SPECTRA`.
+        A key of `simrail.track.spectra.SPECTRA`, or `OWN` with ``own_spectrum``.
     wavelengths_m : tuple of float
         Shortest and longest wavelength.
     fade_m : float
@@ -69,6 +72,8 @@ class Irregularity:
         Discrete defects, added to it.
     measured : MeasuredRails, optional
         Rails from a file, added to what the spectrum gives or in its place; they fade as it does.
+    own_spectrum : OwnSpectrum, optional
+        A spectrum from a file.
     section_gain : SectionGain, optional
         Gain by sections on alignment, vertical profile and cross-level that the spectrum gives; the gauge
         keeps its limits.
@@ -87,14 +92,23 @@ class Irregularity:
     defects: tuple[Defect, ...] = ()
     measured: MeasuredRails | None = None
     section_gain: SectionGain | None = None
+    own_spectrum: OwnSpectrum | None = None
 
     def describe(self) -> dict[str, Any]:
         """Plain data that tells this irregularity from every other; of measured rails their digest."""
-        plain = asdict(replace(self, measured=None))
+        plain = asdict(replace(self, measured=None, own_spectrum=None))
+        del plain["own_spectrum"]
+        if self.own_spectrum is not None:
+            plain["own_spectrum"] = self.own_spectrum.digest
         if self.measured is not None:
             of_file = self.measured
             plain["measured"] = [of_file.digest, of_file.replaces_spectrum, of_file.has_cant]
         return plain
+
+    @property
+    def drawn_from(self) -> Spectrum:
+        """The spectrum that its name or its file means."""
+        return SPECTRA[self.spectrum] if self.own_spectrum is None else self.own_spectrum.spectrum
 
     def scale_of(self, column: str) -> float:
         """Factor on the amplitudes of one of `simrail.core.columns.IRREGULARITY`."""
@@ -109,7 +123,7 @@ class Irregularity:
         InputError
             Naming the field and its limit.
         """
-        if self.spectrum not in SPECTRA:
+        if self.spectrum not in SPECTRA and not (self.spectrum == OWN and self.own_spectrum is not None):
             raise InputError(
                 "is unknown", field="spectrum", value=self.spectrum, limit="one of " + ", ".join(SPECTRA)
             )
@@ -166,7 +180,7 @@ def realise(irregularity: Irregularity, column: str, *, seed: int, step_m: float
     shortest, longest = irregularity.wavelengths_m
     first, last = int(np.ceil(PERIOD_M / longest)), int(np.floor(PERIOD_M / shortest))
     harmonics = np.arange(first, last + 1)
-    spectrum, scale = SPECTRA[irregularity.spectrum], irregularity.scale_of(column)
+    spectrum, scale = irregularity.drawn_from, irregularity.scale_of(column)
     limits = spectrum.gauge_limits_m if column == "gauge_m" else None
     # Within limits a factor above 1 must not lead out of them: it widens what is bent into them.
     before = scale if limits is None else max(scale, 1.0)

@@ -4,7 +4,6 @@ import numpy as np
 
 from simrail.track.irregularity import Irregularity
 from simrail.track.roughness import RoughnessTable
-from simrail.track.spectra import SPECTRA
 
 LONGEST_M = 1.5
 """Longest wave of the roughness where no spectrum of long waves says otherwise."""
@@ -26,7 +25,7 @@ def step_db(irregularity: Irregularity, table: RoughnessTable, *, offset_db: flo
     if irregularity.spectrum == "none":
         return None
     frequency = np.array([1.0 / longest_short_wave_m(irregularity, table)])
-    densities = SPECTRA[irregularity.spectrum].densities
+    densities = irregularity.drawn_from.densities
     vertical, level = (
         irregularity.scale_of(name) ** 2 * densities[name].density(frequency)[0]
         for name in ("vertical_profile_m", "cross_level_m")

@@ -39,7 +39,7 @@ class EndValue(NamedTuple):
 class Step(NamedTuple):
     """Two elements that meet with different values: the number of the second, and what is added there."""
 
-    index: int
+    element: int
     curvature_1pm: float
     cross_slope_m: float
 
@@ -127,7 +127,7 @@ def check_elements(
     require_number(step_smoothing_m, "step_smoothing_m", least=0.0, within=LONGEST_SMOOTHING_M)
     stepped = steps(elements)
     if stepped and not step_smoothing_m:
-        index = stepped[0].index
+        index = stepped[0].element
         raise InputError(
             "curvature or cant steps between two elements",
             field=f"segment[{index}]",
@@ -137,11 +137,11 @@ def check_elements(
         )
     length = sum(element.length_m for element in elements)
     for step in stepped:
-        place = sum(element.length_m for element in elements[: step.index])
+        place = sum(element.length_m for element in elements[: step.element])
         if min(place, length - place) < 0.5 * step_smoothing_m:
             raise InputError(
                 "curvature or cant steps too close to an end of the track to be smoothed",
-                field=f"segment[{step.index}]",
+                field=f"segment[{step.element}]",
                 value=f"{min(place, length - place):g} m from the end",
                 limit=f">= {0.5 * step_smoothing_m:g} m, half of step_smoothing_m",
                 remedy="lengthen the first or the last segment, or shorten step_smoothing_m",

@@ -11,7 +11,7 @@ The default sizes are synthetic: orders of magnitude of what a design drawing an
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -229,7 +229,9 @@ def _with_neighbours(elements: Sequence[Element]) -> list[Element]:
                 beside = around[there + 1]
                 if beside is not None and not isinstance(beside, Transition):
                     meets = ends[there][end == "start"] == ends[i][end == "end"]
-                    changes = {f"{end}_radius_m": None, f"{end}_cant_m": None} if meets else {}
+                    changes: dict[str, Any] = (
+                        {f"{end}_radius_m": None, f"{end}_cant_m": None} if meets else {}
+                    )
                     element = replace(element, **changes)
         found.append(element)
     return found

@@ -19,7 +19,7 @@ had; it is given the limits of class 5, which it must keep too.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -78,6 +78,34 @@ class RationalPsd:
 
 
 @dataclass(frozen=True)
+class TabledPsd:
+    """A density between points of a table, straight in logarithms; nothing outside of them.
+
+    Attributes
+    ----------
+    frequency_1pm : tuple of float
+        Spatial frequencies, rising; none for a density that is nothing.
+    density_m3 : tuple of float
+        One-sided densities there, m^2/(1/m), positive.
+    """
+
+    frequency_1pm: tuple[float, ...]
+    density_m3: tuple[float, ...]
+
+    def density(self, frequency_1pm: npt.ArrayLike) -> FloatArray:
+        """One-sided density in m^2/(1/m) at spatial frequencies > 0."""
+        frequency = np.asarray(frequency_1pm, dtype=float)
+        if not self.frequency_1pm:
+            return np.zeros_like(frequency)
+        logs = np.interp(np.log(frequency), np.log(self.frequency_1pm), np.log(self.density_m3))
+        inside = (frequency >= self.frequency_1pm[0]) & (frequency <= self.frequency_1pm[-1])
+        return np.asarray(np.where(inside, np.exp(logs), 0.0))
+
+
+Psd = RationalPsd | TabledPsd
+
+
+@dataclass(frozen=True)
 class Spectrum:
     """The four densities of one track quality.
 
@@ -85,7 +113,7 @@ class Spectrum:
     ----------
     name, source : str
         Its name in a scenario, and where it comes from.
-    densities : mapping of str to RationalPsd
+    densities : mapping of str to RationalPsd or TabledPsd
         One for each of `simrail.core.columns.IRREGULARITY`: alignment and vertical profile (mean of the
         rails), cross-level (left minus right height), gauge (left minus right lateral).
     gauge_limits_m : tuple of float, optional
@@ -95,8 +123,30 @@ class Spectrum:
 
     name: str
     source: str
-    densities: Mapping[str, RationalPsd]
+    densities: Mapping[str, Psd]
     gauge_limits_m: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class OwnSpectrum:
+    """A person's spectrum, from a file.
+
+    Attributes
+    ----------
+    name : str
+        What to call it: the file.
+    digest : str
+        SHA-256 of its table: equal spectra have equal ones, whatever their file is called.
+    spectrum : Spectrum
+        The densities.
+    notes : tuple of str
+        What it does not hold.
+    """
+
+    name: str = field(compare=False)
+    digest: str
+    spectrum: Spectrum = field(compare=False, repr=False)
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 def _spectrum(

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.track.design import Curve, Straight, TrackDesign, Transition
+from simrail.track.design import CantStation, Curve, Straight, TrackDesign, Transition
 from simrail.track.file import track_by_name, track_text
 from simrail.track.map_errors import MapDefect, MapErrors, draw_map
 
@@ -208,3 +208,17 @@ def test_maps_of_such_lines_are_drawn() -> None:
     assert known.curvature(200.0) == pytest.approx(1.0 / curve.radius_m)
     with pytest.raises(InputError, match="before and after"):
         draw_map(design, MapErrors(), seed=1, draw=0, defects=[MapDefect("missing_transition", 260.0)])
+
+
+def test_maps_move_and_err_the_stations_of_cant() -> None:
+    line = (Straight(200.0), Transition(60.0), Curve(80.0, -400.0), Transition(50.0), Straight(200.0))
+    stations = tuple(CantStation(s, h) for s, h in ((200.0, 0.0), (260.0, 0.05), (340.0, 0.05), (390.0, 0.0)))
+    design = TrackDesign("line", 0.0, line, cant_stations=stations)
+    errors = MapErrors(cant_along_sd_m=0.0, chainage_offset_sd_m=2.0)
+    known = draw_map(design, errors, seed=3, draw=1).cant_stations
+    shifts = [b.at_m - a.at_m for a, b in zip(stations, known, strict=True)]
+    assert shifts[0] != 0.0 and np.ptp(shifts) < 1e-9
+    wrong = [b.cross_slope_m - a.cross_slope_m for a, b in zip(stations, known, strict=True)]
+    # One error of the curve's cant at both of its ends, none where there is none.
+    assert wrong[0] == wrong[3] == 0.0
+    assert wrong[1] == pytest.approx(wrong[2]) and 1e-5 < abs(wrong[1]) < 0.015
