@@ -61,7 +61,11 @@ def check_field(recording: Recording) -> None:
     size = float(np.median(np.linalg.norm(field, axis=1)))
     if SIZES[0] < size / sheet.intensity_t < SIZES[1]:
         return
-    remedy = "calibrate it on the train (hard iron), or mend the intensity of its sheet"
+    remedy = "mend the unit or the scale, or the intensity of its sheet"
+    if size > sheet.intensity_t:
+        first = np.median(field[: max(1, len(field) // 100)], axis=0)
+        iron = _vector(first - _expected_at_start(recording, sheet))
+        remedy = f"take the hard iron of about {iron} uT on X, Y, Z of the body off, or mend the intensity"
     for unit, (multiply, divide) in FIELDS.items():
         for claimed, (by, over) in FIELDS.items():
             if unit != claimed and 0.7 < size * (multiply / divide) / (by / over) / sheet.intensity_t < 1.4:
@@ -145,6 +149,14 @@ def field_offset(recording: Recording) -> FloatArray | None:
     expected = np.einsum("nji,j->ni", turns, _earth(sheet))
     offset: FloatArray = np.median(magnetometer[list(MAGNETIC)].to_numpy()[::step] - expected, axis=0)
     return offset
+
+
+def _expected_at_start(recording: Recording, sheet: MagnetometerSheet) -> FloatArray:
+    """Field of the Earth (3,) on the axes of a body that stands at the start, T."""
+    frame = recording.track.frame_extended(np.array([recording.start_position_m]))
+    turns = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
+    expected: FloatArray = turns[0].T @ _earth(sheet)
+    return expected
 
 
 def _earth(sheet: MagnetometerSheet) -> FloatArray:

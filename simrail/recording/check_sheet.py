@@ -215,7 +215,7 @@ def _no_measurement(
     first, count = int(np.argmax(apart)), int(apart.sum())
     found = float(channel.values[first])
     more = f" (and {count - 1} more such samples)" if count > 1 else ""
-    remedy = f"drop {'those lines' if count > 1 else 'that line'}, so that they are gaps"
+    remedy = _drop(count)
     if bounds.range is not None and abs(found) > SLACK * bounds.range:
         problem = f"is beyond the range of its device in {place(first)}{more}; the sample is no measurement"
         limit = f"{bounds.range / channel.si:.6g} {channel.unit}, the range of {bounds.sheet}"
@@ -232,6 +232,10 @@ def _no_measurement(
         limit=limit,
         remedy=remedy,
     )
+
+
+def _drop(count: int) -> str:
+    return "drop those lines, so that they are gaps" if count > 1 else "drop that line, so that it is a gap"
 
 
 def _check_zeros(
@@ -263,7 +267,7 @@ def _check_zeros(
             field=", ".join(channel.name for channel in channels),
             value=f"0 {channels[0].unit}",
             limit=f"{size / channels[0].si:.4g} {channels[0].unit} just before and after",
-            remedy=f"drop {'those lines' if count > 1 else 'that line'}, so that they are gaps",
+            remedy=_drop(count),
         )
 
 
@@ -349,7 +353,7 @@ def check_ranges(recording: Recording) -> None:
 
 
 def check_counts(counts: pd.Series, sheet: EncoderSheet, *, where: Callable[[int], str], file: str) -> None:
-    """Refuse single readings of a counter that jump there and back: no wheel does.
+    """Refuse single readings of a counter that jump there and back, or at an end: no wheel does.
 
     Parameters
     ----------
@@ -372,15 +376,24 @@ def check_counts(counts: pd.Series, sheet: EncoderSheet, *, where: Callable[[int
     # Beyond two counts a reading, and beyond what a train does in the longer of both intervals.
     most = 2.0 + _JUMP_MPS / sheet.pulse_m * np.maximum(np.diff(time)[:-1], np.diff(time)[1:])
     back = (before * after < 0.0) & (np.minimum(np.abs(before), np.abs(after)) > most)
-    if back.any():
+    if abs(before[0]) > most[0] >= abs(after[0]):
+        i, back = 0, np.ones(1, dtype=np.bool_)
+    elif abs(after[-1]) > most[-1] >= abs(before[-1]):
+        i, back = len(count) - 1, np.ones(1, dtype=np.bool_)
+    else:
         i = int(np.argmax(back)) + 1
+    if back.any():
         more = f" (and {int(back.sum()) - 1} more such readings)" if back.sum() > 1 else ""
         raise InputError(
-            f"jumps there and back in {where(i)} (time_s = {time[i]:.6g}){more}; the reading is no count",
+            f"jumps in {where(i)} (time_s = {time[i]:.6g}){more}; the reading is no count",
             file=file,
             field="pulse_count",
             value=int(count[i]),
-            limit=f"{int(count[i - 1])} before and {int(count[i + 1])} after",
+            limit=" and ".join(
+                f"{int(count[k])} {side}"
+                for k, side in ((i - 1, "before"), (i + 1, "after"))
+                if 0 <= k < len(count)
+            ),
             remedy="drop that line, so that it is a gap; or mend the width of the counter",
         )
 

@@ -110,3 +110,19 @@ def test_a_rate_above_the_truth_is_told_the_rate_that_it_needs(capsys: pytest.Ca
     said = capsys.readouterr().err
     assert "imu[0].grade.rate_hz" in said and "1667" in said and "truth_rate_hz = 2000" in said
     assert call(["check", str(RATES / "s1667.toml"), "--set", "truth_rate_hz=2000"]) == DONE
+
+
+def test_hard_iron_is_named_where_a_ride_is_estimated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Thirty microtesla along the train, beside 44.2 of the Earth."""
+    case, ride = CASES / "11-mag-all-zero", tmp_path / "ride.toml"
+    for name in ("ride.csv", "ride.toml"):
+        (tmp_path / name).write_bytes((case / name).read_bytes())
+    level, down = 44.2 * math.cos(0.9137), 44.2 * math.sin(0.9137)
+    rows = (f"{k / 10},{level + 30.0 + 0.01 * (k % 3)},0.0,{down}" for k in range(401))
+    (tmp_path / "mag.csv").write_text("t,mx,my,mz\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    out = str(tmp_path / "out")
+    assert call(["estimate", str(ride), "--estimator", "AttitudeEkf", "--out", out]) == DONE
+    said = capsys.readouterr().err
+    assert "warning: magnetometer.field: hard iron of [30." in said

@@ -228,3 +228,17 @@ def test_a_count_that_jumps_there_and_back_is_named() -> None:
     count.iloc[700] += 65536
     with pytest.raises(InputError, match=r"line 702 \(time_s = 7\).*no count"):
         check_counts(count, sheet, **judge)
+
+
+@pytest.mark.parametrize(("row", "line"), [(0, 2), (-1, 2001)])
+def test_a_count_that_jumps_at_an_end_is_named(row: int, line: int) -> None:
+    time = pd.Index(np.arange(2000) / RATE, name="time_s")
+    count = pd.Series(np.arange(2000), index=time)
+    count.iloc[row] = 99999
+    with pytest.raises(InputError, match=f"line {line} "):
+        check_counts(
+            count,
+            EncoderSheet("front.left", 1024, 0.29, RATE),
+            where=lambda sample: f"line {sample + 2}",
+            file="ride.csv",
+        )

@@ -26,7 +26,8 @@ _SPOKEN: tuple[tuple[str, str], ...] = (
     (
         "noise",
         "noise, white noise, noise density, spectral noise density, noise spectral density, nsd, rate "
-        "noise density, rate noise, rms noise, noise rms, total noise, total rms noise, output noise, "
+        "noise density, rate noise, rms noise, noise rms, noise std, noise standard deviation, "
+        "total noise, total rms noise, output noise, "
         "angular rate noise density, acceleration noise density, acceleration noise, power spectral "
         "density",
     ),
@@ -48,7 +49,8 @@ _SPOKEN: tuple[tuple[str, str], ...] = (
         "bias repeatability, bias turn on repeatability, bias repeatability, repeatability, run to run "
         "bias, run to run bias stability, run to run bias repeatability, initial bias, initial bias "
         "error, constant bias, fixed bias, bias, bias error, bias offset, zero rate offset, zero rate "
-        "level, zero rate bias, zero g offset, zero g level, zero g bias, zrl, zro",
+        "level, zero rate bias, zero rate output, zero g offset, zero g level, zero g bias, zero g output, "
+        "offset, offset error, zero offset, offset repeatability, zrl, zro",
     ),
     (
         "scale_error",
