@@ -98,6 +98,7 @@ def _alone(column: str, units: dict[str, Factor], *, whole: bool = False) -> Qua
 
 
 IMU_SIGNAL = Signal("imu", (Quantity("gyro", GYRO, RATES), Quantity("accel", ACCEL, FORCES)))
+SECOND_IMU_SIGNAL = Signal("second_imu", IMU_SIGNAL.quantities)
 ENCODER_SIGNAL = Signal(
     "encoder",
     (
@@ -132,6 +133,7 @@ GAPS_SIGNAL = Signal(
 
 SIGNALS: tuple[Signal, ...] = (
     IMU_SIGNAL,
+    SECOND_IMU_SIGNAL,
     ENCODER_SIGNAL,
     MAGNETOMETER_SIGNAL,
     RAIL_SIGNAL,

@@ -21,7 +21,7 @@ from simrail.scenario import tables
 from simrail.scenario.axes import Axis, Listed, axes_of, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
-from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart
+from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart, SecondImuPart
 from simrail.scenario.vibration_tables import VibrationPart
 
 
@@ -62,6 +62,7 @@ class ScenarioFile(Part):
     encoder: EncoderPart | None = None
     magnetometer: MagnetometerPart | None = None
     rail_sensor: RailSensorPart | None = None
+    second_imu: SecondImuPart | None = None
     earth: tables.EarthPart | None = None
     temperature: tables.TemperaturePart | None = None
     estimator: Annotated[list[tables.EstimatorPart], Field(min_length=1)]

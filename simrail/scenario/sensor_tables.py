@@ -1,4 +1,4 @@
-"""What a person writes of the sensors beside the IMU: ``[encoder]``, ``[magnetometer]``, ``[rail_sensor]``.
+"""What a person writes of the sensors beside the IMU: ``[encoder]``, ``[magnetometer]`` and others.
 
 Each part makes the specification of its sensor (`spec`); units of the text end here. Whether a sensor fits
 vehicle and ride is judged by `simrail.scenario.check_sensors`.
@@ -12,11 +12,16 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from simrail.core.toml_files import Part
+from simrail.recording.recording import SecondImuSheet
+from simrail.recording.sheets.grades import ImuGrade
+from simrail.ride.truth import Mount
 from simrail.scenario.axes import Listed
+from simrail.scenario.tables import Name, OnBoard
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.magnetic_surroundings import Steel, Traction
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
 from simrail.sensors.rail_sensor import RailSensorSpec
+from simrail.sensors.second_imu import SecondImuSpec
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -173,4 +178,38 @@ class RailSensorPart(Part):
             noise_m=self.noise_mm / 1e3,
             outlier_fraction=self.outlier_fraction,
             outlier_m=self.outlier_mm / 1e3,
+        )
+
+
+class SecondImuPart(Part):
+    """``[second_imu]``: an IMU on another bogie, recorded with each ``[[imu]]`` by a clock of its own.
+
+    Its ``grade`` is that of the IMU beside it, unless it is given. How far its clock is ahead is drawn for
+    each draw of the sensors with the standard deviation ``clock_offset_sd_s``, which the train knows; or it
+    is ``clock_offset_s``. ``spacing_sd_m`` is how well the train knows the distance of both.
+    """
+
+    name: Name = "second"
+    grade: Listed[str] | None = None
+    body: Listed[str]
+    position_m: tuple[OnBoard, OnBoard, OnBoard]
+    roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
+    yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    clock_offset_sd_s: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = SecondImuSheet.clock_offset_sd_s
+    clock_offset_s: Listed[Annotated[float, Field(ge=-10.0, le=10.0)]] | None = None
+    spacing_sd_m: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = SecondImuSheet.spacing_sd_m
+
+    def spec(self, grade: ImuGrade) -> SecondImuSpec:
+        """The second IMU, of a grade, with no axis left."""
+        mount = Mount(
+            name=self.name,
+            body=str(self.body),
+            position_m=self.position_m,
+            roll_rad=radians(self.roll_deg),
+            pitch_rad=radians(self.pitch_deg),
+            yaw_rad=radians(self.yaw_deg),
+        )
+        return SecondImuSpec(
+            mount, grade, self.clock_offset_sd_s, self.clock_offset_s, spacing_sd_m=self.spacing_sd_m
         )

@@ -14,7 +14,13 @@ from simrail.core.errors import InputError
 from simrail.core.resample import LONGEST_GAP_S
 from simrail.core.toml_files import Part
 from simrail.recording.files.signal_part import SignalPart, VectorPart
-from simrail.recording.recording import EncoderSheet, ImuSheet, MagnetometerSheet, RailSensorSheet
+from simrail.recording.recording import (
+    EncoderSheet,
+    ImuSheet,
+    MagnetometerSheet,
+    RailSensorSheet,
+    SecondImuSheet,
+)
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.recording.sheets.vehicle_sheet_file import VehicleSheetPart
 from simrail.recording.signals import (
@@ -25,6 +31,7 @@ from simrail.recording.signals import (
     ODOMETER_SIGNAL,
     ODOMETRY_SIGNAL,
     RAIL_SIGNAL,
+    SECOND_IMU_SIGNAL,
     Signal,
 )
 from simrail.track.map_file import MapErrorsPart
@@ -71,6 +78,23 @@ class ImuSignalPart(VectorPart):
                 remedy="e.g. grade = \"lord_3dm_gx4_25\"; 'simrail list' shows all",
             )
         return self
+
+
+class SecondImuSignalPart(ImuSignalPart):
+    """``[second_imu]``: an IMU elsewhere on the train, like ``[imu]``, by a clock of its own.
+
+    Attributes
+    ----------
+    spacing_m, spacing_sd_m, clock_offset_sd_s : float
+        As those of `SecondImuSheet`; the spacing from the drawing, where there is one and it is not given.
+    """
+
+    signal: ClassVar[Signal] = SECOND_IMU_SIGNAL
+
+    name: str = "second"
+    spacing_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] | None = None
+    spacing_sd_m: Annotated[float, Field(gt=0.0, le=10.0)] = SecondImuSheet.spacing_sd_m
+    clock_offset_sd_s: Annotated[float, Field(gt=0.0, le=10.0)] = SecondImuSheet.clock_offset_sd_s
 
 
 class EncoderSignalPart(SignalPart):
@@ -240,7 +264,7 @@ class RideFile(Part):
         How wrong the track file may be; taken to be wide without it.
     vehicle_sheet : VehicleSheetPart, optional
         What a drawing of the vehicle says; without it nothing is known of pivots and axles.
-    imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
+    imu, second_imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
         Its signals. Without an odometry it is made from encoder or odometer
         (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
     """
@@ -253,6 +277,7 @@ class RideFile(Part):
     map: MapErrorsPart = MapErrorsPart()
     vehicle_sheet: VehicleSheetPart | None = None
     imu: ImuSignalPart
+    second_imu: SecondImuSignalPart | None = None
     encoder: EncoderSignalPart | None = None
     magnetometer: MagnetometerSignalPart | None = None
     rail_displacement: RailSignalPart | None = None

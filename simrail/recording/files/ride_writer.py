@@ -74,6 +74,17 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         file = f"{signal.name}.{format}"
         write_frame(frame, folder / file, format=format)
         tables[signal.name] = {"file": file}
+    second = recording.second_imu_sheet
+    if second is not None:
+        tables["second_imu"] |= {
+            "name": second.mount,
+            "body": second.mount_body,
+            "position_m": second.mount_position_m,
+            "spacing_m": second.spacing_m,
+            "spacing_sd_m": second.spacing_sd_m,
+            "clock_offset_sd_s": second.clock_offset_sd_s,
+            "sheet": asdict(second.imu),
+        }
     tables["imu"] |= {
         "name": recording.mount,
         "body": recording.mount_body,
