@@ -209,8 +209,8 @@ def search_delay(
 @njit_borrowed
 def _index_at(stamps: FloatArray, time_s: float, rate_hz: float) -> int:
     """Last sample whose stamp is not later than a time; -1 if there is none."""
-    n = stamps.shape[0]
-    i = min(max(int((time_s - stamps[0]) * rate_hz), 0), n - 1)
+    n: int = stamps.shape[0]
+    i: int = min(max(int((time_s - stamps[0]) * rate_hz), 0), n - 1)
     while i >= 0 and stamps[i] > time_s:
         i -= 1
     while i + 1 < n and stamps[i + 1] <= time_s:

@@ -232,6 +232,7 @@ def record_cell(
         rail_sensor=resolved.rail_sensor,
         rails=None if resolved.rail_sensor is None else parts.rails(cell),
         second_imu=resolved.second_imu,
+        gnss=resolved.gnss,
         odometry=TRUTH if cell.spec.odometry == TRUTH else None,
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,

@@ -14,6 +14,7 @@ from simrail.core.columns import (
     ACCEL,
     EDGE_TIME,
     ENCODER,
+    GNSS,
     GYRO,
     IMU,
     MAGNETIC,
@@ -55,8 +56,9 @@ COLUMNS_OF = {
     "odometer": ("speed_mps",),
     "magnetometer": MAGNETIC,
     "rail_displacement": RAIL_DISPLACEMENT,
+    "gnss": (),
 }
-"""Columns that the frames of a recording must have."""
+"""Columns that the frames of a recording must have, with numbers in all rows."""
 
 LEAST_SPACING_M = 5.0
 """Two IMUs that are nearer to each other along the train feel the same place of the rails at nearly the same
@@ -66,6 +68,7 @@ SAME_RATE = 1e-3
 """Relative difference of rates up to which two IMUs sample alike: clocks differ by less."""
 
 SHEETS = {
+    "gnss": ("gnss_sheet", "says nothing", "give the standard deviations of its place and speed"),
     "second_imu": ("second_imu_sheet", "may be anywhere", "say where it sits, with its data sheet"),
     "encoder": ("encoder_sheet", "says nothing", "give pulses per revolution and wheel radius"),
     "odometer": ("odometer_sheet", "says nothing", "give the standard deviations of its speed and scale"),
@@ -104,6 +107,8 @@ def check_recording(recording: Recording) -> None:
     for name, frame in frames.items():
         timed = (EDGE_TIME,) if name == "encoder" and EDGE_TIME in frame else ()
         _check_signal(frame, COLUMNS_OF[name] + timed, what=name)
+        if name == "gnss":
+            _check_gnss(frame)
         if name in SHEETS:
             sheet, worth, remedy = SHEETS[name]
             if getattr(recording, sheet) is None:
@@ -126,6 +131,29 @@ def check_recording(recording: Recording) -> None:
                 value=f"{len(frames[name])} samples",
                 limit=f"the {len(recording.imu)} time stamps of the IMU",
                 remedy=f"make the {name} at the IMU's times",
+            )
+
+
+def _check_gnss(frame: pd.DataFrame) -> None:
+    """It has a place or a speed, and rows without any are fine."""
+    columns = [name for name in GNSS if name in frame]
+    if not columns:
+        raise InputError(
+            "has neither a place nor a speed",
+            field="gnss",
+            value=list(frame) or None,
+            limit=" or ".join(GNSS),
+            remedy='e.g. columns = { time = "t", speed = "v" }',
+        )
+    for name in columns:
+        if not pd.api.types.is_numeric_dtype(frame[name]):
+            raise InputError("holds no numbers", field=f"gnss.{name}", value=str(frame[name].dtype))
+        endless = np.isinf(frame[name].to_numpy(dtype=np.float64))
+        if endless.any():
+            raise InputError(
+                f"is not a finite number at time_s = {frame.index[int(np.argmax(endless))]}",
+                field=f"gnss.{name}",
+                limit="finite, or blank where nothing was received",
             )
 
 

@@ -170,6 +170,35 @@ class OdometerSheet:
 
 
 @dataclass(frozen=True)
+class GnssSheet:
+    """What the train knows of its satellite receiver.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Rate of its samples, those that are blank among them.
+    position_sd_m, correlation_s : float
+        Standard deviation of the part of the place's error that wanders, and over what time it does.
+    position_noise_m : float
+        That of its white part.
+    speed_sd_mps : float
+        That of the speed; white.
+    latency_s : float
+        How much earlier than its stamp is what a sample speaks of.
+    ahead_m : float
+        How far the antenna is ahead of the IMU along the train.
+    """
+
+    rate_hz: float
+    position_sd_m: float
+    speed_sd_mps: float
+    correlation_s: float = 60.0
+    position_noise_m: float = 0.3
+    latency_s: float = 0.0
+    ahead_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class MagnetometerSheet:
     """What the train knows of its magnetometer, and of the field of the Earth where it runs.
 
@@ -260,6 +289,11 @@ class Recording:
         What an IMU elsewhere on the train records, as `imu`, at the times of a clock of its own.
     second_imu_sheet : SecondImuSheet, optional
         Where it sits, and its data sheet.
+    gnss : pandas.DataFrame, optional
+        Indexed by ``time_s``, at which a sample came; columns `simrail.core.columns.GNSS` or one of them:
+        place of the antenna along the map, and speed, NaN where there is none.
+    gnss_sheet : GnssSheet, optional
+        What is known of the receiver.
     """
 
     name: str
@@ -286,6 +320,8 @@ class Recording:
     vehicle_sheet: VehicleSheet | None = None
     second_imu: pd.DataFrame | None = None
     second_imu_sheet: SecondImuSheet | None = None
+    gnss: pd.DataFrame | None = None
+    gnss_sheet: GnssSheet | None = None
 
     @property
     def has_wheel(self) -> bool:
@@ -318,7 +354,7 @@ def odometry_of(recording: Recording) -> pd.DataFrame:
 AT_IMU_TIMES = ("imu", "odometry", "magnetometer", "rail_displacement")
 """Frames of a recording that have one row per sample of the IMU."""
 
-AT_OWN_TIMES = ("encoder", "odometer", "second_imu")
+AT_OWN_TIMES = ("encoder", "odometer", "second_imu", "gnss")
 """Frames of a recording whose device has a clock, or a clock rate, of its own."""
 
 

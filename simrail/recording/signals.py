@@ -11,6 +11,7 @@ from simrail.core.columns import (
     ACCEL,
     EDGE_TIME,
     ENCODER,
+    GNSS,
     GYRO,
     MAGNETIC,
     ODOMETRY,
@@ -106,6 +107,13 @@ ENCODER_SIGNAL = Signal(
         Quantity("edge_time", (EDGE_TIME,), TIMES, required=False),
     ),
 )
+GNSS_SIGNAL = Signal(
+    "gnss",
+    (
+        Quantity("position", GNSS[:1], LENGTHS, required=False),
+        Quantity("speed", GNSS[1:], SPEEDS, required=False),
+    ),
+)
 MAGNETOMETER_SIGNAL = Signal("magnetometer", (Quantity("field", MAGNETIC, FIELDS),))
 RAIL_SIGNAL = Signal("rail_displacement", tuple(_alone(column, LENGTHS) for column in RAIL_DISPLACEMENT))
 ODOMETRY_SIGNAL = Signal(
@@ -139,6 +147,7 @@ SIGNALS: tuple[Signal, ...] = (
     RAIL_SIGNAL,
     ODOMETRY_SIGNAL,
     ODOMETER_SIGNAL,
+    GNSS_SIGNAL,
     GAPS_SIGNAL,
 )
 """Every frame of a `Recording`."""

@@ -34,6 +34,7 @@ from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
 from simrail.scenario.vibration_tables import VibrationPart
 from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.gnss import GnssSpec
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec
@@ -87,6 +88,8 @@ class ResolvedCell:
         The other sensors; None where the scenario has none.
     second_imu : SecondImuSpec, optional
         The IMU on another bogie, likewise.
+    gnss : GnssSpec, optional
+        The satellite receiver, likewise.
     earth_rate : EarthRate, optional
         Rotation of the Earth; None for an Earth at rest.
     temperature : Temperature, optional
@@ -109,6 +112,7 @@ class ResolvedCell:
     magnetometer: MagnetometerSpec | None
     rail_sensor: RailSensorSpec | None
     second_imu: SecondImuSpec | None
+    gnss: GnssSpec | None
     earth_rate: EarthRate | None
     temperature: Temperature | None
     track_map: TrackDesign | None
@@ -186,6 +190,7 @@ class Parts:
             magnetometer=None if spec.magnetometer is None else spec.magnetometer.spec(cell.ride_seed),
             rail_sensor=None if spec.rail_sensor is None else spec.rail_sensor.spec(),
             second_imu=self.second_imu(cell),
+            gnss=None if spec.gnss is None else spec.gnss.spec(),
             earth_rate=None
             if earth is None
             else EarthRate(radians(earth.latitude_deg), radians(earth.x_axis_deg)),

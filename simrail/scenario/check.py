@@ -151,7 +151,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             last_ride = cell.ride_number
             simulated += durations[ride_key] * scenario.spec.monte_carlo.track_draws
         spec = cell.spec
-        sensors = (cell.imu, spec.encoder, spec.magnetometer, spec.rail_sensor, spec.second_imu)
+        sensors = (cell.imu, spec.encoder, spec.magnetometer, spec.rail_sensor, spec.second_imu, spec.gnss)
         words = map(repr, sensors)
         sensor_key = (*way, *words, cell.spec.odometry)
         if sensor_key not in judged_sensors:

@@ -12,6 +12,7 @@ from simrail.ride.truth import Mount
 from simrail.scenario.build import ResolvedCell
 from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
 from simrail.sensors.encoder import check_encoder
+from simrail.sensors.gnss import check_gnss
 from simrail.sensors.magnetometer import check_magnetometer
 from simrail.sensors.rail_sensor import check_rail_sensor
 
@@ -38,6 +39,9 @@ def judge_sensors(resolved: ResolvedCell) -> None:
     if resolved.rail_sensor is not None:
         with blame(None, "rail_sensor"):
             check_rail_sensor(resolved.rail_sensor)
+    if resolved.gnss is not None:
+        with blame(None, "gnss"):
+            check_gnss(resolved.gnss)
     _judge_encoder(resolved)
 
 

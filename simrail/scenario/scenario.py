@@ -21,7 +21,13 @@ from simrail.scenario import tables
 from simrail.scenario.axes import Axis, Listed, axes_of, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
-from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart, SecondImuPart
+from simrail.scenario.sensor_tables import (
+    EncoderPart,
+    GnssPart,
+    MagnetometerPart,
+    RailSensorPart,
+    SecondImuPart,
+)
 from simrail.scenario.vibration_tables import VibrationPart
 
 
@@ -63,6 +69,7 @@ class ScenarioFile(Part):
     magnetometer: MagnetometerPart | None = None
     rail_sensor: RailSensorPart | None = None
     second_imu: SecondImuPart | None = None
+    gnss: GnssPart | None = None
     earth: tables.EarthPart | None = None
     temperature: tables.TemperaturePart | None = None
     estimator: Annotated[list[tables.EstimatorPart], Field(min_length=1)]

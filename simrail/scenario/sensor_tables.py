@@ -18,6 +18,7 @@ from simrail.ride.truth import Mount
 from simrail.scenario.axes import Listed
 from simrail.scenario.tables import Name, OnBoard
 from simrail.sensors.encoder import EncoderSpec, Slip
+from simrail.sensors.gnss import GnssSpec, Outage
 from simrail.sensors.magnetic_surroundings import Steel, Traction
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
 from simrail.sensors.rail_sensor import RailSensorSpec
@@ -213,3 +214,32 @@ class SecondImuPart(Part):
         return SecondImuSpec(
             mount, grade, self.clock_offset_sd_s, self.clock_offset_s, spacing_sd_m=self.spacing_sd_m
         )
+
+
+class OutagePart(Part):
+    """``[[gnss.outage]]``: a stretch of the line where nothing is received, e.g. a tunnel."""
+
+    from_m: float
+    to_m: float
+
+
+class GnssPart(Part):
+    """``[gnss]``: a satellite receiver, its place and speed brought to the line; synthetic.
+
+    See `simrail.sensors.gnss.GnssSpec`; the antenna is ``ahead_m`` of each ``[[imu]]``.
+    """
+
+    rate_hz: Listed[Annotated[float, Field(gt=0.0, le=100.0)]] = GnssSpec.rate_hz
+    position_sd_m: Listed[NotNegative] = GnssSpec.position_sd_m
+    correlation_s: Listed[Positive] = GnssSpec.correlation_s
+    position_noise_m: Listed[Positive] = GnssSpec.position_noise_m
+    speed_sd_mps: Listed[Positive] = GnssSpec.speed_sd_mps
+    latency_s: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = GnssSpec.latency_s
+    ahead_m: Listed[OnBoard] = GnssSpec.ahead_m
+    reacquire_s: Listed[Annotated[float, Field(ge=0.0, le=600.0)]] = GnssSpec.reacquire_s
+    outage: tuple[OutagePart, ...] = ()
+
+    def spec(self) -> GnssSpec:
+        """The receiver, with no axis left."""
+        plain = self.model_dump(exclude={"outage"})
+        return GnssSpec(**plain, outages=tuple(Outage(part.from_m, part.to_m) for part in self.outage))

@@ -17,6 +17,7 @@ from simrail.recording.sheets.grades import ImuGrade, imu_sheet
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
+from simrail.sensors.gnss import GnssSpec, sample_gnss
 from simrail.sensors.imu import EarthRate, arrived, sample_imu
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
@@ -38,6 +39,7 @@ def measure(
     rail_sensor: RailSensorSpec | None = None,
     rails: LaidTrack | None = None,
     second_imu: SecondImuSpec | None = None,
+    gnss: GnssSpec | None = None,
     odometry: str | None = None,
     seed: int,
     draw: int,
@@ -69,6 +71,8 @@ def measure(
         The rails that the ride was run on (`simrail.ride.ride.rails_of`), for that sensor.
     second_imu : SecondImuSpec, optional
         An IMU elsewhere on the train.
+    gnss : GnssSpec, optional
+        A satellite receiver.
     odometry : str, optional
         ``"truth"`` hands the true position, speed and acceleration of the mount on to estimators, an
         ablation. Any other odometry is concluded from what is recorded
@@ -147,6 +151,11 @@ def measure(
         second, second_sheet = sample_second_imu(
             truth, mount, second_imu, seed=seed, draw=draw, earth_rate=earth_rate, temperature=temperature
         )
+    received = None
+    if gnss is not None:
+        received = sample_gnss(
+            truth.motion(mount, columns=("position_m", "speed_mps")), gnss, seed=seed, draw=draw
+        )
     return Recording(
         name=name,
         imu=imu,
@@ -170,6 +179,8 @@ def measure(
         rail_sensor_sheet=None if rail_sensor is None else RailSensorSheet(rail_sensor.noise_m),
         second_imu=second,
         second_imu_sheet=second_sheet,
+        gnss=received,
+        gnss_sheet=None if gnss is None else gnss.sheet,
     )
 
 

@@ -91,6 +91,24 @@ def test_rates_that_differ_are_refused(tmp_path) -> None:
     assert "125 Hz" in str(caught.value) and "250 Hz" in str(caught.value)
 
 
+def test_a_receiver_is_recorded_hidden_by_place_and_asked_for() -> None:
+    text = "\n[gnss]\nrate_hz = 2.0\nreacquire_s = 0.0\n[[gnss.outage]]\nfrom_m = 20.0\nto_m = 40.0\n"
+    one, *_ = recordings(read(text))
+    assert one.gnss is not None and one.gnss_sheet is not None
+    place = one.gnss["position_m"]
+    assert place.isna().any() and one.gnss_sheet.rate_hz == 2.0
+    method = (
+        '\n[[estimator]]\nname = "own"\nmethod = "TrackRelativeSmoother"\n[estimator.options]\ngnss = true\n'
+    )
+    judge_scenario(read(text + method))
+    with pytest.raises(InputError, match="no gnss") as caught:
+        judge_scenario(read(method))
+    assert "[gnss]" in str(caught.value) and "gnss = false" in str(caught.value)
+    with pytest.raises(InputError, match="no length") as caught:
+        judge_scenario(read(text.replace("to_m = 40.0", "to_m = 20.0")))
+    assert "gnss.outage[0].to_m" in str(caught.value)
+
+
 def test_a_method_that_needs_it_is_refused_without() -> None:
     method = '\n[[estimator]]\nname = "delay"\nmethod = "BogieDelayOdometry"\n'
     with pytest.raises(InputError, match="no second imu") as caught:

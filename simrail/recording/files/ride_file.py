@@ -16,6 +16,7 @@ from simrail.core.toml_files import Part
 from simrail.recording.files.signal_part import SignalPart, VectorPart
 from simrail.recording.recording import (
     EncoderSheet,
+    GnssSheet,
     ImuSheet,
     MagnetometerSheet,
     RailSensorSheet,
@@ -26,6 +27,7 @@ from simrail.recording.sheets.vehicle_sheet_file import VehicleSheetPart
 from simrail.recording.signals import (
     ENCODER_SIGNAL,
     GAPS_SIGNAL,
+    GNSS_SIGNAL,
     IMU_SIGNAL,
     MAGNETOMETER_SIGNAL,
     ODOMETER_SIGNAL,
@@ -227,6 +229,31 @@ class OdometerPart(SignalPart):
         return self
 
 
+class GnssSignalPart(SignalPart):
+    """``[gnss]``: what a satellite receiver says, brought to the line; blank cells mean no sample.
+
+    Attributes
+    ----------
+    sheet : GnssSheet
+        How wrong it may be, and how late.
+    """
+
+    signal: ClassVar[Signal] = GNSS_SIGNAL
+
+    sheet: GnssSheet
+
+    @field_validator("sheet")
+    @classmethod
+    def _possible(cls, value: GnssSheet) -> GnssSheet:
+        for field in ("rate_hz", "position_noise_m", "speed_sd_mps", "correlation_s"):
+            if not 0.0 < getattr(value, field) < 1e4:
+                raise InputError("is out of range", field=field, value=getattr(value, field), limit="> 0")
+        for field in ("position_sd_m", "latency_s"):
+            if not 0.0 <= getattr(value, field) < 1e3:
+                raise InputError("is out of range", field=field, value=getattr(value, field), limit=">= 0")
+        return value
+
+
 class OdometrySignalPart(SignalPart):
     """``[odometry]``: position, speed and acceleration of the IMU, made elsewhere by `source`.
 
@@ -264,7 +291,7 @@ class RideFile(Part):
         How wrong the track file may be; taken to be wide without it.
     vehicle_sheet : VehicleSheetPart, optional
         What a drawing of the vehicle says; without it nothing is known of pivots and axles.
-    imu, second_imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
+    imu, second_imu, encoder, magnetometer, rail_displacement, odometer, odometry, gnss, gaps
         Its signals. Without an odometry it is made from encoder or odometer
         (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
     """
@@ -283,6 +310,7 @@ class RideFile(Part):
     rail_displacement: RailSignalPart | None = None
     odometer: OdometerPart | None = None
     odometry: OdometrySignalPart | None = None
+    gnss: GnssSignalPart | None = None
     gaps: GapsPart | None = None
 
     @field_validator("map")

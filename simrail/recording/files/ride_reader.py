@@ -113,6 +113,9 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
     )
     if spec.second_imu is not None:
         recording = _with_second_imu(recording, spec.second_imu, spec, reader, folder)
+    if spec.gnss is not None:
+        received = reader.frame(spec.gnss, "gnss")
+        recording = replace(recording, gnss=received, gnss_sheet=spec.gnss.sheet)
     return _with_way(recording, spec, reader)
 
 

@@ -99,6 +99,7 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         ("encoder", recording.encoder_sheet),
         ("magnetometer", recording.magnetometer_sheet),
         ("rail_displacement", recording.rail_sensor_sheet),
+        ("gnss", recording.gnss_sheet),
     ):
         if sheet is not None:
             tables[table] |= {"sheet": asdict(sheet)}

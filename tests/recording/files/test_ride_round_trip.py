@@ -26,6 +26,7 @@ from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
 from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.gnss import GnssSpec, Outage
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.measure import measure
 from simrail.sensors.rail_sensor import RailSensorSpec
@@ -43,7 +44,7 @@ def recording() -> Recording:
     return recorded()
 
 
-def recorded(second_imu: SecondImuSpec | None = None) -> Recording:
+def recorded(second_imu: SecondImuSpec | None = None, gnss: GnssSpec | None = None) -> Recording:
     track = TrackDesign(
         "curve",
         -50.0,
@@ -69,6 +70,7 @@ def recorded(second_imu: SecondImuSpec | None = None) -> Recording:
         rail_sensor=RailSensorSpec(),
         rails=lay(track, Irregularity("erri_b176_low", fade_m=20.0), seed=1),
         second_imu=second_imu,
+        gnss=gnss,
         seed=1,
         draw=0,
         vehicle_sheet=drawing(model),
@@ -132,6 +134,36 @@ def test_a_second_imu_survives_with_its_clock_and_its_mount(recording, with_two,
     assert (
         short.second_imu.index[-1] <= short.imu.index[-1] < with_two.second_imu.index[len(short.second_imu)]
     )
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_a_receiver_survives_and_blank_cells_are_no_sample(recording, tmp_path, format):
+    with_gnss = recorded(gnss=GnssSpec(rate_hz=5.0, outages=(Outage(30.0, 90.0),)))
+    write_ride(with_gnss, tmp_path / "ride", format=format)
+    again = read_ride(tmp_path / "ride")
+    assert_same(with_gnss, again)
+    blank = again.gnss["position_m"].isna()
+    assert 0 < blank.sum() < len(blank) and (blank == again.gnss["speed_mps"].isna()).all()
+    assert_same(recording, replace(with_gnss, gnss=None, gnss_sheet=None))
+    if format == "csv":
+        # A logger that has the speed alone, in km/h, and blanks for both.
+        lines = (tmp_path / "ride" / "gnss.csv").read_text(encoding="utf-8").splitlines()
+        assert any(line.endswith(",,") for line in lines)
+        text = (tmp_path / "ride" / "ride.toml").read_text(encoding="utf-8")
+        named = 'file = "gnss.csv"\ncolumns = { speed = "speed_mps" }\nunits = { speed = "km/h" }'
+        (tmp_path / "ride" / "ride.toml").write_text(
+            text.replace('file = "gnss.csv"', named), encoding="utf-8"
+        )
+        slow = read_ride(tmp_path / "ride").gnss["speed_mps"]
+        np.testing.assert_allclose(slow, with_gnss.gnss["speed_mps"] / 3.6)
+        (tmp_path / "ride" / "ride.toml").write_text(
+            text.replace("speed_sd_mps = 0.05", "speed_sd_mps = 0.0"), encoding="utf-8"
+        )
+        with pytest.raises(InputError, match=r"gnss\.sheet.*speed_sd_mps"):
+            read_ride(tmp_path / "ride")
+    nothing = with_gnss.gnss.drop(columns=["position_m", "speed_mps"])
+    with pytest.raises(InputError, match="neither a place nor a speed"):
+        check_recording(replace(with_gnss, gnss=nothing))
 
 
 def test_a_second_imu_that_cannot_be_is_refused(with_two, tmp_path):
