@@ -161,8 +161,18 @@ class BogieDelayOdometry:
         )
         second = SecondImu(
             echo=self._echo(recording, sheet),
-            sd=np.array([sheet.clock_offset_sd_s, drift, sheet.spacing_sd_m, self.unlike_m]),
-            process=np.array([CLOCK_WANDER_SPSQRTS**2, 0.0, 0.0, 2.0 * self.unlike_m**2 / self.unlike_s]),
+            sd=np.array(
+                [
+                    sheet.clock_offset_sd_s,
+                    drift,
+                    sheet.spacing_sd_m,
+                    self.unlike_m,
+                    recording.imu_sheet.accel_scale_error / math.sqrt(3.0),
+                ]
+            ),
+            process=np.array(
+                [CLOCK_WANDER_SPSQRTS**2, 0.0, 0.0, 2.0 * self.unlike_m**2 / self.unlike_s, 0.0]
+            ),
         )
         trace = self._stops().trace(recording, second=second)
         _judge_spacing(trace, sheet)

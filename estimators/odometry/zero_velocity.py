@@ -116,7 +116,7 @@ class SecondImu(NamedTuple):
     ----------
     echo : Echo
         Its signal and the first one's.
-    sd, process : ndarray (4,)
+    sd, process : ndarray (5,)
         Of its states, which begin at 0: standard deviation, and variance that a second adds.
     """
 
@@ -294,7 +294,7 @@ class ZeroVelocityOdometry:
         sd = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2)[:, [S, V]])
         if trace.heard is None:
             # A scale that is off makes all changes of the speed wrong by the same share, and no stop shows
-            # it; a second IMU does.
+            # it; a second IMU does, by a state.
             scaled = found.states[:, [S, V]] - [recording.start_position_m, 0.0]
             sd = np.hypot(sd, recording.imu_sheet.accel_scale_error / math.sqrt(3.0) * scaled)
         lines = np.column_stack(

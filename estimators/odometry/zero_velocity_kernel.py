@@ -19,7 +19,7 @@ Whether the train stands is judged by `simrail.estimators.odometry.standstill`, 
 what the filter knows. Odds from seconds that have nothing in common add up, and one second that speaks
 against rest takes all of that away.
 
-Where a second IMU on another bogie echoes the first (`simrail.estimators.odometry.bogie_delay_kernel`), four
+Where a second IMU on another bogie echoes the first (`simrail.estimators.odometry.bogie_delay_kernel`), five
 states follow, and a row: by the delay the speed was larger by e, at the middle of what was seen, T ago. Of
 that the filter knows what it knows of the speed, less what push and pitch have added since; and if the
 second clock is further ahead than it takes it to be, or the distance L (> 0 where the second IMU is behind)
@@ -27,8 +27,8 @@ larger, the speed seen is off by V^2/L and V/L times that, with V at that age. T
 smaller, by a Gauss-Markov process, for what the bogies do not do alike: wheels that are out of round keep
 their phases over long ways, and shift the best match.
 
-    e = dv + T (dpush - g cos(pitch) dpitch) - V^2/L doffset - V/L (dspacing + dunlike),
-    offset' = clock drift,    unlike' = -unlike/tau + w
+    e = dv + T (dpush - g cos(pitch) dpitch - V' dscale) - V^2/L doffset - V/L (dspacing + dunlike),
+    offset' = clock drift,    unlike' = -unlike/tau + w,    v' has (1 + scale) (f_x - push)
 
 d of the truth less the state.
 """
@@ -48,10 +48,11 @@ S, V, ROLL, PITCH, DRIFT_X, DRIFT_Y, DRIFT_Z, PUSH, SWAY, ASKEW = range(STATES)
 """Place and speed along the track, roll, pitch, biases of the gyros, offsets of the accelerometers along X
 and Y, yaw of the IMU in its track."""
 
-ECHO_STATES = 14
-OFFSET, CLOCK_DRIFT, SPACING, UNLIKE = range(STATES, ECHO_STATES)
+ECHO_STATES = 15
+OFFSET, CLOCK_DRIFT, SPACING, UNLIKE, SCALE = range(STATES, ECHO_STATES)
 """With a second IMU: how far its clock is ahead, s, how fast that grows, how much larger the distance of both
-is than told, m, and how much larger it seems for what two bogies do not do alike."""
+is than told, m, how much larger it seems for what two bogies do not do alike, and the share by which the
+accelerometer along X shows too little, which no stop tells."""
 
 SCALED_S = 10.0
 """A curve or a vertical curve lasts so long: an error of a gyro's scale does the same all along."""
@@ -81,7 +82,7 @@ class Model(NamedTuple):
         `simrail.estimators.odometry.standstill.Signs`.
     given : ndarray (n,)
         1 where the train is told to stand, 0 where to run; below 0 the filter judges.
-    process, rest_process : ndarray (10,) or (14,)
+    process, rest_process : ndarray (10,) or (15,)
         Variances that a step adds while the train runs, and at rest.
     noise : ndarray (5,)
         Variances of the rows.
@@ -120,7 +121,7 @@ class Found(NamedTuple):
 
     Attributes
     ----------
-    states, covariances : ndarray (n, 10) or (n, 14), (n, m, m)
+    states, covariances : ndarray (n, 10) or (n, 15), (n, m, m)
         Covariances of the first m states.
     acceleration : ndarray (n,)
         Mean of v' over the step, m/s2; 0 at rest.
@@ -156,7 +157,7 @@ def zero_velocity(
     ----------
     model : Model
     x, p : ndarray (10,), (10, 10), in and out
-        State and covariance at the start of the first step; with a second IMU of 14 states.
+        State and covariance at the start of the first step; with a second IMU of 15 states.
     found : Found, out
     past : History or None, out
         For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
@@ -165,7 +166,7 @@ def zero_velocity(
     """
     n = x.shape[0]
     f, work, h = np.eye(n), np.zeros((n, n)), np.zeros((ECHO_UPDATES, n))
-    gain, v, turn, variance = np.zeros(n), np.zeros(n), np.zeros(3), np.zeros(3)
+    gain, v, turn, variance, scaled = np.zeros(n), np.zeros(n), np.zeros(3), np.zeros(3), np.zeros(5)
     h[REST, V] = h[REST_X, DRIFT_X] = h[REST_Y, DRIFT_Y] = h[REST_Z, DRIFT_Z] = 1.0
     fading = 1.0
     if echo is not None:
@@ -183,8 +184,8 @@ def zero_velocity(
         if stood and not rests:
             p[V, V] += model.unheard_mps**2
         if echo is not None:
-            x[OFFSET] += model.step_s * x[CLOCK_DRIFT]
-            x[UNLIKE] *= fading
+            _predict_echo(model, signal, fading, x, f, scaled)
+            signal = scaled
         found.acceleration[k] = _predict(model, signal, rests, x, p, f, work)
         if past is not None:
             remember_prediction(past, k, x, p, f)
@@ -297,6 +298,21 @@ def _lateral(model: Model, signal: FloatArray, x: FloatArray, h: FloatArray) -> 
 
 
 @njit_borrowed
+def _predict_echo(
+    model: Model, signal: FloatArray, fading: float, x: FloatArray, f: FloatArray, scaled: FloatArray
+) -> None:
+    """The states of a second IMU over one step, their columns of F, and the signal by its scale."""
+    x[OFFSET] += model.step_s * x[CLOCK_DRIFT]
+    x[UNLIKE] *= fading
+    force = signal[3] - x[PUSH]
+    for i in range(signal.shape[0]):
+        scaled[i] = signal[i]
+    scaled[3] += x[SCALE] * force
+    f[V, SCALE] = model.step_s * force
+    f[S, SCALE] = 0.5 * model.step_s * f[V, SCALE]
+
+
+@njit_borrowed
 def _echo(
     model: Model,
     echo: Echo,
@@ -319,7 +335,7 @@ def _echo(
     h[V] = 1.0
     h[PITCH], h[PUSH] = -age * model.gravity * math.cos(x[PITCH]), age
     h[OFFSET], h[SPACING] = -then * then / spacing, -then / spacing
-    h[UNLIKE] = h[SPACING]
+    h[UNLIKE], h[SCALE] = h[SPACING], then - x[V]
     known = 0.0
     for i in range(x.shape[0]):
         if h[i] != 0.0:

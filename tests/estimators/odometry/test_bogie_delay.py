@@ -12,7 +12,7 @@ import pytest
 from simrail.estimators.odometry.bogie_delay import BogieDelayOdometry
 from simrail.estimators.odometry.bogie_delay_kernel import room_to_hear, search_delay
 from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
-from simrail.estimators.odometry.zero_velocity_kernel import OFFSET, SPACING, V
+from simrail.estimators.odometry.zero_velocity_kernel import OFFSET, SCALE, SPACING, V
 
 from simrail.core.columns import ACCEL
 from simrail.core.errors import InputError
@@ -222,6 +222,20 @@ def test_other_rates_nearness_and_slow_recording_are_refused() -> None:
     for options in ({"window_s": 0.0}, {"least_correlation": 1.0}, {"band_hz": (60.0, 10.0)}):
         with pytest.raises(InputError, match=next(iter(options))):
             BogieDelayOdometry(**options)  # type: ignore[arg-type]
+
+
+def test_the_scale_of_the_accelerometer_is_found() -> None:
+    """1 % too little: no stop tells it, and without its state clock and distance would take it for theirs."""
+    recording = recorded()
+    force = recording.imu[ACCEL[0]]
+    sheet = replace(recording.imu_sheet, accel_scale_error=0.01)
+    less = replace(recording, imu=recording.imu.assign(**{ACCEL[0]: force / 1.01}), imu_sheet=sheet)
+    trace = BogieDelayOdometry(smoothed=True).trace(less)
+    assert trace.found.states[-1, SCALE] == pytest.approx(0.01, abs=0.004)
+    found = compared(less)
+    off = (found["speed_mps"] - found["true_mps"]).abs()
+    assert np.sqrt((off**2).mean()) < 0.08
+    assert (off < 1.96 * found["speed_sd_mps"])[found["true_mps"].abs() > 1e-3].mean() > 0.85
 
 
 def test_rails_that_two_bogies_do_not_feel_alike_do_no_harm() -> None:
