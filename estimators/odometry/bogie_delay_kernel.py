@@ -30,6 +30,9 @@ from simrail.core.jit import FloatArray, njit_borrowed
 STEP_S = 2e-3
 """Step of the search, as a delay: a fifth of the width of the peak that a band up to 60 Hz makes."""
 
+BESIDE, ALONE = 5, 0.8
+"""Another peak more than so many steps aside, and more than this share as high, leaves open which it is."""
+
 MOST_NODES, MOST_CANDIDATES = 300, 4001
 """Steps that the way goes back, and steps of a search."""
 
@@ -197,6 +200,10 @@ def search_delay(
     heard.searches[k, 0], heard.searches[k, 2] = 0.0, most
     if most < echo.least_correlation or best == 0 or best == 2 * sides:
         return 0.0, 0.0
+    for i in range(1, 2 * sides):
+        is_peak = heard.rho[i] >= max(heard.rho[i - 1], heard.rho[i + 1])
+        if is_peak and abs(i - best) > BESIDE and heard.rho[i] > ALONE * most:
+            return 0.0, 0.0
     left, right = heard.rho[best - 1], heard.rho[best + 1]
     bend = left - 2.0 * most + right
     c = (best - sides + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)) * step
