@@ -25,7 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import block_diag
 from simrail.estimators.kalman import History, fixed_interval, room_for_history
+from simrail.estimators.odometry.bogie_delay_kernel import Echo, Heard, room_to_hear
 from simrail.estimators.odometry.calm import ACCELERATION_SD_MPS2, calm, calm_so_far, power, unsteady
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of
 from simrail.estimators.odometry.standstill import require_rest_first, signs_of_rest
@@ -34,6 +36,7 @@ from simrail.estimators.odometry.zero_velocity_kernel import (
     ASKEW,
     DRIFT_X,
     DRIFT_Z,
+    ECHO_UPDATES,
     LATERAL,
     PITCH,
     PUSH,
@@ -92,12 +95,34 @@ class Trace(NamedTuple):
         What came out, smoothed if that is wanted.
     past : History or None
         What the filter left behind for the smoother.
+    heard : Heard or None
+        What came of the searches for the delay of a second IMU.
+    last : ndarray (m, m) or None
+        Covariance of all states at the end of the ride.
     """
 
     time_s: FloatArray
     model: Model
     found: Found
     past: History | None
+    heard: Heard | None = None
+    last: FloatArray | None = None
+
+
+class SecondImu(NamedTuple):
+    """What a second IMU adds to the filter.
+
+    Attributes
+    ----------
+    echo : Echo
+        Its signal and the first one's.
+    sd, process : ndarray (5,)
+        Of its states, which begin at 0: standard deviation, and variance that a second adds.
+    """
+
+    echo: Echo
+    sd: FloatArray
+    process: FloatArray
 
 
 @dataclass(frozen=True)
@@ -163,10 +188,13 @@ class ZeroVelocityOdometry:
         trace = self.trace(recording)
         return Estimate(states=self.at_imu_times(trace, recording), mount=recording.mount)
 
-    def trace(self, recording: Recording, *, remembering: bool = False) -> Trace:
+    def trace(
+        self, recording: Recording, *, remembering: bool = False, second: SecondImu | None = None
+    ) -> Trace:
         """Run the filter, and the smoother if wanted; all states at its own steps.
 
         What the filter leaves behind is kept for the smoother, and where it is asked for (``remembering``).
+        A second IMU adds its states and its row.
 
         Raises
         ------
@@ -175,17 +203,26 @@ class ZeroVelocityOdometry:
         """
         vertical_force(recording, tells="rest from motion")
         require_rest_first(recording)
-        block = _block(recording)
-        times = recording.imu.index.to_numpy(dtype=np.float64)
-        steps = len(times) // block
         model = self.model(recording)
+        steps = len(model.signals)
         x, p = self.start(recording, model)
-        found = room(steps, STATES if self.smoothed else PITCH + 1)
-        past = room_for_history(steps, STATES, UPDATES) if self.smoothed or remembering else None
-        zero_velocity(model, x, p, found, past)
+        updates, heard = UPDATES, None
+        if second is not None:
+            x, p = np.append(x, np.zeros(len(second.sd))), block_diag(p, np.diag(second.sd**2))
+            model = model._replace(
+                process=np.append(model.process, second.process * model.step_s),
+                rest_process=np.append(model.rest_process, second.process * model.step_s),
+            )
+            updates, heard = ECHO_UPDATES, room_to_hear(steps)
+        found = room(steps, len(x) if self.smoothed else PITCH + 1, len(x))
+        past = room_for_history(steps, len(x), updates) if self.smoothed or remembering else None
+        if second is None:
+            zero_velocity(model, x, p, found, past)
+        else:
+            zero_velocity(model, x, p, found, past, second.echo, heard)
         if past is not None and self.smoothed:
             fixed_interval(past, found.states, found.covariances)
-        return Trace(times[block - 1 :: block][:steps], model, found, past)
+        return Trace(ends_of_steps(recording), model, found, past, heard, p)
 
     def model(self, recording: Recording) -> Model:
         """Signals at the filter's rate, and the noise: the method's own, with what the data sheet adds."""
@@ -255,9 +292,11 @@ class ZeroVelocityOdometry:
         left = unsteady(recording, _block(recording), len(own)) + (found.acceleration - own) ** 2
         shaking = power(left, rate, both_ways=self.smoothed)
         sd = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2)[:, [S, V]])
-        # A scale that is off makes all changes of the speed wrong by the same share, and no stop shows it.
-        scaled = found.states[:, [S, V]] - [recording.start_position_m, 0.0]
-        sd = np.hypot(sd, recording.imu_sheet.accel_scale_error / math.sqrt(3.0) * scaled)
+        if trace.heard is None:
+            # A scale that is off makes all changes of the speed wrong by the same share, and no stop shows
+            # it; a second IMU does, by a state.
+            scaled = found.states[:, [S, V]] - [recording.start_position_m, 0.0]
+            sd = np.hypot(sd, recording.imu_sheet.accel_scale_error / math.sqrt(3.0) * scaled)
         lines = np.column_stack(
             [
                 found.states[:, S],
@@ -320,6 +359,13 @@ def wandering(sheet: ImuSheet) -> tuple[float, float]:
         )
     )
     return gyro + 1e-16, accel + 1e-14
+
+
+def ends_of_steps(recording: Recording) -> FloatArray:
+    """Time at the end of each of the filter's steps."""
+    block = _block(recording)
+    times = recording.imu.index.to_numpy(dtype=np.float64)
+    return np.ascontiguousarray(times[block - 1 :: block][: len(times) // block])
 
 
 def _block(recording: Recording) -> int:

@@ -18,6 +18,19 @@ on.
 Whether the train stands is judged by `simrail.estimators.odometry.standstill`, from the signals and from
 what the filter knows. Odds from seconds that have nothing in common add up, and one second that speaks
 against rest takes all of that away.
+
+Where a second IMU on another bogie echoes the first (`simrail.estimators.odometry.bogie_delay_kernel`), five
+states follow, and a row: by the delay the speed was larger by e, at the middle of what was seen, T ago. Of
+that the filter knows what it knows of the speed, less what push and pitch have added since; and if the
+second clock is further ahead than it takes it to be, or the distance L (> 0 where the second IMU is behind)
+larger, the speed seen is off by V^2/L and V/L times that, with V at that age. The distance seems larger or
+smaller, by a Gauss-Markov process, for what the bogies do not do alike: wheels that are out of round keep
+their phases over long ways, and shift the best match.
+
+    e = dv + T (dpush - g cos(pitch) dpitch - V' dscale) - V^2/L doffset - V/L (dspacing + dunlike),
+    offset' = clock drift,    unlike' = -unlike/tau + w,    v' has (1 + scale) (f_x - push)
+
+d of the truth less the state.
 """
 
 import math
@@ -25,6 +38,7 @@ from typing import NamedTuple
 
 import numpy as np
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
+from simrail.estimators.odometry.bogie_delay_kernel import Echo, Heard, search_delay
 from simrail.estimators.odometry.standstill import PRIOR, SUREST, TURN_S, rest_log_ratio, speed_log_ratio
 
 from simrail.core.jit import FloatArray, njit, njit_borrowed
@@ -34,12 +48,24 @@ S, V, ROLL, PITCH, DRIFT_X, DRIFT_Y, DRIFT_Z, PUSH, SWAY, ASKEW = range(STATES)
 """Place and speed along the track, roll, pitch, biases of the gyros, offsets of the accelerometers along X
 and Y, yaw of the IMU in its track."""
 
+ECHO_STATES = 15
+OFFSET, CLOCK_DRIFT, SPACING, UNLIKE, SCALE = range(STATES, ECHO_STATES)
+"""With a second IMU: how far its clock is ahead, s, how fast that grows, how much larger the distance of both
+is than told, m, how much larger it seems for what two bogies do not do alike, and the share by which the
+accelerometer along X shows too little, which no stop tells."""
+
 SCALED_S = 10.0
 """A curve or a vertical curve lasts so long: an error of a gyro's scale does the same all along."""
 
 UPDATES = 5
 LATERAL, REST, REST_X, REST_Y, REST_Z = range(UPDATES)
 """Rows: lateral force; at rest, the speed and the three gyros."""
+
+ECHO, ECHO_UPDATES = UPDATES, UPDATES + 1
+"""And the delay of a second IMU."""
+
+ECHO_GATE = 4.0
+"""Standard deviations from which on a delay is no echo."""
 
 
 class Model(NamedTuple):
@@ -56,7 +82,7 @@ class Model(NamedTuple):
         `simrail.estimators.odometry.standstill.Signs`.
     given : ndarray (n,)
         1 where the train is told to stand, 0 where to run; below 0 the filter judges.
-    process, rest_process : ndarray (10,)
+    process, rest_process : ndarray (10,) or (15,)
         Variances that a step adds while the train runs, and at rest.
     noise : ndarray (5,)
         Variances of the rows.
@@ -95,8 +121,8 @@ class Found(NamedTuple):
 
     Attributes
     ----------
-    states, covariances : ndarray (n, 10), (n, m, m)
-        Of the first m states.
+    states, covariances : ndarray (n, 10) or (n, 15), (n, m, m)
+        Covariances of the first m states.
     acceleration : ndarray (n,)
         Mean of v' over the step, m/s2; 0 at rest.
     log_odds : ndarray (n,)
@@ -109,28 +135,43 @@ class Found(NamedTuple):
     log_odds: FloatArray
 
 
-def room(steps: int, spoken_of: int) -> Found:
+def room(steps: int, spoken_of: int, states: int = STATES) -> Found:
     """Room for what the filter says."""
     square = (steps, spoken_of, spoken_of)
-    return Found(np.empty((steps, STATES)), np.empty(square), np.empty(steps), np.empty(steps))
+    return Found(np.empty((steps, states)), np.empty(square), np.empty(steps), np.empty(steps))
 
 
 @njit
-def zero_velocity(model: Model, x: FloatArray, p: FloatArray, found: Found, past: History | None) -> None:
+def zero_velocity(
+    model: Model,
+    x: FloatArray,
+    p: FloatArray,
+    found: Found,
+    past: History | None,
+    echo: Echo | None = None,
+    heard: Heard | None = None,
+) -> None:
     """Run the filter over n steps.
 
     Parameters
     ----------
     model : Model
     x, p : ndarray (10,), (10, 10), in and out
-        State and covariance at the start of the first step.
+        State and covariance at the start of the first step; with a second IMU of 15 states.
     found : Found, out
     past : History or None, out
         For `simrail.estimators.kalman.fixed_interval`; None where no smoother follows.
+    echo, heard : Echo, Heard, optional
+        A second IMU, and room for its delays, out.
     """
-    f, work, h = np.eye(STATES), np.zeros((STATES, STATES)), np.zeros((UPDATES, STATES))
-    gain, v, turn, variance = np.zeros(STATES), np.zeros(STATES), np.zeros(3), np.zeros(3)
+    n = x.shape[0]
+    f, work, h = np.eye(n), np.zeros((n, n)), np.zeros((ECHO_UPDATES, n))
+    gain, v, turn, variance, scaled = np.zeros(n), np.zeros(n), np.zeros(3), np.zeros(3), np.zeros(5)
     h[REST, V] = h[REST_X, DRIFT_X] = h[REST_Y, DRIFT_Y] = h[REST_Z, DRIFT_Z] = 1.0
+    fading = 1.0
+    if echo is not None:
+        fading = math.exp(-model.step_s / echo.unlike_s)
+        f[OFFSET, CLOCK_DRIFT], f[UNLIKE, UNLIKE] = model.step_s, fading
     odds, rests = SUREST, True  # a train begins its ride at rest
     for k in range(model.signals.shape[0]):
         signal = model.signals[k]
@@ -142,6 +183,9 @@ def zero_velocity(model: Model, x: FloatArray, p: FloatArray, found: Found, past
         rests = found.log_odds[k] > model.surely if model.given[k] < 0.0 else model.given[k] > 0.0
         if stood and not rests:
             p[V, V] += model.unheard_mps**2
+        if echo is not None:
+            _predict_echo(model, signal, fading, x, f, scaled)
+            signal = scaled
         found.acceleration[k] = _predict(model, signal, rests, x, p, f, work)
         if past is not None:
             remember_prediction(past, k, x, p, f)
@@ -158,6 +202,12 @@ def zero_velocity(model: Model, x: FloatArray, p: FloatArray, found: Found, past
                     remember(past, k, m, h[m], gain, error, s)
         if rests:
             found.acceleration[k] = 0.0
+        elif echo is not None and heard is not None and k % echo.every == 0:
+            error, noise = _echo(model, echo, heard, k, x, p, found.acceleration, h[ECHO])
+            if noise > 0.0:
+                s = update(x, p, h[ECHO], error, noise, gain, v)
+                if past is not None:
+                    remember(past, k, ECHO, h[ECHO], gain, error, s)
         keep(found.states, found.covariances, k, x, p)
 
 
@@ -226,7 +276,7 @@ def _predict(
     x[PITCH] += dt * pitching
     congruence(f, p, work)
     process = model.rest_process if rests else model.process
-    for i in range(STATES):
+    for i in range(x.shape[0]):
         p[i, i] += process[i]
     scaled = turns * dt * SCALED_S * model.scale_variance
     p[ROLL, ROLL] += scaled * (a * a + (sp / cp) ** 2 * ((sr * b) ** 2 + (cr * c) ** 2))
@@ -245,3 +295,56 @@ def _lateral(model: Model, signal: FloatArray, x: FloatArray, h: FloatArray) -> 
     h[PITCH] = -model.gravity * sr * sp
     h[DRIFT_Y], h[DRIFT_Z] = -x[V] * sr, -x[V] * cr
     return float(signal[4] - x[V] * psd - model.gravity * sr * cp - x[SWAY])
+
+
+@njit_borrowed
+def _predict_echo(
+    model: Model, signal: FloatArray, fading: float, x: FloatArray, f: FloatArray, scaled: FloatArray
+) -> None:
+    """The states of a second IMU over one step, their columns of F, and the signal by its scale."""
+    x[OFFSET] += model.step_s * x[CLOCK_DRIFT]
+    x[UNLIKE] *= fading
+    force = signal[3] - x[PUSH]
+    for i in range(signal.shape[0]):
+        scaled[i] = signal[i]
+    scaled[3] += x[SCALE] * force
+    f[V, SCALE] = model.step_s * force
+    f[S, SCALE] = 0.5 * model.step_s * f[V, SCALE]
+
+
+@njit_borrowed
+def _echo(
+    model: Model,
+    echo: Echo,
+    heard: Heard,
+    k: int,
+    x: FloatArray,
+    p: FloatArray,
+    acceleration: FloatArray,
+    h: FloatArray,
+) -> tuple[float, float]:
+    """Innovation of the delay row and its noise, the row in ``h``; noise 0 where there is none."""
+    speed = abs(x[V])
+    spacing = echo.spacing_m + x[SPACING] + x[UNLIKE]
+    if speed < echo.least_speed_mps or spacing * echo.spacing_m <= 0.0:
+        return 0.0, 0.0
+    age = echo.lag_s + 0.5 * (echo.window_s + abs(spacing) / speed)
+    then = x[V]  # the speed at that age
+    for i in range(max(0, k + 1 - int(age / model.step_s)), k + 1):
+        then -= acceleration[i] * model.step_s
+    h[V] = 1.0
+    h[PITCH], h[PUSH] = -age * model.gravity * math.cos(x[PITCH]), age
+    h[OFFSET], h[SPACING] = -then * then / spacing, -then / spacing
+    h[UNLIKE], h[SCALE] = h[SPACING], then - x[V]
+    known = 0.0
+    for i in range(x.shape[0]):
+        if h[i] != 0.0:
+            for j in range(x.shape[0]):
+                known += h[i] * p[i, j] * h[j]
+    c, noise = search_delay(
+        echo, heard, k, x[V], math.sqrt(known), x[OFFSET], abs(spacing), acceleration, model.step_s
+    )
+    if noise <= 0.0 or c * c > ECHO_GATE**2 * (known + noise):
+        return 0.0, 0.0
+    heard.searches[k, 0] = 1.0
+    return (c if x[V] > 0.0 else -c), noise

@@ -171,6 +171,48 @@ class Fixes:
         return [x[at.S]]
 
 
+@dataclass(frozen=True)
+class Received:
+    """Place and speed of a satellite receiver, as the recording has them.
+
+    A sample is taken by the step that ends after it came, so that a filter looks at nothing later, and is
+    brought forward by what the train has run since the moment that it speaks of. The part of its place's
+    error that wanders is believed as much as one that is new every two correlation times.
+    """
+
+    def rows(self, recording: Recording, steps: "Steps") -> Rows:
+        """Made where there is a sample of either."""
+        frame, sheet = recording.gnss, recording.gnss_sheet
+        if frame is None or sheet is None:
+            raise InputError(
+                "the recording has no satellite receiver",
+                field="gnss",
+                limit="a recording with place or speed by satellite",
+                remedy="add [gnss] to the scenario or the ride file, or set gnss = false",
+            )
+        time = frame.index.to_numpy(dtype=np.float64)
+        number = _steps_after(time, steps)
+        last = np.minimum(number, len(steps.time_s) - 1)
+        since = steps.time_s[last] - (time - sheet.latency_s)
+        speed, acceleration = steps.odometry[last, 1], steps.odometry[last, 2]
+        counts = max(1.0, 2.0 * sheet.correlation_s * sheet.rate_hz)
+        sds = (
+            math.hypot(sheet.position_sd_m * math.sqrt(counts), sheet.position_noise_m),
+            sheet.speed_sd_mps,
+        )
+        moved = (since * (speed - 0.5 * since * acceleration) - sheet.ahead_m, since * acceleration)
+        both = []
+        for name, sd, more in zip(("position_m", "speed_mps"), sds, moved, strict=True):
+            values = frame.get(name)
+            seen = np.full(len(time), np.nan) if values is None else values.to_numpy(dtype=np.float64)
+            both.append(_at_steps(number, seen + more, sd, steps))
+        return Rows(np.hstack([rows.values for rows in both]), np.hstack([rows.variances for rows in both]))
+
+    def shown(self, x: list[Dual]) -> list[Dual]:
+        """`S`, m, and `V`, m/s."""
+        return [x[at.S], x[at.V]]
+
+
 def _steps_after(time: FloatArray, steps: "Steps") -> npt.NDArray[np.int64]:
     """Number of the step that ends at each time or next after it; that of none beyond the last."""
     return np.searchsorted(steps.end_s, time - 1e-9)

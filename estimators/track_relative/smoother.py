@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.aiding import Aiding, aiding_of
+from simrail.estimators.track_relative.aiding import Aiding, Received, aiding_of
 from simrail.estimators.track_relative.kernel import (
     OUTPUTS,
     SEGMENT,
@@ -85,6 +85,8 @@ class TrackRelativeSmoother:
         from that alone. 0 for none; only smoothed and with a geometry.
     wheel : bool
         False leaves encoder and odometer aside: an IMU and a map alone.
+    gnss : bool
+        Take place and speed of the recording's satellite receiver.
     aiding : tuple of Aiding
         What is measured beside what the recording has (`simrail.estimators.track_relative.aiding`).
     """
@@ -98,9 +100,9 @@ class TrackRelativeSmoother:
     geometry_step_m: float = 0.25
     draws: int = 0
     wheel: bool = True
+    gnss: bool = False
     aiding: tuple[Aiding, ...] = ()
 
-    needs = ()
     cites = ("Briales et al. 2021", "Gonzalez-Carbajal et al. 2023", "Hartikainen and Sarkka 2010")
 
     def __post_init__(self) -> None:
@@ -125,6 +127,11 @@ class TrackRelativeSmoother:
             raise InputError("a file and a motion cannot both be given", field="tuning")
         with blame(None, "tuning"):
             self.motions()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """A receiver, if it is asked for."""
+        return ("gnss",) if self.gnss else ()
 
     @property
     def causal(self) -> bool:
@@ -172,7 +179,8 @@ class TrackRelativeSmoother:
         motion = motion_of(recording, self.motions()) if self.motion is None else self.motion
         if steps is None:
             steps = steps_of(recording, self.rate_hz, smoothed=self.smoothed)
-        aiding = (*aiding_of(recording, smoothed=self.smoothed), *self.aiding)
+        received = (Received(),) if self.gnss else ()
+        aiding = (*aiding_of(recording, smoothed=self.smoothed), *received, *self.aiding)
         return course_of(recording, steps, motion, aiding, self.without.split())
 
     def trace(self, recording: Recording) -> Trace:

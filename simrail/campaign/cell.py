@@ -231,6 +231,8 @@ def record_cell(
         magnetometer=resolved.magnetometer,
         rail_sensor=resolved.rail_sensor,
         rails=None if resolved.rail_sensor is None else parts.rails(cell),
+        second_imu=resolved.second_imu,
+        gnss=resolved.gnss,
         odometry=TRUTH if cell.spec.odometry == TRUTH else None,
         seed=cell.sensor_seed,
         draw=cell.sensor_draw,

@@ -44,6 +44,7 @@ STANDSTILL = "standstill_probability"
 ENCODER = ("pulse_count",)
 EDGE_TIME = "edge_time_s"
 RAIL_DISPLACEMENT = ("rail_left_y_m", "rail_left_z_m", "rail_right_y_m", "rail_right_z_m")
+GNSS = ("position_m", "speed_mps")
 MAGNETIC = ("magnetic_x_t", "magnetic_y_t", "magnetic_z_t")
 MOTION = POSITION + VELOCITY + ATTITUDE + IMU + ODOMETRY + RELATIVE_POSITION + RELATIVE_ATTITUDE
 INNOVATION = ("innovation_x_mps2", "innovation_y_mps2", "innovation_z_mps2", "nis")

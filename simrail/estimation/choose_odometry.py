@@ -17,6 +17,8 @@ from simrail.estimation.user_modules import class_named
 from simrail.recording.recording import Recording
 
 SHIPPED: dict[str, tuple[str, dict[str, Any]]] = {
+    "bogie_delay": ("BogieDelayOdometry", {"smoothed": False}),
+    "bogie_delay_smoothed": ("BogieDelayOdometry", {"smoothed": True}),
     "curve_matched": ("CurveMatchedOdometry", {"smoothed": False}),
     "curve_smoothed": ("CurveMatchedOdometry", {"smoothed": True}),
     "encoder": ("EncoderOdometry", {}),

@@ -93,6 +93,8 @@ def needs_what_it_says(estimator: Estimator, recording: Recording) -> None:
         "encoder": {"encoder": None, "encoder_sheet": None, "odometer": None, "odometer_sheet": None},
         "magnetometer": {"magnetometer": None, "magnetometer_sheet": None},
         "rail_sensor": {"rail_displacement": None, "rail_sensor_sheet": None},
+        "second_imu": {"second_imu": None, "second_imu_sheet": None},
+        "gnss": {"gnss": None, "gnss_sheet": None},
     }
     spared = {name: value for need in parts if need not in needs for name, value in parts[need].items()}
     poor: Recording = replace(recording, **spared)
@@ -302,7 +304,13 @@ def time_reversed(recording: Recording) -> Recording:
 
     It is what a train would record that made the same way in the other direction.
     """
-    negated = {"imu": "gyro_", "odometry": "speed_mps", "odometer": "speed_mps"}
+    negated = {
+        "imu": "gyro_",
+        "second_imu": "gyro_",
+        "odometry": "speed_mps",
+        "odometer": "speed_mps",
+        "gnss": "speed_mps",
+    }
     turned = _changed(recording, lambda name, frame: _turned(frame, negate=negated.get(name, "")))
     counts, sheet, start_m = turned.encoder, recording.encoder_sheet, recording.start_position_m
     if sheet is not None and counts is not None:
@@ -336,7 +344,7 @@ def standing(recording: Recording) -> Recording:
     def held(name: str, frame: pd.DataFrame) -> pd.DataFrame:
         values = np.repeat(frame.iloc[:1].to_numpy(), len(frame), axis=0)
         still = pd.DataFrame(values, index=frame.index, columns=frame.columns).astype(frame.dtypes)
-        if name in ("odometry", "odometer"):
+        if name in ("odometry", "odometer", "gnss"):
             still[[c for c in ("speed_mps", "acceleration_mps2") if c in still]] = 0.0
         return still
 

@@ -77,7 +77,7 @@ def states_only(recording: Recording, states: FloatArray, columns: Sequence[str]
     return Estimate(states=frame, mount=recording.mount)
 
 
-NEEDS = ("odometry", "encoder", "magnetometer", "rail_sensor")
+NEEDS = ("odometry", "encoder", "magnetometer", "rail_sensor", "second_imu", "gnss")
 """What an estimator may need beside the IMU, by the keys of a scenario."""
 
 ROLES = ("method", "baseline", "general_purpose", "ablation")

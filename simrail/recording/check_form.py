@@ -14,6 +14,7 @@ from simrail.core.columns import (
     ACCEL,
     EDGE_TIME,
     ENCODER,
+    GNSS,
     GYRO,
     IMU,
     MAGNETIC,
@@ -42,6 +43,8 @@ class _Limit(NamedTuple):
 LIMITS = (
     _Limit("imu", GYRO, 20.0, "rad/s", "degrees"),
     _Limit("imu", ACCEL, 500.0, "m/s2", "mg"),
+    _Limit("second_imu", GYRO, 20.0, "rad/s", "degrees"),
+    _Limit("second_imu", ACCEL, 500.0, "m/s2", "mg"),
     # Two hundred times the Earth's field.
     _Limit("magnetometer", MAGNETIC, 1e-2, "T", "microtesla or gauss"),
     _Limit("rail_displacement", RAIL_DISPLACEMENT, 10.0, "m", "millimetres"),
@@ -52,15 +55,26 @@ STILL_SHARE = 1e-3
 
 COLUMNS_OF = {
     "imu": IMU,
+    "second_imu": IMU,
     "odometry": ODOMETRY + ODOMETRY_SD,
     "encoder": ENCODER,
     "odometer": ("speed_mps",),
     "magnetometer": MAGNETIC,
     "rail_displacement": RAIL_DISPLACEMENT,
+    "gnss": (),
 }
-"""Columns that the frames of a recording must have."""
+"""Columns that the frames of a recording must have, with numbers in all rows."""
+
+LEAST_SPACING_M = 5.0
+"""Two IMUs that are nearer to each other along the train feel the same place of the rails at nearly the same
+time: within one bogie, they rather feel the bogie."""
+
+SAME_RATE = 1e-3
+"""Relative difference of rates up to which two IMUs sample alike: clocks differ by less."""
 
 SHEETS = {
+    "gnss": ("gnss_sheet", "says nothing", "give the standard deviations of its place and speed"),
+    "second_imu": ("second_imu_sheet", "may be anywhere", "say where it sits, with its data sheet"),
     "encoder": ("encoder_sheet", "says nothing", "give pulses per revolution and wheel radius"),
     "odometer": ("odometer_sheet", "says nothing", "give the standard deviations of its speed and scale"),
     "magnetometer": (
@@ -90,19 +104,25 @@ def check_recording(recording: Recording) -> None:
     InputError
         At the first of: a missing column; a value that is no number; time stamps that are not
         increasing, or not uniform in the IMU; a device without its sheet; values beyond `LIMITS`
-        (degrees?); a field that is not as large as the Earth's; an IMU rate other than its sheet's; a frame
-        at other times than the IMU's that belongs there.
+        (degrees?); a field that is not as large as the Earth's; an IMU rate other than its sheet's; two
+        IMUs of different rates, or too near to each other; a frame at other times than the IMU's that belongs there.
     """
     frames = {name: getattr(recording, name) for name in COLUMNS_OF}
     frames = {name: frame for name, frame in frames.items() if frame is not None}
     for name, frame in frames.items():
         timed = (EDGE_TIME,) if name == "encoder" and EDGE_TIME in frame else ()
         _check_signal(frame, COLUMNS_OF[name] + timed, what=name)
+        if name == "gnss":
+            _check_gnss(frame)
         if name in SHEETS:
             sheet, worth, remedy = SHEETS[name]
             if getattr(recording, sheet) is None:
                 raise InputError(f"{name} without its sheet {worth}", field=sheet, remedy=remedy)
     _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz)
+    second = recording.second_imu_sheet
+    if recording.second_imu is not None and second is not None:
+        _check_uniform(recording.second_imu.index.to_numpy(), second.imu.rate_hz, table="second_imu")
+        check_pair(recording.imu_sheet.rate_hz, second.imu.rate_hz, second.spacing_m)
     for limit in LIMITS:
         if limit.frame in frames:
             _check_size(frames[limit.frame], limit)
@@ -118,6 +138,55 @@ def check_recording(recording: Recording) -> None:
                 limit=f"the {len(recording.imu)} time stamps of the IMU",
                 remedy=f"make the {name} at the IMU's times",
             )
+
+
+def _check_gnss(frame: pd.DataFrame) -> None:
+    """It has a place or a speed, and rows without any are fine."""
+    columns = [name for name in GNSS if name in frame]
+    if not columns:
+        raise InputError(
+            "has neither a place nor a speed",
+            field="gnss",
+            value=list(frame) or None,
+            limit=" or ".join(GNSS),
+            remedy='e.g. columns = { time = "t", speed = "v" }',
+        )
+    for name in columns:
+        if not pd.api.types.is_numeric_dtype(frame[name]):
+            raise InputError("holds no numbers", field=f"gnss.{name}", value=str(frame[name].dtype))
+        endless = np.isinf(frame[name].to_numpy(dtype=np.float64))
+        if endless.any():
+            raise InputError(
+                f"is not a finite number at time_s = {frame.index[int(np.argmax(endless))]}",
+                field=f"gnss.{name}",
+                limit="finite, or blank where nothing was received",
+            )
+
+
+def check_pair(rate_hz: float, second_rate_hz: float, spacing_m: float) -> None:
+    """Refuse two IMUs whose rates differ, or that are too near to each other along the train.
+
+    Raises
+    ------
+    InputError
+        Beyond `SAME_RATE` or `LEAST_SPACING_M`.
+    """
+    if abs(second_rate_hz / rate_hz - 1.0) > SAME_RATE:
+        raise InputError(
+            "has another rate than the first IMU",
+            field="second_imu.rate_hz",
+            value=f"{second_rate_hz:g} Hz",
+            limit=f"{rate_hz:g} Hz, to {100.0 * SAME_RATE:g} %",
+            remedy="record both at one rate",
+        )
+    if not abs(spacing_m) >= LEAST_SPACING_M:
+        raise InputError(
+            "is too near to the first IMU along the train",
+            field="second_imu.spacing_m",
+            value=float(f"{spacing_m:.6g}"),
+            limit=f"{LEAST_SPACING_M:g} m at least, ahead or behind",
+            remedy="mount it on another bogie, or leave [second_imu] out",
+        )
 
 
 def _check_signal(frame: pd.DataFrame, columns: tuple[str, ...], *, what: str) -> None:
@@ -174,7 +243,7 @@ def _check_size(frame: pd.DataFrame, bound: _Limit) -> None:
             )
 
 
-def _check_uniform(time: np.ndarray, rate_hz: float) -> None:
+def _check_uniform(time: np.ndarray, rate_hz: float, *, table: str = "imu") -> None:
     """IMU samples must come at the rate of the sheet, to 1 % of an interval each and 0.01 % over all."""
     step = np.diff(time)
     off = np.abs(step * rate_hz - 1.0)
@@ -182,7 +251,7 @@ def _check_uniform(time: np.ndarray, rate_hz: float) -> None:
     if off[worst] > 0.01:
         raise InputError(
             f"is not uniform at sample {worst + 1}",
-            field="imu.time_s",
+            field=f"{table}.time_s",
             value=f"{step[worst]:.6g} s after time_s = {time[worst]:.6g}",
             limit=f"{1.0 / rate_hz:.6g} s, as the sheet's rate of {rate_hz:g} Hz says",
             remedy="mend the rate in the sheet, or resample; gaps are not bridged silently",
@@ -191,7 +260,7 @@ def _check_uniform(time: np.ndarray, rate_hz: float) -> None:
     if abs(mean / rate_hz - 1.0) > 1e-4:
         raise InputError(
             "has another rate than the sheet says",
-            field="imu.time_s",
+            field=f"{table}.time_s",
             value=f"{mean:.9g} Hz",
             limit=f"{rate_hz:g} Hz",
             remedy="mend the rate in the sheet",

@@ -1,7 +1,8 @@
 """What the logger on the train saw, and what the train may know: the wall before the truth.
 
-A `Recording` holds the signals (IMU, encoder, magnetometer) and the knowledge that a real train has: the
-design track, the nominal wheel radius, the IMU's data sheet, where it is mounted, the drawing of the vehicle.
+A `Recording` holds the signals (IMU, encoder, magnetometer, a second IMU) and the knowledge that a real train
+has: the design track, the nominal wheel radius, the IMU's data sheet, where it is mounted, the drawing of the
+vehicle.
 Where the train is, nobody records: an odometry estimator concludes it, and its odometry frame is handed on to
 those estimators that need one (`simrail.estimation.choose_odometry`). A recording never holds a true value,
 except in an odometry frame that is labelled ``source="truth"`` (an ablation). Rides of real trains are read
@@ -95,6 +96,35 @@ class ImuSheet:
 
 
 @dataclass(frozen=True)
+class SecondImuSheet:
+    """What the train knows of a second IMU, beside its signals.
+
+    Attributes
+    ----------
+    mount, mount_body : str
+        Name of this IMU, and of the body that it is mounted on.
+    mount_position_m : tuple of float
+        As `Recording.mount_position_m`.
+    spacing_m : float
+        How far it sits behind the first one along the train, m; below 0 for one that is ahead of it.
+    imu : ImuSheet
+        Its data sheet.
+    spacing_sd_m : float
+        Standard deviation of that distance.
+    clock_offset_sd_s : float
+        Standard deviation of how far its clock is ahead of the first one's.
+    """
+
+    mount: str
+    mount_body: str
+    mount_position_m: tuple[float, float, float]
+    spacing_m: float
+    imu: ImuSheet
+    spacing_sd_m: float = 0.01
+    clock_offset_sd_s: float = 0.02
+
+
+@dataclass(frozen=True)
 class EncoderSheet:
     """What the train knows of its wheel encoder.
 
@@ -138,6 +168,35 @@ class OdometerSheet:
 
     speed_sd_mps: float
     radius_relative_sd: float
+
+
+@dataclass(frozen=True)
+class GnssSheet:
+    """What the train knows of its satellite receiver.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Rate of its samples, those that are blank among them.
+    position_sd_m, correlation_s : float
+        Standard deviation of the part of the place's error that wanders, and over what time it does.
+    position_noise_m : float
+        That of its white part.
+    speed_sd_mps : float
+        That of the speed; white.
+    latency_s : float
+        How much earlier than its stamp is what a sample speaks of.
+    ahead_m : float
+        How far the antenna is ahead of the IMU along the train.
+    """
+
+    rate_hz: float
+    position_sd_m: float
+    speed_sd_mps: float
+    correlation_s: float = 60.0
+    position_noise_m: float = 0.3
+    latency_s: float = 0.0
+    ahead_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -228,6 +287,15 @@ class Recording(Shown):
         Its data sheet.
     vehicle_sheet : VehicleSheet, optional
         The vehicle's drawing, and how far the train may be from it; None where nothing is known of it.
+    second_imu : pandas.DataFrame, optional
+        What an IMU elsewhere on the train records, as `imu`, at the times of a clock of its own.
+    second_imu_sheet : SecondImuSheet, optional
+        Where it sits, and its data sheet.
+    gnss : pandas.DataFrame, optional
+        Indexed by ``time_s``, at which a sample came; columns `simrail.core.columns.GNSS` or one of them:
+        place of the antenna along the map, and speed, NaN where there is none.
+    gnss_sheet : GnssSheet, optional
+        What is known of the receiver.
     """
 
     name: str
@@ -252,12 +320,18 @@ class Recording(Shown):
     odometer_sheet: OdometerSheet | None = None
     map_errors: MapErrors = UNSTATED
     vehicle_sheet: VehicleSheet | None = None
+    second_imu: pd.DataFrame | None = None
+    second_imu_sheet: SecondImuSheet | None = None
+    gnss: pd.DataFrame | None = None
+    gnss_sheet: GnssSheet | None = None
 
     def _facts(self) -> Facts:
         aiding = {
             "encoder": self.encoder,
             "odometer": self.odometer,
             "magnetometer": self.magnetometer,
+            "second IMU": self.second_imu,
+            "GNSS": self.gnss,
             "rail sensor": self.rail_displacement,
         }
         lost = 0 if self.gaps is None else int(self.gaps["missing"].sum())
@@ -301,8 +375,8 @@ def odometry_of(recording: Recording) -> pd.DataFrame:
 AT_IMU_TIMES = ("imu", "odometry", "magnetometer", "rail_displacement")
 """Frames of a recording that have one row per sample of the IMU."""
 
-AT_OWN_TIMES = ("encoder", "odometer")
-"""Frames of a recording whose device has a clock rate of its own."""
+AT_OWN_TIMES = ("encoder", "odometer", "second_imu", "gnss")
+"""Frames of a recording whose device has a clock, or a clock rate, of its own."""
 
 
 def beginning(recording: Recording, *, samples: int) -> Recording:

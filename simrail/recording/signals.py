@@ -11,6 +11,7 @@ from simrail.core.columns import (
     ACCEL,
     EDGE_TIME,
     ENCODER,
+    GNSS,
     GYRO,
     MAGNETIC,
     ODOMETRY,
@@ -98,11 +99,19 @@ def _alone(column: str, units: dict[str, Factor], *, whole: bool = False) -> Qua
 
 
 IMU_SIGNAL = Signal("imu", (Quantity("gyro", GYRO, RATES), Quantity("accel", ACCEL, FORCES)))
+SECOND_IMU_SIGNAL = Signal("second_imu", IMU_SIGNAL.quantities)
 ENCODER_SIGNAL = Signal(
     "encoder",
     (
         Quantity("count", ENCODER, COUNTS, whole=True),
         Quantity("edge_time", (EDGE_TIME,), TIMES, required=False),
+    ),
+)
+GNSS_SIGNAL = Signal(
+    "gnss",
+    (
+        Quantity("position", GNSS[:1], LENGTHS, required=False),
+        Quantity("speed", GNSS[1:], SPEEDS, required=False),
     ),
 )
 MAGNETOMETER_SIGNAL = Signal("magnetometer", (Quantity("field", MAGNETIC, FIELDS),))
@@ -132,11 +141,13 @@ GAPS_SIGNAL = Signal(
 
 SIGNALS: tuple[Signal, ...] = (
     IMU_SIGNAL,
+    SECOND_IMU_SIGNAL,
     ENCODER_SIGNAL,
     MAGNETOMETER_SIGNAL,
     RAIL_SIGNAL,
     ODOMETRY_SIGNAL,
     ODOMETER_SIGNAL,
+    GNSS_SIGNAL,
     GAPS_SIGNAL,
 )
 """Every frame of a `Recording`."""

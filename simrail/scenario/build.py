@@ -34,10 +34,12 @@ from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
 from simrail.scenario.vibration_tables import VibrationPart
 from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.gnss import GnssSpec
 from simrail.sensors.imu import EarthRate
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.rail_sensor import RailSensorSpec
+from simrail.sensors.second_imu import SecondImuSpec
 from simrail.track.bands import BANDS, Band
 from simrail.track.design import TrackDesign
 from simrail.track.file import TrackFile
@@ -84,6 +86,10 @@ class ResolvedCell:
         The IMU.
     encoder, magnetometer, rail_sensor : EncoderSpec, MagnetometerSpec, RailSensorSpec, optional
         The other sensors; None where the scenario has none.
+    second_imu : SecondImuSpec, optional
+        The IMU on another bogie, likewise.
+    gnss : GnssSpec, optional
+        The satellite receiver, likewise.
     earth_rate : EarthRate, optional
         Rotation of the Earth; None for an Earth at rest.
     temperature : Temperature, optional
@@ -105,6 +111,8 @@ class ResolvedCell:
     encoder: EncoderSpec | None
     magnetometer: MagnetometerSpec | None
     rail_sensor: RailSensorSpec | None
+    second_imu: SecondImuSpec | None
+    gnss: GnssSpec | None
     earth_rate: EarthRate | None
     temperature: Temperature | None
     track_map: TrackDesign | None
@@ -181,6 +189,8 @@ class Parts:
             # Steel stands where the seed of the track puts it.
             magnetometer=None if spec.magnetometer is None else spec.magnetometer.spec(cell.ride_seed),
             rail_sensor=None if spec.rail_sensor is None else spec.rail_sensor.spec(),
+            second_imu=self.second_imu(cell),
+            gnss=None if spec.gnss is None else spec.gnss.spec(),
             earth_rate=None
             if earth is None
             else EarthRate(radians(earth.latitude_deg), radians(earth.x_axis_deg)),
@@ -236,6 +246,8 @@ class Parts:
             return None
         spec = self.scenario.spec
         bodies = {str(body) for part in spec.imu if part.is_on(cell.spec.vehicle) for body in each(part.body)}
+        if spec.second_imu is not None:
+            bodies |= {str(body) for body in each(spec.second_imu.body)}
         places = {str(place) for place in each(spec.encoder.wheel)} if spec.encoder is not None else set()
         wheels = {vehicle.wheel_at(place, direction=profile.direction) for place in places}
         if cell.spec.vibration is not None:
@@ -304,6 +316,15 @@ class Parts:
         file = self._noun("imu", ImuFile, cell.imu.grade, f"{field}.grade", _as_it_is, noun="imu file")
         with blame(self.scenario.file, f"{field}.sheet"):
             return file.with_figures(figures).grade(grade.name)
+
+    def second_imu(self, cell: Cell) -> SecondImuSpec | None:
+        """The second IMU of a cell, of the grade of its IMU unless it has its own."""
+        part = cell.spec.second_imu
+        if part is None:
+            return None
+        if part.grade is None:
+            return part.spec(self.grade(cell))
+        return part.spec(self._noun("imu", ImuFile, str(part.grade), "second_imu.grade", ImuFile.grade))
 
     def _noun(
         self,

@@ -35,7 +35,17 @@ from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity", "vibration")
-SENSING = ("odometry", "map", "encoder", "magnetometer", "rail_sensor", "earth", "temperature")
+SENSING = (
+    "odometry",
+    "map",
+    "encoder",
+    "magnetometer",
+    "rail_sensor",
+    "second_imu",
+    "gnss",
+    "earth",
+    "temperature",
+)
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,9 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
         if cell.ride_number != last_ride:
             last_ride = cell.ride_number
             simulated += durations[ride_key] * scenario.spec.monte_carlo.track_draws
-        words = map(repr, (cell.imu, cell.spec.encoder, cell.spec.magnetometer, cell.spec.rail_sensor))
+        spec = cell.spec
+        sensors = (cell.imu, spec.encoder, spec.magnetometer, spec.rail_sensor, spec.second_imu, spec.gnss)
+        words = map(repr, sensors)
         sensor_key = (*way, *words, cell.spec.odometry)
         if sensor_key not in judged_sensors:
             judged_sensors.add(sensor_key)

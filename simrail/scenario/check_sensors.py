@@ -7,9 +7,12 @@ scenario's.
 
 from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
+from simrail.recording.check_form import check_pair
+from simrail.ride.truth import Mount
 from simrail.scenario.build import ResolvedCell
 from simrail.sensors.decimation import check_bandwidth, decimation_factor, sampling_of
 from simrail.sensors.encoder import check_encoder
+from simrail.sensors.gnss import check_gnss
 from simrail.sensors.magnetometer import check_magnetometer
 from simrail.sensors.rail_sensor import check_rail_sensor
 
@@ -29,12 +32,16 @@ def judge_sensors(resolved: ResolvedCell) -> None:
         not hold, or has no use on this ride.
     """
     _judge_imu(resolved)
+    _judge_second_imu(resolved)
     if resolved.magnetometer is not None:
         with blame(None, "magnetometer"):
             check_magnetometer(resolved.magnetometer)
     if resolved.rail_sensor is not None:
         with blame(None, "rail_sensor"):
             check_rail_sensor(resolved.rail_sensor)
+    if resolved.gnss is not None:
+        with blame(None, "gnss"):
+            check_gnss(resolved.gnss)
     _judge_encoder(resolved)
 
 
@@ -64,6 +71,36 @@ def _judge_imu(resolved: ResolvedCell) -> None:
             bandwidth = grade.bandwidth_of(kind)
             if bandwidth is not None:
                 check_bandwidth(bandwidth, truth_rate)
+
+
+def _judge_second_imu(resolved: ResolvedCell) -> None:
+    """It is another IMU than the first, on the vehicle, far enough from it, and of its rate."""
+    second, vehicle = resolved.second_imu, resolved.ride.vehicle
+    if second is None:
+        return
+    names = vehicle.body_names
+    one_of(second.mount.body, names, "the vehicle has no such body", field="second_imu.body")
+    if second.mount.name == resolved.mount.name:
+        raise InputError(
+            "is the name of an [[imu]] that it is recorded with",
+            field="second_imu.name",
+            value=second.mount.name,
+            remedy="give it a name of its own: by its name its noise is drawn",
+        )
+    check_pair(
+        resolved.grade.rate_hz,
+        second.grade.rate_hz,
+        _along(resolved, resolved.mount) - _along(resolved, second.mount),
+    )
+    with blame(None, "second_imu.grade"):
+        sampling_of(resolved.ride.rate_hz, second.grade.rate_hz, second.grade.oversampling)
+        if second.grade.bandwidth_hz is not None:
+            check_bandwidth(second.grade.bandwidth_hz, resolved.ride.rate_hz)
+
+
+def _along(resolved: ResolvedCell, mount: Mount) -> float:
+    """Where a mount is along the vehicle, m."""
+    return float(mount.position_m[0] + resolved.ride.vehicle.body(mount.body).position_m[0])
 
 
 def _judge_encoder(resolved: ResolvedCell) -> None:

@@ -22,7 +22,13 @@ from simrail.scenario import tables
 from simrail.scenario.axes import Axis, Listed, axes_of, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
 from simrail.scenario.overrides import override
-from simrail.scenario.sensor_tables import EncoderPart, MagnetometerPart, RailSensorPart
+from simrail.scenario.sensor_tables import (
+    EncoderPart,
+    GnssPart,
+    MagnetometerPart,
+    RailSensorPart,
+    SecondImuPart,
+)
 from simrail.scenario.vibration_tables import VibrationPart
 
 
@@ -86,6 +92,10 @@ class ScenarioFile(Part):
     """A magnetometer in the housing of each IMU; without it there is none."""
     rail_sensor: RailSensorPart | None = None
     """A sensor beside each IMU that sees both rails; without it there is none."""
+    second_imu: SecondImuPart | None = None
+    """An IMU on another bogie, recorded beside each of the others; without it there is none."""
+    gnss: GnssPart | None = None
+    """A satellite receiver; without it there is none."""
     earth: tables.EarthPart | None = None
     """The Earth turns; without it, it is at rest."""
     temperature: tables.TemperaturePart | None = None

@@ -1,4 +1,4 @@
-"""What a person writes of the sensors beside the IMU: ``[encoder]``, ``[magnetometer]``, ``[rail_sensor]``.
+"""What a person writes of the sensors beside the IMU: ``[encoder]``, ``[magnetometer]`` and others.
 
 Each part makes the specification of its sensor (`spec`); units of the text end here. Whether a sensor fits
 vehicle and ride is judged by `simrail.scenario.check_sensors`.
@@ -12,11 +12,17 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from simrail.core.toml_files import Part
+from simrail.recording.recording import SecondImuSheet
+from simrail.recording.sheets.grades import ImuGrade
+from simrail.ride.truth import Mount
 from simrail.scenario.axes import Listed
+from simrail.scenario.tables import Name, OnBoard
 from simrail.sensors.encoder import EncoderSpec, Slip
+from simrail.sensors.gnss import GnssSpec, Outage
 from simrail.sensors.magnetic_surroundings import Steel, Traction
 from simrail.sensors.magnetometer import EarthField, MagnetometerSpec, VehicleIron
 from simrail.sensors.rail_sensor import RailSensorSpec
+from simrail.sensors.second_imu import SecondImuSpec
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -221,3 +227,87 @@ class RailSensorPart(Part):
             outlier_fraction=self.outlier_fraction,
             outlier_m=self.outlier_mm / 1e3,
         )
+
+
+class SecondImuPart(Part):
+    """``[second_imu]``: an IMU on another bogie, recorded with each ``[[imu]]`` by a clock of its own.
+
+    Its ``grade`` is that of the IMU beside it, unless it is given. How far its clock is ahead is drawn for
+    each draw of the sensors with the standard deviation ``clock_offset_sd_s``, which the train knows; or it
+    is ``clock_offset_s``. ``spacing_sd_m`` is how well the train knows the distance of both.
+    """
+
+    name: Name = "second"
+    """Name of the IMU."""
+    grade: Listed[str] | None = None
+    """A shipped IMU, or the path of an IMU file; that of the IMU beside it if left out."""
+    body: Listed[str]
+    """The body that carries it."""
+    position_m: tuple[OnBoard, OnBoard, OnBoard]
+    """Where, m: ahead of the body's reference point, left of the track's centre, above the rails."""
+    roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    """How it is turned on the body about X, degrees."""
+    pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
+    """The same about Y, degrees."""
+    yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
+    """The same about Z, degrees."""
+    clock_offset_sd_s: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = SecondImuSheet.clock_offset_sd_s
+    """Standard deviation of how far its clock is ahead, s; the train knows it."""
+    clock_offset_s: Listed[Annotated[float, Field(ge=-10.0, le=10.0)]] | None = None
+    """How far its clock is ahead, s, in place of a draw."""
+    spacing_sd_m: Listed[Annotated[float, Field(gt=0.0, le=10.0)]] = SecondImuSheet.spacing_sd_m
+    """How well the train knows the distance of both, m."""
+
+    def spec(self, grade: ImuGrade) -> SecondImuSpec:
+        """The second IMU, of a grade, with no axis left."""
+        mount = Mount(
+            name=self.name,
+            body=str(self.body),
+            position_m=self.position_m,
+            roll_rad=radians(self.roll_deg),
+            pitch_rad=radians(self.pitch_deg),
+            yaw_rad=radians(self.yaw_deg),
+        )
+        return SecondImuSpec(
+            mount, grade, self.clock_offset_sd_s, self.clock_offset_s, spacing_sd_m=self.spacing_sd_m
+        )
+
+
+class OutagePart(Part):
+    """``[[gnss.outage]]``: a stretch of the line where nothing is received, e.g. a tunnel."""
+
+    from_m: float
+    """Where it begins, s along the track, m."""
+    to_m: float
+    """Where it ends, m."""
+
+
+class GnssPart(Part):
+    """``[gnss]``: a satellite receiver, its place and speed brought to the line; synthetic.
+
+    See `simrail.sensors.gnss.GnssSpec`; the antenna is ``ahead_m`` of each ``[[imu]]``.
+    """
+
+    rate_hz: Listed[Annotated[float, Field(gt=0.0, le=100.0)]] = GnssSpec.rate_hz
+    """Rate of its samples, Hz."""
+    position_sd_m: Listed[NotNegative] = GnssSpec.position_sd_m
+    """Standard deviation of the part of the place's error that wanders, m."""
+    correlation_s: Listed[Positive] = GnssSpec.correlation_s
+    """Time in which that wanders, s."""
+    position_noise_m: Listed[Positive] = GnssSpec.position_noise_m
+    """White noise of the place, m."""
+    speed_sd_mps: Listed[Positive] = GnssSpec.speed_sd_mps
+    """White noise of the speed, m/s."""
+    latency_s: Listed[Annotated[float, Field(ge=0.0, le=10.0)]] = GnssSpec.latency_s
+    """How much later than what it speaks of a sample comes, s."""
+    ahead_m: Listed[OnBoard] = GnssSpec.ahead_m
+    """How far the antenna is ahead of the IMU, m."""
+    reacquire_s: Listed[Annotated[float, Field(ge=0.0, le=600.0)]] = GnssSpec.reacquire_s
+    """How long nothing is received after an outage, s."""
+    outage: tuple[OutagePart, ...] = ()
+    """Stretches of the line where nothing is received."""
+
+    def spec(self) -> GnssSpec:
+        """The receiver, with no axis left."""
+        plain = self.model_dump(exclude={"outage"})
+        return GnssSpec(**plain, outages=tuple(Outage(part.from_m, part.to_m) for part in self.outage))

@@ -17,10 +17,12 @@ from simrail.recording.sheets.grades import ImuGrade, imu_sheet
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
+from simrail.sensors.gnss import GnssSpec, sample_gnss
 from simrail.sensors.imu import EarthRate, arrived, sample_imu
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 from simrail.sensors.rail_sensor import RailSensorSpec, sample_rails
+from simrail.sensors.second_imu import SecondImuSpec, sample_second_imu
 from simrail.track.design import TrackDesign
 from simrail.track.laid_track import LaidTrack
 from simrail.track.map_errors import EXACT, MapErrors
@@ -36,6 +38,8 @@ def measure(
     magnetometer: MagnetometerSpec | None = None,
     rail_sensor: RailSensorSpec | None = None,
     rails: LaidTrack | None = None,
+    second_imu: SecondImuSpec | None = None,
+    gnss: GnssSpec | None = None,
     odometry: str | None = None,
     seed: int,
     draw: int,
@@ -65,6 +69,10 @@ def measure(
         A sensor beside the IMU that sees both rails.
     rails : LaidTrack, optional
         The rails that the ride was run on (`simrail.ride.ride.rails_of`), for that sensor.
+    second_imu : SecondImuSpec, optional
+        An IMU elsewhere on the train.
+    gnss : GnssSpec, optional
+        A satellite receiver.
     odometry : str, optional
         ``"truth"`` hands the true position, speed and acceleration of the mount on to estimators, an
         ablation. Any other odometry is concluded from what is recorded
@@ -138,6 +146,16 @@ def measure(
             limit="truth",
             remedy=f'use simrail.with_odometry(recording, "{odometry}")',
         )
+    second, second_sheet = None, None
+    if second_imu is not None:
+        second, second_sheet = sample_second_imu(
+            truth, mount, second_imu, seed=seed, draw=draw, earth_rate=earth_rate, temperature=temperature
+        )
+    received = None
+    if gnss is not None:
+        received = sample_gnss(
+            truth.motion(mount, columns=("position_m", "speed_mps")), gnss, seed=seed, draw=draw
+        )
     return Recording(
         name=name,
         imu=imu,
@@ -159,6 +177,10 @@ def measure(
         magnetometer_sheet=None if magnetometer is None else magnetometer_sheet(magnetometer),
         rail_displacement=seen,
         rail_sensor_sheet=None if rail_sensor is None else RailSensorSheet(rail_sensor.noise_m),
+        second_imu=second,
+        second_imu_sheet=second_sheet,
+        gnss=received,
+        gnss_sheet=None if gnss is None else gnss.sheet,
     )
 
 

@@ -14,17 +14,26 @@ from simrail.core.errors import InputError
 from simrail.core.resample import LONGEST_GAP_S
 from simrail.core.toml_files import Part
 from simrail.recording.files.signal_part import SignalPart, VectorPart
-from simrail.recording.recording import EncoderSheet, ImuSheet, MagnetometerSheet, RailSensorSheet
+from simrail.recording.recording import (
+    EncoderSheet,
+    GnssSheet,
+    ImuSheet,
+    MagnetometerSheet,
+    RailSensorSheet,
+    SecondImuSheet,
+)
 from simrail.recording.sheets.imu_file import ImuFile
 from simrail.recording.sheets.vehicle_sheet_file import VehicleSheetPart
 from simrail.recording.signals import (
     ENCODER_SIGNAL,
     GAPS_SIGNAL,
+    GNSS_SIGNAL,
     IMU_SIGNAL,
     MAGNETOMETER_SIGNAL,
     ODOMETER_SIGNAL,
     ODOMETRY_SIGNAL,
     RAIL_SIGNAL,
+    SECOND_IMU_SIGNAL,
     Signal,
 )
 from simrail.track.map_file import MapErrorsPart
@@ -73,6 +82,26 @@ class ImuSignalPart(VectorPart):
                 remedy="e.g. grade = \"lord_3dm_gx4_25\"; 'simrail list' shows all",
             )
         return self
+
+
+class SecondImuSignalPart(ImuSignalPart):
+    """``[second_imu]``: an IMU elsewhere on the train, like ``[imu]``, by a clock of its own.
+
+    Attributes
+    ----------
+    spacing_m : float, optional
+        How far it sits behind the first IMU along the train, m; from the drawing, where there is one and it is
+        not given.
+    spacing_sd_m, clock_offset_sd_s : float
+        Standard deviations of that, m, and of how far its clock is ahead, s.
+    """
+
+    signal: ClassVar[Signal] = SECOND_IMU_SIGNAL
+
+    name: str = "second"
+    spacing_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] | None = None
+    spacing_sd_m: Annotated[float, Field(gt=0.0, le=10.0)] = SecondImuSheet.spacing_sd_m
+    clock_offset_sd_s: Annotated[float, Field(gt=0.0, le=10.0)] = SecondImuSheet.clock_offset_sd_s
 
 
 class EncoderSignalPart(SignalPart):
@@ -205,6 +234,31 @@ class OdometerPart(SignalPart):
         return self
 
 
+class GnssSignalPart(SignalPart):
+    """``[gnss]``: what a satellite receiver says, brought to the line; blank cells mean no sample.
+
+    Attributes
+    ----------
+    sheet : GnssSheet
+        How wrong it may be, and how late.
+    """
+
+    signal: ClassVar[Signal] = GNSS_SIGNAL
+
+    sheet: GnssSheet
+
+    @field_validator("sheet")
+    @classmethod
+    def _possible(cls, value: GnssSheet) -> GnssSheet:
+        for field in ("rate_hz", "position_noise_m", "speed_sd_mps", "correlation_s"):
+            if not 0.0 < getattr(value, field) < 1e4:
+                raise InputError("is out of range", field=field, value=getattr(value, field), limit="> 0")
+        for field in ("position_sd_m", "latency_s"):
+            if not 0.0 <= getattr(value, field) < 1e3:
+                raise InputError("is out of range", field=field, value=getattr(value, field), limit=">= 0")
+        return value
+
+
 class OdometrySignalPart(SignalPart):
     """``[odometry]``: position, speed and acceleration of the IMU, made elsewhere by `source`.
 
@@ -243,7 +297,7 @@ class RideFile(Part):
         How wrong the track file may be; taken to be wide without it.
     vehicle_sheet : VehicleSheetPart, optional
         What a drawing of the vehicle says; without it nothing is known of pivots and axles.
-    imu, encoder, magnetometer, rail_displacement, odometer, odometry, gaps
+    imu, second_imu, encoder, magnetometer, rail_displacement, odometer, odometry, gnss, gaps
         Its signals. Without an odometry it is made from encoder or odometer
         (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
     """
@@ -256,11 +310,13 @@ class RideFile(Part):
     map: MapErrorsPart = MapErrorsPart()
     vehicle_sheet: VehicleSheetPart | None = None
     imu: ImuSignalPart
+    second_imu: SecondImuSignalPart | None = None
     encoder: EncoderSignalPart | None = None
     magnetometer: MagnetometerSignalPart | None = None
     rail_displacement: RailSignalPart | None = None
     odometer: OdometerPart | None = None
     odometry: OdometrySignalPart | None = None
+    gnss: GnssSignalPart | None = None
     gaps: GapsPart | None = None
 
     @field_validator("map")

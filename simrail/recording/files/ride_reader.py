@@ -9,6 +9,7 @@ Not here: an odometry, where the file has none, and whether the ride can be true
 `simrail.estimation.recorded_ride.read_ride`.
 """
 
+import math
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -32,9 +33,9 @@ from simrail.core.toml_files import blame, judge, label, load, read_toml
 from simrail.recording.check_form import SHEETS, check_recording
 from simrail.recording.check_sheet import check_counts, field_bounds, imu_bounds
 from simrail.recording.files.data_file import line_of
-from simrail.recording.files.ride_file import ImuSignalPart, RideFile
+from simrail.recording.files.ride_file import ImuSignalPart, RideFile, SecondImuSignalPart
 from simrail.recording.files.signal_reader import SignalReader
-from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording
+from simrail.recording.recording import EncoderSheet, ImuSheet, OdometerSheet, Recording, SecondImuSheet
 from simrail.recording.sheets.grades import imu_sheet
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.track.design import NO_MAP
@@ -42,6 +43,9 @@ from simrail.track.file import TrackFile
 
 RIDE_FILE = "ride.toml"
 """Name of the ride file in a folder that simrail wrote."""
+
+SPACING_SDS = 6.0
+"""Standard deviations by which a stated spacing of two IMUs may differ from the drawing's."""
 
 WAY_GAP_S = 1.0
 """A wheel or an odometer may be silent for this long (or three readings) while the train moves."""
@@ -81,7 +85,8 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
             track = load(TrackFile, "track", spec.track, folder=folder).design(Path(spec.track).stem)
     reader = SignalReader(folder)
     sheet = _sheet(spec.imu, folder)
-    imu, rate_hz, gaps = _uniform(reader.frame(spec.imu, "imu", imu_bounds(sheet)), spec)
+    signals = reader.frame(spec.imu, "imu", imu_bounds(sheet))
+    imu, rate_hz, gaps = _uniform(signals, spec.imu, spec.longest_gap_s, "imu")
     if spec.gaps is not None:
         noted = reader.frame(spec.gaps, "gaps")
         gaps = noted if gaps is None else pd.concat([noted, gaps], ignore_index=True)
@@ -115,7 +120,62 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
         gaps=gaps,
         **others,
     )
+    if spec.second_imu is not None:
+        recording = _with_second_imu(recording, spec.second_imu, spec, reader, folder)
+    if spec.gnss is not None:
+        received = reader.frame(spec.gnss, "gnss")
+        recording = replace(recording, gnss=received, gnss_sheet=spec.gnss.sheet)
     return _with_way(recording, spec, reader)
+
+
+def _with_second_imu(
+    recording: Recording, part: SecondImuSignalPart, spec: RideFile, reader: SignalReader, folder: Path
+) -> Recording:
+    """Add the second IMU, at uniform times of its own; its gaps are bridged like the first one's."""
+    own = _sheet(part, folder, "second_imu")
+    signals = reader.frame(part, "second_imu", imu_bounds(own))
+    imu, rate_hz, _ = _uniform(signals, part, spec.longest_gap_s, "second_imu")
+    with blame(None, "second_imu"):
+        spacing_m = _spacing_m(recording, part)
+    sheet = SecondImuSheet(
+        mount=part.name,
+        mount_body=part.body,
+        mount_position_m=part.position_m,
+        spacing_m=spacing_m,
+        imu=replace(own, rate_hz=rate_hz),
+        spacing_sd_m=part.spacing_sd_m,
+        clock_offset_sd_s=part.clock_offset_sd_s,
+    )
+    return replace(recording, second_imu=imu, second_imu_sheet=sheet)
+
+
+def _spacing_m(recording: Recording, part: SecondImuSignalPart) -> float:
+    """How far a second IMU is behind the first: as told, or by the drawing; refused where these differ."""
+    drawn, drawing = None, recording.vehicle_sheet
+    if drawing is not None:
+        bodies = drawing.body(recording.mount_body), drawing.body(part.body)
+        if bodies[0] is not None and bodies[1] is not None:
+            first, second = bodies[0].x_m + recording.mount_position_m[0], bodies[1].x_m + part.position_m[0]
+            drawn = first - second
+            slack = SPACING_SDS * math.hypot(part.spacing_sd_m, math.sqrt(2.0) * drawing.place_sd_m)
+            if part.spacing_m is not None and abs(part.spacing_m - drawn) > slack:
+                raise InputError(
+                    "is not the distance on the drawing of the vehicle",
+                    field="spacing_m",
+                    value=part.spacing_m,
+                    limit=f"{drawn:g} m to {slack:.2g} m",
+                    remedy="mend it (positive if the second IMU sits behind the first), or the drawing",
+                )
+    if part.spacing_m is not None:
+        return part.spacing_m
+    if drawn is None:
+        raise InputError(
+            "is missing, and no drawing of the vehicle has both bodies",
+            field="spacing_m",
+            limit="metres that this IMU sits behind the first, along the train; below 0 ahead of it",
+            remedy="measure it to a centimetre: a thousandth of it is a thousandth of the way",
+        )
+    return drawn
 
 
 def _at(frame: pd.DataFrame, times: FloatArray, longest_gap_s: float, what: str) -> pd.DataFrame:
@@ -125,15 +185,17 @@ def _at(frame: pd.DataFrame, times: FloatArray, longest_gap_s: float, what: str)
     return resample(frame, times, longest_gap_s=longest_gap_s, what=what)[0]
 
 
-def _uniform(imu: pd.DataFrame, spec: RideFile) -> tuple[pd.DataFrame, float, pd.DataFrame | None]:
+def _uniform(
+    imu: pd.DataFrame, part: ImuSignalPart, longest_gap_s: float, table: str
+) -> tuple[pd.DataFrame, float, pd.DataFrame | None]:
     """IMU at uniform times, its rate, and the gaps that were bridged (None if there were none)."""
     time = imu.index.to_numpy()
     measured = rate_of(time)
-    stated = spec.imu.rate_hz or (spec.imu.sheet.rate_hz if spec.imu.sheet else None)
+    stated = part.rate_hz or (part.sheet.rate_hz if part.sheet else None)
     if stated is not None and abs(measured / stated - 1.0) > 0.01:
         raise InputError(
             "the time stamps have another rate than is stated",
-            field="imu.rate_hz" if spec.imu.rate_hz else "imu.sheet.rate_hz",
+            field=f"{table}.rate_hz" if part.rate_hz else f"{table}.sheet.rate_hz",
             value=stated,
             limit=f"{measured:.6g} Hz, to 1 %",
             remedy="mend it, or the unit of the time stamps; samples are not thinned out here",
@@ -142,17 +204,17 @@ def _uniform(imu: pd.DataFrame, spec: RideFile) -> tuple[pd.DataFrame, float, pd
     if is_uniform(time, rate):
         return imu, rate, None
     grid = uniform_times(float(time[0]), float(time[-1]), rate)
-    sampled, gaps = resample(imu, grid, longest_gap_s=spec.longest_gap_s)
+    sampled, gaps = resample(imu, grid, longest_gap_s=longest_gap_s)
     return sampled, rate, gaps if len(gaps) else None
 
 
-def _sheet(part: ImuSignalPart, folder: Path) -> ImuSheet:
+def _sheet(part: ImuSignalPart, folder: Path, table: str = "imu") -> ImuSheet:
     if part.sheet is not None:
         return part.sheet
     if part.datasheet is not None:
         grade = part.datasheet.grade("datasheet")
     else:
-        with blame(None, "imu.grade"):
+        with blame(None, f"{table}.grade"):
             grade = load_grade(str(part.grade), folder=folder)
     return imu_sheet(grade, delay_s=part.delay_s)
 

@@ -74,6 +74,17 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         file = f"{signal.name}.{format}"
         write_frame(frame, folder / file, format=format)
         tables[signal.name] = {"file": file}
+    second = recording.second_imu_sheet
+    if second is not None:
+        tables["second_imu"] |= {
+            "name": second.mount,
+            "body": second.mount_body,
+            "position_m": second.mount_position_m,
+            "spacing_m": second.spacing_m,
+            "spacing_sd_m": second.spacing_sd_m,
+            "clock_offset_sd_s": second.clock_offset_sd_s,
+            "sheet": asdict(second.imu),
+        }
     tables["imu"] |= {
         "name": recording.mount,
         "body": recording.mount_body,
@@ -88,6 +99,7 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
         ("encoder", recording.encoder_sheet),
         ("magnetometer", recording.magnetometer_sheet),
         ("rail_displacement", recording.rail_sensor_sheet),
+        ("gnss", recording.gnss_sheet),
     ):
         if sheet is not None:
             tables[table] |= {"sheet": asdict(sheet)}

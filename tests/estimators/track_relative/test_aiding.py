@@ -14,6 +14,7 @@ from simrail.estimators.track_relative.aiding import (
     Fixes,
     Odometer,
     OdometryPlace,
+    Received,
     Standstill,
     WheelWay,
     aiding_of,
@@ -24,7 +25,8 @@ from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
 from simrail.core.errors import InputError
 from simrail.core.seeds import stream
-from simrail.recording.recording import OdometerSheet, Recording
+from simrail.recording.recording import OdometerSheet, Recording, beginning
+from simrail.sensors.gnss import GnssSpec, Outage, sample_gnss
 
 
 def alone(recording: Recording) -> Recording:
@@ -128,6 +130,55 @@ def test_an_imu_alone_knows_its_place_on_a_map(
     assert np.sqrt((error**2).mean()) < 1.0
     assert (error.abs() < 1.96 * sd).mean() > 0.85
     assert sd.max() < 5.0
+
+
+def with_receiver(recording: Recording, motion: pd.DataFrame, **options: Any) -> Recording:
+    spec = GnssSpec(**options)
+    return replace(recording, gnss=sample_gnss(motion, spec, seed=4, draw=0), gnss_sheet=spec.sheet)
+
+
+def test_a_receiver_is_of_the_step_after_it_came(rough: Callable, rough_motion: Callable) -> None:
+    """Place and speed brought forward by the latency, the antenna brought to the IMU; none in the tunnel."""
+    recording, motion = rough(), rough_motion()
+    tunnel = Outage(200.0, 300.0)
+    options = {"rate_hz": 5.0, "position_sd_m": 0.0, "position_noise_m": 1e-6, "speed_sd_mps": 1e-6}
+    seen = with_receiver(recording, motion, latency_s=0.24, ahead_m=9.0, outages=(tunnel,), **options)
+    steps, kind = steps_of(recording, 25.0), Received()
+    rows = kind.rows(seen, steps)
+    for column, name, close in ((0, "position_m", 0.05), (1, "speed_mps", 0.05)):
+        (made,) = np.nonzero(np.isfinite(rows.variances[:, column]))
+        true = np.interp(steps.time_s[made], motion.index, motion[name])
+        np.testing.assert_allclose(rows.values[made, column], true, atol=close)
+        assert len(made) > 100
+        place = np.interp(steps.time_s[made], motion.index, motion["position_m"])
+        assert not ((place + 9.0 > 206.0) & (place + 9.0 < 300.0)).any()
+    assert seen.gnss is not None
+    came = seen.gnss.index.to_numpy()[10]
+    first = int(np.searchsorted(steps.end_s, came - 1e-9))
+    assert np.isfinite(rows.variances[first, 0]) and np.isinf(rows.variances[first - 1, 0])
+    states = stream(3, "states").standard_normal((4, at.STATES))
+    place, speed = kind.shown(duals(states))
+    np.testing.assert_allclose(place.value, states[:, at.S])
+    np.testing.assert_allclose(speed.value, states[:, at.V])
+
+
+def test_a_receiver_helps_when_it_is_asked_for(rough: Callable, rough_motion: Callable) -> None:
+    """Not otherwise: the same bits with it and without; and by the causal filter nothing later is used."""
+    recording, motion = alone(rough()), rough_motion()
+    seen = with_receiver(recording, motion, position_sd_m=0.2, position_noise_m=0.1)
+    plain, _ = place_error(recording, motion)
+    unheard, _ = place_error(seen, motion)
+    pd.testing.assert_series_equal(plain, unheard, check_exact=True)
+    aided, sd = place_error(seen, motion, gnss=True)
+    assert np.sqrt((aided**2).mean()) < np.sqrt((plain**2).mean())
+    assert (aided.abs() < 1.96 * sd).mean() > 0.85
+    causal = TrackRelativeSmoother(smoothed=False, gnss=True, geometry_step_m=0.0)
+    assert causal.needs == ("gnss",) and TrackRelativeSmoother().needs == ()
+    whole = causal.estimate(seen).states
+    part = causal.estimate(beginning(seen, samples=5003)).states
+    pd.testing.assert_frame_equal(whole.iloc[:5003], part, check_exact=True)
+    with pytest.raises(InputError, match="no satellite receiver"):
+        causal.estimate(recording)
 
 
 def test_an_odometer_measures_the_speed(rough: Callable, rough_motion: Callable) -> None:

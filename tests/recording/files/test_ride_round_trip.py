@@ -15,20 +15,22 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
 from simrail.recording.check_physics import check_plausible
-from simrail.recording.files.ride_file import RideFile
+from simrail.recording.files.ride_file import ImuSignalPart, RideFile
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.files.ride_writer import write_ride
 from simrail.recording.files.signal_part import SignalPart, VectorPart
-from simrail.recording.recording import OdometerSheet, Recording
+from simrail.recording.recording import OdometerSheet, Recording, beginning
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.signals import SIGNALS
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
 from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.gnss import GnssSpec, Outage
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.measure import measure
 from simrail.sensors.rail_sensor import RailSensorSpec
+from simrail.sensors.second_imu import SecondImuSpec
 from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
 from simrail.track.file import TrackFile, track_by_name, track_text
 from simrail.track.irregularity import Irregularity
@@ -39,6 +41,10 @@ from simrail.vehicle.speed_profile import SpeedProfile
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
+    return recorded()
+
+
+def recorded(second_imu: SecondImuSpec | None = None, gnss: GnssSpec | None = None) -> Recording:
     track = TrackDesign(
         "curve",
         -50.0,
@@ -63,6 +69,8 @@ def recording() -> Recording:
         magnetometer=MagnetometerSpec(),
         rail_sensor=RailSensorSpec(),
         rails=lay(track, Irregularity("erri_b176_low", fade_m=20.0), seed=1),
+        second_imu=second_imu,
+        gnss=gnss,
         seed=1,
         draw=0,
         vehicle_sheet=drawing(model),
@@ -105,6 +113,86 @@ def test_round_trip_is_exact(recording, tmp_path, format):
     assert_same(recording, read_ride(tmp_path / "ride" / "ride.toml"))
     s = np.linspace(-40.0, 280.0, 50)
     np.testing.assert_array_equal(again.track.frame(s).k, recording.track.frame(s).k)
+
+
+@pytest.fixture(scope="module")
+def with_two() -> Recording:
+    rear = Mount("rear", "body", (-14.0, 0.3, 0.6), roll_rad=0.01)
+    return recorded(SecondImuSpec(rear, load_grade("lord_3dm_gx4_25"), clock_offset_s=0.0123456789))
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_a_second_imu_survives_with_its_clock_and_its_mount(recording, with_two, tmp_path, format):
+    """And what else is recorded is the same to the bit, with it and without."""
+    write_ride(with_two, tmp_path / "ride", format=format)
+    again = read_ride(tmp_path / "ride")
+    assert_same(with_two, again)
+    assert again.second_imu_sheet.spacing_m == pytest.approx(14.1, abs=5e-3)  # along the slope
+    assert again.second_imu.index[0] == with_two.imu.index[0] + 0.0123456789
+    assert_same(recording, replace(with_two, second_imu=None, second_imu_sheet=None))
+    short = beginning(with_two, samples=100)
+    assert (
+        short.second_imu.index[-1] <= short.imu.index[-1] < with_two.second_imu.index[len(short.second_imu)]
+    )
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_a_receiver_survives_and_blank_cells_are_no_sample(recording, tmp_path, format):
+    with_gnss = recorded(gnss=GnssSpec(rate_hz=5.0, outages=(Outage(30.0, 90.0),)))
+    write_ride(with_gnss, tmp_path / "ride", format=format)
+    again = read_ride(tmp_path / "ride")
+    assert_same(with_gnss, again)
+    blank = again.gnss["position_m"].isna()
+    assert 0 < blank.sum() < len(blank) and (blank == again.gnss["speed_mps"].isna()).all()
+    assert_same(recording, replace(with_gnss, gnss=None, gnss_sheet=None))
+    if format == "csv":
+        # A logger that has the speed alone, in km/h, and blanks for both.
+        lines = (tmp_path / "ride" / "gnss.csv").read_text(encoding="utf-8").splitlines()
+        assert any(line.endswith(",,") for line in lines)
+        text = (tmp_path / "ride" / "ride.toml").read_text(encoding="utf-8")
+        named = 'file = "gnss.csv"\ncolumns = { speed = "speed_mps" }\nunits = { speed = "km/h" }'
+        (tmp_path / "ride" / "ride.toml").write_text(
+            text.replace('file = "gnss.csv"', named), encoding="utf-8"
+        )
+        slow = read_ride(tmp_path / "ride").gnss["speed_mps"]
+        np.testing.assert_allclose(slow, with_gnss.gnss["speed_mps"] / 3.6)
+        (tmp_path / "ride" / "ride.toml").write_text(
+            text.replace("speed_sd_mps = 0.05", "speed_sd_mps = 0.0"), encoding="utf-8"
+        )
+        with pytest.raises(InputError, match=r"gnss\.sheet.*speed_sd_mps"):
+            read_ride(tmp_path / "ride")
+    nothing = with_gnss.gnss.drop(columns=["position_m", "speed_mps"])
+    with pytest.raises(InputError, match="neither a place nor a speed"):
+        check_recording(replace(with_gnss, gnss=nothing))
+
+
+def test_a_second_imu_that_cannot_be_is_refused(with_two, tmp_path):
+    write_ride(with_two, tmp_path / "ride", format="parquet")
+    text = (tmp_path / "ride" / "ride.toml").read_text(encoding="utf-8")
+    spacing = next(line for line in text.splitlines() if line.startswith("spacing_m"))
+    for stated, words in (
+        ("spacing_m = 13.0", "is not the distance on the drawing"),
+        ("spacing_m = -14.1", "is not the distance on the drawing"),
+        ('mount = "x"', "unknown key"),
+    ):
+        (tmp_path / "ride" / "ride.toml").write_text(text.replace(spacing, stated), encoding="utf-8")
+        with pytest.raises(InputError, match=words) as caught:
+            read_ride(tmp_path / "ride")
+        assert "second_imu" in str(caught.value) and "\n" not in str(caught.value)
+    # By the drawing, where nobody has said it.
+    (tmp_path / "ride" / "ride.toml").write_text(text.replace(spacing + "\n", ""), encoding="utf-8")
+    assert read_ride(tmp_path / "ride").second_imu_sheet.spacing_m == pytest.approx(14.1, abs=1e-9)
+    sheet = with_two.second_imu_sheet
+    with pytest.raises(InputError, match="too near to the first IMU"):
+        check_recording(replace(with_two, second_imu_sheet=replace(sheet, spacing_m=4.9)))
+    slow = replace(sheet, imu=replace(sheet.imu, rate_hz=125.0))
+    with pytest.raises(InputError, match="another rate than the first IMU"):
+        check_recording(replace(with_two, second_imu=with_two.second_imu.iloc[::2], second_imu_sheet=slow))
+    with pytest.raises(InputError, match="second_imu without its sheet"):
+        check_recording(replace(with_two, second_imu_sheet=None))
+    wild = with_two.second_imu.assign(accel_z_mps2=9810.0)
+    with pytest.raises(InputError, match=r"second_imu\.accel_z_mps2"):
+        check_recording(replace(with_two, second_imu=wild))
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
@@ -205,7 +293,8 @@ def test_every_frame_of_a_recording_is_a_signal():
     for signal in SIGNALS:
         form = next(
             p
-            for p in SignalPart.__subclasses__() + VectorPart.__subclasses__()
+            for part in (SignalPart, VectorPart, ImuSignalPart)
+            for p in part.__subclasses__()
             if p is not VectorPart and p.signal is signal
         )
         assert form.signal is signal

@@ -19,7 +19,7 @@ from simrail.report.pages.section import PageData
 from simrail.report.papers.claim import Claim, judged
 from simrail.report.papers.veillard_2016 import judges
 from simrail.report.papers.veillard_2016.figures import sharpest
-from simrail.report.papers.veillard_2016.judges import Evidence, beside_ours, errata
+from simrail.report.papers.veillard_2016.judges import OURS, Evidence, beside_ours, errata
 from simrail.report.papers.veillard_2016.lines import (
     FIGURES,
     PAPER,
@@ -263,7 +263,7 @@ def test_ours_is_said_to_lose_where_it_loses() -> None:
     )
     won = beside_ours(Evidence(planted(only("track_relative", "speed", -2.0), without=("curve_matched",))))
     assert "wins in speed" in won and "loses in speed" not in won
-    assert beside_ours(Evidence(planted(without=("track_relative", "curve_matched")))) == ""
+    assert beside_ours(Evidence(planted(without=OURS))) == ""
 
 
 def test_the_table_has_every_part_in_mg_and_the_range_of_the_distance() -> None:

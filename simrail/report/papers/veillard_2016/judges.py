@@ -201,9 +201,13 @@ def errata(seen: Evidence) -> list[str]:
     return [*notes, PAPER.written(PAPER.words["erratum_count"])]
 
 
+OURS = ("track_relative", "curve_matched", "zero_velocity", "bogie_delay")
+"""Parts that are methods of our own."""
+
+
 def beside_ours(seen: Evidence) -> str:
     """How our own methods do with the same IMU and no wheel; "" if none was run."""
-    own = [part for part in ("track_relative", "curve_matched") if seen.lines.has(part)]
+    own = [part for part in OURS if seen.lines.has(part)]
     if not own or not seen.lines.has("paper"):
         return ""
     compared = {

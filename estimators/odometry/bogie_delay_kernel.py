@@ -1,0 +1,307 @@
+"""Compiled search for the delay between two IMUs on two bogies.
+
+What one bogie feels, the next one feels once the train has run the distance L between them. With D(t) the
+way, the sample of the one behind at t has its counterpart ahead at t' where D(t') = D(t) - L. The shape of
+the speed over the last seconds is that of a filter; what is searched is a constant c that is added to it:
+
+    D(t') + c t' = D(t) + c t - L,      rho(c) = sum of b(t) a(t') / sqrt(sum of b(t)^2 sum of a(t')^2)
+
+over a window of the signal b behind and a ahead, both through the same band pass. The largest rho, and a
+parabola through it and its neighbours, give c. So a window may hold braking and setting off.
+
+The variance of c follows from rho and the band f1..f2. Of the delay between two signals of flat spectra, each
+in noise of its own, seen for W seconds (Cramer-Rao bound: A. H. Quazi, IEEE Trans. ASSP 29(3) (1981) 527-533,
+for signals that are not weak):
+
+    sd_delay^2 = 3 (1/rho^2 - 1) / (8 pi^2 W (f2^3 - f1^3))
+
+times (V^2/L)^2, with what two bogies that are not alike add.
+
+Not here: the row of the filter (`simrail.estimators.odometry.zero_velocity_kernel`).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from simrail.core.jit import FloatArray, njit_borrowed
+
+STEP_S = 2e-3
+"""Step of the search, as a delay: a fifth of the width of the peak that a band up to 60 Hz makes."""
+
+BESIDE, ALONE = 5, 0.8
+"""Another peak more than so many steps aside, and more than this share as high, leaves open which it is."""
+
+MOST_NODES, MOST_CANDIDATES = 300, 4001
+"""Steps that the way goes back, and steps of a search."""
+
+CRAWLING = 0.25
+"""Share of the least speed below which the train, seconds ago, had hardly left: there the shape is vague."""
+
+
+class Echo(NamedTuple):
+    """Two IMUs on a ride of k steps of a filter.
+
+    Attributes
+    ----------
+    first, second : ndarray (n,), (m,)
+        Their vertical forces through the band pass.
+    first_s, second_s : ndarray (n,), (m,)
+        Their stamps, each by its own clock.
+    rate_hz : float
+        Of both, about.
+    end_s : ndarray (k,)
+        Time at the end of each step, by the first clock.
+    spacing_m : float
+        How far the second is behind the first; below 0 for ahead.
+    every, window, stride : int
+        Steps from one search to the next; samples in a window, and every which of them is looked at.
+    window_s, lag_s : float
+        Length of the window; how late the band pass is: what it gives speaks of so long ago.
+    least_speed_mps, least_correlation : float
+        What a search asks for.
+    width_sds, width_mps : float
+        It goes so many standard deviations to either side, and this far at least.
+    delay_variance : float
+        sd_delay^2 / (1/rho^2 - 1), s^2.
+    floor_mps, floor_share : float
+        What two bogies that are not alike add to each: a speed, and a share of the speed.
+    unlike_s : float
+        Time within which what they add to all changes.
+    shared : float
+        Searches that look at the same sample: the variance of each is so many times larger.
+    """
+
+    first: FloatArray
+    second: FloatArray
+    first_s: FloatArray
+    second_s: FloatArray
+    rate_hz: float
+    end_s: FloatArray
+    spacing_m: float
+    every: int
+    window: int
+    stride: int
+    window_s: float
+    lag_s: float
+    least_speed_mps: float
+    least_correlation: float
+    width_sds: float
+    width_mps: float
+    delay_variance: float
+    floor_mps: float
+    floor_share: float
+    unlike_s: float
+    shared: float
+
+
+class Heard(NamedTuple):
+    """Room for a search, and what came of each.
+
+    Attributes
+    ----------
+    node_s, node_m : ndarray (q,)
+        Times of the last steps, the last first, and the way since.
+    rho : ndarray (r,)
+        Of each candidate.
+    searches : ndarray (k, 4)
+        By step: 1 if it was taken, 0 if not, -1 if none was made; c, m/s; rho; standard deviation of c.
+    """
+
+    node_s: FloatArray
+    node_m: FloatArray
+    rho: FloatArray
+    searches: FloatArray
+
+
+def room_to_hear(steps: int) -> Heard:
+    """Room for a ride of so many steps."""
+    searches = np.zeros((steps, 4))
+    searches[:, 0] = -1.0
+    return Heard(np.empty(MOST_NODES), np.empty(MOST_NODES), np.empty(MOST_CANDIDATES), searches)
+
+
+@njit_borrowed
+def search_delay(
+    echo: Echo,
+    heard: Heard,
+    k: int,
+    speed: float,
+    sd: float,
+    offset_s: float,
+    length: float,
+    acceleration: FloatArray,
+    step_s: float,
+) -> tuple[float, float]:
+    """What the delay adds to the speed at the end of step k, in its own direction, and the variance of that.
+
+    Parameters
+    ----------
+    echo, heard : Echo, Heard
+    k : int
+    speed, sd : float
+        Speed by the filter, signed; standard deviation of what is searched.
+    offset_s : float
+        How far the second clock is ahead.
+    length : float
+        Distance of both IMUs, > 0.
+    acceleration : ndarray (k,)
+        Of each step so far.
+    step_s : float
+        Length of a step.
+
+    Returns
+    -------
+    c, variance : float
+        Variance 0 where nothing was found.
+    """
+    forward = speed > 0.0
+    second_behind = forward == (echo.spacing_m > 0.0)
+    now = echo.end_s[k]
+    behind, ahead, behind_s, ahead_s = echo.first, echo.second, echo.first_s, echo.second_s
+    later_behind, later_ahead = echo.lag_s, echo.lag_s + offset_s
+    if second_behind:
+        behind, ahead, behind_s, ahead_s = echo.second, echo.first, echo.second_s, echo.first_s
+        later_behind, later_ahead = echo.lag_s + offset_s, echo.lag_s
+    # Nothing that is stamped later than this step has been seen, nor lies in the future of the filter.
+    last = _index_at(behind_s, min(now, now + later_behind), echo.rate_hz)
+    begin = last - echo.window + 1
+    if begin < 0:
+        return 0.0, 0.0
+    seen = _index_at(ahead_s, min(now, now + later_ahead), echo.rate_hz)
+    nodes = _way_back(echo, heard, k, speed, acceleration, step_s, behind_s[begin] - later_behind, length)
+    if nodes == 0:
+        return 0.0, 0.0
+    size = abs(speed)
+    step = STEP_S * size * size / length
+    sides = min(math.ceil(max(echo.width_sds * sd, echo.width_mps) / step), (heard.rho.shape[0] - 1) // 2)
+    best = 0
+    for i in range(2 * sides + 1):
+        heard.rho[i] = _correlation(
+            echo,
+            heard,
+            nodes,
+            (i - sides) * step,
+            length,
+            behind,
+            ahead,
+            behind_s,
+            ahead_s,
+            later_behind,
+            later_ahead,
+            begin,
+            last,
+            seen,
+        )
+        if heard.rho[i] > heard.rho[best]:
+            best = i
+    most = heard.rho[best]
+    heard.searches[k, 0], heard.searches[k, 2] = 0.0, most
+    if most < echo.least_correlation or best == 0 or best == 2 * sides:
+        return 0.0, 0.0
+    for i in range(1, 2 * sides):
+        is_peak = heard.rho[i] >= max(heard.rho[i - 1], heard.rho[i + 1])
+        if is_peak and abs(i - best) > BESIDE and heard.rho[i] > ALONE * most:
+            return 0.0, 0.0
+    left, right = heard.rho[best - 1], heard.rho[best + 1]
+    bend = left - 2.0 * most + right
+    c = (best - sides + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)) * step
+    by_noise = echo.delay_variance * (1.0 / (most * most) - 1.0) * (size * size / length) ** 2
+    variance = echo.shared * (by_noise + (echo.floor_mps + echo.floor_share * size) ** 2)
+    heard.searches[k, 1], heard.searches[k, 3] = c, math.sqrt(variance)
+    return c, variance
+
+
+@njit_borrowed
+def _index_at(stamps: FloatArray, time_s: float, rate_hz: float) -> int:
+    """Last sample whose stamp is not later than a time; -1 if there is none."""
+    n: int = stamps.shape[0]
+    i: int = min(max(int((time_s - stamps[0]) * rate_hz), 0), n - 1)
+    while i >= 0 and stamps[i] > time_s:
+        i -= 1
+    while i + 1 < n and stamps[i + 1] <= time_s:
+        i += 1
+    return i
+
+
+@njit_borrowed
+def _way_back(
+    echo: Echo,
+    heard: Heard,
+    k: int,
+    speed: float,
+    acceleration: FloatArray,
+    step_s: float,
+    begin_s: float,
+    length: float,
+) -> int:
+    """Way of the last steps, back from step k by the accelerations; how many, 0 if they do not reach.
+
+    They reach where the train had yet to run the distance of the IMUs, and some, to the window's begin.
+    """
+    sign = 1.0 if speed > 0.0 else -1.0
+    v, way, way_at_begin = sign * speed, 0.0, -1.0
+    heard.node_s[0], heard.node_m[0] = echo.end_s[k], 0.0
+    for q in range(1, min(heard.node_s.shape[0], k + 1)):
+        before = v - sign * acceleration[k + 1 - q] * step_s
+        if before < CRAWLING * echo.least_speed_mps:
+            return 0
+        way += 0.5 * (v + before) * step_s
+        v = before
+        heard.node_s[q], heard.node_m[q] = echo.end_s[k - q], way
+        if way_at_begin < 0.0 and heard.node_s[q] <= begin_s:
+            way_at_begin = way
+        if way_at_begin >= 0.0 and way > way_at_begin + 1.3 * length:
+            return q + 1
+    return 0
+
+
+@njit_borrowed
+def _correlation(
+    echo: Echo,
+    heard: Heard,
+    nodes: int,
+    c: float,
+    length: float,
+    behind: FloatArray,
+    ahead: FloatArray,
+    behind_s: FloatArray,
+    ahead_s: FloatArray,
+    later_behind: float,
+    later_ahead: float,
+    begin: int,
+    last: int,
+    seen: int,
+) -> float:
+    """rho(c) of the window begin..last; -1 where it reaches beyond what is known."""
+    now = heard.node_s[0]
+    both = squares = others = 0.0
+    here = there = 0
+    j = seen
+    for i in range(last, begin - 1, -echo.stride):
+        t = behind_s[i] - later_behind
+        while here < nodes - 2 and heard.node_s[here + 1] > t:
+            here += 1
+        share = (heard.node_s[here] - t) / (heard.node_s[here] - heard.node_s[here + 1])
+        way = heard.node_m[here] + share * (heard.node_m[here + 1] - heard.node_m[here])
+        way += c * (now - t) + length
+        low = heard.node_m[there] + c * (now - heard.node_s[there])
+        high = heard.node_m[there + 1] + c * (now - heard.node_s[there + 1])
+        while there < nodes - 2 and high < way:
+            there += 1
+            low, high = high, heard.node_m[there + 1] + c * (now - heard.node_s[there + 1])
+        if high < way or high <= low:
+            return -1.0
+        share = (way - low) / (high - low)
+        place = heard.node_s[there] + share * (heard.node_s[there + 1] - heard.node_s[there]) + later_ahead
+        while j >= 0 and ahead_s[j] > place:
+            j -= 1
+        if j < 0 or j + 1 > seen:
+            return -1.0
+        share = (place - ahead_s[j]) / (ahead_s[j + 1] - ahead_s[j])
+        value = ahead[j] + share * (ahead[j + 1] - ahead[j])
+        both += behind[i] * value
+        squares += behind[i] * behind[i]
+        others += value * value
+    return both / math.sqrt(squares * others) if squares > 0.0 and others > 0.0 else -1.0
