@@ -226,6 +226,8 @@ class Recording:
         Its data sheet.
     vehicle_sheet : VehicleSheet, optional
         The vehicle's drawing, and how far the train may be from it; None where nothing is known of it.
+    notes : tuple of str
+        What was done to its signals when they were read, one line each.
     """
 
     name: str
@@ -250,6 +252,7 @@ class Recording:
     odometer_sheet: OdometerSheet | None = None
     map_errors: MapErrors = UNSTATED
     vehicle_sheet: VehicleSheet | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def has_wheel(self) -> bool:
