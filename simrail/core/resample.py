@@ -179,8 +179,8 @@ def resample(
         )
     gaps = find_gaps(stamps, interval_s or (times[-1] - times[0]) / (len(times) - 1))
     refuse_long_gaps(gaps, longest_gap_s, what=what)
-    values = np.empty((len(times), frame.shape[1]))
-    for column, name in enumerate(frame.columns):
+    values: dict[str, FloatArray] = {}
+    for name in frame.columns:
         samples = frame[name].to_numpy(dtype=np.float64)
         if not np.isfinite(samples).all():
             raise InputError(
@@ -190,8 +190,8 @@ def resample(
                 limit="finite numbers",
                 remedy="drop that sample, so that it is a gap; nothing is filled in silently",
             )
-        values[:, column] = np.interp(times, stamps, samples)
-    return pd.DataFrame(values, index=pd.Index(times, name="time_s"), columns=frame.columns), gaps
+        values[name] = np.interp(times, stamps, samples)
+    return pd.DataFrame(values, index=pd.Index(times, name="time_s"), copy=False), gaps
 
 
 def refuse_long_gaps(gaps: pd.DataFrame, longest_gap_s: float, *, what: str = "imu") -> None:

@@ -19,11 +19,15 @@ WHEEL_JUMP_MPS = 60.0
 LEAST_JUMP = 4
 """Pulses below which a step is no jump: a late stamp may move a few from one step to the next."""
 
+LONE_JUMP_MPS, LONE_JUMP_MPS2 = 3.0, 30.0
+"""Speed that a wheel cannot have for one reading alone, beside 1.5 times that of the readings around it, and
+the acceleration that takes. A late reading has it, too, but the next one makes up for it."""
+
 FOLLOWED = 0.45
 """Share of the modulus up to which a step tells its direction: beyond half of it, it is a step back."""
 
 COMMON = (
-    *(2**bits for bits in (8, 10, 12, 14, 15, 16, 20, 24, 31, 32, 48)),
+    *(2**bits for bits in (*range(8, 33), 48)),
     *(10**digits for digits in (3, 4, 5, 6, 7, 8, 9)),
 )
 """Moduli that devices have, so that one jump is enough to know them."""
@@ -128,7 +132,13 @@ def _jumps(counts: np.ndarray, step: np.ndarray, time: FloatArray, m_per_pulse: 
         return np.empty(0, dtype=np.int64)
     interval = 1.0 / rate_of(time)
     speed = step * m_per_pulse / np.maximum(np.diff(time), interval)
-    far = np.abs(speed - _local_median(speed)) > WHEEL_JUMP_MPS
+    usual = _local_median(speed)
+    off = speed - usual
+    far = np.abs(off) > WHEEL_JUMP_MPS
+    least = np.maximum(LONE_JUMP_MPS, LONE_JUMP_MPS2 * interval)
+    around = np.convolve(off, np.ones(5), mode="same")
+    lone = (np.abs(off) > np.maximum(least, 1.5 * np.abs(usual))) & (np.abs(around) > 0.7 * np.abs(off))
+    far |= lone & (np.abs(step) > 2 * LEAST_JUMP)
     # A short modulus: its steps are possible speeds, but they span the range, again and again.
     span = float(np.ptp(counts))
     wide = (np.abs(step) > 0.5 * span) & (span >= 16)

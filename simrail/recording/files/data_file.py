@@ -173,19 +173,13 @@ def read_columns(
     texts = [data.column(name) for name in text]
     unique = list(dict.fromkeys(called))
     if data.layout is None:
-        read = _read_parquet(data.path, unique, texts)
+        read = {name: _parquet_column(data.path, name, is_text=name in texts) for name in unique}
     else:
         part = data.part
         read = read_text(
             data.path, data.layout, unique, separator=part.separator, decimal=part.decimal, text=texts
         )
-    columns: dict[str, FloatArray | pd.Series] = {}
-    for name, column in zip(wanted, called, strict=True):
-        if column in texts:
-            columns[name] = read.column(column).to_pandas()
-        else:
-            columns[name] = read.column(column).to_numpy().astype(np.float64, copy=False)
-    return columns
+    return {name: read[column] for name, column in zip(wanted, called, strict=True)}
 
 
 def near(word: str, known: Sequence[str]) -> str | None:
@@ -195,18 +189,20 @@ def near(word: str, known: Sequence[str]) -> str | None:
     return f"did you mean {folded[close[0]]!r}?" if close else None
 
 
-def _read_parquet(path: Path, wanted: list[str], text: Sequence[str]) -> pa.Table:
+def _parquet_column(path: Path, name: str, *, is_text: bool) -> FloatArray | pd.Series:
     try:
-        table = pq.read_table(path, columns=wanted)
+        column = pq.read_table(path, columns=[name]).column(name)
     except (OSError, ValueError) as error:
         raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
-    for name in wanted:
-        kind = table.schema.field(name).type
-        if name not in text and not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-            raise InputError(
-                "holds no numbers", file=label(path), field=name, value=str(kind), limit="numbers"
-            )
-    return table
+    if is_text:
+        series: pd.Series = column.to_pandas()
+        return series
+    if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
+        raise InputError(
+            "holds no numbers", file=label(path), field=name, value=str(column.type), limit="numbers"
+        )
+    numbers: FloatArray = column.to_numpy().astype(np.float64, copy=False)
+    return numbers
 
 
 def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
@@ -217,6 +213,14 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             field=where,
             value=name,
             remedy="rename them, or give the number of the column",
+        )
+    below = _names_below(name, data)
+    if below is not None:
+        return InputError(
+            f"{file} has the column names in line {below + 1}, below other text",
+            field=f"{table}.skip_lines",
+            value=part.skip_lines,
+            remedy=f"set skip_lines = {below}",
         )
     other = next((mark for mark in _SEPARATORS if mark != part.separator and mark in "".join(found)), None)
     if len(found) == 1 and other and data.named:
@@ -245,16 +249,29 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
     )
 
 
+def _names_below(name: str, data: DataFile) -> int | None:
+    """Number, from 0, of a line below the first ones that holds the name of a column."""
+    if data.layout is None or not data.named or name.isdecimal():
+        return None
+    with data.path.open(encoding="utf-8-sig", errors="replace") as file:
+        for number, line in enumerate(islice(file, MOST_TEXT)):
+            fields = split(line.rstrip("\n"), data.part.separator)
+            if (
+                number >= data.part.skip_lines
+                and len(fields) > 1
+                and name in fields
+                and name not in data.names
+            ):
+                return number
+    return None
+
+
 def _elsewhere(name: str, data: DataFile, table: str) -> str | None:
-    """Where a missing column may be: below text at the top, or in another file of the same folder."""
-    part, layout = data.part, data.layout
-    if layout is None:
+    """Another file of the same folder that has the column, as a remedy."""
+    part = data.part
+    if data.layout is None or name.isdecimal():
         return None
     try:
-        with data.path.open(encoding="utf-8-sig") as file:
-            for number, line in enumerate(islice(file, MOST_TEXT)):
-                if number >= layout.data_line and name in split(line.rstrip("\n"), part.separator):
-                    return f"for text above the column names set skip_lines = {number}"
         for path in sorted(data.path.parent.glob(f"*{data.path.suffix}"))[:MOST_FILES]:
             other = layout_of(path, separator=part.separator, skip_lines=0, units_row=None)
             if path != data.path and other.named and name in other.names:

@@ -56,6 +56,9 @@ WAY_GAP_S = 1.0
 SLOW_INTERVALS = 3.0
 """A signal that is slower than the longest gap may be silent for this many of its own intervals."""
 
+SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
+"""Rates of IMUs; beyond them the unit of the time stamps is wrong."""
+
 ASIDE = ("magnetometer", "rail_displacement", "odometry")
 """Signals that are given at the IMU's times."""
 
@@ -199,6 +202,14 @@ def _uniform(
     """A frame at uniform times, its rate, and the gaps that were bridged (None if there were none)."""
     time = imu.index.to_numpy()
     measured = rate_of(time)
+    if not SLOWEST_HZ <= measured <= FASTEST_HZ:
+        raise InputError(
+            "the time stamps are of no IMU's rate",
+            field="imu.units.time",
+            value=f"{measured:.4g} Hz",
+            limit=f"{SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz",
+            remedy="give the unit of the time stamps: s, ms, us, ns, epoch_s, epoch_ms, ...",
+        )
     stated = spec.imu.rate_hz or (spec.imu.sheet.rate_hz if spec.imu.sheet else None)
     if stated is not None and abs(measured / stated - 1.0) > 0.01:
         raise InputError(
@@ -310,8 +321,10 @@ def _going_on(
     )
     if found.times:
         counts = counts.assign(pulse_count=found.counts)
+        times = "once" if found.times == 1 else f"{found.times} times"
+        known = modulus is not None or found.modulus & (found.modulus - 1) == 0
+        more = "" if known else " (if that is another number, give counter_modulus)"
         reader.notes.append(
-            f"{field}: the counter begins anew after {found.modulus} pulses, "
-            f"{'once' if found.times == 1 else f'{found.times} times'}; its counts go on"
+            f"{field}: the counter begins anew after {found.modulus} pulses, {times}; its counts go on{more}"
         )
     return counts

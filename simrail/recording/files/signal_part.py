@@ -76,15 +76,15 @@ class SignalPart(DataPart):
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
         quantities = {quantity.key: quantity for quantity in self.signal.quantities}
-        keys = [*quantities, *(["time"] if self.signal.timed else [])]
         tables: dict[str, Iterable[str]] = {
             "columns": self.columns,
             "units": self.units,
             "lsb_per_unit": self.lsb_per_unit,
         }
         for field, table in tables.items():
+            keys = [*quantities, *(["time"] if self.signal.timed and field != "lsb_per_unit" else [])]
             for key in table:
-                if key not in keys or (field == "lsb_per_unit" and key == "time"):
+                if key not in keys:
                     raise InputError(
                         "unknown key",
                         field=f"{field}.{key}",

@@ -125,7 +125,7 @@ class SignalReader:
         elif signal.timed:
             assert part.rate_hz is not None
             time = part.start_s + np.arange(size) / part.rate_hz
-        columns = {key: [np.asarray(read[name]) for name in group] for key, group in names.items()}
+        columns = {key: [_own(read, name, wanted) for name in group] for key, group in names.items()}
         return _Rows(data, columns, names, time, times[0] if times else "time", stamped, size)
 
     def _framed(self, rows: _Rows, part: SignalPart, signal: Signal, table: str) -> pd.DataFrame:
@@ -171,6 +171,12 @@ class SignalReader:
     def _note(self, text: str) -> None:
         if text not in self.notes:
             self.notes.append(text)
+
+
+def _own(read: dict[str, FloatArray | pd.Series], name: str, wanted: list[str]) -> FloatArray:
+    """A column, which is scaled in place: a copy where it is wanted twice, or belongs to the file."""
+    values = np.asarray(read[name])
+    return values if wanted.count(name) == 1 and values.flags.writeable else values.copy()
 
 
 def _has_nan(columns: dict[str, list[FloatArray]], signal: Signal) -> bool:
@@ -233,8 +239,11 @@ def _si(
     unit = part.units.get(quantity.key, next(iter(quantity.units)))
     multiply, divide = (quantity.units | quantity.increments)[unit.removeprefix("-")]
     divide *= part.lsb_per_unit.get(quantity.key, 1.0)
-    scaled = values if multiply == divide else values * multiply / divide
-    return -scaled if unit.startswith("-") else scaled
+    # In place: a long ride is held once.
+    if multiply != divide:
+        np.multiply(values, multiply, out=values)
+        np.divide(values, divide, out=values)
+    return np.negative(values, out=values) if unit.startswith("-") else values
 
 
 def _turned(device: list[FloatArray], part: VectorPart) -> list[FloatArray]:

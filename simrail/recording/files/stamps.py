@@ -121,7 +121,7 @@ def _counted_on(count: FloatArray, table: str, name: str, notes: list[str]) -> F
     """A counter of time that goes on where it began anew; as it is, if it did not."""
     step = np.diff(count)
     back = np.flatnonzero(step < 0.0)
-    if not len(back) or len(back) > FEW_STEPS_BACK * len(step) + 1:
+    if not len(back) or 3 * len(back) > len(step):
         return count
     usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
     scales = (1.0,) if np.array_equal(count, np.rint(count)) else ()
@@ -193,8 +193,11 @@ def lost_share(time: FloatArray) -> float:
 
 def _shared(time: FloatArray, first: int, count: int, file: str, field: str) -> InputError:
     starts = np.concatenate([[True], np.diff(time) != 0.0])
-    last = len(time) - int(np.flatnonzero(starts)[-1])
-    rate = (len(time) - last) / (time[-1] - time[0]) if time[-1] > time[0] else np.nan
+    begins = np.flatnonzero(starts)
+    # The first group may be the end of one.
+    first_whole = begins[1] if len(begins) > 2 else begins[0]
+    seconds = time[-1] - time[first_whole]
+    rate = (begins[-1] - first_whole) / seconds if seconds > 0.0 else np.nan
     rate = round(rate) if abs(rate / max(round(rate), 1) - 1.0) < 2e-3 else rate
     return InputError(
         f"has duplicate time stamps at sample {first + 1} ({count} such samples), though the samples differ",

@@ -13,10 +13,13 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 
 from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
 from simrail.core.toml_files import label
 
 COMMENTS = ("#", "%", "//")
@@ -28,7 +31,26 @@ MOST_TEXT = 200
 MOST_UNIT_ROWS = 5
 """Lines of text (units, descriptions, kinds) that may stand between the names and the data."""
 
-NULLS = ("", "NaN", "nan", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL", "None", "--")
+BLOCK_BYTES = 1 << 20
+"""Text that is parsed at a time."""
+
+NULLS = (
+    "",
+    "NaN",
+    "nan",
+    "NAN",
+    "-nan",
+    "NA",
+    "N/A",
+    "n/a",
+    "#N/A",
+    "null",
+    "NULL",
+    "None",
+    "-",
+    "--",
+    "---",
+)
 _PADDED_NULLS = [
     *(before + word for before in ("", " ") for word in NULLS),
     *(" " * count for count in range(2, 13)),
@@ -119,8 +141,8 @@ def split(line: str, separator: str) -> list[str]:
 
 def read_text(
     path: Path, layout: Layout, wanted: Sequence[str], *, separator: str, decimal: str, text: Sequence[str]
-) -> pa.Table:
-    """Read columns of a text file, and no others.
+) -> dict[str, FloatArray | pd.Series]:
+    """Read columns of a text file, and no others, block by block: the memory is that of the columns.
 
     Parameters
     ----------
@@ -135,6 +157,11 @@ def read_text(
     text : sequence of str
         Those of the columns that are kept as text.
 
+    Returns
+    -------
+    dict of str to ndarray (n,) or pandas.Series
+        By name: float64, or text.
+
     Raises
     ------
     InputError
@@ -147,25 +174,65 @@ def read_text(
     convert = pa_csv.ConvertOptions(
         column_types=types, include_columns=list(wanted), decimal_point=decimal, null_values=_PADDED_NULLS
     )
-    empty = pa.table({name: pa.array([], type=types[name]) for name in wanted})
+    blocks = path.stat().st_size // BLOCK_BYTES + 2
     if separator != " ":
-        read = pa_csv.ReadOptions(skip_rows=layout.data_line, column_names=names, use_threads=False)
+        read = pa_csv.ReadOptions(
+            skip_rows=layout.data_line, column_names=names, use_threads=False, block_size=BLOCK_BYTES
+        )
         try:
-            return pa_csv.read_csv(path, read, parse, convert)
-        except pa.ArrowInvalid as error:
-            if "Empty CSV" in str(error):
-                return empty
-    # Comments between the data, or several blanks: once more, line by line.
-    read = pa_csv.ReadOptions(column_names=names, use_threads=False)
+            return _blocks_read(path, read, parse, convert, types, blocks)
+        except pa.ArrowInvalid:
+            pass  # comments between the data, or some lines that end in a separator: once more, line by line
+    read = pa_csv.ReadOptions(column_names=names, use_threads=False, block_size=BLOCK_BYTES)
     try:
         with path.open("rb") as file:
-            return pa_csv.read_csv(
-                _Cleaned(file, layout.data_line, blanks=separator == " "), read, parse, convert
-            )
+            return _blocks_read(_Cleaned(file, layout, separator), read, parse, convert, types, blocks)
     except pa.ArrowInvalid as error:
-        if "Empty CSV" in str(error):
-            return empty
         raise _bad_text(str(error), path, layout, separator, decimal) from None
+
+
+def _blocks_read(
+    source: "Path | _Cleaned",
+    read: pa_csv.ReadOptions,
+    parse: pa_csv.ParseOptions,
+    convert: pa_csv.ConvertOptions,
+    types: dict[str, pa.DataType],
+    blocks: int,
+) -> dict[str, FloatArray | pd.Series]:
+    columns = {name: _Column(kind == pa.float64()) for name, kind in types.items()}
+    try:
+        with pa_csv.open_csv(source, read, parse, convert) as reader:
+            for batch in reader:
+                for name, column in columns.items():
+                    column.add(batch.column(name).to_numpy(zero_copy_only=False), blocks)
+    except pa.ArrowInvalid as error:
+        if "Empty CSV" not in str(error):
+            raise
+    return {name: column.whole() for name, column in columns.items()}
+
+
+class _Column:
+    """A column that grows by blocks, in one array: parts to be joined would take its memory twice."""
+
+    def __init__(self, is_number: bool) -> None:
+        self._is_number = is_number
+        self._values = np.empty(0, dtype=np.float64 if is_number else object)
+        self._count = 0
+
+    def add(self, block: FloatArray, blocks: int) -> None:
+        """Append a block, of about so many in all."""
+        needed = self._count + len(block)
+        if needed > len(self._values):
+            # Memory that is not written to is not taken: too much is no loss.
+            wider = np.empty(max(needed, len(block) * blocks, 3 * self._count // 2), dtype=self._values.dtype)
+            wider[: self._count] = self._values[: self._count]
+            self._values = wider
+        self._values[self._count : needed] = block
+        self._count = needed
+
+    def whole(self) -> FloatArray | pd.Series:
+        values = self._values[: self._count]
+        return values if self._is_number else pd.Series(values, dtype=object)
 
 
 def line_number(path: Path, layout: Layout, row: int) -> int:
@@ -180,12 +247,12 @@ def line_number(path: Path, layout: Layout, row: int) -> int:
 
 
 class _Cleaned(io.RawIOBase):
-    """The data lines of a text file as bytes, without comments; if wanted, with one blank between values."""
+    """The data lines of a text file as bytes: no comments, one blank for several, as many fields as names."""
 
-    def __init__(self, file: io.BufferedReader, data_line: int, *, blanks: bool) -> None:
-        for _ in range(data_line):
+    def __init__(self, file: io.BufferedReader, layout: Layout, separator: str) -> None:
+        for _ in range(layout.data_line):
             file.readline()
-        self._blocks = _clean_blocks(file, blanks=blanks)
+        self._blocks = _clean_blocks(file, separator.encode(), len(layout.names))
         self._rest = b""
 
     def readable(self) -> bool:
@@ -200,13 +267,22 @@ class _Cleaned(io.RawIOBase):
         return count
 
 
-def _clean_blocks(file: io.BufferedReader, *, blanks: bool) -> Iterator[bytes]:
+def _clean_blocks(file: io.BufferedReader, separator: bytes, width: int) -> Iterator[bytes]:
     while lines := file.readlines(1 << 18):
         kept = [line for line in lines if _holds_data(line)]
-        if blanks:
+        if separator == b" ":
             kept = [b" ".join(line.split()) + b"\n" for line in kept]
+        elif any(line.count(separator) != width - 1 for line in kept):
+            kept = [_fitted(line.rstrip(b"\r\n"), separator, width) + b"\n" for line in kept]
         if kept:
             yield b"".join(kept)
+
+
+def _fitted(line: bytes, separator: bytes, width: int) -> bytes:
+    """A line without the empty fields at its end that no name stands above."""
+    while line.count(separator) > width - 1 and line.endswith(separator):
+        line = line[: -len(separator)]
+    return line
 
 
 def _holds_data(line: bytes) -> bool:
