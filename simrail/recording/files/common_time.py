@@ -51,7 +51,8 @@ def common_time(imu: pd.DataFrame, signals: Mapping[str, pd.DataFrame], notes: l
     refuse_little(time, within, signals)
     late = [name for name, frame in signals.items() if frame.index[0] > time[0] or frame.index[-1] < time[-1]]
     notes.append(_shortened(time, within, late))
-    return imu.loc[within]
+    cut: pd.DataFrame = imu.loc[within]
+    return cut
 
 
 def refuse_little(time: FloatArray, within: np.ndarray, signals: Mapping[str, pd.DataFrame]) -> None:
