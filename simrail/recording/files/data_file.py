@@ -1,4 +1,4 @@
-"""Columns of numbers from a data file, CSV or Parquet, as a logger wrote it.
+"""Columns of numbers from a data file as a logger wrote it: text, Parquet, HDF5, MATLAB, MCAP, rosbag.
 
 Reads the columns that are asked for by name, as float64 exactly as printed, and refuses what is not there
 or no number, with the line of the file. What the columns mean is said by the ride file
@@ -6,23 +6,34 @@ or no number, with the line of the file. What the columns mean is said by the ri
 """
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 from pydantic import Field, field_validator
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import Part, label
+from simrail.recording.files.bag_file import open_bag
+from simrail.recording.files.table_file import Read, Table, open_hdf5, open_mat, open_parquet
 from simrail.recording.files.text_file import MOST_TEXT, Layout, layout_of, line_number, read_text, split
 
-TEXTS, TABLES = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq")
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+TABLES: dict[str, Callable[[Path], Table]] = {
+    ".parquet": open_parquet,
+    ".pq": open_parquet,
+    ".h5": open_hdf5,
+    ".hdf5": open_hdf5,
+    ".mat": open_mat,
+    ".mcap": open_bag,
+    ".db3": open_bag,
+    ".bag": open_bag,
+}
+"""Kinds of files that are no text, and what opens them."""
+
 MOST_FILES = 50
 """Files of a folder that are looked into for a missing column."""
 
@@ -35,7 +46,7 @@ class DataPart(Part):
     Attributes
     ----------
     file : str
-        Path, seen from the folder of the ride file; ``.parquet``, or text.
+        Path, seen from the folder of the ride file; what it is is seen from its ending, see `TABLES`.
     separator : str
         What stands between two values; a blank stands for any number of blanks and tabs.
     decimal : str
@@ -55,11 +66,11 @@ class DataPart(Part):
     @field_validator("file")
     @classmethod
     def _known_kind(cls, value: str) -> str:
-        if Path(value).suffix.lower() not in TEXTS + TABLES:
+        if Path(value).suffix.lower() not in [*TEXTS, *TABLES]:
             raise InputError(
-                "is neither CSV nor Parquet",
+                "is of no kind that is read",
                 value=value,
-                limit="a name that ends in " + ", ".join(TEXTS + TABLES),
+                limit="a name that ends in " + ", ".join([*TEXTS, *TABLES]),
                 remedy="export the logger's file as CSV",
             )
         return value
@@ -79,12 +90,15 @@ class DataFile:
         Its columns, in order; their numbers from 1 on where it has no line of names.
     layout : Layout, optional
         How it is laid out, if it is text.
+    read : callable, optional
+        Reads its columns, if it is none.
     """
 
     path: Path
     part: DataPart
     names: tuple[str, ...]
     layout: Layout | None = None
+    read: Read | None = None
 
     @property
     def named(self) -> bool:
@@ -130,10 +144,8 @@ def open_data(part: DataPart, folder: Path, *, table: str) -> DataFile:
             remedy="mend the path; it is seen from the folder of the ride file",
         )
     if path.suffix.lower() in TABLES:
-        try:
-            return DataFile(path, part, tuple(pq.read_schema(path).names))
-        except (OSError, ValueError) as error:
-            raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
+        table_file = TABLES[path.suffix.lower()](path)
+        return DataFile(path, part, table_file.names, read=table_file.read)
     layout = layout_of(path, separator=part.separator, skip_lines=part.skip_lines, units_row=part.units_row)
     return DataFile(path, part, layout.names, layout)
 
@@ -172,12 +184,13 @@ def read_columns(
     called = [data.column(name) for name in wanted]
     texts = [data.column(name) for name in text]
     unique = list(dict.fromkeys(called))
-    if data.layout is None:
-        read = {name: _parquet_column(data.path, name, is_text=name in texts) for name in unique}
+    if data.read is not None:
+        read = data.read(unique, texts)
     else:
-        part = data.part
+        part, layout = data.part, data.layout
+        assert layout is not None
         read = read_text(
-            data.path, data.layout, unique, separator=part.separator, decimal=part.decimal, text=texts
+            data.path, layout, unique, separator=part.separator, decimal=part.decimal, text=texts
         )
     return {name: read[column] for name, column in zip(wanted, called, strict=True)}
 
@@ -187,22 +200,6 @@ def near(word: str, known: Sequence[str]) -> str | None:
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
     return f"did you mean {folded[close[0]]!r}?" if close else None
-
-
-def _parquet_column(path: Path, name: str, *, is_text: bool) -> FloatArray | pd.Series:
-    try:
-        column = pq.read_table(path, columns=[name]).column(name)
-    except (OSError, ValueError) as error:
-        raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
-    if is_text:
-        series: pd.Series = column.to_pandas()
-        return series
-    if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
-        raise InputError(
-            "holds no numbers", file=label(path), field=name, value=str(column.type), limit="numbers"
-        )
-    numbers: FloatArray = column.to_numpy().astype(np.float64, copy=False)
-    return numbers
 
 
 def _no_such_column(name: str, data: DataFile, table: str) -> InputError:

@@ -175,7 +175,7 @@ class SignalReader:
 
 def _own(read: dict[str, FloatArray | pd.Series], name: str, wanted: list[str]) -> FloatArray:
     """A column, which is scaled in place: a copy where it is wanted twice, or belongs to the file."""
-    values = np.asarray(read[name])
+    values = np.asarray(read[name], dtype=np.float64)
     return values if wanted.count(name) == 1 and values.flags.writeable else values.copy()
 
 
