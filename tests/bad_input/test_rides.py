@@ -135,7 +135,7 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
             ('time = "ms"               ', 'time = "s" '),
             ('units = { time = "ms" }', 'units = { time = "s" }'),
         ),
-        ["gap", "imu.time_s", "longest_gap_s"],
+        ["imu.units.time", "no IMU's rate", "0.1 Hz", "ms"],
     ),
     # axes
     "upside_down": (

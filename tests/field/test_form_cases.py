@@ -169,6 +169,7 @@ def test_26_increments_without_names_apart_by_blanks(base: Recording, tmp_path: 
     np.testing.assert_allclose(found.imu[[*GYRO]], known[[*GYRO]], rtol=0.0, atol=1.1e-5)
     np.testing.assert_allclose(found.imu[[*ACCEL]], known[[*ACCEL]], rtol=0.0, atol=2e-4)
     assert "increments of gyro are taken as means over 50 ms" in notes_of(found)
+    assert found.imu_sheet.lag_s == pytest.approx(0.025, rel=1e-6)  # a mean up to the stamp is half of it old
 
 
 def test_27_gyroscope_and_accelerometer_in_files_of_their_own(base: Recording, tmp_path: Path) -> None:

@@ -153,7 +153,7 @@ def _numbers(message: Any, path: str) -> Iterator[tuple[str, float | int]]:
             (_, seconds), (_, rest) = _members(value)
             yield place, 10**9 * int(seconds) + int(rest)
         elif isinstance(value, bool | int | float | np.number):
-            yield place, value
+            yield place, float(value)
         else:
             yield from _numbers(value, place)
 
@@ -166,4 +166,6 @@ def _value(message: Any, place: str) -> float | int:
     if _is_stamp(current):
         (_, seconds), (_, rest) = _members(current)
         return 10**9 * int(seconds) + int(rest)
-    return current if isinstance(current, int | float) else float("nan")
+    if isinstance(current, int):
+        return current
+    return float(current) if isinstance(current, float | np.number) else float("nan")

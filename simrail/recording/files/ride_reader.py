@@ -111,7 +111,7 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
     recording = Recording(
         name=spec.name,
         imu=imu,
-        imu_sheet=replace(_sheet(spec.imu, folder), rate_hz=rate_hz),
+        imu_sheet=_sheet_at(spec.imu, folder, rate_hz),
         mount=spec.imu.name,
         mount_body=spec.imu.body,
         mount_position_m=spec.imu.position_m,
@@ -229,6 +229,12 @@ def _uniform(
     grid = uniform_times(float(time[0]), float(time[-1]), rate)
     sampled, gaps = resample(imu, grid, longest_gap_s=longest_gap_s)
     return sampled, rate, gaps if len(gaps) else None
+
+
+def _sheet_at(part: ImuSignalPart, folder: Path, rate_hz: float) -> ImuSheet:
+    """The sheet at the rate of the file; an increment, a mean up to its stamp, is half an interval old."""
+    sheet = replace(_sheet(part, folder), rate_hz=rate_hz)
+    return replace(sheet, lag_s=max(sheet.lag_s, 0.5 / rate_hz)) if part.increments else sheet
 
 
 def _sheet(part: ImuSignalPart, folder: Path) -> ImuSheet:
