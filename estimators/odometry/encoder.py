@@ -141,7 +141,8 @@ class EncoderOdometry:
 
 def _frame(states: FloatArray, times: FloatArray, start_m: float, scale_sd: float) -> pd.DataFrame:
     """The odometry of states and variances (n, 6), whose way has a scale of relative sd `scale_sd`."""
-    states[:, 3:] = np.sqrt(states[:, 3:] + (scale_sd * states[:, :3]) ** 2)
+    for k in range(3):  # one after another: of a ride of hours, all at once would be held three times
+        states[:, 3 + k] = np.sqrt(states[:, 3 + k] + (scale_sd * states[:, k]) ** 2)
     states[:, 0] += start_m
     return pd.DataFrame(states, index=pd.Index(times, name="time_s"), columns=[*ODOMETRY, *ODOMETRY_SD])
 

@@ -15,6 +15,7 @@ from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
+from simrail.recording.files.ned import Frame, in_ned
 from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
 from simrail.ride.truth import Truth
 from simrail.scenario.cells import Cell, cell_record, first_cells
@@ -37,6 +38,7 @@ def export(
     draw: int = 0,
     truth: bool = False,
     contact: bool = False,
+    axes: Frame = "flu",
     watcher: Watcher | None = None,
 ) -> list[str]:
     """Write every recording of a scenario, for one draw of track and sensors.
@@ -55,6 +57,9 @@ def export(
         Writes the true motion of the mount at the IMU's times beside each recording, too.
     contact : bool
         Writes the forces between wheels and rails beside each recording, too: one file per wheel.
+    axes : {"flu", "ned"}
+        Axes of body and ground: simrail's own, or FRD and NED (`simrail.recording.files.ned`), named in the
+        columns.
     watcher : Watcher, optional
         Is told of the progress.
 
@@ -93,9 +98,10 @@ def export(
                 recording = record_cell(cell, motion, parts)
                 name = names[cell.number]
                 (draft / name).mkdir()
-                write_parts(recording, draft / name, format=format)
+                write_parts(recording, draft / name, format=format, axes=axes)
                 if truth:
                     true = truth_at_imu(motion, recording)
+                    true = true if axes == "flu" else in_ned(true)
                     write_frame(true, draft / name / f"{TRUTH_STEM}.{format}", format=format)
                 if contact:
                     _write_contact(motion, draft / name / CONTACT_FOLDER, format=format)

@@ -10,6 +10,7 @@ from simrail.cli.options import DONE, Form, Scenario, Seed, Settings, number
 from simrail.core.errors import InputError, one_of
 
 if TYPE_CHECKING:
+    from simrail.recording.files.ned import Frame
     from simrail.recording.files.ride_writer import Format
 
 
@@ -25,6 +26,12 @@ def export(
         bool,
         typer.Option("--contact", help="Write the forces between wheels and rails, a file per wheel, too."),
     ] = False,
+    frame: Annotated[
+        str,
+        typer.Option(
+            "--frame", metavar="flu|ned", help="Axes: forward, left, up, or FRD of the body and NED."
+        ),
+    ] = "flu",
     seed: Seed = None,
     settings: Settings = None,
 ) -> int:
@@ -35,10 +42,12 @@ def export(
     from simrail.campaign.progress import ProgressWatcher
     from simrail.scenario.scenario import load_scenario
 
+    one_of(frame, ("flu", "ned"), "no such axes", field="--frame")
+    axes = cast("Frame", frame)
     chosen, read = _format(form), load_scenario(scenario, overrides=settings or [], seed=seed)
     with ProgressWatcher(Console(stderr=True)) as watcher:
         names = export_scenario(
-            read, out, format=chosen, draw=draw, truth=truth, contact=contact, watcher=watcher
+            read, out, format=chosen, draw=draw, truth=truth, contact=contact, axes=axes, watcher=watcher
         )
     print(f"wrote {number(len(names), 'recording')} into {out}:")
     for name in names:

@@ -24,6 +24,12 @@ LONGEST_GAP_S = 0.1
 """Longest gap that is bridged unless said otherwise: a train's body moves at about 1 Hz, so a tenth of a
 second of it is still nearly a straight line; of an axle's vibrations nothing is recovered."""
 
+JUMP_S = 60.0
+"""From here on a step of the time stamps is called a jump of the clock, not a gap of so many samples."""
+
+MOST_LOST = 0.05
+"""Largest share of the samples that may be missing: more straight lines than that are no recording."""
+
 GAPS = ("start_s", "end_s", "missing")
 """Columns of a frame of gaps: last stamp before, first stamp after, samples missing between (int64)."""
 
@@ -130,6 +136,7 @@ def resample(
     *,
     longest_gap_s: float = LONGEST_GAP_S,
     what: str = "imu",
+    interval_s: float | None = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Interpolate signals linearly at uniform times.
 
@@ -144,6 +151,8 @@ def resample(
         Longest distance of two stamps that is bridged.
     what : str
         How messages call the signal.
+    interval_s : float, optional
+        Interval of the frame's own samples, which tells what is a gap; that of `times` if not given.
 
     Returns
     -------
@@ -166,12 +175,12 @@ def resample(
             field=f"{what}.time_s",
             value=[float(times[0]), float(times[-1])],
             limit=f"from {stamps[0]:.9g} to {stamps[-1]:.9g} s, the first and last time stamp",
-            remedy="resample within the recorded time",
+            remedy=f"cut to {max(stamps[0], times[0]):.9g} ... {min(stamps[-1], times[-1]):.9g} s",
         )
-    gaps = find_gaps(stamps, (times[-1] - times[0]) / (len(times) - 1))
+    gaps = find_gaps(stamps, interval_s or (times[-1] - times[0]) / (len(times) - 1))
     refuse_long_gaps(gaps, longest_gap_s, what=what)
-    values = np.empty((len(times), frame.shape[1]))
-    for column, name in enumerate(frame.columns):
+    values: dict[str, FloatArray] = {}
+    for name in frame.columns:
         samples = frame[name].to_numpy(dtype=np.float64)
         if not np.isfinite(samples).all():
             raise InputError(
@@ -181,8 +190,8 @@ def resample(
                 limit="finite numbers",
                 remedy="drop that sample, so that it is a gap; nothing is filled in silently",
             )
-        values[:, column] = np.interp(times, stamps, samples)
-    return pd.DataFrame(values, index=pd.Index(times, name="time_s"), columns=frame.columns), gaps
+        values[name] = np.interp(times, stamps, samples)
+    return pd.DataFrame(values, index=pd.Index(times, name="time_s"), copy=False), gaps
 
 
 def refuse_long_gaps(gaps: pd.DataFrame, longest_gap_s: float, *, what: str = "imu") -> None:
@@ -197,11 +206,51 @@ def refuse_long_gaps(gaps: pd.DataFrame, longest_gap_s: float, *, what: str = "i
     too_long = np.flatnonzero(length > longest_gap_s * (1.0 + 1e-9))
     if len(too_long):
         gap = gaps.iloc[int(too_long[0])]
+        seconds = float(gap["end_s"] - gap["start_s"])
         more = f" (and {len(too_long) - 1} more such gaps)" if len(too_long) > 1 else ""
+        if seconds > JUMP_S:
+            raise InputError(
+                f"the clock jumps by {_spoken(seconds)}{more}",
+                field=f"{what}.time_s",
+                value=f"{seconds:.9g} s after time_s = {gap['start_s']:.9g}",
+                limit=f"longest_gap_s = {longest_gap_s:g} s",
+                remedy="cut the recording there and give each part a ride file; or, if no samples are lost, "
+                "leave time out and give rate_hz",
+            )
         raise InputError(
             f"has a gap of {gap['missing']:.0f} samples that is too long to bridge{more}",
             field=f"{what}.time_s",
-            value=f"{gap['end_s'] - gap['start_s']:.6g} s after time_s = {gap['start_s']:.9g}",
+            value=f"{seconds:.6g} s after time_s = {gap['start_s']:.9g}",
             limit=f"longest_gap_s = {longest_gap_s:g} s",
-            remedy="cut the recording there; or raise longest_gap_s, knowing that a straight line fills it",
+            remedy=f"cut the recording there; or raise {what.partition('.')[0]}.longest_gap_s, knowing that "
+            "nothing was measured in it",
         )
+
+
+def refuse_many_lost(gaps: pd.DataFrame, samples: int, *, what: str = "imu") -> None:
+    """Refuse a recording that lacks more than `MOST_LOST` of its samples.
+
+    Raises
+    ------
+    InputError
+        Naming the share.
+    """
+    missing = float(gaps["missing"].sum())
+    share = missing / (missing + samples)
+    if share > MOST_LOST:
+        raise InputError(
+            f"lacks {missing:.0f} samples, in {len(gaps)} gaps",
+            field=f"{what}.time_s",
+            value=f"{100.0 * share:.3g} % of all",
+            limit=f"{100.0 * MOST_LOST:g} %",
+            remedy="mend the logger, or cut the recording; if no samples are lost and the stamps are those "
+            "of packets, leave time out and give rate_hz",
+        )
+
+
+def _spoken(seconds: float) -> str:
+    """A long time in the unit that people use for it."""
+    for unit, size in (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.4g} s"

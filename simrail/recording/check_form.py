@@ -105,7 +105,8 @@ def check_recording(recording: Recording) -> None:
         At the first of: a missing column; a value that is no number; time stamps that are not
         increasing, or not uniform in the IMU; a device without its sheet; values beyond `LIMITS`
         (degrees?); a field that is not as large as the Earth's; an IMU rate other than its sheet's; two
-        IMUs of different rates, or too near to each other; a frame at other times than the IMU's that belongs there.
+        IMUs of different rates, or too near to each other; a frame at other times than the IMU's that belongs
+        there.
     """
     frames = {name: getattr(recording, name) for name in COLUMNS_OF}
     frames = {name: frame for name, frame in frames.items() if frame is not None}

@@ -296,6 +296,8 @@ class Recording(Shown):
         place of the antenna along the map, and speed, NaN where there is none.
     gnss_sheet : GnssSheet, optional
         What is known of the receiver.
+    notes : tuple of str
+        What was done to its signals when they were read, one line each.
     """
 
     name: str
@@ -324,6 +326,7 @@ class Recording(Shown):
     second_imu_sheet: SecondImuSheet | None = None
     gnss: pd.DataFrame | None = None
     gnss_sheet: GnssSheet | None = None
+    notes: tuple[str, ...] = ()
 
     def _facts(self) -> Facts:
         aiding = {

@@ -4,7 +4,7 @@ Reading and writing go over this list, so a new signal of `Recording` is one ent
 `simrail.recording.files.ride_file.RideFile`. No data here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi
 
 from simrail.core.columns import (
@@ -26,6 +26,7 @@ Factor = tuple[float, float]
 _DEGREE = (pi, 180.0)
 
 TIMES: dict[str, Factor] = {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "ns": (1.0, 1e9)}
+ANGLES: dict[str, Factor] = {"rad": (1.0, 1.0), "deg": _DEGREE, "mrad": (1.0, 1e3), "urad": (1.0, 1e6)}
 RATES: dict[str, Factor] = {"rad/s": (1.0, 1.0), "deg/s": _DEGREE, "deg/h": (pi, 180.0 * 3600.0)}
 FORCES: dict[str, Factor] = {
     "m/s2": (1.0, 1.0),
@@ -41,6 +42,7 @@ FIELDS: dict[str, Factor] = {
     "nT": (1.0, 1e9),
     "G": (1.0, 1e4),
 }
+IMPULSES: dict[str, Factor] = {"m/s": (1.0, 1.0), "mm/s": (1.0, 1e3)}
 COUNTS: dict[str, Factor] = {"1": (1.0, 1.0)}
 
 
@@ -60,6 +62,8 @@ class Quantity:
         True if it is a whole number.
     required : bool
         False for a column that a recording may lack; it alone may hold NaN.
+    increments : dict of str to Factor
+        Units in which a file may give what a sample adds to its integral, rather than the quantity.
     """
 
     key: str
@@ -67,6 +71,7 @@ class Quantity:
     units: dict[str, Factor]
     whole: bool = False
     required: bool = True
+    increments: dict[str, Factor] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -98,8 +103,13 @@ def _alone(column: str, units: dict[str, Factor], *, whole: bool = False) -> Qua
     return Quantity(column, (column,), units, whole=whole)
 
 
-IMU_SIGNAL = Signal("imu", (Quantity("gyro", GYRO, RATES), Quantity("accel", ACCEL, FORCES)))
-SECOND_IMU_SIGNAL = Signal("second_imu", IMU_SIGNAL.quantities)
+_GYRO = Quantity("gyro", GYRO, RATES, increments=ANGLES)
+_ACCEL = Quantity("accel", ACCEL, FORCES, increments=IMPULSES)
+IMU_SIGNAL = Signal("imu", (_GYRO, _ACCEL))
+SECOND_IMU_SIGNAL = Signal("second_imu", (_GYRO, _ACCEL))
+IMU_SENSORS = (Signal("imu", (_GYRO,)), Signal("imu", (_ACCEL,)))
+"""Gyroscope and accelerometer of an IMU apart, as loggers that give each a file of its own have them."""
+
 ENCODER_SIGNAL = Signal(
     "encoder",
     (

@@ -17,7 +17,7 @@ from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import blame, existing_file, label
-from simrail.recording.files.data_file import DataPart, line_of, near, read_columns
+from simrail.recording.files.data_file import DataPart, near, open_data, read_columns
 from simrail.recording.files.signal_part import Names
 from simrail.scenario.axes import Listed
 from simrail.scenario.measured_header import recognise
@@ -158,7 +158,8 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
         part = _by_name(part, path, notes)
     here = part.model_copy(update={"file": path.name})
     names = [name for column in part.columns.values() for name in column]
-    columns = read_columns(here, path.parent, names, table="irregularity.measured")
+    data = open_data(here, path.parent, table="irregularity.measured")
+    columns = read_columns(data, names, table="irregularity.measured")
     read = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
     with blame(label(path)):
         if not len(read[names[0]]):
@@ -174,7 +175,7 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
             replaces_spectrum=part.instead_of_spectrum,
             partial=part.partial,
             has_cant=part.cross_level_has_cant,
-            where=lambda i: line_of(here, i),
+            where=data.place,
         )
     return replace(rails, notes=(*notes, *_band_notes(part, rails)))
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label
-from simrail.recording.files.data_file import TABLES, DataPart, column_names
+from simrail.recording.files.data_file import TABLES, DataPart, open_data
 
 _RAILS = (
     ("level", r"ll|longitudinal ?level|(vertical )?profile|level|top"),
@@ -64,7 +64,7 @@ def recognise(path: Path) -> Recognised:
     """
     separator, decimal = _layout(path)
     part = DataPart(file=path.name, separator=separator, decimal=decimal)
-    names = column_names(part, path.parent, table="irregularity.measured")
+    names = open_data(part, path.parent, table="irregularity.measured").names
     columns: dict[str, tuple[str, ...]] = {}
     units: dict[str, tuple[str, ...]] = {}
     bands, unused = set(), []

@@ -172,7 +172,7 @@ class IrregularityPart(Part):
 
     @property
     def _names_file(self) -> bool:
-        return Path(str(self.spectrum)).suffix.lower() in TEXTS + TABLES
+        return Path(str(self.spectrum)).suffix.lower() in (*TEXTS, *TABLES)
 
 
 class StopPart(Part):

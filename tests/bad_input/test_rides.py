@@ -135,7 +135,7 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
             ('time = "ms"               ', 'time = "s" '),
             ('units = { time = "ms" }', 'units = { time = "s" }'),
         ),
-        ["gap", "imu.time_s", "longest_gap_s"],
+        ["imu.units.time", "no IMU's rate", "0.1 Hz", "ms"],
     ),
     # axes
     "upside_down": (
@@ -192,7 +192,7 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
     "empty_file": (raw(lambda t: ""), [DATA, "is empty"]),
     "header_only": (raw(lambda t: t.split("\n")[0] + "\n"), [DATA, "too short", "0 samples"]),
     "no_file": (lambda folder: (folder / DATA).unlink(), ["imu.file", DATA, "no such file"]),
-    "other_kind": (text((f'"{DATA}"', '"ride.mat"')), ["imu.file", "ride.mat", "neither CSV nor Parquet"]),
+    "other_kind": (text((f'"{DATA}"', '"ride.xls"')), ["imu.file", "ride.xls", "no kind that is read"]),
     "binary": (lambda folder: (folder / DATA).write_bytes(b"\xff\xfe\x00\x93") and None, [DATA, "UTF-8"]),
     "nan": (put(123, "wy", ""), [DATA, "wy", "line 125", "nan", "drop"]),
     "infinite": (put(123, "ax", "inf"), [DATA, "ax", "line 125", "inf"]),

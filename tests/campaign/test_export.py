@@ -18,6 +18,7 @@ from simrail.campaign.cell import record_cell
 from simrail.campaign.export import CONTACT_FOLDER, TRUTH_STEM, export
 from simrail.cli.main import BAD_INPUT, DONE, call
 from simrail.core.columns import CONTACT, ENCODER, IMU, MOTION, ODOMETRY, ODOMETRY_SD
+from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import shipped
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.recording import Recording
@@ -100,6 +101,29 @@ roll_deg = 3.0
         again = read_ride(here / "out" / name)
         assert again.mount == cell.imu.name and again.imu_sheet.grade == cell.imu.grade
         assert_same(recorded(scenario, cell), again)
+
+
+def test_the_truth_in_ned_is_the_same_motion(here: Path) -> None:
+    """Turned by half a turn about X: the rotation of the body is the same one, told in other axes."""
+    order = ["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal", "--truth"]
+    assert call([*order, "--out", "flu"]) == DONE and call([*order, "--frame", "ned", "--out", "ned"]) == DONE
+    own, ned = (
+        pd.read_csv(here / axes / "out_axle_ideal" / "truth_not_part_of_the_recording.csv")
+        for axes in ("flu", "ned")
+    )
+    half_turn = np.diag([1.0, -1.0, -1.0])
+    attitude = rotation_matrix(own[["roll_rad", "pitch_rad", "yaw_rad"]].to_numpy())
+    turned = rotation_matrix(ned[["roll_ned_rad", "pitch_ned_rad", "yaw_ned_rad"]].to_numpy())
+    np.testing.assert_allclose(turned, half_turn @ attitude @ half_turn, rtol=0.0, atol=1e-15)
+    for old, new in (
+        ("velocity_{}_mps", "velocity_{}_ned_mps"),
+        ("accel_{}_mps2", "accel_{}_frd_mps2"),
+        ("{}_m", "{}_ned_m"),
+    ):
+        vectors = own[[old.format(axis) for axis in "xyz"]].to_numpy() @ half_turn
+        np.testing.assert_array_equal(ned[[new.format(axis) for axis in "xyz"]].to_numpy(), vectors)
+    np.testing.assert_array_equal(ned["position_m"], own["position_m"])  # along the track
+    assert call([*order, "--frame", "enu", "--out", "x"]) == BAD_INPUT and not (here / "x").exists()
 
 
 def test_columns_of_the_files_are_those_of_the_vocabulary(here: Path) -> None:

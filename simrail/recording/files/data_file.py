@@ -1,66 +1,125 @@
-"""Columns of numbers from a data file, CSV or Parquet, as a logger wrote it.
+"""Columns of numbers from a data file as a logger wrote it: text, Parquet, HDF5, MATLAB, MCAP, rosbag.
 
 Reads the columns that are asked for by name, as float64 exactly as printed, and refuses what is not there
 or no number, with the line of the file. What the columns mean is said by the ride file
 (`simrail.recording.files.signal_part`).
 """
 
-import csv
 import difflib
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.csv as pa_csv
-import pyarrow.parquet as pq
 from pydantic import Field, field_validator
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import Part, label
+from simrail.recording.files.bag_file import open_bag
+from simrail.recording.files.table_file import Read, Table, open_hdf5, open_mat, open_parquet
+from simrail.recording.files.text_file import MOST_TEXT, Layout, layout_of, line_number, read_text, split
 
-TEXTS, TABLES = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq")
-_SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+TABLES: dict[str, Callable[[Path], Table]] = {
+    ".parquet": open_parquet,
+    ".pq": open_parquet,
+    ".h5": open_hdf5,
+    ".hdf5": open_hdf5,
+    ".mat": open_mat,
+    ".mcap": open_bag,
+    ".db3": open_bag,
+    ".bag": open_bag,
+}
+"""Kinds of files that are no text, and what opens them."""
+
+MOST_FILES = 50
+"""Files of a folder that are looked into for a missing column."""
+
+_SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blank"}
 
 
 class DataPart(Part):
-    """A data file, and how its text is laid out; the last three are for CSV only.
+    """A data file, and how its text is laid out; all but the first are for text only.
 
     Attributes
     ----------
     file : str
-        Path, seen from the folder of the ride file; ``.parquet``, or text.
+        Path, seen from the folder of the ride file; what it is is seen from its ending, see `TABLES`.
     separator : str
-        What stands between two values.
+        What stands between two values; a blank stands for any number of blanks and tabs.
     decimal : str
         ``"."`` or ``","``.
     skip_lines : int
-        Lines before the line of column names.
+        Lines at the top that are passed over; comments (``#``, ``%``, ``//``) are, anyway.
+    units_row : bool, optional
+        Whether a row of units follows the line of column names; found out where nothing is said.
     """
 
     file: str
     separator: str = Field(default=",", min_length=1, max_length=1)
     decimal: str = Field(default=".", pattern=r"^[.,]$")
     skip_lines: int = Field(default=0, ge=0, le=1000)
+    units_row: bool | None = None
 
     @field_validator("file")
     @classmethod
     def _known_kind(cls, value: str) -> str:
-        if Path(value).suffix.lower() not in TEXTS + TABLES:
+        if Path(value).suffix.lower() not in [*TEXTS, *TABLES]:
             raise InputError(
-                "is neither CSV nor Parquet",
+                "is of no kind that is read",
                 value=value,
-                limit="a name that ends in " + ", ".join(TEXTS + TABLES),
+                limit="a name that ends in " + ", ".join([*TEXTS, *TABLES]),
                 remedy="export the logger's file as CSV",
             )
         return value
 
 
-def column_names(part: DataPart, folder: Path, *, table: str) -> list[str]:
-    """Names of the columns of a data file.
+@dataclass(frozen=True)
+class DataFile:
+    """A data file that is there, and the names of its columns.
+
+    Attributes
+    ----------
+    path : Path
+        Where it is.
+    part : DataPart
+        What the ride file says of it.
+    names : tuple of str
+        Its columns, in order; their numbers from 1 on where it has no line of names.
+    layout : Layout, optional
+        How it is laid out, if it is text.
+    read : callable, optional
+        Reads its columns, if it is none.
+    """
+
+    path: Path
+    part: DataPart
+    names: tuple[str, ...]
+    layout: Layout | None = None
+    read: Read | None = None
+
+    @property
+    def named(self) -> bool:
+        """Whether the columns have names."""
+        return self.layout is None or self.layout.named
+
+    def column(self, name: str) -> str:
+        """The name of a column, which may be given as its number, from 1 on, where no column is called so."""
+        if name not in self.names and name.isdecimal() and 1 <= int(name) <= len(self.names):
+            return self.names[int(name) - 1]
+        return name
+
+    def place(self, row: int) -> str:
+        """Where a row of data, counted from 0, stands in the file, in words."""
+        if self.layout is None:
+            return f"row {row}"
+        return f"line {line_number(self.path, self.layout, row)}"
+
+
+def open_data(part: DataPart, folder: Path, *, table: str) -> DataFile:
+    """Find a data file, and the names of its columns.
 
     Parameters
     ----------
@@ -85,39 +144,21 @@ def column_names(part: DataPart, folder: Path, *, table: str) -> list[str]:
             remedy="mend the path; it is seen from the folder of the ride file",
         )
     if path.suffix.lower() in TABLES:
-        try:
-            return list(pq.read_schema(path).names)
-        except (OSError, ValueError) as error:
-            raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as text:
-            for _ in range(part.skip_lines):
-                text.readline()
-            line = text.readline()
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from None
-    except UnicodeDecodeError:
-        raise InputError("is not UTF-8 text", file=label(path), remedy="save the file as UTF-8") from None
-    if not line.strip():
-        raise InputError(
-            "is empty" if not part.skip_lines else "has no line of column names",
-            file=label(path),
-            remedy="write the column names in one line, then one line per sample",
-        )
-    return [name.strip() for name in next(csv.reader([line.strip("\r\n")], delimiter=part.separator))]
+        table_file = TABLES[path.suffix.lower()](path)
+        return DataFile(path, part, table_file.names, read=table_file.read)
+    layout = layout_of(path, separator=part.separator, skip_lines=part.skip_lines, units_row=part.units_row)
+    return DataFile(path, part, layout.names, layout)
 
 
 def read_columns(
-    part: DataPart, folder: Path, names: Sequence[str], *, table: str, text: Sequence[str] = ()
+    data: DataFile, names: Sequence[str], *, table: str, text: Sequence[str] = ()
 ) -> dict[str, FloatArray | pd.Series]:
     """Read columns by name.
 
     Parameters
     ----------
-    part : DataPart
-        Which file, and its layout.
-    folder : Path
-        Folder of the ride file.
+    data : DataFile
+        Which file.
     names : sequence of str
         Columns to read.
     table : str
@@ -136,31 +177,22 @@ def read_columns(
         If a column is not there (naming near ones), a field is no number, or a line has too few or too
         many fields.
     """
-    found = column_names(part, folder, table=table)
-    path = folder / part.file
-    for name in dict.fromkeys(names):
-        if found.count(name) != 1:
-            raise _no_such_column(name, found, part, table, label(path))
     wanted = list(dict.fromkeys(names))
-    if path.suffix.lower() in TABLES:
-        read = _read_parquet(path, wanted, text)
-    else:
-        read = _read_csv(path, part, found, wanted, text)
-    columns: dict[str, FloatArray | pd.Series] = {}
     for name in wanted:
-        column = read.column(name)
-        if name in text:
-            columns[name] = column.to_pandas()
-        else:
-            columns[name] = column.to_numpy().astype(np.float64)
-    return columns
-
-
-def line_of(part: DataPart, sample: int) -> str:
-    """Where a sample stands in its file, in words."""
-    if Path(part.file).suffix.lower() in TABLES:
-        return f"row {sample}"
-    return f"line {sample + part.skip_lines + 2}"
+        if data.names.count(data.column(name)) != 1:
+            raise _no_such_column(name, data, table)
+    called = [data.column(name) for name in wanted]
+    texts = [data.column(name) for name in text]
+    unique = list(dict.fromkeys(called))
+    if data.read is not None:
+        read = data.read(unique, texts)
+    else:
+        part, layout = data.part, data.layout
+        assert layout is not None
+        read = read_text(
+            data.path, layout, unique, separator=part.separator, decimal=part.decimal, text=texts
+        )
+    return {name: read[column] for name, column in zip(wanted, called, strict=True)}
 
 
 def near(word: str, known: Sequence[str]) -> str | None:
@@ -170,87 +202,39 @@ def near(word: str, known: Sequence[str]) -> str | None:
     return f"did you mean {folded[close[0]]!r}?" if close else None
 
 
-def _read_csv(
-    path: Path, part: DataPart, found: list[str], wanted: list[str], text: Sequence[str]
-) -> pa.Table:
-    types = {name: pa.string() if name in text else pa.float64() for name in wanted}
-    # Columns that are not read may have any name, also none or a double one.
-    unique = [name if name in types else f"unread {i}" for i, name in enumerate(found)]
-    try:
-        return pa_csv.read_csv(
-            path,
-            read_options=pa_csv.ReadOptions(
-                skip_rows=part.skip_lines + 1, column_names=unique, use_threads=False
-            ),
-            parse_options=pa_csv.ParseOptions(delimiter=part.separator),
-            convert_options=pa_csv.ConvertOptions(
-                column_types=types,
-                include_columns=wanted,
-                decimal_point=part.decimal,
-                null_values=["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null"],
-            ),
-        )
-    except pa.ArrowInvalid as error:
-        said = str(error)
-        if "Empty CSV" in said:
-            return pa.table({name: pa.array([], type=types[name]) for name in wanted})
-        raise _bad_text(said, path, part, found) from None
-
-
-def _bad_text(said: str, path: Path, part: DataPart, found: list[str]) -> InputError:
-    """What is wrong with the text, from what the parser says of it."""
-    row = re.search(r"Row #(\d+)", said)
-    line = f" in line {row[1]}" if row else ""
-    value = re.search(r"invalid value '(.*)'", said)
-    if value:
-        number = re.search(r"CSV column #(\d+)", said)
-        column = found[int(number[1])] if number and int(number[1]) < len(found) else None
-        remedy = "drop that line, so that it is a gap; or mend it"
-        if "," in value[1] and part.decimal == ".":
-            remedy = 'set decimal = ","'
-        return InputError(
-            f"holds no number{line}", file=label(path), field=column, value=value[1], remedy=remedy
-        )
-    count = re.search(r"Expected (\d+) columns, got (\d+)", said)
-    if count:
-        return InputError(
-            f"has another number of fields{line} than in the line of column names",
-            file=label(path),
-            value=int(count[2]),
-            limit=count[1],
-            remedy="mend that line; for text above the column names set skip_lines, for another separator "
-            "than a comma set separator",
-        )
-    return InputError(f"cannot be read as CSV: {said}", file=label(path))
-
-
-def _read_parquet(path: Path, wanted: list[str], text: Sequence[str]) -> pa.Table:
-    try:
-        table = pq.read_table(path, columns=wanted)
-    except (OSError, ValueError) as error:
-        raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
-    for name in wanted:
-        kind = table.schema.field(name).type
-        if name not in text and not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-            raise InputError(
-                "holds no numbers", file=label(path), field=name, value=str(kind), limit="numbers"
-            )
-    return table
-
-
-def _no_such_column(name: str, found: list[str], part: DataPart, table: str, file: str) -> InputError:
-    where = f"{table}.columns"
+def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
+    found, part, file, where = data.names, data.part, label(data.path), f"{table}.columns"
     if name in found:
         return InputError(
-            f"{file} has several columns of this name", field=where, value=name, remedy="rename them"
+            f"{file} has several columns of this name",
+            field=where,
+            value=name,
+            remedy="rename them, or give the number of the column",
+        )
+    below = _names_below(name, data)
+    if below is not None:
+        return InputError(
+            f"{file} has the column names in line {below + 1}, below other text",
+            field=f"{table}.skip_lines",
+            value=part.skip_lines,
+            remedy=f"set skip_lines = {below}",
         )
     other = next((mark for mark in _SEPARATORS if mark != part.separator and mark in "".join(found)), None)
-    if len(found) == 1 and other:
+    if len(found) == 1 and other and data.named:
         return InputError(
             f"{file} has one column only, whose name holds a {_SEPARATORS[other]}",
             field=f"{table}.separator",
             value=part.separator,
             remedy=f"set separator = {other!r}".replace("'", '"'),
+        )
+    if not data.named:
+        return InputError(
+            f"{file} has no line of column names",
+            field=where,
+            value=name,
+            limit=f"a number from 1 to {len(found)}",
+            remedy="give the numbers of the columns, e.g. time = 1, gyro = [2, 3, 4]"
+            + (", and the separator" if len(found) == 1 else ""),
         )
     listed = ", ".join(found[:20]) + (", ..." if len(found) > 20 else "")
     return InputError(
@@ -258,5 +242,38 @@ def _no_such_column(name: str, found: list[str], part: DataPart, table: str, fil
         field=where,
         value=name,
         limit=f"one of {listed}",
-        remedy=near(name, found) or f"name it in [{table}.columns]",
+        remedy=_elsewhere(name, data, table) or near(name, found) or f"name it in [{table}.columns]",
     )
+
+
+def _names_below(name: str, data: DataFile) -> int | None:
+    """Number, from 0, of a line below the first ones that holds the name of a column."""
+    if data.layout is None or not data.named or name.isdecimal():
+        return None
+    with data.path.open(encoding="utf-8-sig", errors="replace") as file:
+        for number, line in enumerate(islice(file, MOST_TEXT)):
+            fields = split(line.rstrip("\n"), data.part.separator)
+            if (
+                number >= data.part.skip_lines
+                and len(fields) > 1
+                and name in fields
+                and name not in data.names
+            ):
+                return number
+    return None
+
+
+def _elsewhere(name: str, data: DataFile, table: str) -> str | None:
+    """Another file of the same folder that has the column, as a remedy."""
+    part = data.part
+    if data.layout is None or name.isdecimal():
+        return None
+    try:
+        for path in sorted(data.path.parent.glob(f"*{data.path.suffix}"))[:MOST_FILES]:
+            other = layout_of(path, separator=part.separator, skip_lines=0, units_row=None)
+            if path != data.path and other.named and name in other.names:
+                own = f"{table}.gyro or {table}.accel" if table == "imu" else table
+                return f'{path.name} has it: name that file in [{own}], file = "{path.name}"'
+    except (InputError, OSError, UnicodeDecodeError):
+        return None
+    return None

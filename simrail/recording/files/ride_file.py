@@ -6,14 +6,14 @@ of each signal; `simrail.recording.files.ride_reader` reads the data.
 """
 
 from dataclasses import replace
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from simrail.core.errors import InputError
 from simrail.core.resample import LONGEST_GAP_S
-from simrail.core.toml_files import Part
-from simrail.recording.files.signal_part import SignalPart, VectorPart
+from simrail.core.toml_files import Part, blame, judge
+from simrail.recording.files.signal_part import TICKS, SignalPart, VectorPart
 from simrail.recording.recording import (
     EncoderSheet,
     GnssSheet,
@@ -28,6 +28,7 @@ from simrail.recording.signals import (
     ENCODER_SIGNAL,
     GAPS_SIGNAL,
     GNSS_SIGNAL,
+    IMU_SENSORS,
     IMU_SIGNAL,
     MAGNETOMETER_SIGNAL,
     ODOMETER_SIGNAL,
@@ -39,11 +40,57 @@ from simrail.recording.signals import (
 from simrail.track.map_file import MapErrorsPart
 
 
+class SensorPart(Part):
+    """``[imu.gyro]``, ``[imu.accel]``: what one sensor of an IMU has of its own; all else is as in ``[imu]``.
+
+    Attributes
+    ----------
+    file, separator, decimal, skip_lines, units_row
+        As `DataPart`.
+    columns, units, lsb_per_unit, tick_rate_hz, rate_hz, start_s
+        As `SignalPart`.
+    axes, roll_deg, pitch_deg, yaw_deg
+        As `VectorPart`.
+    """
+
+    file: str | None = None
+    separator: str | None = None
+    decimal: str | None = None
+    skip_lines: int | None = None
+    units_row: bool | None = None
+    columns: dict[str, Any] | None = None
+    units: dict[str, str] | None = None
+    lsb_per_unit: dict[str, float] | None = None
+    tick_rate_hz: float | None = None
+    rate_hz: float | None = None
+    start_s: float | None = None
+    axes: tuple[str, str, str] | None = None
+    roll_deg: float | None = None
+    pitch_deg: float | None = None
+    yaw_deg: float | None = None
+
+
+class GyroPart(VectorPart):
+    """The gyroscope of an IMU, apart."""
+
+    signal: ClassVar[Signal] = IMU_SENSORS[0]
+
+
+class AccelPart(VectorPart):
+    """The accelerometer of an IMU, apart."""
+
+    signal: ClassVar[Signal] = IMU_SENSORS[1]
+
+
 class ImuSignalPart(VectorPart):
     """``[imu]``: the IMU, where it sits, and its data sheet (one of three ways to give it).
 
     Attributes
     ----------
+    gyro, accel : SensorPart, optional
+        What each of its sensors has of its own: a file, columns, units, axes.
+    output : str, optional
+        ``"increments"`` if samples are turns in rad and gains of speed in m/s; such units say so, too.
     name, body : str
         Name of the IMU, and of the body that carries it.
     position_m : tuple of float
@@ -62,6 +109,10 @@ class ImuSignalPart(VectorPart):
 
     signal: ClassVar[Signal] = IMU_SIGNAL
 
+    file: str = ""
+    gyro: SensorPart | None = None
+    accel: SensorPart | None = None
+    output: Literal["rates", "increments"] | None = None
     name: str = "imu"
     body: str
     position_m: tuple[float, float, float]
@@ -69,6 +120,51 @@ class ImuSignalPart(VectorPart):
     grade: str | None = None
     datasheet: ImuFile | None = None
     sheet: ImuSheet | None = None
+
+    @model_validator(mode="after")
+    def _output_as_units(self) -> Self:
+        sensors = {key: getattr(self, key) for key in ("gyro", "accel")}
+        if not self.file and not all(part is not None and part.file for part in sensors.values()):
+            raise InputError(
+                "is required", field="file", remedy="add it, here or in [imu.gyro] and [imu.accel]"
+            )
+        for key, unit in (("gyro", "rad"), ("accel", "m/s")) if self.output == "increments" else ():
+            self.units.setdefault(key, unit)
+        rates = [key for key in sensors if key not in self.increments]
+        if self.output is not None and bool(rates) != (self.output == "rates"):
+            raise InputError(
+                "does not go with the units",
+                field="output",
+                value=self.output,
+                limit='units of increments, e.g. "rad" and "m/s"'
+                if rates
+                else 'units of rates, e.g. "rad/s"',
+                remedy="mend units.gyro and units.accel, or leave output out",
+            )
+        for key, kind in (("gyro", GyroPart), ("accel", AccelPart)):
+            with blame(None, key):
+                self.sensor(key, kind)
+        return self
+
+    def sensor(self, key: str, kind: type[VectorPart]) -> VectorPart:
+        """What is said of one of the sensors, with what it shares with the other.
+
+        Parameters
+        ----------
+        key : str
+            ``"gyro"`` or ``"accel"``.
+        kind : type
+            `GyroPart` or `AccelPart`.
+        """
+        shared = {name: getattr(self, name) for name in kind.model_fields if name in self.model_fields_set}
+        own: SensorPart | None = getattr(self, key)
+        said = {} if own is None else own.model_dump(exclude_none=True)
+        for name in ("columns", "units", "lsb_per_unit"):
+            mine = {word: value for word, value in shared.get(name, {}).items() if word in (key, "time")}
+            shared[name] = mine | said.pop(name, {})
+        if "tick_rate_hz" in shared and shared["units"].get("time") != TICKS:
+            shared.pop("tick_rate_hz")
+        return judge(kind, shared | said, file=None)
 
     @model_validator(mode="after")
     def _one_sheet(self) -> Self:
@@ -90,8 +186,8 @@ class SecondImuSignalPart(ImuSignalPart):
     Attributes
     ----------
     spacing_m : float, optional
-        How far it sits behind the first IMU along the train, m; from the drawing, where there is one and it is
-        not given.
+        How far it sits behind the first IMU along the train, m; from the drawing, where there is one and it
+        is not given.
     spacing_sd_m, clock_offset_sd_s : float
         Standard deviations of that, m, and of how far its clock is ahead, s.
     """
@@ -113,6 +209,8 @@ class EncoderSignalPart(SignalPart):
         What the train knows of it.
     reverse : bool
         True if the logger counts up while the train runs towards smaller s.
+    counter_modulus : int, optional
+        Pulses after which the counter begins anew; found out where nothing is said.
     radius_relative_sd : float, optional
         That of the sheet, where the sheet does not say it.
     """
@@ -121,6 +219,7 @@ class EncoderSignalPart(SignalPart):
 
     sheet: EncoderSheet
     reverse: bool = False
+    counter_modulus: Annotated[int, Field(ge=16)] | None = None
     radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
 
     @field_validator("sheet")
@@ -292,7 +391,7 @@ class RideFile(Part):
     gravity_mps2 : float
         Local gravity.
     longest_gap_s : float
-        Longest gap in a signal that is bridged by a straight line.
+        Longest gap in a signal that is bridged, unless its own table says otherwise.
     map : MapErrorsPart, optional
         How wrong the track file may be; taken to be wide without it.
     vehicle_sheet : VehicleSheetPart, optional

@@ -15,6 +15,7 @@ import pyarrow.csv as pa_csv
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
 from simrail.core.toml_files import toml_text
+from simrail.recording.files.ned import Frame, in_ned, ned_table
 from simrail.recording.files.ride_reader import RIDE_FILE
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.vehicle_sheet_file import vehicle_sheet_table
@@ -27,7 +28,7 @@ Format = Literal["csv", "parquet"]
 TRACK_FILE = "track.toml"
 
 
-def write_ride(recording: Recording, folder: Path, *, format: Format = "csv") -> None:
+def write_ride(recording: Recording, folder: Path, *, format: Format = "csv", axes: Frame = "flu") -> None:
     """Write a recording into a new folder; it appears whole or not at all.
 
     Parameters
@@ -38,6 +39,8 @@ def write_ride(recording: Recording, folder: Path, *, format: Format = "csv") ->
         Must not exist yet; its parents are made.
     format : str
         ``"csv"`` or ``"parquet"``: the form of the signals.
+    axes : {"flu", "ned"}
+        Axes of the signals: simrail's own, or forward, right, down, named in the columns.
 
     Raises
     ------
@@ -46,7 +49,7 @@ def write_ride(recording: Recording, folder: Path, *, format: Format = "csv") ->
     """
     refuse_existing(folder)
     with draft_of(folder) as draft:
-        write_parts(recording, draft, format=format)
+        write_parts(recording, draft, format=format, axes=axes)
 
 
 def refuse_existing(folder: Path) -> None:
@@ -55,8 +58,8 @@ def refuse_existing(folder: Path) -> None:
         raise InputError("exists already", file=folder, remedy="remove it or choose another name")
 
 
-def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
-    """Write the files of a recording into a folder that is there."""
+def write_parts(recording: Recording, folder: Path, *, format: Format, axes: Frame = "flu") -> None:
+    """Write the files of a recording into a folder that is there, in simrail's axes or in FRD."""
     tables: dict[str, dict[str, Any]] = {}
     for signal in SIGNALS:
         frame: pd.DataFrame | None = getattr(recording, signal.name)
@@ -72,8 +75,10 @@ def write_parts(recording: Recording, folder: Path, *, format: Format) -> None:
                 remedy="drop them",
             )
         file = f"{signal.name}.{format}"
-        write_frame(frame, folder / file, format=format)
+        write_frame(frame if axes == "flu" else in_ned(frame), folder / file, format=format)
         tables[signal.name] = {"file": file}
+        if axes == "ned":
+            tables[signal.name] |= ned_table(signal, [*frame.columns])
     second = recording.second_imu_sheet
     if second is not None:
         tables["second_imu"] |= {

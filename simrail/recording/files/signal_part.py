@@ -5,6 +5,7 @@ and a device as one can be mounted. Which signals there are, and what each says 
 `simrail.recording.files.ride_file`; the data are read by `simrail.recording.files.signal_reader`.
 """
 
+from collections.abc import Iterable
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -14,16 +15,24 @@ from simrail.core.errors import InputError
 from simrail.recording.files.data_file import DataPart, near
 from simrail.recording.signals import TIMES, Signal
 
-DATE_TIMES = ("iso", "epoch_s", "epoch_ms", "epoch_us", "epoch_ns")
-"""Time stamps that are dates: text as ISO 8601 has it, or a count since 1970."""
+TEXT_TIMES = "iso"
+"""Time stamps that are text: date-times, or clock times (`simrail.recording.files.clock_times`)."""
+
+EPOCHS = ("epoch_s", "epoch_ms", "epoch_us", "epoch_ns")
+"""Time stamps that are a count since 1970."""
+
+TICKS = "ticks"
+"""Time stamps that count the ticks of a clock, `SignalPart.tick_rate_hz` of them in a second."""
 
 
 def _as_tuple(value: object) -> object:
-    return (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else value
+    names = value if isinstance(value, list) else [value]
+    whole = [str(name) if isinstance(name, int) and not isinstance(name, bool) else name for name in names]
+    return tuple(whole) if isinstance(value, list | str | int) else value
 
 
 Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
-"""Column names: one text, or an array of them."""
+"""Columns: one name, or number from 1 on, or an array of them."""
 
 Positive = Annotated[float, Field(gt=0.0)]
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -38,11 +47,19 @@ class SignalPart(DataPart):
         Quantity -> column name (three for a vector, in the device's order x, y, z), and ``time``. Left
         out are those that have simrail's own names.
     units : dict
-        Quantity -> unit; SI where left out. ``"-g"`` is a logger that prints the negative.
+        Quantity -> unit; SI where left out. ``"-g"`` is a logger that prints the negative. The time may be
+        text (``"iso"``: clock times and date-times of many forms), or ``"ticks"``.
+    lsb_per_unit : dict
+        Quantity -> counts of one unit, for a file of raw counts, e.g. ``gyro = 16.4`` of ``"deg/s"``.
+    tick_rate_hz : float, optional
+        Ticks in a second, for a time in ticks.
     rate_hz : float, optional
         Rate of the samples, for a file without time stamps; beside time stamps, the rate they should have.
     start_s : float
         Time of the first sample of a file without time stamps.
+    longest_gap_s : float, optional
+        Longest distance of two samples that is bridged; that of the ride file where nothing is said, and
+        for devices slower than that, three of their intervals.
     """
 
     signal: ClassVar[Signal]
@@ -50,14 +67,22 @@ class SignalPart(DataPart):
 
     columns: dict[str, Names] = Field(default_factory=dict)
     units: dict[str, str] = Field(default_factory=dict)
+    lsb_per_unit: dict[str, Positive] = Field(default_factory=dict)
+    tick_rate_hz: Positive | None = None
     rate_hz: Positive | None = None
     start_s: float = 0.0
+    longest_gap_s: Annotated[float, Field(gt=0.0, le=600.0)] | None = None
 
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
         quantities = {quantity.key: quantity for quantity in self.signal.quantities}
-        keys = [*quantities, *(["time"] if self.signal.timed else [])]
-        for field, table in (("columns", self.columns), ("units", self.units)):
+        tables: dict[str, Iterable[str]] = {
+            "columns": self.columns,
+            "units": self.units,
+            "lsb_per_unit": self.lsb_per_unit,
+        }
+        for field, table in tables.items():
+            keys = [*quantities, *(["time"] if self.signal.timed and field != "lsb_per_unit" else [])]
             for key in table:
                 if key not in keys:
                     raise InputError(
@@ -67,18 +92,11 @@ class SignalPart(DataPart):
                         remedy=near(key, keys) or "remove it",
                     )
         for key, names in self.columns.items():
-            count = len(quantities[key].columns) if key in quantities else 1
-            if len(names) != count:
-                wanted = "three column names, of the axes x, y, z" if count == 3 else "one column name"
-                raise InputError(
-                    "lacks an axis" if count == 3 else "names several columns",
-                    field=f"columns.{key}",
-                    value=list(names),
-                    limit=wanted,
-                    remedy='e.g. ["ax", "ay", "az"]' if count == 3 else None,
-                )
+            self._judge_names(key, names, len(quantities[key].columns) if key in quantities else 1)
         for key, unit in self.units.items():
-            known = [*quantities[key].units] if key in quantities else [*TIMES, *DATE_TIMES]
+            known = [*TIMES, TEXT_TIMES, *EPOCHS, TICKS]
+            if key in quantities:
+                known = [*quantities[key].units, *quantities[key].increments]
             if unit.removeprefix("-" if key in quantities else "") not in known:
                 raise InputError(
                     "is no unit of this quantity",
@@ -87,7 +105,41 @@ class SignalPart(DataPart):
                     limit="one of " + ", ".join(known),
                     remedy=near(unit, known),
                 )
+        if (self.units.get("time") == TICKS) != (self.tick_rate_hz is not None):
+            raise InputError(
+                'belongs to units.time = "ticks", and that to it',
+                field="tick_rate_hz",
+                value=self.tick_rate_hz,
+                remedy='give both, e.g. tick_rate_hz = 32768.0 and units.time = "ticks"',
+            )
         return self
+
+    def _judge_names(self, key: str, names: tuple[str, ...], count: int) -> None:
+        """Refuse another number of columns than a quantity has; a time may stand in two, date first."""
+        if len(names) == count or (key == "time" and len(names) == 2 and self.units.get(key) == TEXT_TIMES):
+            return
+        wanted = "three column names, of the axes x, y, z" if count == 3 else "one column name"
+        raise InputError(
+            "lacks an axis" if count == 3 else "names several columns",
+            field=f"columns.{key}",
+            value=list(names),
+            limit=wanted,
+            remedy='e.g. ["ax", "ay", "az"]' if count == 3 else None,
+        )
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of the time stamps."""
+        return self.units.get("time", "s")
+
+    @property
+    def increments(self) -> tuple[str, ...]:
+        """Quantities that the file gives as increments."""
+        return tuple(
+            quantity.key
+            for quantity in self.signal.quantities
+            if self.units.get(quantity.key, "").removeprefix("-") in quantity.increments
+        )
 
 
 class VectorPart(SignalPart):

@@ -1,11 +1,12 @@
 """From the columns of a data file to the frame of one signal: SI, the body's axes, times from the start.
 
-Nothing is resampled or filled in: a missing value is refused with its line. How the signals of a ride go
-together is the matter of `simrail.recording.files.ride_reader`.
+Nothing is resampled or filled in: a row without any value of a signal is no sample of it, one that lacks some
+is refused with its line. What was done to time stamps (`simrail.recording.files.stamps`) and units is kept as
+notes. How the signals of a ride go together is the matter of `simrail.recording.files.ride_reader`.
 """
 
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,28 @@ import pandas as pd
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.core.resample import check_stamps
+from simrail.core.resample import rate_of
 from simrail.core.rotation import rotation_matrix
-from simrail.core.toml_files import blame, label
+from simrail.core.toml_files import label
 from simrail.recording.check_sheet import Bounds, Channel, check_samples
-from simrail.recording.files.data_file import column_names, line_of, read_columns
-from simrail.recording.files.signal_part import DATE_TIMES, SignalPart, VectorPart
-from simrail.recording.signals import TIMES, Quantity
+from simrail.recording.files.data_file import DataFile, open_data, read_columns
+from simrail.recording.files.signal_part import TEXT_TIMES, SignalPart, VectorPart
+from simrail.recording.files.stamps import RideClock, mended
+from simrail.recording.signals import Quantity, Signal
+
+
+@dataclass
+class _Rows:
+    """The rows of a data file that a signal needs: columns by quantity, and the times."""
+
+    data: DataFile
+    columns: dict[str, list[FloatArray]]
+    names: dict[str, list[str]]
+    time: FloatArray | None
+    time_name: str
+    stamped: bool
+    size: int
+    bounds: Mapping[str, Bounds]
 
 
 class SignalReader:
@@ -29,12 +45,22 @@ class SignalReader:
     ----------
     folder : Path
         Folder of the ride file, which the paths of its data files start from.
+
+    Attributes
+    ----------
+    notes : list of str
+        What was done to the signals that were read, one line each.
+    folder : Path
+        As given.
+    places : dict of str to callable
+        By table, where a sample of its frame stands in its file, in words.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._zero_s: int | None = None
-        self._dated: bool | None = None
+        self._clock = RideClock()
+        self.notes: list[str] = []
+        self.places: dict[str, Callable[[int], str]] = {}
 
     def frame(self, part: SignalPart, table: str, bounds: Mapping[str, Bounds] | None = None) -> pd.DataFrame:
         """Frame of a signal: its columns in SI and in the body's axes, indexed by ``time_s``.
@@ -55,100 +81,165 @@ class SignalReader:
             another than that of the first signal read; if a sample is none of its device
             (`simrail.recording.check_sheet`).
         """
+        return self._framed(self._read(part, table, bounds), part, part.signal, table)
+
+    def apart(
+        self, part: SignalPart, table: str, signals: tuple[Signal, ...], bounds: Mapping[str, Bounds]
+    ) -> list[pd.DataFrame]:
+        """Frames of sensors that share a file: one frame if they share all samples, else one for each.
+
+        Parameters
+        ----------
+        part : SignalPart
+            What the ride file says of all of them.
+        table : str
+            Table of the ride file, for messages.
+        signals : tuple of Signal
+            The quantities of each sensor.
+        bounds : mapping of str to Bounds
+            What the sheet of the device says, by quantity.
+        """
+        rows = self._read(part, table, bounds)
+        blank = [
+            np.isnan(np.vstack([c for q in one.quantities for c in rows.columns[q.key]])).all(axis=0)
+            if _has_nan(rows.columns, one)
+            else np.zeros(rows.size, dtype=bool)
+            for one in signals
+        ]
+        if all(np.array_equal(blank[0], other) for other in blank[1:]):
+            return [self._framed(rows, part, part.signal, table)]
+        return [self._framed(rows, part, one, f"{table}.{one.quantities[0].key}") for one in signals]
+
+    def _read(self, part: SignalPart, table: str, bounds: Mapping[str, Bounds] | None) -> _Rows:
+        """The columns that a signal needs, and no others."""
         signal = part.signal
-        found = column_names(part, self.folder, table=table)
+        data = open_data(part, self.folder, table=table)
+        if data.layout is not None and data.layout.units:
+            self._note(f"{label(data.path)}: a row of units ({', '.join(data.layout.units)}) is passed over")
         names: dict[str, list[str]] = {}
         for quantity in signal.quantities:
             named = list(part.columns.get(quantity.key, quantity.columns))
-            if quantity.required or quantity.key in part.columns or set(named) <= set(found):
+            if quantity.required or quantity.key in part.columns or set(named) <= set(data.names):
                 names[quantity.key] = named
-        time_name, unit = part.columns.get("time", ("time_s",))[0], part.units.get("time", "s")
-        stamped = signal.timed and ("time" in part.columns or time_name in found or part.rate_hz is None)
-        wanted = [*([time_name] if stamped else []), *(name for group in names.values() for name in group)]
-        text = [time_name] if stamped and unit == "iso" else []
-        read = read_columns(part, self.folder, wanted, table=table, text=text)
-        columns: dict[str, FloatArray] = {}
-        device: dict[str, list[FloatArray]] = {}
-        for quantity in signal.quantities:
-            if quantity.key in names:
-                values = [
-                    _si(np.asarray(read[name]), quantity, part, name, label(self.folder / part.file))
-                    for name in names[quantity.key]
-                ]
-                device[quantity.key] = values
-                if isinstance(part, VectorPart) and len(values) == 3:
-                    values = _turned(values, part)
-                columns.update(zip(quantity.columns, values, strict=True))
-        frame = pd.DataFrame(columns)
-        if signal.timed:
-            if len(frame) < 3:
-                raise InputError(
-                    "is too short",
-                    file=label(self.folder / part.file),
-                    value=f"{len(frame)} samples",
-                    limit=">= 3",
-                )
-            if stamped:
-                time = self._times(read[time_name], unit, part, table)
-            else:
-                assert part.rate_hz is not None
-                time = part.start_s + np.arange(len(frame)) / part.rate_hz
-            with blame(label(self.folder / part.file)):
-                check_stamps(time, field=f"{table}.{time_name}")
-            frame.index = pd.Index(time, name="time_s")
-            for quantity in signal.quantities:
-                if bounds is not None and quantity.key in bounds:
-                    check_samples(
-                        _channels(device[quantity.key], names[quantity.key], quantity, part),
-                        quantity.key,
-                        bounds[quantity.key],
-                        time=time,
-                        where=partial(line_of, part),
-                        file=label(self.folder / part.file),
-                    )
+        times = list(part.columns.get("time", ("time_s",)))
+        stamped = signal.timed and ("time" in part.columns or times[0] in data.names or part.rate_hz is None)
+        if not stamped:
+            times = []
+        wanted = [*times, *(name for group in names.values() for name in group)]
+        text = times if part.time_unit == TEXT_TIMES else []
+        read = read_columns(data, wanted, table=table, text=text)
+        size = len(next(iter(read.values())))
+        time: FloatArray | None = None
+        if stamped:
+            raw = read.pop(times[0]) if times[0] not in names else read[times[0]]
+            for more in times[1:]:
+                raw = pd.Series(raw).str.cat(pd.Series(read.pop(more)), sep=" ")
+            time = self._clock.seconds(
+                raw, part, table, file=label(data.path), name=times[0], notes=self.notes
+            )
+        elif signal.timed:
+            assert part.rate_hz is not None
+            time = part.start_s + np.arange(size) / part.rate_hz
+        columns = {key: [_own(read, name, wanted) for name in group] for key, group in names.items()}
+        name = times[0] if times else "time"
+        return _Rows(data, columns, names, time, name, stamped, size, bounds or {})
+
+    def _framed(self, rows: _Rows, part: SignalPart, signal: Signal, table: str) -> pd.DataFrame:
+        """Frame of some quantities of the rows that were read."""
+        quantities = [quantity for quantity in signal.quantities if quantity.key in rows.columns]
+        kept = _kept(rows, quantities)
+
+        def place(sample: int) -> str:
+            return rows.data.place(sample if kept is None else int(kept[sample]))
+
+        self.places[table] = place
+        file = label(rows.data.path)
+        scaled: dict[str, FloatArray] = {}
+        for quantity in quantities:
+            values = [
+                _si(_taken(column, kept), quantity, part, name, file, place)
+                for name, column in zip(rows.names[quantity.key], rows.columns[quantity.key], strict=True)
+            ]
+            bounds = rows.bounds.get(quantity.key)
+            if bounds is not None and rows.time is not None and quantity.key not in part.increments:
+                channels = _channels(values, rows.names[quantity.key], quantity, part)
+                time = _taken(rows.time, kept)
+                check_samples(channels, quantity.key, bounds, time=time, where=place, file=file)
+            if isinstance(part, VectorPart) and len(values) == 3:
+                values = _turned(values, part)
+            scaled.update(zip(quantity.columns, values, strict=True))
+        frame = pd.DataFrame(scaled, copy=False)
+        if not signal.timed:
+            return frame
+        if len(frame) < 3:
+            raise InputError("is too short", file=file, value=f"{len(frame)} samples", limit=">= 3")
+        assert rows.time is not None
+        time = _taken(rows.time, kept)
+        if rows.stamped:
+            frame, time = mended(
+                frame, time, file=file, field=f"{table}.{rows.time_name}", table=table, notes=self.notes
+            )
+        if part.increments:
+            self._as_rates(frame, part, signal, rate_of(time))
+        frame.index = pd.Index(time, name="time_s")
         return frame
 
-    def _times(self, raw: FloatArray | pd.Series, unit: str, part: SignalPart, table: str) -> FloatArray:
-        """Time stamps in seconds since the start."""
-        dated = unit in DATE_TIMES
-        self._dated = dated if self._dated is None else self._dated
-        if dated != self._dated:
-            raise InputError(
-                "has dates where the IMU has none, or none where it has: no common clock",
-                field=f"{table}.units.time",
-                value=unit,
-                remedy="give both in one clock",
-            )
-        if not dated:
-            multiply, divide = TIMES[unit]
-            return np.asarray(raw, dtype=np.float64) * multiply / divide
-        if unit == "iso":
-            try:
-                stamps = pd.to_datetime(pd.Series(raw), utc=True, format="ISO8601")
-            except (ValueError, TypeError) as error:
-                raise InputError(
-                    f"holds no date-time ({error})",
-                    file=label(self.folder / part.file),
-                    field=part.columns.get("time", ("time_s",))[0],
-                    limit="e.g. 2024-05-31T12:00:00.123",
-                ) from None
-            count = stamps.dt.as_unit("ns").astype("int64").to_numpy()
-            per_second: float | int = 10**9
-        else:
-            count = np.asarray(raw)
-            per_second = TIMES[unit.removeprefix("epoch_")][1]
-        if self._zero_s is None:
-            self._zero_s = int(count[0] // per_second)
-        return np.asarray((count - self._zero_s * per_second) / float(per_second), dtype=np.float64)
+    def _as_rates(self, frame: pd.DataFrame, part: SignalPart, signal: Signal, rate: float) -> None:
+        """Make increments rates, in place: over the interval that a sample stands for."""
+        for quantity in signal.quantities:
+            if quantity.key in part.increments:
+                frame[list(quantity.columns)] *= rate
+                self._note(
+                    f"imu: increments of {quantity.key} are taken as means over {1e3 / rate:.4g} ms, "
+                    "up to their time stamps"
+                )
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
 
 
-def _si(values: FloatArray, quantity: Quantity, part: SignalPart, name: str, file: str) -> FloatArray:
+def _own(read: dict[str, FloatArray | pd.Series], name: str, wanted: list[str]) -> FloatArray:
+    """A column, which is scaled in place: a copy where it is wanted twice, or belongs to the file."""
+    values = np.asarray(read[name], dtype=np.float64)
+    return values if wanted.count(name) == 1 and values.flags.writeable else values.copy()
+
+
+def _has_nan(columns: dict[str, list[FloatArray]], signal: Signal) -> bool:
+    return any(
+        bool(np.isnan(column).any()) for quantity in signal.quantities for column in columns[quantity.key]
+    )
+
+
+def _kept(rows: _Rows, quantities: list[Quantity]) -> np.ndarray | None:
+    """Rows that hold a sample, in order; None if all do."""
+    blank = np.ones(rows.size, dtype=bool)
+    for quantity in quantities:
+        for column in rows.columns[quantity.key]:
+            if not blank.any():
+                return None
+            blank &= np.isnan(column)
+    return np.flatnonzero(~blank) if blank.any() else None
+
+
+def _taken(column: FloatArray, kept: np.ndarray | None) -> FloatArray:
+    return column if kept is None else column[kept]
+
+
+def _si(
+    values: FloatArray,
+    quantity: Quantity,
+    part: SignalPart,
+    name: str,
+    file: str,
+    place: Callable[[int], str],
+) -> FloatArray:
     """Values of a column in SI; a missing one is refused, not filled."""
     bad = ~np.isfinite(values)
-    if bad.any() and quantity.required:
+    if bad.any() and (quantity.required or len(part.signal.quantities) == 1):
         first = int(np.argmax(bad))
         raise InputError(
-            f"is not a finite number in {line_of(part, first)} ({int(bad.sum())} such samples)",
+            f"is not a finite number in {place(first)} ({int(bad.sum())} such samples)",
             file=file,
             field=name,
             value=float(values[first]),
@@ -159,7 +250,7 @@ def _si(values: FloatArray, quantity: Quantity, part: SignalPart, name: str, fil
         broken = values != np.rint(values)
         if broken.any():
             raise InputError(
-                f"is no whole number in {line_of(part, int(np.argmax(broken)))}",
+                f"is no whole number in {place(int(np.argmax(broken)))}",
                 file=file,
                 field=name,
                 value=float(values[int(np.argmax(broken))]),
@@ -167,9 +258,13 @@ def _si(values: FloatArray, quantity: Quantity, part: SignalPart, name: str, fil
             )
         return values.astype(np.int64)
     unit = part.units.get(quantity.key, next(iter(quantity.units)))
-    multiply, divide = quantity.units[unit.removeprefix("-")]
-    scaled = values if multiply == divide else values * multiply / divide
-    return -scaled if unit.startswith("-") else scaled
+    multiply, divide = (quantity.units | quantity.increments)[unit.removeprefix("-")]
+    divide *= part.lsb_per_unit.get(quantity.key, 1.0)
+    # In place: a long ride is held once.
+    if multiply != divide:
+        np.multiply(values, multiply, out=values)
+        np.divide(values, divide, out=values)
+    return np.negative(values, out=values) if unit.startswith("-") else values
 
 
 def _channels(
@@ -178,6 +273,9 @@ def _channels(
     """Columns as the device logged them, in SI."""
     unit = part.units.get(quantity.key, next(iter(quantity.units))).removeprefix("-")
     multiply, divide = quantity.units[unit]
+    per_unit = part.lsb_per_unit.get(quantity.key)
+    if per_unit is not None:
+        unit, divide = "counts", divide * per_unit
     return tuple(
         Channel(name, column, unit, multiply / divide) for name, column in zip(names, values, strict=True)
     )

@@ -77,6 +77,7 @@ def ride_facts(recording: Recording) -> list[str]:
         f"{len(time)} samples at {recording.imu_sheet.rate_hz:g} Hz, {time[-1] - time[0]:.1f} s; {lost}",
         way,
         *recording_facts(recording),
+        *(f"note: {note}" for note in recording.notes),
     ]
 
 

@@ -1,0 +1,243 @@
+"""Time stamps as loggers write them, to seconds on the one clock of a ride.
+
+Text and counts of any unit become seconds. What can be undone is, and is noted: a clock time that goes over
+midnight, a counter of ticks that begins anew, a line that was written twice, packets whose samples share the
+time of their arrival (`simrail.core.packets`). What cannot is refused, with time and size: a clock that is
+set back, stamps that several samples share.
+"""
+
+import numpy as np
+import pandas as pd
+
+from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
+from simrail.core.packets import spread
+from simrail.core.resample import MOST_LOST, check_stamps, find_gaps, rate_of
+from simrail.core.toml_files import blame
+from simrail.recording.files.clock_times import EMPTY, continued, read_times
+from simrail.recording.files.signal_part import EPOCHS, TEXT_TIMES, TICKS, SignalPart
+from simrail.recording.signals import TIMES
+
+COUNTER_BITS = (8, 12, 15, 16, 20, 24, 31, 32)
+"""Widths of counters of time: where one begins anew, it falls by all but a step of its range."""
+
+FEW_STEPS_BACK = 0.01
+"""Share of the steps that a clock that is set may make back; more of them are samples in disorder."""
+
+
+class RideClock:
+    """The clock of a ride: dates, from the whole second of the first signal on, or seconds of its own."""
+
+    def __init__(self) -> None:
+        self._zero_s: int | None = None
+        self._dated: bool | None = None
+        self._first_s: float | None = None
+
+    def seconds(
+        self,
+        raw: FloatArray | pd.Series,
+        part: SignalPart,
+        table: str,
+        *,
+        file: str,
+        name: str,
+        notes: list[str],
+    ) -> FloatArray:
+        """Time stamps in seconds; NaN where there are none.
+
+        Parameters
+        ----------
+        raw : ndarray (n,) or pandas.Series
+            As read.
+        part : SignalPart
+            What the ride file says of them.
+        table, file, name : str
+            Their table in the ride file, their data file and column, for messages.
+        notes : list of str
+            Takes what was done to them.
+
+        Raises
+        ------
+        InputError
+            If they are of no known form, or on another kind of clock than those of the first signal.
+        """
+        unit = part.time_unit
+        if unit == TEXT_TIMES:
+            read = read_times(pd.Series(raw), file=file, field=name)
+            if read.dates_ns is not None:
+                self._same_kind(True, unit, table)
+                return self._since(read.dates_ns, 10**9)
+            assert read.seconds is not None
+            self._same_kind(False, unit, table)
+            return self._over_midnight(read.seconds, read.period_s, table, notes)
+        self._same_kind(unit in EPOCHS, unit, table)
+        if unit in EPOCHS:
+            return self._since(np.asarray(raw), int(TIMES[unit.removeprefix("epoch_")][1]))
+        count = _counted_on(np.asarray(raw, dtype=np.float64), table, name, notes)
+        if unit == TICKS:
+            return count / float(part.tick_rate_hz or 1.0)
+        multiply, divide = TIMES[unit]
+        return count if multiply == divide else count * multiply / divide
+
+    def _same_kind(self, dated: bool, unit: str, table: str) -> None:
+        self._dated = dated if self._dated is None else self._dated
+        if dated != self._dated:
+            raise InputError(
+                "has dates where the IMU has none, or none where it has: no common clock",
+                field=f"{table}.units.time",
+                value=unit,
+                remedy="give both in one clock",
+            )
+
+    def _since(self, count: np.ndarray, per_second: int) -> FloatArray:
+        """Seconds since the whole second of the first stamp of the ride."""
+        known = count != EMPTY if count.dtype.kind == "i" else np.isfinite(count)
+        if not known.any():
+            return np.full(len(count), np.nan)
+        if self._zero_s is None:
+            self._zero_s = int(count[int(np.argmax(known))] // per_second)
+        since = np.where(known, count, self._zero_s * per_second) - self._zero_s * per_second
+        seconds = np.asarray(since / float(per_second), dtype=np.float64)
+        seconds[~known] = np.nan
+        return seconds
+
+    def _over_midnight(
+        self, seconds: FloatArray, period_s: float, table: str, notes: list[str]
+    ) -> FloatArray:
+        """Clock times that go on, within a signal and from the first signal to the others."""
+        whole, times = continued(seconds, period_s)
+        known = whole[np.isfinite(whole)]
+        if self._first_s is None:
+            self._first_s = float(known[0]) if len(known) else 0.0
+        elif len(known):
+            whole += period_s * round((self._first_s - float(known[0])) / period_s)
+        if times:
+            what = "midnight" if period_s > 3600.0 else "the full hour"
+            notes.append(f"{table}: the clock passes {what}; its times go on")
+        return whole
+
+
+def _counted_on(count: FloatArray, table: str, name: str, notes: list[str]) -> FloatArray:
+    """A counter of time that goes on where it began anew; as it is, if it did not."""
+    step = np.diff(count)
+    back = np.flatnonzero(step < 0.0)
+    if not len(back) or 3 * len(back) > len(step):
+        return count
+    usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
+    scales = (1.0,) if np.array_equal(count, np.rint(count)) else ()
+    for bits in COUNTER_BITS if scales else ():
+        modulus = float(2**bits)
+        after = step[back] + modulus
+        if count.max() < modulus and (after >= 0.0).all() and (after <= max(20.0 * usual, 1.0)).all():
+            whole = count.copy()
+            whole[1:] += modulus * np.cumsum(step < 0.0)
+            notes.append(f"{table}: {name} begins anew after 2^{bits}, {_times(len(back))}; its times go on")
+            return whole
+    return count
+
+
+def mended(
+    frame: pd.DataFrame, time: FloatArray, *, file: str, field: str, table: str, notes: list[str]
+) -> tuple[pd.DataFrame, FloatArray]:
+    """Samples and their times without lines written twice, packets spread evenly.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Samples.
+    time : ndarray (n,)
+        Their stamps, s.
+    file, field, table : str
+        Where they stand, for messages: data file, field with the name of the column, table of the ride file.
+    notes : list of str
+        Takes what was done.
+
+    Raises
+    ------
+    InputError
+        If the stamps go back, or several samples share one.
+    """
+    step = np.diff(time)
+    if (step == 0.0).any():
+        twice = np.concatenate([[False], step == 0.0])
+        same = np.ones(len(time) - 1, dtype=bool)
+        for name in frame:
+            values = frame[name].to_numpy()
+            same &= (values[1:] == values[:-1]) | ((values[1:] != values[1:]) & (values[:-1] != values[:-1]))
+        other = np.flatnonzero(twice[1:] & ~same)
+        if len(other):
+            raise _shared(time, int(other[0]), int(twice.sum()), file, field)
+        frame, time = frame[~twice].reset_index(drop=True), time[~twice]
+        notes.append(f"{table}: {_counted(int(twice.sum()), 'sample')} that the logger wrote twice left out")
+        step = np.diff(time)
+    if (step < 0.0).any():
+        _refuse_back(time, step, file, field)
+    with blame(file):
+        check_stamps(time, field=field)
+    if len(time) > 2 and lost_share(time) > MOST_LOST:
+        packets = spread(time)
+        if packets is not None:
+            notes.append(
+                f"{table}: stamps of packets of {packets.size} samples are spread evenly, at "
+                f"{packets.rate_hz:.6g} Hz (samples over time), moved by {packets.moved_s:.3g} s at most"
+            )
+            time = packets.time
+    return frame, time
+
+
+def lost_share(time: FloatArray) -> float:
+    """Share of the samples that are missing between stamps, as their usual interval has it."""
+    missing = float(find_gaps(time, 1.0 / rate_of(time))["missing"].sum())
+    return missing / (missing + len(time))
+
+
+def _shared(time: FloatArray, first: int, count: int, file: str, field: str) -> InputError:
+    starts = np.concatenate([[True], np.diff(time) != 0.0])
+    begins = np.flatnonzero(starts)
+    # The first group may be the end of one.
+    first_whole = begins[1] if len(begins) > 2 else begins[0]
+    seconds = time[-1] - time[first_whole]
+    rate = (begins[-1] - first_whole) / seconds if seconds > 0.0 else np.nan
+    rate = round(rate) if abs(rate / max(round(rate), 1) - 1.0) < 2e-3 else rate
+    return InputError(
+        f"has duplicate time stamps at sample {first + 1} ({count} such samples), though the samples differ",
+        file=file,
+        field=field,
+        value=[float(time[first]), float(time[first + 1])],
+        limit="strictly increasing",
+        remedy="these are stamps of packets, or too coarse; if no samples are lost leave time out and give "
+        f"rate_hz = {rate:.6g}",
+    )
+
+
+def _refuse_back(time: FloatArray, step: FloatArray, file: str, field: str) -> None:
+    """Refuse stamps that go back: of a clock that was set, or of samples in disorder."""
+    back = np.flatnonzero(step < 0.0)
+    first, size = int(back[0]), float(step[back[0]])
+    usual = float(np.median(np.abs(step)))
+    if len(back) <= 1 + FEW_STEPS_BACK * len(step) and -size > 5.0 * usual:
+        more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
+        raise InputError(
+            f"has reversed time stamps at sample {first + 1}: the clock jumps back{more}",
+            file=file,
+            field=field,
+            value=f"{size:.9g} s after {time[first]:.9g} s",
+            limit="strictly increasing",
+            remedy="cut the recording there; or, if no samples are lost, leave time out and give rate_hz",
+        )
+    raise InputError(
+        f"has reversed time stamps at sample {first + 1} ({len(back)} steps back)",
+        file=file,
+        field=field,
+        value=[float(time[first]), float(time[first + 1])],
+        limit="strictly increasing",
+        remedy="sort the samples by time",
+    )
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _counted(count: int, word: str) -> str:
+    return f"{count} {word}{'s' * (count != 1)}"
