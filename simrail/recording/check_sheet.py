@@ -283,7 +283,10 @@ def _check_stuck(
     The device must show noise otherwise, on another axis meanwhile or on both sides: a computed ride has
     none.
     """
-    rate = (len(time) - 1) / float(time[-1] - time[0])
+    span = float(time[-1] - time[0])
+    if span <= 0.0:
+        return  # stamps that go back are refused elsewhere
+    rate = (len(time) - 1) / span
     noise = bounds.noise * np.sqrt(rate)
     shortest = max(STUCK_SAMPLES, int(np.ceil(STUCK_S * rate)))
     if noise == 0.0 or len(time) <= shortest:

@@ -170,6 +170,7 @@ def test_a_way_that_begins_late_shortens_the_ride_and_moves_its_start(
         read_signals(tmp_path)
     # With a way of its own, a magnetometer that begins late moves the start along it.
     field = pd.DataFrame({"t": frame["t"][200:], "x": 2e-5, "y": 0.0, "z": -4e-5})
+    field["x"] += 1e-7 * np.sin(np.arange(len(field)))  # a device that shows one number throughout is stuck
     field.to_csv(tmp_path / "mag.csv", index=False)
     table = (
         '[magnetometer]\nfile = "mag.csv"\ncolumns = { time = "t", field = ["x", "y", "z"] }\n'

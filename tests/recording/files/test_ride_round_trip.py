@@ -1,6 +1,6 @@
 """Recordings survive the disk bit by bit, whole or not at all."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import get_type_hints
 
 import numpy as np
@@ -93,7 +93,7 @@ def assert_same(a: Recording, b: Recording) -> None:
             assert right.index.name == (None if part == "gaps" else "time_s")
             assert left.dtypes.equals(right.dtypes)
     blank = dict.fromkeys(FRAMES)
-    assert repr(replace(a, **blank)) == repr(replace(b, **blank))
+    assert repr(asdict(replace(a, **blank))) == repr(asdict(replace(b, **blank)))
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
