@@ -226,6 +226,9 @@ class Recording:
         Its data sheet.
     vehicle_sheet : VehicleSheet, optional
         The vehicle's drawing, and how far the train may be from it; None where nothing is known of it.
+    start_speed_mps : float, optional
+        Speed at the first sample, negative towards smaller s, to some metres per second; None where nobody
+        said it: then it is found out by the first second of an encoder.
     """
 
     name: str
@@ -250,6 +253,7 @@ class Recording:
     odometer_sheet: OdometerSheet | None = None
     map_errors: MapErrors = UNSTATED
     vehicle_sheet: VehicleSheet | None = None
+    start_speed_mps: float | None = None
 
     @property
     def has_wheel(self) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from simrail.core.errors import InputError
 from simrail.recording.evidence.finding import Finding, Verdict
@@ -84,11 +85,14 @@ class Evidence:
         One for each of `KINDS`.
     turn_rad, push_mps : float
         Turn of the track on the ride, and its changes of speed, both summed.
+    middle_s : float
+        Time from the first stamp of the device of the way to where the offset of its clock holds.
     """
 
     findings: tuple[Finding, ...]
     turn_rad: float = 0.0
     push_mps: float = 0.0
+    middle_s: float = 0.0
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
@@ -119,7 +123,9 @@ def weigh(recording: Recording) -> Evidence:
     if ride is None:
         why = "nobody says how far the train went, or the ride is too short"
         return Evidence(tuple(_unjudged(key, math.inf, "nothing", why) for key in KINDS))
-    best = best_fit(ride)
+    # The matrices are small: threads of BLAS cost more than they bring.
+    with threadpool_limits(1):
+        best = best_fit(ride)
     moved = motion(ride, best.x)
     turn = (
         np.abs(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps).mean()
@@ -144,7 +150,8 @@ def weigh(recording: Recording) -> Evidence:
         if not kind.by:
             sources = ["gravity" + " and curves" * has["turn"]]
         findings.append(_judged(key, best, slack[key], " and ".join(sources), ride))
-    return Evidence(tuple(findings), float(turn), float(push))
+    middle = ride.middle_s - float(ride.way.time_s[0])
+    return Evidence(tuple(findings), float(turn), float(push), middle)
 
 
 def best_fit(ride: Ride) -> Fit:

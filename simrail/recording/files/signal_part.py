@@ -43,6 +43,12 @@ class SignalPart(DataPart):
         Rate of the samples, for a file without time stamps; beside time stamps, the rate they should have.
     start_s : float
         Time of the first sample of a file without time stamps.
+    scale : dict
+        Quantity -> factor on its values, for a device that is found to be off by one.
+    time_offset_s : float
+        Seconds that are added to its stamps: negative for a device whose stamps are late.
+    time_drift_ppm : float
+        Millionths of the time since its first stamp that are added too: positive for a slow clock.
     """
 
     signal: ClassVar[Signal]
@@ -52,6 +58,9 @@ class SignalPart(DataPart):
     units: dict[str, str] = Field(default_factory=dict)
     rate_hz: Positive | None = None
     start_s: float = 0.0
+    scale: dict[str, Positive] = Field(default_factory=dict)
+    time_offset_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
+    time_drift_ppm: Annotated[float, Field(ge=-10_000.0, le=10_000.0)] = 0.0
 
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
@@ -66,6 +75,15 @@ class SignalPart(DataPart):
                         limit="one of " + ", ".join(keys),
                         remedy=near(key, keys) or "remove it",
                     )
+        scaled = [key for key, quantity in quantities.items() if not quantity.whole]
+        for key in self.scale:
+            if key not in scaled:
+                raise InputError(
+                    "has no scale",
+                    field=f"scale.{key}",
+                    limit="one of " + ", ".join(scaled),
+                    remedy=near(key, scaled) or "remove it",
+                )
         for key, names in self.columns.items():
             count = len(quantities[key].columns) if key in quantities else 1
             if len(names) != count:

@@ -14,6 +14,7 @@ from simrail.core.jit import FloatArray
 from simrail.core.resample import check_stamps
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import blame, label
+from simrail.recording.files.as_mended import as_mended
 from simrail.recording.files.data_file import column_names, line_of, read_columns
 from simrail.recording.files.signal_part import DATE_TIMES, SignalPart, VectorPart
 from simrail.recording.signals import TIMES, Quantity
@@ -88,7 +89,7 @@ class SignalReader:
             with blame(label(self._folder / part.file)):
                 check_stamps(time, field=f"{table}.{time_name}")
             frame.index = pd.Index(time, name="time_s")
-        return frame
+        return as_mended(frame, part)
 
     def _times(self, raw: FloatArray | pd.Series, unit: str, part: SignalPart, table: str) -> FloatArray:
         """Time stamps in seconds since the start."""
