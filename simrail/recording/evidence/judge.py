@@ -2,8 +2,8 @@
 
 A figure is held against its nominal value in standard deviations: its own, with what a sound ride may be off
 besides (the sheet's errors of scale and of the package, the map's of place and radius, what the model leaves
-out). Beyond `LIKELY` of them it is likely wrong, beyond `SURE` surely. Of nine figures each, 500 sound rides
-have 0.3 beyond `LIKELY` by chance. What a ride knows no better than `WANTED` is not called sound: it could
+out). Beyond `LIKELY` of them it is likely wrong, beyond `SURE` surely: one normal figure is beyond
+`LIKELY` in 0.2 of 500 sound rides. What a ride knows no better than `WANTED` is not called sound: it could
 not be judged.
 """
 
@@ -30,7 +30,7 @@ from simrail.recording.evidence.model import (
 from simrail.recording.evidence.start import scan
 from simrail.recording.recording import Recording
 
-LIKELY, SURE = 4.0, 8.0
+LIKELY, SURE = 3.5, 8.0
 """Standard deviations from which on a figure is likely wrong, and surely."""
 
 EXPLAINED = 0.9
@@ -198,7 +198,7 @@ def _slack(ride: Ride, found: Fit) -> dict[str, float]:
         "pitch": math.hypot(package, errors.gradient_sd, 0.2 * _DEG),
         "roll": math.hypot(package, errors.cant_along_sd_m / recording.track.rail_base_m, 0.2 * _DEG),
         "offset": clock,
-        "drift": math.hypot(sheet.clock_drift, 2.0 * clock / seconds, 2e-5),
+        "drift": math.hypot(sheet.clock_drift, 0.03 / seconds, 3e-5),
     }
 
 

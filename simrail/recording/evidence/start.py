@@ -24,8 +24,11 @@ OFFSETS_S = np.arange(-6.0, 6.01, 0.1)
 SHIFTS_M, SHIFT_STEP_M = 500.0, 5.0
 FACTORS = (1.0, -1.0, 0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.318, 3.14, 0.667, 1.5, 0.8, 1.25)
 
-LEAST_PUSH = 0.5
-"""Share of what the accelerometer shows that the push has to explain before a scan is believed."""
+LEAST_PUSH = 0.05
+"""Share of what else is left of the accelerometer that the push has to explain for its scan to be a start."""
+
+QUARTERS_RAD = (np.pi, 0.5 * np.pi, -0.5 * np.pi)
+"""Angles at which devices are mounted that are not told of."""
 
 
 def scan(ride: Ride) -> list[FloatArray]:
@@ -41,6 +44,10 @@ def scan(ride: Ride) -> list[FloatArray]:
     starts = [sound]
     for x in likely:
         starts += _by_curves(ride, x, free=pushed is None)
+    for angle in QUARTERS_RAD:
+        turned = sound.copy()
+        turned[INDEX["yaw"]] = angle
+        starts.append(turned)
     return starts + likely[1:]
 
 
