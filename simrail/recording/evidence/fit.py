@@ -162,7 +162,7 @@ def fit(ride: Ride, start: FloatArray) -> Fit:
     if moving.sum() >= 4:
         total = ride.measured[moving] - ride.measured[moving].mean(axis=0)
         explained = 1.0 - (left[moving] ** 2).sum(axis=0) / np.maximum((total**2).sum(axis=0), 1e-30)
-    sizes = np.where(seen[:, None], np.minimum(np.abs(left / _CLASS), OUTLIER), OUTLIER)
+    sizes = np.where(seen[:, None], np.minimum(np.abs(left / _CLASS), OUTLIER), 0.5)
     return Fit(x, covariance, float(np.mean(sizes**2)), explained, standing)
 
 

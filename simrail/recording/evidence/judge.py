@@ -71,7 +71,7 @@ KINDS = {
 """What is judged, in the order in which it is told; ``by`` is what it needs, one of them at least."""
 
 
-_MUCH = {"gyro": 0.05, "wheel": 0.05, "shift": 10.0, "yaw": 0.05, "offset": 0.2}
+_MUCH = {"gyro": 0.05, "wheel": 0.05, "shift": 10.0, "yaw": 0.05, "offset": 0.2, "drift": 3e-4}
 """What counts as far."""
 
 
@@ -155,9 +155,9 @@ def weigh(recording: Recording) -> Evidence:
 
 
 def best_fit(ride: Ride) -> Fit:
-    """The fit from the sound ride's values; from others as well where it leaves much unexplained."""
+    """The fit from the sound ride's values; from others too where it blames or leaves much."""
     first = fit(ride, start_values())
-    if _explains(ride, first):
+    if _explains(ride, first) and not _blamed(first):
         return first
     fits = [first, *(fit(ride, x) for x in scan(ride))]
     least = min(other.cost for other in fits)

@@ -96,7 +96,7 @@ def _reading_sd(read: FloatArray, pulse: float) -> float:
     moving = np.abs(np.diff(read[:-3])) > 2.0 * pulse
     fourth = np.diff(read, 4)[moving]
     spread = 0.0 if len(fourth) < 8 else float(np.median(np.abs(fourth))) / 0.6745 / np.sqrt(70.0)
-    return max(pulse / np.sqrt(12.0), spread)
+    return float(max(pulse / np.sqrt(12.0), spread))
 
 
 def _times(stamps: FloatArray) -> FloatArray:
