@@ -40,7 +40,9 @@ def scan(ride: Ride) -> list[FloatArray]:
         backwards = pushed.copy()
         backwards[INDEX["wheel"]] *= -1.0
         backwards[INDEX["yaw"]] = np.remainder(pushed[INDEX["yaw"]], 2.0 * np.pi) - np.pi
-        likely += [pushed, backwards]
+        timed = sound.copy()
+        timed[INDEX["offset"]] = pushed[INDEX["offset"]]
+        likely += [timed, pushed, backwards]
     starts = [sound]
     for x in likely:
         starts += _by_curves(ride, x, free=pushed is None)
