@@ -80,6 +80,7 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
+from simrail.estimators.odometry.moving_start import start_of
 from simrail.estimators.odometry.pointing import (
     LATERAL_CREEP,
     Pointing,
@@ -257,8 +258,10 @@ class CurveMatchedOdometry:
         sd = np.sqrt(np.diagonal(steps.covariance, axis1=1, axis2=2)[:, [S, V]])
         sd[:, 0] = np.hypot(sd[:, 0], chainage_sd(recording, values[:, 0]))
         lines = np.column_stack([values, sd, np.sqrt(ACCELERATION_SD_MPS2**2 + shaking)])
-        # Until the filter's first step: standing at the start.
-        start = [recording.start_position_m, 0.0, 0.0, self.start_sd_m, STILL_SD_MPS, ACCELERATION_SD_MPS2]
+        # Until the filter's first step: at the start, standing or at its first speed.
+        speed, speed_sd = first_speed(recording)
+        place = [recording.start_position_m, speed, 0.0]
+        start = [*place, self.start_sd_m, speed_sd, ACCELERATION_SD_MPS2]
         lines, times = np.vstack([start, lines]), np.concatenate([[-np.inf], steps.time_s])
         if self.smoothed:
             times[0] = min(wanted[0], steps.time_s[0]) - 1.0 / rate
@@ -318,17 +321,21 @@ class CurveMatchedOdometry:
     def _start(
         self, recording: Recording, pulse: float, chord: Chord | None, yaw: Pointing
     ) -> tuple[FloatArray, FloatArray]:
-        """State and covariance of a train that stands where it is known to stand."""
+        """State and covariance of a train that stands, or runs, where it is known to."""
         sheet, wheel, errors = recording.imu_sheet, recording.encoder_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
+        x[V], speed_sd = first_speed(recording)
+        if x[V] != 0.0:  # the first step ends at the first sample, and begins one interval earlier
+            x[S] -= x[V] / sheet.rate_hz
+            x[WAY] = -x[V] / sheet.rate_hz
         x[LAG], chord_sd = (0.0, 0.0) if chord is None else lag_of(chord)
         x[TURN], turn_sd = turn_of(chord, yaw)
         if chord is not None and x[TURN] > 0.0:
             x[LAG], chord_sd = 0.0, place_sd_of(chord)
         sd = np.zeros(STATES)
         sd[S] = math.hypot(self.start_sd_m, float(chainage_sd(recording, x[S])))
-        sd[V] = STILL_SD_MPS
+        sd[V] = speed_sd
         sd[WAY] = pulse / math.sqrt(12.0)
         sd[SCALE] = 0.0 if wheel is None else wheel.radius_relative_sd
         sd[TREAD] = self.tread_sd * tread_share(recording)
@@ -344,6 +351,15 @@ class CurveMatchedOdometry:
         sd[BEND] = errors.radius_relative_sd
         sd[EVEN] = sd[ODD] = errors.place_sd_m
         return x, np.diag(sd**2)
+
+
+def first_speed(recording: Recording) -> tuple[float, float]:
+    """Speed at the first sample, and its standard deviation: of a train at rest, or by its first second."""
+    start = start_of(recording)
+    if start.speed_mps == 0.0 or not recording.has_wheel:
+        return start.speed_mps, max(start.sd_mps, STILL_SD_MPS)
+    wheel = EncoderOdometry().estimate(recording).states.iloc[0]
+    return float(wheel["speed_mps"]), max(float(wheel["speed_sd_mps"]), STILL_SD_MPS)
 
 
 def counts_at(recording: Recording, times: FloatArray) -> tuple[FloatArray, float]:

@@ -13,6 +13,9 @@ count is treated as white. That is wrong in one case: at an exactly constant spe
 of pulses per reading the count's error is a slow sawtooth, which the filter follows.
 
 An odometer that shows the speed, in place of a counter, runs through the same model.
+
+A recording that begins at speed is another matter (`simrail.estimators.odometry.moving_start`): its first
+seconds are answered with hindsight.
 """
 
 from dataclasses import dataclass
@@ -20,6 +23,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from simrail.estimators.kalman import mirror, update
+from simrail.estimators.odometry.moving_start import (
+    ACCELERATION_SD_MPS2,
+    BACK_S,
+    Start,
+    reading_variance,
+    smoothed_back,
+    start_of,
+    start_of_counts,
+)
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
@@ -30,6 +42,11 @@ from simrail.recording.recording import EncoderSheet, OdometerSheet, Recording
 JERK_INTENSITY_M2PS5 = 0.01
 """Intensity of the model's white jerk. Small enough for quiet accelerations at constant speed, large
 enough to follow service braking (0.6 m/s2, jerk 0.4 m/s3) with a lag of about 0.15 s."""
+
+
+FADE_S = 1.5
+"""Time constant with which a ride that begins at speed goes over to the filter of all others, which takes
+stamps at their word: it follows traction the faster for it."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +88,9 @@ class EncoderOdometry:
         """
         times, start_m = recording.imu.index.to_numpy(dtype=np.float64), recording.start_position_m
         if recording.encoder is not None and recording.encoder_sheet is not None:
-            states = self.from_counts(recording.encoder, recording.encoder_sheet, times, start_m)
+            states = self.from_counts(
+                recording.encoder, recording.encoder_sheet, times, start_m, start=start_of(recording)
+            )
         elif recording.odometer is not None and recording.odometer_sheet is not None:
             states = self.from_speed(recording.odometer, recording.odometer_sheet, times, start_m)
         else:
@@ -84,7 +103,13 @@ class EncoderOdometry:
         return Estimate(states=states, mount=recording.mount)
 
     def from_counts(
-        self, encoder: pd.DataFrame, sheet: EncoderSheet, times: FloatArray, start_position_m: float
+        self,
+        encoder: pd.DataFrame,
+        sheet: EncoderSheet,
+        times: FloatArray,
+        start_position_m: float,
+        *,
+        start: Start | None = None,
     ) -> pd.DataFrame:
         """Odometry from encoder counts.
 
@@ -104,6 +129,8 @@ class EncoderOdometry:
             after it.
         start_position_m : float
             Position s at the first count.
+        start : Start, optional
+            Speed at the first count; found out by the first second if not given.
 
         Returns
         -------
@@ -112,17 +139,45 @@ class EncoderOdometry:
             and acceleration are exactly 0.
         """
         quantum = sheet.pulse_m
+        read, counts = np.array(encoder.index.to_numpy(dtype=np.float64)), encoder["pulse_count"].to_numpy()
+        way = (counts - counts[0]).astype(np.float64) * quantum
+        if start is None:
+            start = start_of_counts(read, way, quantum)
+        moves, counted = start.speed_mps != 0.0, quantum**2 / 12.0
+        variance = reading_variance(read, way, quantum) if moves else counted
         states = _filter(
-            np.array(encoder.index.to_numpy(dtype=np.float64)),
-            encoder["pulse_count"].to_numpy(dtype=np.float64),
+            read,
+            counts.astype(np.float64),
             np.array(times, dtype=np.float64),
             quantum,
             self.jerk_intensity_m2ps5,
             self.still_s,
+            start.speed_mps,
+            start.sd_mps,
+            variance - counted,
         )
+        if moves:
+            self._look_back(states, read, way, times, start, variance)
         # The unknown first place between two edges shifts every position alike, by up to half a pulse.
         states[:, 3] += quantum**2 / 12.0
         return _frame(states, times, start_position_m, sheet.radius_relative_sd)
+
+    def _look_back(
+        self,
+        states: FloatArray,
+        read: FloatArray,
+        way: FloatArray,
+        times: FloatArray,
+        start: Start,
+        variance: float,
+    ) -> None:
+        """Put what all the first seconds say in place of states (n, 6) of those seconds."""
+        intensity = self.jerk_intensity_m2ps5
+        means, covariances = smoothed_back(read, way, start, variance=variance, intensity=intensity)
+        last = np.searchsorted(read[: len(means)], times, side="right") - 1
+        for i in np.flatnonzero(times < read[0] + BACK_S):
+            k = max(int(last[i]), 0)
+            ahead(means[k], covariances[k], float(times[i] - read[k]), intensity, states[i])
 
     def from_speed(
         self, odometer: pd.DataFrame, sheet: OdometerSheet, times: FloatArray, start_position_m: float
@@ -191,9 +246,20 @@ def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: Floa
 
 @njit
 def _filter(
-    time: FloatArray, count: FloatArray, wanted: FloatArray, q: float, intensity: float, still: float
+    time: FloatArray,
+    count: FloatArray,
+    wanted: FloatArray,
+    q: float,
+    intensity: float,
+    still: float,
+    first_speed: float,
+    first_speed_sd: float,
+    jitter: float,
 ) -> FloatArray:
-    """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times."""
+    """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times.
+
+    From rest, where ``first_speed`` is 0; ``jitter`` is what stamps add to the variance of a count at first.
+    """
     out = np.empty((len(wanted), 6))
     x, p, h = np.zeros(STATES), np.zeros((STATES, STATES)), np.zeros(STATES)
     gain, work = np.zeros(STATES), np.zeros(STATES)
@@ -206,11 +272,19 @@ def _filter(
     idle = 0.0
     patience = still
     direction = 0.0
+    if first_speed != 0.0:
+        resting = False
+        direction = np.sign(first_speed)
+        x[V] = first_speed
+        p[S, S] = q * q / 12.0
+        p[V, V] = first_speed_sd**2
+        p[A, A] = ACCELERATION_SD_MPS2**2
     next_out = 0
     for k in range(len(time)):
         dt = time[k] - time[k - 1] if k > 0 else 0.0
         change = count[k] - count[k - 1] if k > 0 else 0.0
         way = (count[k] - count[0]) * q
+        fading = jitter * np.exp((time[0] - time[k]) / FADE_S)
         idle += dt
         if not resting:
             predict(x, p, dt, intensity)
@@ -229,14 +303,14 @@ def _filter(
             if steps == 1.0:
                 width = min(q, max(0.1 * q, (abs(x[V]) + 2.0 * np.sqrt(p[V, V])) * dt))
             middle = way - 0.5 * direction * (q - width)
-            update(x, p, h, middle - x[S], width * width / 12.0, gain, work)
+            update(x, p, h, middle - x[S], width * width / 12.0 + fading, gain, work)
             idle = 0.0
             patience = min(max(3.0 * q / max(abs(x[V]), 1e-9), still), 10.0 * still)
         elif not resting:
             # No pulse although one was due: the train is at most at the edge.
             if abs(x[S] - way) > 0.5 * q:
                 edge = way + np.sign(x[S] - way) * 0.5 * q
-                update(x, p, h, edge - x[S], q * q / 12.0, gain, work)
+                update(x, p, h, edge - x[S], q * q / 12.0 + fading, gain, work)
             if x[V] * direction <= 0.0 or idle > patience:
                 resting = True
         if resting:

@@ -356,7 +356,7 @@ def curve_matched(
     grid, table : ndarray (2,), (m, 10)
         The map (`simrail.estimators.odometry.line_table`).
     x, p : ndarray (18,), (18, 18)
-        State and covariance at the start; replaced by the last ones.
+        State and covariance at the start, at rest if its speed is 0; replaced by the last ones.
     steps : Steps, output
         Of n rows.
     scratch : Scratch
@@ -369,7 +369,8 @@ def curve_matched(
     h[WHEEL, WAY] = h[HEADING, YAW] = h[REST, V] = 1.0
     h[HEADING, SWAY] = -1.0
     direction = idle = moving = agreed = wheel_speed = steady = 0.0
-    resting, slipping = True, False
+    # A train that begins at speed does not rest.
+    resting, slipping = x[V] == 0.0, False
     before = line_at(grid, table, x[S])
     for k in range(signals.shape[0]):
         here = line_at(grid, table, x[S])

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, counts_at
+from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, counts_at, first_speed
 from simrail.estimators.odometry.kernel import DIRECTION_SPEED_MPS, SATURATION_RADIUS_M
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.aiding import Aiding, Rows
@@ -88,9 +88,9 @@ def steps_of(recording: Recording, rate_hz: float, *, smoothed: bool = False) ->
     trace = method.trace(recording)
     odometry = mean(method.at_imu_times(trace, recording)[[*ODOMETRY, ODOMETRY_SD[0]]].to_numpy())
     ends = time[block - 1 :: block][:n]
-    # Before the odometry's first step, which a short ride does not have, the train stands.
+    # Before the odometry's first step, which a short ride does not have, the train is as it begins.
     known = np.searchsorted(trace.time_s, ends + 1e-9, side="right")
-    resting = np.concatenate([[True], trace.resting])[known]
+    resting = np.concatenate([[first_speed(recording)[0] == 0.0], trace.resting])[known]
     odometry[resting, 1:3] = 0.0
     counts, pulse_m = counts_at(recording, time)
     return Steps(

@@ -8,7 +8,8 @@ import math
 from collections.abc import Collection
 
 import numpy as np
-from simrail.estimators.odometry.curve_matched import STILL_SD_MPS, CurveMatchedOdometry
+from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, first_speed
+from simrail.estimators.odometry.moving_start import ACCELERATION_SD_MPS2
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of, pointing_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import Noise
@@ -121,6 +122,7 @@ def first_state(recording: Recording, motion: Motion) -> FloatArray:
     """State (51,) before anything is measured."""
     chord, x = chord_of(recording), np.zeros(at.STATES)
     x[at.S], x[at.TILT] = recording.start_position_m, motion.tilt
+    x[at.V] = first_speed(recording)[0]
     if chord is not None:
         x[at.LAG] = lag_of(chord)[0]
         if chord.half_m > 0.0 and not chord.weights:
@@ -147,7 +149,8 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     chord = chord_of(recording)
     pointing = pointing_of(recording, chord)
     sd[at.S] = math.hypot(method.start_sd_m, chainage_sd(recording, recording.start_position_m))
-    sd[at.V], sd[at.A] = STILL_SD_MPS, 1e-2
+    speed, speed_sd = first_speed(recording)
+    sd[at.V], sd[at.A] = speed_sd, 1e-2 if speed == 0.0 else ACCELERATION_SD_MPS2
     scaled = recording.odometer_sheet if wheel is None else wheel
     if wheel is not None:
         sd[at.WAY] = wheel.pulse_m

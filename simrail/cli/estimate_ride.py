@@ -4,13 +4,15 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from simrail.cli.options import say
 from simrail.core.atomic_files import draft_of
 from simrail.core.columns import ODOMETRY
 from simrail.core.errors import InputError
 from simrail.core.toml_files import blame, label
 from simrail.estimation.estimate import Estimate, Estimator, description_of
-from simrail.estimation.recorded_ride import read_ride
+from simrail.estimation.recorded_ride import judged_ride
 from simrail.estimation.user_modules import class_named
+from simrail.recording.evidence.judge import warnings_of
 from simrail.recording.files.ride_writer import Format, write_frame
 from simrail.recording.recording import Recording
 from simrail.report.pages.estimate_page import write_estimate_page
@@ -43,7 +45,9 @@ def ride_for(estimator: Estimator, method: str, ride: Path) -> Recording:
     InputError
         If it cannot be read, or does not say where the train is, which the estimator has to be told.
     """
-    recording = read_ride(ride)
+    recording, evidence = judged_ride(ride)
+    for line in warnings_of(evidence):
+        say(f"warning: {label(ride)}: {line}")
     if recording.odometry is None and "odometry" in description_of(estimator).needs:
         problem = f"{method} needs to know where the train is, and the ride does not say"
         limit = "[encoder], [odometer] or [odometry]"

@@ -113,7 +113,12 @@ def _plan(name: str, seed: int | None, settings: list[str], *, many: bool) -> in
 
 
 def check(
-    scenario: Scenario,
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|FILE", help="A shipped scenario, the path of a TOML file, or a recorded ride's."
+        ),
+    ],
     plugins: Annotated[
         bool,
         typer.Option(
@@ -121,10 +126,29 @@ def check(
             help="Load Python files that the scenario names, which runs their code; or judge the rest.",
         ),
     ] = True,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            "--write", metavar="NEW.toml", help="Of a ride: write its file with what is wrong mended."
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
 ) -> int:
-    """Judge a scenario without running it."""
+    """Judge a scenario without running it, or say what a recorded ride shows of itself."""
+    from simrail.cli.check_ride import check_ride, is_ride, refuse_ride_option
+
+    if is_ride(scenario):
+        for option, given in (
+            ("--set", settings),
+            ("--seed", seed is not None),
+            ("--no-plugins", not plugins),
+        ):
+            if given:
+                refuse_ride_option(option)
+        return check_ride(Path(scenario), write)
+    if write is not None:
+        raise InputError("is for recorded rides", field="--write", value=str(write), remedy="leave it out")
     from simrail.scenario.check import judge_scenario
     from simrail.scenario.scenario import load_scenario
 

@@ -1,5 +1,6 @@
 """A recorded ride, ready for estimators: its signals, an odometry, and whether all that can be true."""
 
+import warnings
 from pathlib import Path
 
 from simrail.core.toml_files import blame, label
@@ -7,6 +8,7 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_field import check_hard_iron
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.check_sheet import check_ranges
+from simrail.recording.evidence.judge import Evidence, warnings_of
 from simrail.recording.files.ride_reader import read_signals, ride_file
 from simrail.recording.recording import Recording
 
@@ -27,13 +29,26 @@ def read_ride(path: Path) -> Recording:
     InputError
         If a file is missing or unreadable, or says something impossible, or the recording passes neither
         `check_recording` nor `check_plausible`, or its samples are not those of its sheets.
+
+    Warns
+    -----
+    UserWarning
+        Of each figure that is likely wrong.
     """
+    recording, evidence = judged_ride(path)
+    for line in warnings_of(evidence):
+        warnings.warn(line, stacklevel=2)
+    return recording
+
+
+def judged_ride(path: Path) -> tuple[Recording, Evidence]:
+    """As `read_ride`, with what the ride says of itself, and without a warning."""
     recording = read_signals(path)
     if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
         source = "encoder" if recording.odometer is None else "odometer"
         recording = with_odometry(recording, "encoder", source=source)
     with blame(label(ride_file(path))):
-        check_plausible(recording)
+        evidence = check_plausible(recording)
         check_ranges(recording)
         check_hard_iron(recording)
-    return recording
+    return recording, evidence

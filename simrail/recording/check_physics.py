@@ -12,6 +12,7 @@ import pandas as pd
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.recording.evidence.judge import Evidence, refuse_wrong, weigh
 from simrail.recording.recording import Recording
 from simrail.recording.signals import FORCES
 from simrail.recording.standstill import at_rest_initially
@@ -40,29 +41,40 @@ BEYOND_TRACK_M = 20.0
 """How far an odometry may be off the end of the track by its own error."""
 
 
-def check_plausible(recording: Recording) -> None:
-    """Refuse a recording whose units, axes or signs cannot be those that are claimed.
+def check_plausible(recording: Recording) -> Evidence:
+    """Refuse a recording whose units, axes, factors, place or clocks cannot be those that are claimed.
 
     The specific force is judged at rest, where the ride begins with a second of it, else by its median.
-    Where the ride has them, its curves are compared with the gyro's Z (the track's yaw rate, d yaw / ds times
-    speed), its setting off and braking with the accelerometer's X and Y, by least squares. A ride on the
-    straight at constant speed says nothing of either, nor does one without odometry or without a map.
+    Then the ride's curves, its setting off and braking, and gravity are weighed together
+    (`simrail.recording.evidence.judge`). What that cannot explain is held against wide limits: the gyro's Z
+    against the track's yaw rate, the accelerometer's X and Y against the odometry's acceleration. A ride on
+    the straight at constant speed says nothing of either, nor does one without odometry or
+    without a map.
+
+    Returns
+    -------
+    Evidence
+        What was found; what in it is likely wrong, is for the caller to tell.
 
     Raises
     ------
     InputError
         If gravity has another size or direction; if the train turns faster than a train; if it leaves the
-        track; if the gyro does not turn with the track: by none of its curves, the other way, or many times
-        as much; if the accelerometer does not push when the train gains speed, or sideways, or backwards.
+        track; if a figure is surely wrong; if the gyro does not turn with the track: by none of its curves,
+        the other way, or many times as much; if the accelerometer does not push when the train gains speed,
+        or sideways, or backwards.
     """
     _check_gravity(recording)
     _check_turning(recording)
+    evidence = weigh(recording)
+    refuse_wrong(evidence)
     if not recording.track.is_map:
-        return
+        return evidence
     if recording.odometry is not None:
         _check_motion(recording, recording.odometry)
     else:
         _check_on_track(recording, recording.start_position_m, field="start_position_m")
+    return evidence
 
 
 def _check_gravity(recording: Recording) -> None:

@@ -287,6 +287,9 @@ class Recording(Shown):
         Its data sheet.
     vehicle_sheet : VehicleSheet, optional
         The vehicle's drawing, and how far the train may be from it; None where nothing is known of it.
+    start_speed_mps : float, optional
+        Speed at the first sample, negative towards smaller s, to some metres per second; None where nobody
+        said it: then it is found out by the first second of an encoder.
     second_imu : pandas.DataFrame, optional
         What an IMU elsewhere on the train records, as `imu`, at the times of a clock of its own.
     second_imu_sheet : SecondImuSheet, optional
@@ -322,6 +325,7 @@ class Recording(Shown):
     odometer_sheet: OdometerSheet | None = None
     map_errors: MapErrors = UNSTATED
     vehicle_sheet: VehicleSheet | None = None
+    start_speed_mps: float | None = None
     second_imu: pd.DataFrame | None = None
     second_imu_sheet: SecondImuSheet | None = None
     gnss: pd.DataFrame | None = None

@@ -86,11 +86,14 @@ class Signal:
         What it holds.
     timed : bool
         True if its frame is indexed by ``time_s``.
+    keeps_blanks : bool
+        True if a row without any value is a sample that says so, and none that is missing.
     """
 
     name: str
     quantities: tuple[Quantity, ...]
     timed: bool = True
+    keeps_blanks: bool = False
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -123,6 +126,7 @@ GNSS_SIGNAL = Signal(
         Quantity("position", GNSS[:1], LENGTHS, required=False),
         Quantity("speed", GNSS[1:], SPEEDS, required=False),
     ),
+    keeps_blanks=True,
 )
 MAGNETOMETER_SIGNAL = Signal("magnetometer", (Quantity("field", MAGNETIC, FIELDS),))
 RAIL_SIGNAL = Signal("rail_displacement", tuple(_alone(column, LENGTHS) for column in RAIL_DISPLACEMENT))

@@ -388,6 +388,9 @@ class RideFile(Part):
         A shipped track, or the path of a track file; without it only methods that need no map run.
     start_position_m : float, optional
         s of the IMU at its first sample; 0 if not given, which only a ride without a track may leave out.
+    start_speed_mps : float, optional
+        Speed at the first sample of a ride that begins at speed, negative towards smaller s; found out by an
+        encoder if not given.
     gravity_mps2 : float
         Local gravity.
     longest_gap_s : float
@@ -404,6 +407,7 @@ class RideFile(Part):
     name: str = Field(min_length=1, max_length=200)
     track: str | None = None
     start_position_m: float | None = None
+    start_speed_mps: Annotated[float, Field(ge=-150.0, le=150.0)] | None = None
     gravity_mps2: Annotated[float, Field(ge=9.7, le=9.9)] = 9.81
     longest_gap_s: Annotated[float, Field(gt=0.0, le=10.0)] = LONGEST_GAP_S
     map: MapErrorsPart = MapErrorsPart()

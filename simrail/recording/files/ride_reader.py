@@ -130,6 +130,7 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
         encoder=None,
         encoder_sheet=None,
         start_position_m=spec.start_position_m or 0.0,
+        start_speed_mps=spec.start_speed_mps,
         odometry_source="" if spec.odometry is None else spec.odometry.source,
         gravity_mps2=spec.gravity_mps2,
         gaps=gaps,

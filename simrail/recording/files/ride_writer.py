@@ -112,6 +112,7 @@ def write_parts(recording: Recording, folder: Path, *, format: Format, axes: Fra
         "name": recording.name,
         "track": f"./{TRACK_FILE}",
         "start_position_m": recording.start_position_m,
+        "start_speed_mps": recording.start_speed_mps,
         "gravity_mps2": recording.gravity_mps2,
         "map": map_table(recording.map_errors),
     }

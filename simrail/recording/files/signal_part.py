@@ -60,6 +60,12 @@ class SignalPart(DataPart):
     longest_gap_s : float, optional
         Longest distance of two samples that is bridged; that of the ride file where nothing is said, and
         for devices slower than that, three of their intervals.
+    scale : dict
+        Quantity -> factor on its values, for a device that is found to be off by one.
+    time_offset_s : float
+        Seconds that are added to its stamps: negative for a device whose stamps are late.
+    time_drift_ppm : float
+        Millionths of the time since its first stamp that are added too: positive for a slow clock.
     """
 
     signal: ClassVar[Signal]
@@ -72,6 +78,9 @@ class SignalPart(DataPart):
     rate_hz: Positive | None = None
     start_s: float = 0.0
     longest_gap_s: Annotated[float, Field(gt=0.0, le=600.0)] | None = None
+    scale: dict[str, Positive] = Field(default_factory=dict)
+    time_offset_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
+    time_drift_ppm: Annotated[float, Field(ge=-10_000.0, le=10_000.0)] = 0.0
 
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
@@ -91,6 +100,15 @@ class SignalPart(DataPart):
                         limit="one of " + ", ".join(keys),
                         remedy=near(key, keys) or "remove it",
                     )
+        scaled = [key for key, quantity in quantities.items() if not quantity.whole]
+        for key in self.scale:
+            if key not in scaled:
+                raise InputError(
+                    "has no scale",
+                    field=f"scale.{key}",
+                    limit="one of " + ", ".join(scaled),
+                    remedy=near(key, scaled) or "remove it",
+                )
         for key, names in self.columns.items():
             self._judge_names(key, names, len(quantities[key].columns) if key in quantities else 1)
         for key, unit in self.units.items():

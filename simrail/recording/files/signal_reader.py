@@ -18,6 +18,7 @@ from simrail.core.resample import rate_of
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import label
 from simrail.recording.check_sheet import Bounds, Channel, check_samples
+from simrail.recording.files.as_mended import as_mended
 from simrail.recording.files.data_file import DataFile, open_data, read_columns
 from simrail.recording.files.signal_part import TEXT_TIMES, SignalPart, VectorPart
 from simrail.recording.files.stamps import RideClock, mended
@@ -147,7 +148,7 @@ class SignalReader:
     def _framed(self, rows: _Rows, part: SignalPart, signal: Signal, table: str) -> pd.DataFrame:
         """Frame of some quantities of the rows that were read."""
         quantities = [quantity for quantity in signal.quantities if quantity.key in rows.columns]
-        kept = _kept(rows, quantities)
+        kept = None if signal.keeps_blanks else _kept(rows, quantities)
 
         def place(sample: int) -> str:
             return rows.data.place(sample if kept is None else int(kept[sample]))
@@ -170,7 +171,7 @@ class SignalReader:
             scaled.update(zip(quantity.columns, values, strict=True))
         frame = pd.DataFrame(scaled, copy=False)
         if not signal.timed:
-            return frame
+            return as_mended(frame, part)
         if len(frame) < 3:
             raise InputError("is too short", file=file, value=f"{len(frame)} samples", limit=">= 3")
         assert rows.time is not None
@@ -182,7 +183,7 @@ class SignalReader:
         if part.increments:
             self._as_rates(frame, part, signal, rate_of(time))
         frame.index = pd.Index(time, name="time_s")
-        return frame
+        return as_mended(frame, part)
 
     def _as_rates(self, frame: pd.DataFrame, part: SignalPart, signal: Signal, rate: float) -> None:
         """Make increments rates, in place: over the interval that a sample stands for."""

@@ -1,0 +1,203 @@
+"""What gyro and accelerometer should show of a ride, given its map and its wheel, and a few faults of both.
+
+Means over blocks of half a second of five channels (gyro X, Y, Z, accelerometer X, Y). With w(t) the way of
+the wheel, the train is at
+
+    s = start + shift + wheel w(t - offset - drift (t - middle)),   V = ds/dt,   A = dV/dt,
+
+its body, on springs in the track frame (roll phi, pitch theta, Darboux curvatures k), turns and feels
+
+    rate  = V k + (d roll/dt, d pitch/dt + roll V k3, 0),   roll = lean a/g,   pitch = -squat A/g
+    force = (A (1 + squat + stretch) - g sin theta, a (1 + lean), g cos theta cos phi - V^2 k2)
+    a     = V^2 k3 + g cos theta sin phi
+
+and the device, whose axes are turned against those that were claimed by R(roll, pitch, yaw), reads
+
+    gyro (R' rate) + bias,   R' force + bias.
+
+Not here: motion of the body in the track, which averages out or is noise, and the height of the mount.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simrail.core.columns import ACCEL, GYRO
+from simrail.core.jit import FloatArray
+from simrail.core.rotation import rotation_matrix
+from simrail.recording.evidence.line import K1, K3, PITCH, ROLL, MapTable, map_table
+from simrail.recording.evidence.way import Way, way_of
+from simrail.recording.recording import Recording
+
+BLOCK_S, MOST_BLOCKS = 0.5, 6000
+"""Length of a block: below it sway and vibration, above it ramps of traction; and most blocks of a ride."""
+
+FINE = 5
+"""Times in a block at which the model is evaluated."""
+
+MARGIN_M = 600.0
+"""How far beyond the ride the map is looked at."""
+
+GLOBALS = (
+    "wheel",
+    "shift",
+    "offset",
+    "drift",
+    "gyro",
+    "roll",
+    "pitch",
+    "yaw",
+    "squat",
+    "lean",
+    "stretch",
+    "gyro_bias_x",
+    "gyro_bias_y",
+    "gyro_bias_z",
+    "accel_bias_x",
+    "accel_bias_y",
+)
+"""Parameters that hold for the whole ride, in the order of their columns."""
+
+INDEX = {name: i for i, name in enumerate(GLOBALS)}
+
+NOMINAL = {"wheel": 1.0, "gyro": 1.0}
+"""Of parameters whose sound value is not 0."""
+
+CHANNELS = 5
+GYRO_X, GYRO_Y, GYRO_Z, FORCE_X, FORCE_Y = range(CHANNELS)
+
+
+@dataclass(frozen=True)
+class Ride:
+    """A ride in blocks, ready for the fit.
+
+    Attributes
+    ----------
+    recording : Recording
+        What was recorded.
+    way : Way
+        Its motion by the wheel.
+    table : MapTable
+        The map.
+    fine_s : ndarray (b * FINE,)
+        Times of the IMU's clock in the blocks.
+    measured : ndarray (b, 5)
+        Means of the five channels.
+    block_s : float
+        Length of a block.
+    """
+
+    recording: Recording
+    way: Way
+    table: MapTable
+    fine_s: FloatArray
+    measured: FloatArray
+    block_s: float
+
+    @property
+    def reading_s(self) -> float:
+        """Interval of the readings of the device that says the way."""
+        frame = getattr(self.recording, self.way.device)
+        return float((frame.index[-1] - frame.index[0]) / (len(frame) - 1))
+
+    @property
+    def middle_s(self) -> float:
+        """Time from which the drift of a clock is counted."""
+        return float(0.5 * (self.fine_s[0] + self.fine_s[-1]))
+
+
+def ride_of(recording: Recording) -> Ride | None:
+    """Blocks of a recording; None where nobody says how the train moved, or it is shorter than eight."""
+    way = way_of(recording)
+    if way is None:
+        return None
+    stamps = recording.imu.index.to_numpy(dtype=np.float64)
+    rate, lag = recording.imu_sheet.rate_hz, recording.imu_sheet.lag_s
+    block_s = max(BLOCK_S, 2.0 / rate, (stamps[-1] - stamps[0]) / MOST_BLOCKS)
+    count = int((stamps[-1] - stamps[0]) / block_s)
+    if count < 8:
+        return None
+    # A sample stands for the interval around its stamp: sums up to the ends of those intervals.
+    signals = recording.imu[[*GYRO, *ACCEL[:2]]].to_numpy(dtype=np.float64)
+    ends = np.concatenate([stamps - 0.5 / rate, [stamps[-1] + 0.5 / rate]])
+    sums = np.vstack([np.zeros(CHANNELS), np.cumsum(signals, axis=0)]) / rate
+    edges = stamps[0] + block_s * np.arange(count + 1)
+    sums = np.column_stack([np.interp(edges, ends, column) for column in sums.T])
+    # What a stamp says is as old as the device's response.
+    fine = edges[0] - lag + block_s / FINE * (np.arange(count * FINE) + 0.5)
+    low, high = way.way_m.min(), way.way_m.max()
+    start = recording.start_position_m
+    low, high = start + 2.0 * min(low, 0.0) - MARGIN_M, start + 2.0 * max(high, 0.0) + MARGIN_M
+    track = recording.track
+    low, high = max(low, track.start_m - 50.0), min(high, track.end_m + 50.0)
+    table = map_table(track, low, max(high, low + 50.0))
+    return Ride(recording, way, table, fine, np.diff(sums, axis=0) / block_s, block_s)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Place, speed and acceleration (b * FINE,) of the train for a set of parameters, and whether known."""
+
+    place_m: FloatArray
+    speed_mps: FloatArray
+    acceleration_mps2: FloatArray
+
+
+def start_values() -> FloatArray:
+    """Parameters of a sound ride."""
+    return np.array([NOMINAL.get(name, 0.0) for name in GLOBALS])
+
+
+def motion(ride: Ride, x: FloatArray) -> Motion:
+    """How the train moved, for parameters (len(GLOBALS),)."""
+    wheel, shift, offset, drift = x[:4]
+    way = ride.way
+    times = ride.fine_s - offset - drift * (ride.fine_s - ride.middle_s)
+    # Uniform times: the cell of each is found without a search.
+    at = np.clip((times - way.time_s[0]) / way.step_s, 0.0, len(way.time_s) - 1.000001)
+    cell = at.astype(np.int64)
+    share = at - cell
+
+    def of(values: FloatArray) -> FloatArray:
+        between: FloatArray = values[cell] + share * (values[cell + 1] - values[cell])
+        return between
+
+    place = ride.recording.start_position_m + shift + wheel * of(way.way_m)
+    return Motion(place, wheel * of(way.speed_mps), wheel * of(way.acceleration_mps2))
+
+
+def inside(ride: Ride, x: FloatArray) -> np.ndarray:
+    """Blocks (b,) of which the device of the way tells, for a clock of that offset."""
+    times = ride.fine_s[::FINE] - x[INDEX["offset"]]
+    time = ride.way.time_s
+    seen: np.ndarray = (times >= time[0]) & (times + ride.block_s <= time[-1])
+    return seen
+
+
+def expected(ride: Ride, x: FloatArray) -> FloatArray:
+    """Means of the five channels (b, 5) that parameters (len(GLOBALS),) let expect."""
+    by = dict(zip(GLOBALS, x, strict=True))
+    moved, gravity = motion(ride, x), ride.recording.gravity_mps2
+    line = ride.table.at(moved.place_m)
+    speed, push = moved.speed_mps, moved.acceleration_mps2
+    step, level = ride.block_s / FINE, np.cos(line[:, PITCH])
+    beside = speed**2 * line[:, K3] + gravity * level * np.sin(line[:, ROLL])
+    roll, pitch = by["lean"] * beside / gravity, -by["squat"] * push / gravity
+    rate = speed[:, None] * line[:, K1 : K3 + 1]
+    rate[:, 1] += roll * rate[:, 2] + np.gradient(pitch, step)
+    rate[:, 0] += np.gradient(roll, step)
+    along = push * (1.0 + by["squat"] + by["stretch"]) - gravity * np.sin(line[:, PITCH])
+    up = gravity * level * np.cos(line[:, ROLL]) - speed**2 * line[:, K1 + 1]
+    force = np.column_stack([along, beside * (1.0 + by["lean"]), up])
+    turn = rotation_matrix(np.array([[by["roll"], by["pitch"], by["yaw"]]]))[0]
+    read = np.empty((len(speed), CHANNELS))
+    read[:, :3] = by["gyro"] * (rate @ turn)
+    read[:, 3:] = (force @ turn)[:, :2]
+    means: FloatArray = read.reshape(-1, FINE, CHANNELS).mean(axis=1)
+    return means + x[-CHANNELS:]
+
+
+def blocks_of(values: FloatArray) -> FloatArray:
+    """Means (b,) over blocks of values (b * FINE,)."""
+    means: FloatArray = values.reshape(-1, FINE).mean(axis=1)
+    return means

@@ -1,0 +1,151 @@
+"""A ride file with what its recording found wrong set right: its text in, its text out.
+
+Only what is judged wrong is changed, each by the setting that its finding names. The data files are not
+touched. Comments of the ride file are not kept.
+"""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simrail.core.atomic_files import whole_file
+from simrail.core.errors import InputError
+from simrail.core.rotation import euler_angles, rotation_matrix
+from simrail.core.toml_files import judge, label, read_toml, toml_text
+from simrail.recording.evidence.finding import Finding
+from simrail.recording.evidence.judge import Evidence
+from simrail.recording.files.ride_file import RideFile
+from simrail.recording.files.ride_reader import ride_file
+
+ANGLES = ("roll", "pitch", "yaw")
+
+
+def write_mended(path: Path, evidence: Evidence, out: Path) -> list[str]:
+    """Write a ride file that has what is wrong set right; it appears whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The ride file, or its folder.
+    evidence : Evidence
+        What was found of it.
+    out : Path
+        The new ride file; must not exist yet.
+
+    Returns
+    -------
+    list of str
+        The settings that were changed, as ``key = value (before)``.
+
+    Raises
+    ------
+    InputError
+        If the new file exists, or nothing is wrong that a setting could mend.
+    """
+    if out.exists():
+        raise InputError("exists already", file=label(out), field="--write", remedy="choose another name")
+    if not out.parent.is_dir():
+        raise InputError("no such folder", file=label(out.parent), field="--write", remedy="make it first")
+    path = ride_file(path)
+    data = read_toml(path)
+    changes = mended(data, evidence)
+    if not changes:
+        raise InputError("nothing is wrong that a setting could mend", file=label(path), field="--write")
+    _move(data, path.parent, out.parent)
+    text = toml_text(data)
+    judge(RideFile, data, file=label(out))
+    with whole_file(out) as stream:
+        stream.write(text.encode())
+    return changes
+
+
+def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
+    """Set right what is wrong in the tables of a ride file, in place; returns what was changed."""
+    wrong = {finding.key: finding for finding in evidence.wrong if finding.setting}
+    changes: list[str] = []
+    if "gyro" in wrong:
+        _multiply(data, "imu.scale.gyro", 1.0 / wrong["gyro"].value, changes)
+    if "wheel" in wrong:
+        _mend_wheel(data, wrong["wheel"], changes)
+    if "shift" in wrong:
+        _add(data, "start_position_m", wrong["shift"].value, changes)
+    if any(key in wrong for key in ANGLES):
+        _turn(data, wrong, changes)
+    offset = wrong["offset"].value if "offset" in wrong else 0.0
+    if "drift" in wrong:
+        _add(data, wrong["drift"].setting, wrong["drift"].value, changes)
+        offset = evidence.of("offset").value - 1e-6 * wrong["drift"].value * evidence.middle_s
+    if offset:
+        _add(data, evidence.of("offset").setting, offset, changes)
+    return changes
+
+
+def _mend_wheel(data: dict[str, Any], wheel: Finding, changes: list[str]) -> None:
+    """Radius or scale; or the direction, where that is wrong."""
+    if wheel.value < 0.0:
+        before = bool(_table(data, wheel.setting).get("reverse", False))
+        _set(data, wheel.setting, not before, before, changes)
+    elif wheel.setting == "odometer.scale":
+        quantity = "distance" if "distance" in data["odometer"].get("columns", {}) else "speed"
+        _multiply(data, f"{wheel.setting}.{quantity}", wheel.value, changes)
+    else:
+        _multiply(data, wheel.setting, wheel.value, changes)
+
+
+def _turn(data: dict[str, Any], wrong: Mapping[str, Finding], changes: list[str]) -> None:
+    """Mounting angles: those that are given, turned on by those that were found."""
+    imu = data["imu"]
+    given = np.radians([[float(imu.get(f"{key}_deg", 0.0)) for key in ANGLES]])
+    found = np.radians([[wrong[key].value if key in wrong else 0.0 for key in ANGLES]])
+    angles = np.degrees(euler_angles(rotation_matrix(found) @ rotation_matrix(given)))[0]
+    for key, angle in zip(ANGLES, angles, strict=True):
+        before = float(imu.get(f"{key}_deg", 0.0))
+        if abs(angle - before) > 1e-6:
+            _set(data, f"imu.{key}_deg", float(f"{angle:.5g}"), before, changes)
+
+
+def _table(data: dict[str, Any], setting: str) -> dict[str, Any]:
+    """The table that a dotted setting stands in; made where it is not there."""
+    table = data
+    for name in setting.split(".")[:-1]:
+        table = table.setdefault(name, {})
+    return table
+
+
+def _set(data: dict[str, Any], setting: str, value: object, before: object, changes: list[str]) -> None:
+    _table(data, setting)[setting.rpartition(".")[2]] = value
+    shown = [str(word).lower() if isinstance(word, bool) else f"{word:g}" for word in (value, before)]
+    changes.append(f"{setting} = {shown[0]} (before: {shown[1]})")
+
+
+def _multiply(data: dict[str, Any], setting: str, factor: float, changes: list[str]) -> None:
+    before = float(_table(data, setting).get(setting.rpartition(".")[2], 1.0))
+    _set(data, setting, float(f"{before * factor:.6g}"), before, changes)
+
+
+def _add(data: dict[str, Any], setting: str, value: float, changes: list[str]) -> None:
+    before = float(_table(data, setting).get(setting.rpartition(".")[2], 0.0))
+    _set(data, setting, round(before + value, 4), before, changes)
+
+
+def _move(data: dict[str, Any], folder: Path, other: Path) -> None:
+    """Paths of a ride file, seen from another folder."""
+    if folder.resolve() == other.resolve():
+        return
+    for table, key in [
+        (data, "track"),
+        *((part, "file") for part in _parts(data)),
+        *((part, "grade") for part in _parts(data)),
+    ]:
+        named = table.get(key)
+        if isinstance(named, str) and not Path(named).is_absolute() and (folder / named).is_file():
+            table[key] = f"./{Path(os.path.relpath(folder / named, other)).as_posix()}"
+
+
+def _parts(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """Every table of a ride file, and those inside."""
+    inner = [value for value in data.values() if isinstance(value, dict)]
+    return [part for table in inner for part in (table, *_parts(table))]

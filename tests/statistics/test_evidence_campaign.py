@@ -1,0 +1,151 @@
+"""False alarms of sound rides, and the share of planted faults that is found: a campaign, and its script.
+
+``python -m tests.statistics.test_evidence_campaign`` prints the figures: the rides of shipped scenarios, both
+directions, all grades, each with a map that errs; and a curve of detection over sizes for each kind of fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+import pytest
+
+from simrail.campaign.cell import record_cell, simulated
+from simrail.campaign.progress import Watcher
+from simrail.recording.evidence.judge import KINDS, weigh
+from simrail.recording.recording import Recording
+from simrail.scenario.cells import cells
+from simrail.scenario.check import judge_scenario
+from simrail.scenario.scenario import load_scenario
+from tests.shared.planted_faults import PLANTS
+
+SIZES: dict[str, tuple[float, ...]] = {
+    "gyro": (0.5, 2.0, 1.03, 1.02, 1.05),
+    "wheel": (0.5, 2.0, 1.02, 1.01, 1.03),
+    "shift": (20.0, -20.0, 10.0, 60.0),
+    "yaw": (5.0, 2.0, -20.0, 30.0, 90.0, 180.0),
+    "pitch": (2.0, 1.0),
+    "roll": (2.0, 1.0),
+    "offset": (0.3, 0.1, -2.0),
+    "drift": (200.0, 500.0),
+}
+"""Sizes of planted faults: those of the requirement first, then those of the curve of detection."""
+
+KINEMATIC = ("engine=kinematic",)
+
+CHEAP: tuple[tuple[str, Sequence[str], int, int], ...] = (
+    ("validation_quick", KINEMATIC, 10, 12),
+    ("quick_kinematic", (), 2, 1),
+)
+"""(scenario, settings, one cell in so many, most cells) of the slow test: no multibody ride to wait for."""
+
+ALL: tuple[tuple[str, Sequence[str], int, int], ...] = (
+    ("validation_quick", KINEMATIC, 1, 432),
+    ("quick_kinematic", (), 1, 4),
+    ("validation_quick", (), 9, 48),
+    ("odometry", (), 7, 30),
+    ("scale_track", (), 3, 8),
+    ("metro_table3", (), 2, 6),
+    ("metro_geometry", (), 3, 6),
+    ("vertical_profile", (), 3, 6),
+    ("track_relative", (), 5, 12),
+    ("passes", (), 7, 6),
+    ("shaking", (), 1, 6),
+    ("leaves", (), 1, 2),
+)
+"""The same of the script."""
+
+
+def rides(chosen: Sequence[tuple[str, Sequence[str], int, int]]) -> Iterator[tuple[str, Recording]]:
+    """Recordings of scenarios, as a logger would hand them in: without an odometry."""
+    for name, settings, every, most in chosen:
+        scenario = load_scenario(name, overrides=list(settings))
+        parts = judge_scenario(scenario).parts
+        wanted = [cell for i, cell in enumerate(cells(scenario)) if i % every == 0][:most]
+        for _, group in groupby(wanted, key=lambda cell: cell.ride_number):
+            of_ride = list(group)
+            motion = simulated(of_ride[0], parts, Watcher(), 1, 1)
+            for cell in of_ride:
+                recorded = record_cell(cell, motion, parts)
+                yield f"{name} {cell.imu.grade}", replace(recorded, odometry=None, odometry_source="")
+
+
+def false_alarms(recordings: Sequence[tuple[str, Recording]]) -> list[str]:
+    """What is said of sound rides."""
+    found = []
+    for name, recording in recordings:
+        found += [f"{name}: {finding.key} {finding.shown}" for finding in weigh(recording).wrong]
+    return found
+
+
+def detection(
+    recordings: Sequence[tuple[str, Recording]], key: str, size: float
+) -> tuple[float, float, float]:
+    """Share found, share in which nothing else was blamed, rms error of the figure found."""
+    found, alone, errors = [], [], []
+    for _, recording in recordings:
+        if recording.encoder is None:
+            continue
+        evidence = weigh(PLANTS[key](recording, size))
+        wrong = [finding.key for finding in evidence.wrong]
+        found.append(key in wrong)
+        alone.append(wrong == [key])
+        error = evidence.of(key).value - size
+        errors.append(np.remainder(error + 180.0, 360.0) - 180.0 if key == "yaw" else error)
+    return float(np.mean(found)), float(np.mean(alone)), float(np.sqrt(np.mean(np.square(errors))))
+
+
+@pytest.fixture(scope="module")
+def recordings() -> list[tuple[str, Recording]]:
+    return list(rides(CHEAP))
+
+
+@pytest.mark.slow
+def test_sound_rides_raise_no_alarm(recordings: list[tuple[str, Recording]]) -> None:
+    assert false_alarms(recordings) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("key", "size"),
+    [
+        ("gyro", 0.5),
+        ("gyro", 2.0),
+        ("gyro", 1.05),
+        ("wheel", 0.5),
+        ("wheel", 2.0),
+        ("wheel", 1.02),
+        ("shift", 20.0),
+        ("yaw", 5.0),
+        ("pitch", 2.0),
+        ("roll", 2.0),
+        ("offset", 0.3),
+    ],
+)
+def test_planted_faults_are_found(key: str, size: float, recordings: list[tuple[str, Recording]]) -> None:
+    share, _, _ = detection(recordings, key, size)
+    assert share >= 0.9  # of some twelve rides: one may be missed
+
+
+def main() -> None:
+    """Print the figures of the campaign."""
+    kept, alarms, count = [], [], 0
+    for pair in rides(ALL):
+        alarms += false_alarms([pair])
+        if count % 12 == 0:
+            kept.append(pair)
+        count += 1
+    print(f"{count} sound rides, {len(alarms)} false alarms: {alarms}")
+    for key in KINDS:
+        for size in SIZES[key]:
+            share, alone, error = detection(kept, key, size)
+            print(
+                f"{key} {size:g}: found {share:.0%} of {len(kept)}, alone {alone:.0%}, rms error {error:.4g}"
+            )
+
+
+if __name__ == "__main__":
+    main()
