@@ -5,6 +5,7 @@ a cell do not depend on which cells ran before it, or with it. Who runs which ce
 where, is decided in `simrail.campaign.campaign`.
 """
 
+import errno
 import math
 import time
 import traceback
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
     from simrail.campaign.progress import Watcher  # how it is shown decides no score
 
 STAGES = ("simulate", "measure", "estimate", "score")
+
+_OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE)
+"""What the machine lacks, whoever finds it out; any other `OSError` of an estimator is its own failure."""
 
 
 @dataclass(frozen=True)
@@ -188,6 +192,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
             recorded.append(_record(cell, truth, parts, tally))
         except Exception as error:
             check()
+            unless_of_the_machine(error)
             for name in tally.estimators:
                 tally.fail(cell, name, error)
         if cell.sensor_draw == cell.map_draw == 0:  # neither changes anything of the ride itself
@@ -195,6 +200,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
                 _score_ride(cell, truth, parts, tally)
             except Exception as error:
                 check()
+                unless_of_the_machine(error)
                 tally.fail(cell, RIDE, error)
     if not recorded:
         return
@@ -210,7 +216,14 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
                 _score(one, name, *outcome, parts, tally)
             except Exception as error:
                 check()
+                unless_of_the_machine(error)
                 tally.fail(one.cell, name, error)
+
+
+def unless_of_the_machine(error: BaseException) -> None:
+    """Raise an error that is no property of a cell: it ends the campaign, which goes on when it is mended."""
+    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+        raise error
 
 
 def record_cell(
@@ -244,7 +257,9 @@ def record_cell(
         recording = with_sheets_of(recording, told)
     if resolved.odometry is None:
         return recording
-    return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
+    with fenced():
+        estimated = with_odometry(handed(recording), resolved.odometry, source=cell.spec.odometry)
+    return replace(recording, odometry=estimated.odometry, odometry_source=estimated.odometry_source)
 
 
 def with_sheets_of(recording: Recording, told: ResolvedCell) -> Recording:
@@ -263,7 +278,7 @@ def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: 
     watcher.ride_begins(number, count, cell.ride.name)
     with interruptible() as check:
         try:
-            truth = simulate(parts.ride(cell), progress=watcher.ride_goes, warn=False)
+            truth = simulate(parts.ride(cell), progress=watcher.ride_goes, told=watcher.told, warn=False)
         except Exception:
             check()  # an engine in C++ may have made an error of its own of Ctrl-C
             raise

@@ -23,7 +23,7 @@ from typing import Literal
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from simrail.campaign.cell import Failure
 from simrail.campaign.worker import BatchResult
@@ -154,7 +154,10 @@ def _locked(folder: Path) -> Iterator[None]:
     lock = FileLock(folder / ".lock")
     try:
         lock.acquire(blocking=False)
-    except OSError as error:  # also where one that has just ended took its folder with it
+    except (
+        Timeout,
+        FileNotFoundError,
+    ) as error:  # also where one that has just ended took its folder with it
         raise InputError(
             "this plan is being run by another process, into the same folder",
             field="--out",

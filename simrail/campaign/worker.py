@@ -6,7 +6,6 @@ Nothing here knows which batches there are, nor who runs them: see `simrail.camp
 `simrail.campaign.executors`.
 """
 
-import errno
 import os
 import pickle
 import socket
@@ -140,7 +139,7 @@ def run_ride(packed: bytes, cells: tuple[Cell, ...], progress: Progress | None =
     InputError
         If this process runs other code than the one that packed the plan.
     OSError
-        If the disk is full.
+        If the cache of rides cannot be read or written.
     """
     return _run(packed, cells, progress, ride_only=True)
 
@@ -164,8 +163,8 @@ def _run(
                     worker.truth(cell, notes, progress)
         except Exception as error:
             check()
-            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-                raise  # no property of a cell: it ends the campaign, which goes on when there is room
+            if isinstance(error, OSError):
+                raise  # of the cache, no property of a cell: it ends the campaign, which goes on afterwards
             for cell in cells:
                 for name in tally.estimators:
                     tally.fail(cell, name, error)
