@@ -25,6 +25,7 @@ from typing import Any
 
 from simrail.core.errors import InputError
 from simrail.core.jit import cache_folder
+from simrail.core.sealed_files import HEADER, DamagedError, plain_of
 
 LIMIT_GB = 20.0
 
@@ -33,9 +34,6 @@ SPARE = "SIMRAIL_SPARE_RIDES"
 
 _CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
 """What a folder says that nobody may write to."""
-
-HEADER = "truth.json"
-"""File of a folder that is written last: without it a folder was interrupted and is no ride."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +120,9 @@ def rides(where: Path | None = None) -> list[CachedRide]:
             size = sum(file.stat().st_size for file in place.parent.iterdir())
             used = place.stat().st_mtime
             try:
-                name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
-            except (ValueError, KeyError):
+                manifest = plain_of(place.parent).get("manifest")
+                name = str(manifest.get("ride", "?")) if isinstance(manifest, dict) else "?"
+            except DamagedError:
                 name = "damaged"
             cached.append(CachedRide(place.parent.name, name, size, used))
     return sorted(cached, key=lambda ride: -ride.last_used_s)

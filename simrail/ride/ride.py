@@ -16,6 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
+from simrail.core.sealed_files import HEADER, DamagedError
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
 from simrail.ride.contact_extremes import ContactExtremes
@@ -59,7 +60,7 @@ _SOURCES = (
         "ride/truth_files.py",
         "ride/truth_rows.py",
     ),
-    *("core/rotation.py", "core/seeds.py", "core/jit.py"),
+    *("core/rotation.py", "core/seeds.py", "core/jit.py", "core/sealed_files.py"),
 )
 _VIBRATION_SOURCES = ("ride/vibration",)
 
@@ -193,7 +194,7 @@ def is_cached(ride: Ride) -> bool:
     if ride.vibration is not None and not is_cached(ride.without_vibration):
         return False
     places = ride_cache.places_of(ride_cache.key_of(ride.describe()))
-    return any((place / ride_cache.HEADER).is_file() for place in places)
+    return any((place / HEADER).is_file() for place in places)
 
 
 def simulate(
@@ -265,7 +266,7 @@ def _kept_before(
     for place in ride_cache.places_of(key):
         try:
             found = read(place)
-        except (FileNotFoundError, ValueError, KeyError) as error:
+        except DamagedError as error:
             ride_cache.drop(place)
             if told is not None:
                 told(f"{name} in the cache was damaged ({error}): {again}")
