@@ -30,7 +30,7 @@ from simrail.campaign.progress import Watcher
 from simrail.campaign.result import CampaignResult
 from simrail.campaign.stored_results import StoredResults, read_results
 from simrail.campaign.worker import BatchResult
-from simrail.core.atomic_files import draft_of
+from simrail.core.atomic_files import draft_of, restore
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label
 from simrail.report.pages.page import SETS_BESIDE, write_report
@@ -126,6 +126,8 @@ def run(
     elif overrides or seed is not None:
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
+    if restore(folder) and watcher is not None:
+        watcher.told(f"former results were put back into {folder}: a run ended while it replaced them")
     _judge_folder(folder)
     other = _other_results(Path(beside), scenario, folder) if beside is not None else None
     plan = judge_scenario(scenario, many=many)
@@ -178,6 +180,7 @@ def run_cell(
     started, begun = datetime.now(UTC), time.perf_counter()
     read = load_scenario(scenario, overrides=overrides, seed=seed)
     if out is not None:
+        restore(Path(out))
         _judge_folder(Path(out))
     plan = judge_scenario(read)
     if not 0 <= cell < plan.cells:
@@ -257,14 +260,13 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
     factors = [ride["real_time_factor"] for ride in campaign.rides if "real_time_factor" in ride]
     spec = scenario.spec
     versions = {package: version(package) for package in PACKAGES}
-    settings = "".join(f" --set '{setting}'" for setting in scenario.overrides)
     return {
         "scenario": scenario.name,
         "title": scenario.title,
         "scenario_hash": campaign.plan.content_hash,
         "seed": spec.seed,
         "settings": list(scenario.overrides),
-        "command": f"simrail run {shlex.quote(scenario.called)}{settings}",
+        "command": scenario.command,
         "engine": sorted({str(ride["engine"]) for ride in campaign.rides}),
         "earth": "at rest" if spec.earth is None else spec.earth.model_dump(mode="json", warnings=False),
         "temperature": spec.temperature and spec.temperature.model_dump(mode="json", warnings=False),

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from datetime import datetime
+from glob import escape
 from pathlib import Path
 from typing import Literal
 
@@ -172,7 +173,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 def _drop_abandoned(results: Path) -> None:
     """Drop unfinished runs into a folder of results that nobody has gone on with for a month."""
-    for folder in results.parent.glob(f".{results.name}.unfinished-*"):
+    for folder in results.parent.glob(f".{escape(results.name)}.unfinished-*"):
         with suppress(OSError):
             if time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:
                 shutil.rmtree(folder)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from simrail.core.atomic_files import restore
 from simrail.core.errors import InputError
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.scoring.table import SCORE_COLUMNS
@@ -64,6 +65,7 @@ def read_results(folder: Path, *, field: str, remedy: str) -> StoredResults:
     InputError
         If one of the files is missing, cannot be read, or lacks what today's simrail writes into it.
     """
+    restore(folder)
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         scores, cells = (pd.read_parquet(folder / f"{name}.parquet") for name in ("scores", "cells"))

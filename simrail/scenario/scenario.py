@@ -7,6 +7,7 @@ Only the form of each field is judged here; whether track, vehicle, rides and se
 is judged by `simrail.scenario.check`, and what is run is listed by `simrail.scenario.cells`.
 """
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
@@ -207,6 +208,19 @@ class Scenario:
     def called(self) -> str:
         """What a command calls it: a shipped one by its name, a person's own by its file."""
         return self.name if self.folder in (None, shipped_folder()) else self.file
+
+    @property
+    def command(self) -> str:
+        """The command that runs it with its settings, quoted for a shell; a setting always, to be read."""
+        called = f"./{self.called}" if self.called.startswith("-") else self.called
+        settings = [f"--set {in_quotes(setting)}" for setting in self.overrides]
+        return " ".join(["simrail run", shlex.quote(called), *settings])
+
+
+def in_quotes(text: str) -> str:
+    """A text in quotes of a shell, within which it takes nothing for a command."""
+    inside = text.replace("'", "'\"'\"'")
+    return f"'{inside}'"
 
 
 def _is_own(name: str) -> bool:
