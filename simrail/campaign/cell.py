@@ -12,17 +12,19 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from simrail.campaign.fence import MOST_PRINTED, digest, fenced, handed
+from simrail.campaign.time_limit import FIRST_CALL_S, LimitedEstimator, Outcome, estimate_here
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
 from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
-from simrail.estimation.estimate import Estimate, Estimator, estimate_many
+from simrail.estimation.estimate import Estimate, Estimator
 from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.grades import imu_sheet
 from simrail.ride.ride import simulate
@@ -112,6 +114,8 @@ class BatchTally:
         How each is tuned, by the same names.
     warm : set of str
         Estimators whose kernels have been compiled in this process.
+    limits_s : mapping of str to float
+        How long an estimator may take for a recording, by the names of those that have such a limit.
     figures : list of (pandas.DataFrame, dict)
         Figures of one estimate, and their labels.
     failures : list of Failure
@@ -126,6 +130,7 @@ class BatchTally:
     estimators: Mapping[str, Estimator]
     tunings: Mapping[str, str]
     warm: set[str] = field(default_factory=set)
+    limits_s: Mapping[str, float] = field(default_factory=dict)
     figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     printed: dict[str, str] = field(default_factory=dict)
@@ -293,8 +298,9 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     recording = record_cell(cell, truth, parts)
     estimates = {}
     for name, estimator in tally.estimators.items():
-        with suppress(Exception), fenced():
-            (estimates[name],) = estimate_many(estimator, [handed(recording)])
+        (outcome,) = estimates_of(name, estimator, [recording], tally, lambda: None)
+        if not isinstance(outcome, Exception):
+            estimates[name] = outcome[0]
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
@@ -323,28 +329,52 @@ def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally, *, again:
 
 
 def estimates_of(
-    name: str, estimator: Estimator, recordings: list[Recording], tally: BatchTally, check: Check
+    name: str, estimator: Estimator, recordings: Sequence[Recording], tally: BatchTally, check: Check
 ) -> Iterator[tuple[Estimate, float] | Exception]:
     """Each estimate and the microseconds per sample that it took, or what went wrong with it.
 
     A method that takes many recordings at once takes them all; if one of them upsets it, it takes them
-    one by one, so that only that one fails.
+    one by one, so that only that one fails. One with a time limit runs in a process of its own.
     """
+    limit_s = tally.limits_s.get(name)
+    if limit_s is None:
+        yield from _outcomes(name, estimator, recordings, partial(estimate_here, estimator), tally, check)
+        return
+    limited = LimitedEstimator(estimator, limit_s)
+    try:
+        # Every process of its own loads its kernels, or compiles them.
+        with tally.timed("estimate"), suppress(Exception):
+            limited.estimate([beginning(recordings[0], samples=64)], at_least_s=FIRST_CALL_S)
+        tally.warm.add(name)
+        yield from _outcomes(name, estimator, recordings, limited.estimate, tally, check)
+    finally:
+        limited.close()
+
+
+def _outcomes(
+    name: str,
+    estimator: Estimator,
+    recordings: Sequence[Recording],
+    run: Callable[[Sequence[Recording]], Outcome],
+    tally: BatchTally,
+    check: Check,
+) -> Iterator[tuple[Estimate, float] | Exception]:
+    """What `estimates_of` yields, by a way to run an estimator."""
     if name not in tally.warm:
         # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
-        with tally.timed("estimate"), suppress(Exception), fenced():
-            estimate_many(estimator, [beginning(recordings[0], samples=64)])
+        with tally.timed("estimate"), suppress(Exception):
+            run([beginning(recordings[0], samples=64)])
         tally.warm.add(name)
-    groups = [recordings] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
+    groups = [list(recordings)] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
     while groups:
         group = groups.pop(0)
         try:
-            given = [handed(one) for one in group]
-            with tally.timed("estimate"), fenced() as printed:
-                begun = time.perf_counter()
-                estimates = estimate_many(estimator, given)
-                seconds = time.perf_counter() - begun
-            tally.note_print(name, printed.getvalue())
+            with tally.timed("estimate"):
+                outcome = run(group)
+            if name in tally.limits_s:
+                tally.cpu_s["estimate"] += outcome.cpu_s  # of another process
+            tally.note_print(name, outcome.printed)
+            estimates = outcome.estimates
             if len(estimates) != len(group):
                 raise ValueError(f"estimate_many gave {len(estimates)} estimates of {len(group)} recordings")
         except Exception as error:
@@ -354,7 +384,7 @@ def estimates_of(
             else:
                 yield error
             continue
-        us_per_sample = 1e6 * seconds / sum(len(one.imu) for one in group)
+        us_per_sample = 1e6 * outcome.wall_s / sum(len(one.imu) for one in group)
         yield from ((estimate, us_per_sample) for estimate in estimates)
 
 

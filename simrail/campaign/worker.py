@@ -80,7 +80,8 @@ class _Worker:
     def tally(self, sample: int) -> BatchTally:
         """What gathers one batch; with the estimators of a sample."""
         parts = self.parts
-        return BatchTally(parts.scenario.name, parts.estimators(sample), parts.tunings(sample), self.warm)
+        estimators, tunings = parts.estimators(sample), parts.tunings(sample)
+        return BatchTally(parts.scenario.name, estimators, tunings, self.warm, parts.time_limits_s)
 
     def take_sample(self, tally: BatchTally, sample: int) -> None:
         """Give a batch the estimators of another sample; their names are the same in every one."""

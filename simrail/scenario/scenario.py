@@ -40,6 +40,7 @@ class ScenarioFile(Part):
     rate at which forces between wheels and rails are kept, ``truth_rate_hz`` over a whole number; 0 keeps
     none. ``passes`` is over how many of the rides the rails are fused
     (`simrail.estimators.rails.fuse`); a cell is then so many rides, and its scores are of the rails alone.
+    ``time_limit_s`` is that of every estimator which names none of its own.
     """
 
     title: str
@@ -54,6 +55,7 @@ class ScenarioFile(Part):
     monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
     passes: Listed[Annotated[int, Field(ge=1, le=1000)]] | None = None
     odometry: Listed[str] = ""
+    time_limit_s: tables.TimeLimit | None = None
     irregularity: tables.IrregularityPart | None = None
     vibration: VibrationPart | None = None
     map: tables.MapPart | None = None

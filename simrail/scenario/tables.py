@@ -401,15 +401,20 @@ class TemperaturePart(Part):
     time_constant_s: Listed[Positive] = 600.0
 
 
+TimeLimit = Annotated[float, Field(ge=0.01, le=86400.0)]
+
+
 class EstimatorPart(Part):
     """``[[estimator]]``: a method under a name, with the keyword arguments of its class.
 
     ``stands_for`` says which row of the paper's table it is set beside, by the words of the page of that
-    paper (`simrail.report.papers`).
+    paper (`simrail.report.papers`). ``time_limit_s`` is how long it may take for a recording; it is then
+    ended, and its row says so. Without one, nothing ends it.
     """
 
     name: Name
     method: str
+    time_limit_s: TimeLimit | None = None
     stands_for: Name | None = None
     options: dict[str, Any] = Field(default_factory=dict)
 
