@@ -30,7 +30,8 @@ from simrail.campaign.progress import Watcher
 from simrail.campaign.result import CampaignResult
 from simrail.campaign.stored_results import StoredResults, read_results
 from simrail.campaign.worker import BatchResult
-from simrail.core.atomic_files import draft_of, restore
+from simrail.core.atomic_files import can_be_made, draft_of, restore
+from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label
 from simrail.report.pages.page import SETS_BESIDE, write_report
@@ -231,12 +232,12 @@ def _write(
     """Write the results of a campaign into a folder."""
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
     campaign.cells.to_parquet(draft / "cells.parquet", index=False)
-    aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
+    write_csv(aggregate(campaign.scores, campaign.cells), draft / "scores.csv")
     verdicts = campaign.verdicts
     if len(verdicts):
-        verdicts.to_csv(draft / "verdicts.csv", index=False, float_format="%.9g")
+        write_csv(verdicts, draft / "verdicts.csv")
     if budgets is not None and len(budgets):
-        budgets.to_csv(draft / "budget.csv", index=False, float_format="%.9g")
+        write_csv(budgets, draft / "budget.csv")
     drawing = time.perf_counter()
     write_report(
         draft / "report.html",
@@ -306,21 +307,27 @@ def git_revision() -> str | None:
         return None
 
 
+def _is_there(folder: Path) -> bool:
+    try:
+        return folder.exists()
+    except (OSError, ValueError):  # by such a name there can be none
+        return False
+
+
 def _judge_folder(folder: Path) -> None:
     """Refuse a folder that cannot be written, or whose contents are not results."""
     remedy = "choose another folder with --out"
-    if folder.exists():
+    if _is_there(folder):
         if not folder.is_dir():
-            raise _refusal("--out", folder, "the results need a folder, this is a file", remedy)
+            problem, limit = "the results need a folder, this is a file", "a new or empty folder"
+            raise _refusal("--out", folder, problem, remedy, limit=limit)
         if any(folder.iterdir()) and not (folder / MANIFEST).is_file():
             problem = "the folder holds other things than results, and would be replaced"
             limit = f"a new or empty folder, or one that holds a {MANIFEST}"
             raise _refusal("--out", folder, problem, remedy, limit=limit)
-    above = folder.absolute()
-    while not above.exists():
-        above = above.parent
-    if not above.is_dir() or not os.access(above, os.W_OK):
-        raise _refusal("--out", folder, "the folder cannot be written", remedy)
+    if not can_be_made(folder):
+        limit = "a folder that may be written to, by a name of at most 255 bytes"
+        raise _refusal("--out", folder, "the folder cannot be written", remedy, limit=limit)
 
 
 def _failures(campaign: CampaignResult) -> str:

@@ -77,7 +77,7 @@ class ProgressWatcher(Watcher):
         self._ride = self._progress.add_task(f"ride {name}{which}", total=None, note="")
         self._begun = time.perf_counter()
         if not self._console.is_terminal:
-            self._console.print(f"ride {name}{which}", highlight=False)
+            self._console.print(f"ride {name}{which}", highlight=False, markup=False)
 
     def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
         """See `Watcher`."""
@@ -126,7 +126,7 @@ class ProgressWatcher(Watcher):
 
     def told(self, line: str) -> None:
         """See `Watcher`."""
-        self._console.print(line, highlight=False, soft_wrap=True)
+        self._console.print(line, highlight=False, soft_wrap=True, markup=False)
 
     def recording_written(self, number: int, count: int, name: str) -> None:
         """See `Watcher`."""

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -42,6 +43,20 @@ def draft_of(folder: Path) -> Iterator[Path]:
         shutil.rmtree(former, ignore_errors=True)
 
 
+def can_be_made(folder: Path) -> bool:
+    """Whether a folder, and drafts beside it, can be made where it is to be; nothing is left of the trial."""
+    above = folder.absolute().parent
+    try:
+        folder.exists()  # no file may stand on the way, and its name must be one
+        while not above.exists():
+            above = above.parent
+        # As long as the longest name beside it, that of an unfinished run or a former folder.
+        Path(tempfile.mkdtemp(prefix=f".{folder.name}.{'x' * 24}.", dir=above)).rmdir()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
 def restore(folder: Path) -> bool:
     """Put a folder back that a killed process had moved away to make room for a new one.
 
@@ -56,6 +71,8 @@ def restore(folder: Path) -> bool:
     OSError
         If it cannot be moved.
     """
+    if not folder.name:
+        return False
     formers = sorted(folder.parent.glob(f".{escape(folder.name)}.*.former"), key=_changed)
     end = time.monotonic() + _IN_MOTION_S
     while formers and not folder.exists() and time.monotonic() < end:

@@ -80,7 +80,9 @@ class ScenarioFile(Part):
     def _divides_the_output(cls, value: float | Axis | Distribution) -> float | Axis | Distribution:
         for step in each(value):
             if abs(0.001 / float(step) - round(0.001 / float(step))) > 1e-6:
-                raise ValueError(f"does not divide the output interval of 0.001 s: {step}; try 0.0005")
+                limit, remedy = "0.001 s over a whole number", "try 0.0005"
+                problem = "does not divide the output interval of 0.001 s"
+                raise InputError(problem, value=step, limit=limit, remedy=remedy)
         return value
 
     @field_validator("truth_rate_hz")
@@ -90,9 +92,8 @@ class ScenarioFile(Part):
             if float(rate) in (2000.0, 4000.0):
                 continue
             if abs(1000.0 / float(rate) - round(1000.0 / float(rate))) > 1e-9:
-                raise ValueError(
-                    f"is not 1000 Hz divided by a whole number, 2000 or 4000 Hz: {rate}; try 250.0"
-                )
+                limit = "1000 Hz over a whole number, 2000 or 4000 Hz"
+                raise InputError("is no such rate", value=rate, limit=limit, remedy="try 250.0")
         return value
 
     @field_validator("ride", "imu", "estimator")
@@ -101,7 +102,8 @@ class ScenarioFile(Part):
         names = [(part.name, getattr(part, "vehicle", None)) for part in value]
         for name, vehicle in names:
             if names.count((name, vehicle)) > 1 or (vehicle and (name, None) in names):
-                raise ValueError(f"two of them are named {name!r}; give each a name of its own")
+                limit, remedy = "each name once", "give each a name of its own"
+                raise InputError("two of them have one name", value=name, limit=limit, remedy=remedy)
         return value
 
     @model_validator(mode="after")
@@ -132,13 +134,17 @@ class ScenarioFile(Part):
         vehicles = [str(vehicle) for vehicle in each(self.vehicle)]
         for i, part in enumerate(self.imu):
             if part.vehicle is not None and part.vehicle not in vehicles:
-                raise ValueError(
-                    f"imu[{i}].vehicle is none of the scenario's: found {part.vehicle!r}; "
-                    f"limit: one of {', '.join(vehicles)}"
+                raise InputError(
+                    "is none of the scenario's",
+                    field=f"imu[{i}].vehicle",
+                    value=part.vehicle,
+                    limit=f"one of {', '.join(vehicles)}",
+                    remedy="choose one of them",
                 )
         for vehicle in vehicles:
             if not any(part.is_on(vehicle) for part in self.imu):
-                raise ValueError(f"no imu is on {vehicle!r}; add an [[imu]] with vehicle = {vehicle!r}")
+                limit, remedy = "an imu on each vehicle", f"add an [[imu]] with vehicle = {vehicle!r}"
+                raise InputError("has no imu", field="vehicle", value=vehicle, limit=limit, remedy=remedy)
         return self
 
 

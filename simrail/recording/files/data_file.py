@@ -88,23 +88,45 @@ def column_names(part: DataPart, folder: Path, *, table: str) -> list[str]:
         try:
             return list(pq.read_schema(path).names)
         except (OSError, ValueError) as error:
-            raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
+            raise _no_parquet(path, error) from None
     try:
         with path.open(encoding="utf-8-sig", newline="") as text:
             for _ in range(part.skip_lines):
                 text.readline()
             line = text.readline()
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from None
-    except UnicodeDecodeError:
-        raise InputError("is not UTF-8 text", file=label(path), remedy="save the file as UTF-8") from None
+        limit, remedy = "a file that may be read", "mend the path, or its rights"
+        said = error.strerror
+        raise InputError("cannot be read", file=label(path), value=said, limit=limit, remedy=remedy) from None
+    except UnicodeDecodeError as error:
+        bad, remedy = error.object[error.start : error.start + 8], "save the file as UTF-8"
+        raise InputError(
+            "is not UTF-8 text", file=label(path), value=bad, limit="UTF-8", remedy=remedy
+        ) from None
     if not line.strip():
         raise InputError(
             "is empty" if not part.skip_lines else "has no line of column names",
             file=label(path),
+            limit="a line of column names, and one or more lines of samples",
             remedy="write the column names in one line, then one line per sample",
         )
-    return [name.strip() for name in next(csv.reader([line.strip("\r\n")], delimiter=part.separator))]
+    try:
+        return [name.strip() for name in next(csv.reader([line.strip("\r\n")], delimiter=part.separator))]
+    except csv.Error as error:
+        raise InputError(
+            f"has no line of column names that can be read ({error})",
+            file=label(path),
+            value=line[:60],
+            limit="names that are set apart by separators",
+            remedy="mend the first line, or set skip_lines",
+        ) from None
+
+
+def _no_parquet(path: Path, error: Exception) -> InputError:
+    """What is said of a file that is called Parquet and is none, or a damaged one."""
+    said = " ".join(str(error).split())
+    limit, remedy = "a whole Parquet file", "write it anew, or give CSV"
+    return InputError("is not readable Parquet", file=label(path), value=said, limit=limit, remedy=remedy)
 
 
 def read_columns(
@@ -208,8 +230,14 @@ def _bad_text(said: str, path: Path, part: DataPart, found: list[str]) -> InputE
         remedy = "drop that line, so that it is a gap; or mend it"
         if "," in value[1] and part.decimal == ".":
             remedy = 'set decimal = ","'
+        limit = "a number, or nothing where there is none"
         return InputError(
-            f"holds no number{line}", file=label(path), field=column, value=value[1], remedy=remedy
+            f"holds no number{line}",
+            file=label(path),
+            field=column,
+            value=value[1],
+            limit=limit,
+            remedy=remedy,
         )
     count = re.search(r"Expected (\d+) columns, got (\d+)", said)
     if count:
@@ -221,14 +249,15 @@ def _bad_text(said: str, path: Path, part: DataPart, found: list[str]) -> InputE
             remedy="mend that line; for text above the column names set skip_lines, for another separator "
             "than a comma set separator",
         )
-    return InputError(f"cannot be read as CSV: {said}", file=label(path))
+    limit, remedy = "a line of column names, and a line of numbers for each sample", "mend that place"
+    return InputError("cannot be read as CSV", file=label(path), value=said, limit=limit, remedy=remedy)
 
 
 def _read_parquet(path: Path, wanted: list[str], text: Sequence[str]) -> pa.Table:
     try:
         table = pq.read_table(path, columns=wanted)
     except (OSError, ValueError) as error:
-        raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
+        raise _no_parquet(path, error) from None
     for name in wanted:
         kind = table.schema.field(name).type
         if name not in text and not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
@@ -242,7 +271,11 @@ def _no_such_column(name: str, found: list[str], part: DataPart, table: str, fil
     where = f"{table}.columns"
     if name in found:
         return InputError(
-            f"{file} has several columns of this name", field=where, value=name, remedy="rename them"
+            f"{file} has several columns of this name",
+            field=where,
+            value=name,
+            limit="a name of one column",
+            remedy="rename them",
         )
     other = next((mark for mark in _SEPARATORS if mark != part.separator and mark in "".join(found)), None)
     if len(found) == 1 and other:
@@ -250,6 +283,7 @@ def _no_such_column(name: str, found: list[str], part: DataPart, table: str, fil
             f"{file} has one column only, whose name holds a {_SEPARATORS[other]}",
             field=f"{table}.separator",
             value=part.separator,
+            limit="what sets the columns apart",
             remedy=f"set separator = {other!r}".replace("'", '"'),
         )
     listed = ", ".join(found[:20]) + (", ..." if len(found) > 20 else "")

@@ -150,7 +150,8 @@ def _si(values: FloatArray, quantity: Quantity, part: SignalPart, name: str, fil
         return values.astype(np.int64)
     unit = part.units.get(quantity.key, next(iter(quantity.units)))
     multiply, divide = quantity.units[unit.removeprefix("-")]
-    scaled = values if multiply == divide else values * multiply / divide
+    with np.errstate(over="ignore"):  # what is beyond all numbers is judged where samples are
+        scaled = values if multiply == divide else values * multiply / divide
     return -scaled if unit.startswith("-") else scaled
 
 
