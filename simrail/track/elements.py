@@ -29,6 +29,10 @@ SMOOTH_STEP = np.array([6.0, -15.0, 10.0, 0.0, 0.0, 0.0])
 """The quintic from 0 to 1 with zero slope and bend at both ends, highest power first."""
 
 
+MOST_LENGTH_M = 1e6
+"""Of one element: the longest straight there is has 478 km (figure from memory)."""
+
+
 @dataclass(frozen=True)
 class Straight:
     """A straight without cant.
@@ -149,7 +153,7 @@ def check_elements(elements: Sequence[Element], *, rail_base_m: float = RAIL_BAS
         raise InputError("has no elements", field="segment", remedy="add a straight")
     for i, element in enumerate(elements):
         here = f"segment[{i}]"
-        require_number(element.length_m, f"{here}.length_m", above=0.0)
+        require_number(element.length_m, f"{here}.length_m", above=0.0, within=MOST_LENGTH_M)
         if isinstance(element, Curve):
             require_number(element.radius_m, f"{here}.radius_m", zero=False)
             require_number(element.cant_m, f"{here}.cant_m", within=MAX_CANT_PER_BASE * rail_base_m)
