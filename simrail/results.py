@@ -131,7 +131,7 @@ def run(
         watcher.told(f"former results were put back into {folder}: a run ended while it replaced them")
     _judge_folder(folder)
     other = _other_results(Path(beside), scenario, folder) if beside is not None else None
-    plan = judge_scenario(scenario, many=many)
+    plan = judge_scenario(scenario, many=many, progress=None if watcher is None else watcher.judging)
     key = key_of(plan)
     with checkpoint_of(folder, key, start=start) as checkpoint:
         if start == "retry-failed":

@@ -77,7 +77,8 @@ def _say_usage(error: Any) -> None:
         error.show()
         return
     text = one_line(" ".join(error.format_message().split()).rstrip("."), 2 * MOST_SHOWN)
-    say(f"simrail: {text}; remedy: see '{context.command_path} --help'")
+    command = "simrail" if context.parent is None else f"simrail {context.info_name}"
+    say(f"simrail: {text}; limit: what the help lists; remedy: see '{command} --help'")
 
 
 def _version(wanted: bool) -> None:

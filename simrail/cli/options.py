@@ -26,7 +26,7 @@ Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Replace the sce
 Form = Annotated[str, typer.Option("--format", metavar="csv|parquet", help="Form of the data files.")]
 
 
-def finite(value: float | None) -> float | None:
+def finite(param: typer.CallbackParam, value: float | None) -> float | None:
     """Refuse an option that is no finite number; a range takes NaN for one within it.
 
     Raises
@@ -35,7 +35,7 @@ def finite(value: float | None) -> float | None:
         If it is none.
     """
     if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is no finite number")
+        raise typer.BadParameter(f"{value} is no finite number", param=param)
     return value
 
 
@@ -52,9 +52,11 @@ def judge_out(out: Path | None) -> None:
     InputError
         If it is a file, or cannot be written.
     """
-    if out is None or (out.is_dir() and os.access(out, os.W_OK)):
+    if out is None:
         return
-    if not can_be_made(out) or out.exists():
+    # Where one is already, files are written into it; else it has to be made.
+    is_good = can_be_made(out) and (os.access(out, os.W_OK) if out.is_dir() else not out.exists())
+    if not is_good:
         raise InputError(
             "the folder cannot be written",
             field="--out",

@@ -125,6 +125,9 @@ def check(
     settings: Settings = None,
 ) -> int:
     """Judge a scenario without running it."""
+    from rich.console import Console
+
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.scenario.check import judge_scenario
     from simrail.scenario.scenario import load_scenario
 
@@ -135,7 +138,8 @@ def check(
     elif files:
         read = read.without_own_files()
         say(f"judged without {', '.join(files)}, and without the methods in it")
-    plan = judge_scenario(read)
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        plan = judge_scenario(read, progress=watcher.judging)
     for warning in plan.warnings:
         say(f"warning: {warning}")
     for note in plan.notes:
