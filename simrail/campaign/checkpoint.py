@@ -164,6 +164,7 @@ def _locked(folder: Path) -> Iterator[None]:
             field="--out",
             value=folder.name,
             remedy="wait for it, or choose another folder with --out",
+            limit="one process at a time",
         ) from error
     try:
         yield

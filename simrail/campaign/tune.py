@@ -227,6 +227,7 @@ def estimator_named(scenario: Scenario, parts: Parts, estimator: str) -> Estimat
             field="--estimator",
             value=", ".join(variants),
             remedy=f"choose one with --set estimator.{estimator}.options.NAME=VALUE",
+            limit="one of them",
         )
     (only,) = variants.values()
     return only

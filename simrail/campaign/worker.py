@@ -127,6 +127,7 @@ def pack(parts: Parts) -> bytes:
                 field="estimator",
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
+                limit="what can be pickled",
             ) from error
     sources = sources_of([estimator for _, estimator in estimators])
     return pickle.dumps((score_code_hash(), sources, pickle.dumps(parts)))
@@ -224,6 +225,7 @@ def _at_work_on(packed: bytes) -> Iterator[tuple[_Worker, Check]]:
                     "the worker runs other code than the campaign, and would give other bits",
                     value=_name(),
                     remedy="change no source while a campaign runs, and install the same on every machine",
+                    limit="the code of the campaign",
                 )
             install(sources)
             _worker = _Worker(packed, pickle.loads(parts))

@@ -71,6 +71,7 @@ def run(
             "these options do not go together",
             field=" ".join(f"--{name}" for name in [*wanted, *named]),
             remedy="choose one of them; --cell runs in this process",
+            limit="one of them",
         )
     console = Console()
     with ProgressWatcher(Console(stderr=True)) as watcher:

@@ -76,13 +76,22 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
             remedy="e.g. my_filter",
         )
     if not folder.is_dir():
-        raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
+        raise InputError(
+            "there is no such folder",
+            field="--in",
+            value=str(folder),
+            remedy="make it first",
+            limit="a folder that is there",
+        )
     path = folder / f"{name}.{'py' if kind in ('estimator', 'odometry') else 'toml'}"
     data = folder / f"{name}.csv" if kind == "ride" else None
     for file in (path, data):
         if file is not None and file.exists():
             raise InputError(
-                "the file exists", file=label(file), remedy="choose another name, or move the file away"
+                "the file exists",
+                file=label(file),
+                remedy="choose another name, or move the file away",
+                limit="a name that is free",
             )
     if data is not None:
         text, logged = ride_template(name)

@@ -96,7 +96,12 @@ def check_recording(recording: Recording) -> None:
         if name in SHEETS:
             sheet, worth, remedy = SHEETS[name]
             if getattr(recording, sheet) is None:
-                raise InputError(f"{name} without its sheet {worth}", field=sheet, remedy=remedy)
+                raise InputError(
+                    f"{name} without its sheet {worth}",
+                    field=sheet,
+                    remedy=remedy,
+                    limit="a signal with its sheet",
+                )
     _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz)
     for limit in LIMITS:
         if limit.frame in frames:

@@ -371,6 +371,7 @@ class Parts:
                     field=f"estimator[{method.index}].name",
                     value=method.name,
                     remedy="give each a name of its own",
+                    limit="each name once",
                 )
             shared = None if is_drawn else first.get(method.name)
             estimators[method.name] = shared or estimator_of(self.scenario, method)

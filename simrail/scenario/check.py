@@ -221,6 +221,7 @@ def _judge_ride_figures(scenario: Scenario, estimators: Mapping[str, Estimator])
             field="estimator",
             value=RIDE,
             remedy="give the estimator another name",
+            limit="another name",
         )
     return [RIDE]
 

@@ -207,6 +207,7 @@ class Scenario:
                 field="estimator" if not kept else "odometry",
                 value=", ".join(self.own_files),
                 remedy="judge it with them, or name a shipped method beside them",
+                limit="a shipped method, or --plugins",
             )
         odometry = self.spec.odometry if len(usual) == len(each(self.spec.odometry)) else Axis(usual)
         spec = self.spec.model_copy(update={"estimator": kept, "odometry": odometry})

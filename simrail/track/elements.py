@@ -29,6 +29,9 @@ SMOOTH_STEP = np.array([6.0, -15.0, 10.0, 0.0, 0.0, 0.0])
 """The quintic from 0 to 1 with zero slope and bend at both ends, highest power first."""
 
 
+LEAST_LENGTH_M = 1e-6
+"""Of one element: of shorter ones places cannot be told apart along a track."""
+
 MOST_LENGTH_M = 1e6
 """Of one element: the longest straight there is has 478 km (figure from memory)."""
 
@@ -150,10 +153,12 @@ def check_elements(elements: Sequence[Element], *, rail_base_m: float = RAIL_BAS
         Naming the element (counted from 0, as in ``segment[3]``) and its field.
     """
     if not elements:
-        raise InputError("has no elements", field="segment", remedy="add a straight")
+        raise InputError(
+            "has no elements", field="segment", remedy="add a straight", limit="one element or more"
+        )
     for i, element in enumerate(elements):
         here = f"segment[{i}]"
-        require_number(element.length_m, f"{here}.length_m", above=0.0, within=MOST_LENGTH_M)
+        require_number(element.length_m, f"{here}.length_m", above=LEAST_LENGTH_M, within=MOST_LENGTH_M)
         if isinstance(element, Curve):
             require_number(element.radius_m, f"{here}.radius_m", zero=False)
             require_number(element.cant_m, f"{here}.cant_m", within=MAX_CANT_PER_BASE * rail_base_m)
@@ -164,6 +169,7 @@ def check_elements(elements: Sequence[Element], *, rail_base_m: float = RAIL_BAS
                     "a transition joins two neighbours, each a straight or a curve",
                     field=here,
                     remedy="put a straight or a curve before and after it",
+                    limit="a straight or a curve on either side",
                 )
         elif after is not None and not isinstance(after, Transition):
             ends = ((part.curvature_1pm, part.cross_slope_m) for part in (element, after))
@@ -173,6 +179,7 @@ def check_elements(elements: Sequence[Element], *, rail_base_m: float = RAIL_BAS
                     field=f"segment[{i + 1}]",
                     value=after,
                     remedy="put a transition between them",
+                    limit="neighbours that meet in curvature and cant",
                 )
 
 

@@ -47,6 +47,7 @@ class SegmentPart(Part):
                 "a curve needs its radius",
                 field="radius_m",
                 remedy="add it; positive to the left",
+                limit="not 0 m",
             )
         for field in ("radius_m", "cant_mm"):
             if self.kind != "curve" and getattr(self, field) is not None:
@@ -57,6 +58,7 @@ class SegmentPart(Part):
                     remedy=f"remove it: a {self.kind} takes it from its neighbours"
                     if self.kind == "transition"
                     else "remove it, or make the segment a curve",
+                    limit="a curve",
                 )
         return self
 
@@ -223,4 +225,5 @@ def _thousandths(value: float, field: str) -> float:
         field=field,
         value=value,
         remedy=f"take {middle!r} / 1000 instead: it differs in the last of its 53 bits",
+        limit="a decimal in mm or permil",
     )

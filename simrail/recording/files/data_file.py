@@ -83,6 +83,7 @@ def column_names(part: DataPart, folder: Path, *, table: str) -> list[str]:
             field=f"{table}.file",
             value=part.file,
             remedy="mend the path; it is seen from the folder of the ride file",
+            limit="a file that is there",
         )
     if path.suffix.lower() in TABLES:
         try:

@@ -100,6 +100,7 @@ class SignalReader:
                 field=f"{table}.units.time",
                 value=unit,
                 remedy="give both in one clock",
+                limit="dates in all files, or in none",
             )
         if not dated:
             multiply, divide = TIMES[unit]
@@ -146,6 +147,7 @@ def _si(values: FloatArray, quantity: Quantity, part: SignalPart, name: str, fil
                 field=name,
                 value=float(values[int(np.argmax(broken))]),
                 remedy="give a distance as [odometer]" if quantity.key == "count" else None,
+                limit="whole numbers",
             )
         return values.astype(np.int64)
     unit = part.units.get(quantity.key, next(iter(quantity.units)))

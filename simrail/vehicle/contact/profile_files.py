@@ -185,5 +185,6 @@ def _path(text: str, beside: Path | None, own: str, *, field: str, names: str) -
             field=field,
             value=text,
             remedy="a relative path starts at the file that names it",
+            limit="a file that is there",
         )
     return path

@@ -112,7 +112,12 @@ def _parse(path: Path, *, kind: int) -> tuple[FloatArray, FloatArray, FloatArray
     try:
         lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
-        raise InputError("the profile cannot be read", value=error.strerror) from error
+        raise InputError(
+            "the profile cannot be read",
+            value=error.strerror,
+            limit="a file that may be read",
+            remedy="mend the path, or its rights",
+        ) from error
     simpack = path.suffix.lower() not in TEXTS
     header: dict[str, float] = {} if simpack else {"units.len.f": 1e3}
     rows: list[tuple[float, float, int]] = []
@@ -166,6 +171,7 @@ def _parse(path: Path, *, kind: int) -> tuple[FloatArray, FloatArray, FloatArray
             field=f"line {int(at[i])}",
             value=(float(y[i]), float(z[i])),
             remedy="leave out points that were not measured",
+            limit="finite numbers",
         )
     return y, z, at, header
 
@@ -174,7 +180,9 @@ def _number(text: str, field: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError("not a number", field=field, value=text, remedy="decimals have a point") from None
+        raise InputError(
+            "not a number", field=field, value=text, remedy="decimals have a point", limit="a number"
+        ) from None
 
 
 def _in_metres(
