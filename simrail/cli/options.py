@@ -35,7 +35,7 @@ def finite(param: typer.CallbackParam, value: float | None) -> float | None:
         If it is none.
     """
     if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is no finite number", param=param)
+        raise typer.BadParameter(f"{value} is no finite number", param_hint=f"'{param.opts[0]}'")
     return value
 
 

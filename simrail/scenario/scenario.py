@@ -92,7 +92,7 @@ class ScenarioFile(Part):
             if float(rate) in (2000.0, 4000.0):
                 continue
             if abs(1000.0 / float(rate) - round(1000.0 / float(rate))) > 1e-9:
-                limit = "1000 Hz over a whole number, 2000 or 4000 Hz"
+                limit = "1000 Hz divided by a whole number, 2000 or 4000 Hz"
                 raise InputError("is no such rate", value=rate, limit=limit, remedy="try 250.0")
         return value
 
@@ -103,7 +103,8 @@ class ScenarioFile(Part):
         for name, vehicle in names:
             if names.count((name, vehicle)) > 1 or (vehicle and (name, None) in names):
                 limit, remedy = "each name once", "give each a name of its own"
-                raise InputError("two of them have one name", value=name, limit=limit, remedy=remedy)
+                problem = f"two of them are named {name!r}"
+                raise InputError(problem, value=name, limit=limit, remedy=remedy)
         return value
 
     @model_validator(mode="after")
@@ -144,7 +145,8 @@ class ScenarioFile(Part):
         for vehicle in vehicles:
             if not any(part.is_on(vehicle) for part in self.imu):
                 limit, remedy = "an imu on each vehicle", f"add an [[imu]] with vehicle = {vehicle!r}"
-                raise InputError("has no imu", field="vehicle", value=vehicle, limit=limit, remedy=remedy)
+                problem = f"no imu is on {vehicle!r}"
+                raise InputError(problem, value=vehicle, limit=limit, remedy=remedy)
         return self
 
 

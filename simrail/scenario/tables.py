@@ -207,7 +207,7 @@ class RidePart(Part):
         if (self.end_m is None) != (self.speed_kmh is None):
             missing = "end_m" if self.end_m is None else "speed_kmh"
             limit = "end_m and speed_kmh for a ride, neither for a standstill"
-            raise InputError("is missing", field=missing, limit=limit, remedy=f"add {missing}")
+            raise InputError(f"{missing} is missing", limit=limit, remedy=f"add {missing}")
         if self.end_m is None and self.stops:
             _refuse_on_standstill("stops", "has no stops on the way")
         if self.end_m is None and any(each(self.reverse)):
