@@ -33,6 +33,10 @@ MOST = 1e12
 """No number of a file is as large: the stiffest is a modulus of elasticity, 2e11 N/m2."""
 
 
+MOST_LETTERS = 10_000
+"""Of one text of a file."""
+
+
 class Part(BaseModel):
     """Base of every file model.
 
@@ -229,7 +233,7 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Pat
 
 
 def _refuse_absurd(data: Any, file: object, field: str = "") -> None:
-    """Refuse a number that is finite, and beyond all that these files speak of: it overflows somewhere."""
+    """Refuse a number beyond all that these files speak of, which overflows somewhere, and endless texts."""
     if isinstance(data, dict):
         for key, value in data.items():
             if key not in ("seed", "options"):
@@ -237,6 +241,9 @@ def _refuse_absurd(data: Any, file: object, field: str = "") -> None:
     elif isinstance(data, list | tuple):
         for i, value in enumerate(data):
             _refuse_absurd(value, file, f"{field}[{i}]")
+    elif isinstance(data, str) and len(data) > MOST_LETTERS:
+        limit = f"at most {MOST_LETTERS} characters"
+        raise InputError("is too long", file=file, field=field, value=data, limit=limit, remedy="shorten it")
     elif isinstance(data, int | float) and abs(data) >= MOST:
         limit, remedy = f"below {MOST:g}", "mind the unit, which is in the name of the field"
         raise InputError("is out of range", file=file, field=field, value=data, limit=limit, remedy=remedy)

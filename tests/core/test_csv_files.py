@@ -21,4 +21,4 @@ def test_texts_are_harmless_and_numbers_are_numbers(kind: str, tmp_path: Path) -
     shown = ["'=1+1", "'+cmd", "'-2+3", "'@SUM", "'\\t=1", "plain", "-12.5", "a\\nb", "\\x1b[31m", ""]
     assert [row[0] for row in rows] == shown
     assert {row[1] for row in rows} == {"-1.5"}
-    assert list(frame["text"].astype(object))[0] == "=1+1", "the table itself is as it was"
+    assert frame["text"].iloc[0] == "=1+1", "the table itself is as it was"
