@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from simrail import results
-from simrail.campaign import cell as campaign_cell
+from simrail.campaign import time_limit
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.ride import cache as ride_cache
 from simrail.ride import ride as ride_module
@@ -125,11 +125,11 @@ def test_storage_that_cannot_be_used_ends_the_run_and_keeps_former_results(
 def test_what_the_machine_lacks_is_no_failure_of_an_estimator(
     mine: list[str], here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(campaign_cell, "estimate_many", raising(errno.ENOSPC))
+    monkeypatch.setattr(time_limit, "estimate_many", raising(errno.ENOSPC))
     assert call(mine) == CELL_FAILED
     assert "No space left" in capsys.readouterr().err.splitlines()[-1]
     assert not (here / "results").exists()
-    monkeypatch.setattr(campaign_cell, "estimate_many", raising(errno.ENOENT))
+    monkeypatch.setattr(time_limit, "estimate_many", raising(errno.ENOENT))
     assert call(mine) == CELL_FAILED, "a file that an estimator did not find is its own failure"
     assert (here / "results" / "mine" / "failures.txt").exists()
 
