@@ -66,6 +66,7 @@ class Vqf:
                 field="magnetometer",
                 value=recording.name,
                 remedy="add a [magnetometer] to the scenario, or set magnetometer = false",
+                limit="a recording with a magnetometer",
             )
         gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
         gyro = np.ascontiguousarray(gyro - rest_bias(recording, enabled=self.rest_bias).bias)

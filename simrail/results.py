@@ -30,7 +30,8 @@ from simrail.campaign.progress import Watcher
 from simrail.campaign.result import CampaignResult
 from simrail.campaign.stored_results import StoredResults, read_results
 from simrail.campaign.worker import BatchResult
-from simrail.core.atomic_files import draft_of
+from simrail.core.atomic_files import can_be_made, draft_of, restore
+from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 from simrail.core.shown import Facts, Shown, names
 from simrail.core.toml_files import label
@@ -147,9 +148,11 @@ def run(
     elif overrides or seed is not None:
         raise TypeError("settings go to load_scenario when the scenario has been read already")
     folder = Path(out) if out is not None else Path("results") / scenario.name
+    if restore(folder) and watcher is not None:
+        watcher.told(f"former results were put back into {folder}: a run ended while it replaced them")
     _judge_folder(folder)
     other = _other_results(Path(beside), scenario, folder) if beside is not None else None
-    plan = judge_scenario(scenario, many=many)
+    plan = judge_scenario(scenario, many=many, progress=None if watcher is None else watcher.judging)
     key = key_of(plan)
     with checkpoint_of(folder, key, start=start) as checkpoint:
         if start == "retry-failed":
@@ -199,6 +202,7 @@ def run_cell(
     started, begun = datetime.now(UTC), time.perf_counter()
     read = load_scenario(scenario, overrides=overrides, seed=seed)
     if out is not None:
+        restore(Path(out))
         _judge_folder(Path(out))
     plan = judge_scenario(read)
     if not 0 <= cell < plan.cells:
@@ -249,12 +253,12 @@ def _write(
     """Write the results of a campaign into a folder."""
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
     campaign.cells.to_parquet(draft / "cells.parquet", index=False)
-    aggregate(campaign.scores, campaign.cells).to_csv(draft / "scores.csv", index=False, float_format="%.9g")
+    write_csv(aggregate(campaign.scores, campaign.cells), draft / "scores.csv")
     verdicts = campaign.verdicts
     if len(verdicts):
-        verdicts.to_csv(draft / "verdicts.csv", index=False, float_format="%.9g")
+        write_csv(verdicts, draft / "verdicts.csv")
     if budgets is not None and len(budgets):
-        budgets.to_csv(draft / "budget.csv", index=False, float_format="%.9g")
+        write_csv(budgets, draft / "budget.csv")
     drawing = time.perf_counter()
     write_report(
         draft / "report.html",
@@ -278,14 +282,13 @@ def describe(scenario: Scenario, campaign: CampaignResult) -> dict[str, Any]:
     factors = [ride["real_time_factor"] for ride in campaign.rides if "real_time_factor" in ride]
     spec = scenario.spec
     versions = {package: version(package) for package in PACKAGES}
-    settings = "".join(f" --set '{setting}'" for setting in scenario.overrides)
     return {
         "scenario": scenario.name,
         "title": scenario.title,
         "scenario_hash": campaign.plan.content_hash,
         "seed": spec.seed,
         "settings": list(scenario.overrides),
-        "command": f"simrail run {shlex.quote(scenario.called)}{settings}",
+        "command": scenario.command,
         "engine": sorted({str(ride["engine"]) for ride in campaign.rides}),
         "earth": "at rest" if spec.earth is None else spec.earth.model_dump(mode="json", warnings=False),
         "temperature": spec.temperature and spec.temperature.model_dump(mode="json", warnings=False),
@@ -325,21 +328,27 @@ def git_revision() -> str | None:
         return None
 
 
+def _is_there(folder: Path) -> bool:
+    try:
+        return folder.exists()
+    except (OSError, ValueError):  # by such a name there can be none
+        return False
+
+
 def _judge_folder(folder: Path) -> None:
     """Refuse a folder that cannot be written, or whose contents are not results."""
     remedy = "choose another folder with --out"
-    if folder.exists():
+    if _is_there(folder):
         if not folder.is_dir():
-            raise _refusal("--out", folder, "the results need a folder, this is a file", remedy)
+            problem, limit = "the results need a folder, this is a file", "a new or empty folder"
+            raise _refusal("--out", folder, problem, remedy, limit=limit)
         if any(folder.iterdir()) and not (folder / MANIFEST).is_file():
             problem = "the folder holds other things than results, and would be replaced"
             limit = f"a new or empty folder, or one that holds a {MANIFEST}"
             raise _refusal("--out", folder, problem, remedy, limit=limit)
-    above = folder.absolute()
-    while not above.exists():
-        above = above.parent
-    if not above.is_dir() or not os.access(above, os.W_OK):
-        raise _refusal("--out", folder, "the folder cannot be written", remedy)
+    if not can_be_made(folder):
+        limit = "a folder that may be written to, by a name of at most 255 bytes"
+        raise _refusal("--out", folder, "the folder cannot be written", remedy, limit=limit)
 
 
 def _failures(campaign: CampaignResult) -> str:

@@ -99,6 +99,7 @@ class EncoderOdometry:
                 field="encoder",
                 value=recording.name,
                 remedy="add an [encoder] to the scenario, or [encoder] or [odometer] to the ride",
+                limit="a recording with an encoder",
             )
         return Estimate(states=states, mount=recording.mount)
 

@@ -124,7 +124,12 @@ class TrackRelativeSmoother:
             if not is_good:
                 raise InputError(out, field=name, value=getattr(self, name), limit=limit)
         if self.tuning is not None and self.motion is not None:
-            raise InputError("a file and a motion cannot both be given", field="tuning")
+            raise InputError(
+                "a file and a motion cannot both be given",
+                field="tuning",
+                limit="one of them",
+                remedy="leave one out",
+            )
         with blame(None, "tuning"):
             self.motions()
 

@@ -171,6 +171,7 @@ class TrajectorySmoother:
                     field=name,
                     value=getattr(self, name),
                     remedy="in a scenario, name a file of them in the option tuning",
+                    limit="Hyperparameters",
                 )
         again = self.smoothed and self.second_order and not self.printed
         is_whole = isinstance(self.draws, int) and not isinstance(self.draws, bool)
@@ -190,7 +191,12 @@ class TrajectorySmoother:
                 raise InputError(problem, field=name, value=getattr(self, name), limit=limit)
         given = self.hyperparameters != Hyperparameters() or self.curve_hyperparameters is not None
         if self.tuning is not None and given:
-            raise InputError("a file and values cannot both be given", field="tuning")
+            raise InputError(
+                "a file and values cannot both be given",
+                field="tuning",
+                limit="one of them",
+                remedy="leave one out",
+            )
 
     needs = ("odometry",)
     label = "trajectory smoother"

@@ -125,13 +125,24 @@ def sight_of(estimate: Estimate, recording: Recording) -> Sight:
     sheet = recording.rail_sensor_sheet if recording.rail_displacement is not None else None
     known = states if "position_m" in states.columns else odometry_of(recording)
     if len(known) != len(states):
-        raise InputError("states are not at the recording's times", field="states", value=len(states))
+        raise InputError(
+            "states are not at the recording's times",
+            field="states",
+            value=len(states),
+            limit="a row for each sample",
+            remedy="index them by the times of the IMU",
+        )
     track = recording.track
     base = track.rail_base_m
     place = np.clip(known["position_m"].to_numpy(dtype=np.float64), track.start_m, track.end_m)
     values = states[[*ATTITUDE, *RELATIVE_POSITION]].to_numpy(dtype=np.float64)
     if not (np.isfinite(place).all() and np.isfinite(values).all()):
-        raise InputError("holds a value that is not finite", field="states")
+        raise InputError(
+            "holds a value that is not finite",
+            field="states",
+            limit="finite numbers",
+            remedy="mend the estimate",
+        )
     frame = track.frame(place)
     design = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
     turn = np.swapaxes(design, 1, 2) @ rotation_matrix(values[:, :3])

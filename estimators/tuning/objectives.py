@@ -192,7 +192,13 @@ class SmootherTuning:
         )
         likelihood = Likelihood(tuple(map(self.smoother.model, recordings)), counts)
         if likelihood.samples == 0:
-            raise InputError("no sample is of this kind", field="kind", value=self._which)
+            raise InputError(
+                "no sample is of this kind",
+                field="kind",
+                value=self._which,
+                limit="one sample or more",
+                remedy="ride over such a part of the track",
+            )
         return likelihood
 
     def reference_error(
@@ -220,11 +226,23 @@ class SmootherTuning:
                 edges = [self.band.edges_m(name.removesuffix("_m")) for name in TUNED]
                 reasons = [why_not(edge, count=count, step_m=self.step_m) for edge in edges]
                 if any(reasons):
-                    raise InputError(max(reasons), field="band", value=self.band.name)
+                    raise InputError(
+                        max(reasons),
+                        field="band",
+                        value=self.band.name,
+                        limit="a ride that is long enough for the band",
+                        remedy="choose another band, or a longer ride",
+                    )
         models = tuple(map(self.smoother.model, recordings))
         output = KnownOutput(tuple(recordings), models, tuple(references), self.kind, self.band, self.step_m)
         if not len(output.errors(Hyperparameters())):
-            raise InputError("knows none of the places", field="reference", value=self._which)
+            raise InputError(
+                "knows none of the places",
+                field="reference",
+                value=self._which,
+                limit="places that the ride passes",
+                remedy="give a reference of this line",
+            )
         return output
 
     @property

@@ -11,7 +11,7 @@ An interrupted search goes on where it was, bit by bit: what it does depends on 
 alone, so it is run again from the start on the values that are on record (`Record`).
 """
 
-import zipfile
+import io
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ import cma
 import numpy as np
 from scipy.optimize import minimize
 
-from simrail.core.atomic_files import whole_file
 from simrail.core.jit import FloatArray
+from simrail.core.sealed_files import DamagedError, damage_told, read_sealed_file, write_sealed_file
 
 Batch = Callable[[FloatArray], FloatArray]
 """Values (b,) at points (b, m) of the unit cube; no point's value may depend on the other points."""
@@ -93,13 +93,10 @@ class Record:
         self._points: list[FloatArray] = []
         self._values: list[FloatArray] = []
         if path is not None and path.is_file():
-            try:
-                with np.load(path, allow_pickle=False) as data:
-                    if str(data["key"]) == key:
-                        self._points = list(data["points"])
-                        self._values = list(data["values"])
-            except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-                pass
+            with suppress(DamagedError), damage_told():
+                data = np.load(io.BytesIO(read_sealed_file(path)), allow_pickle=False)
+                if str(data["key"]) == key:
+                    self._points, self._values = list(data["points"]), list(data["values"])
 
     @property
     def count(self) -> int:
@@ -131,8 +128,9 @@ class Record:
     def _save(self) -> None:
         if self._path is None:
             return
-        with whole_file(self._path) as file:
-            np.savez(file, key=self._key, points=self._points, values=self._values)
+        stream = io.BytesIO()
+        np.savez(stream, key=self._key, points=self._points, values=self._values)
+        write_sealed_file(self._path, stream.getvalue())
 
 
 def least(

@@ -45,7 +45,13 @@ def objective_of(
         assert isinstance(tunable, ByLikelihood)
         return tunable.likelihood(recordings)
     if len(references) != len(recordings):
-        raise InputError("are not one per recording", field="references", value=len(references))
+        raise InputError(
+            "are not one per recording",
+            field="references",
+            value=len(references),
+            limit="one for each recording",
+            remedy="give as many as recordings",
+        )
     assert isinstance(tunable, ByReference)
     return tunable.reference_error(recordings, references)
 

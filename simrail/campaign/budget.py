@@ -171,7 +171,12 @@ def error_budget(
     watcher.cells_begin(0, len(draws))
     for number, cell in enumerate(draws):
         if cell.passes:
-            raise InputError("has no budget: it is fused of several rides", field="passes")
+            raise InputError(
+                "has no budget: it is fused of several rides",
+                field="passes",
+                limit="a scenario without passes",
+                remedy="leave out passes, or the budget",
+            )
         truth = simulated(cell, parts, watcher, number + 1, len(draws))
         rows.append(_products(cell, truth, parts, estimator, wanted, terms))
         watcher.cells_done(number + 1, len(draws), 0, "")
@@ -242,7 +247,11 @@ def _error(
             at = chosen_windows(against.windows, (wanted.window,))[wanted.window]
             return pd.Series(values[at], index=at)
     raise InputError(
-        "this method says nothing of it", field="quantity", value=wanted.what, remedy="name another method"
+        "this method says nothing of it",
+        field="quantity",
+        value=wanted.what,
+        remedy="name another method",
+        limit="a method with such an estimate",
     )
 
 

@@ -32,6 +32,7 @@ from simrail.campaign.result import CampaignResult, chosen_cells, gather
 from simrail.campaign.worker import BatchResult, fail_batch, forget, pack, run_batch, run_ride
 from simrail.core.interrupts import interruptible
 from simrail.core.source_hash import score_code_hash
+from simrail.ride import cache as ride_cache
 from simrail.ride.ride import is_cached
 from simrail.scenario.cells import Cell, rides_of
 from simrail.scenario.check import Plan, judge_scenario
@@ -95,12 +96,14 @@ def run_campaign(
     InputError
         If the scenario cannot be run; then nothing has been run. Or if a worker runs other code.
     OSError
-        If a disk is full, or the cluster has gone. Batches that are complete are kept.
+        If the cache or the results cannot be read or written, e.g. because a disk is full, or if the cluster
+        has gone. Batches that are complete are kept.
     KeyboardInterrupt
         If interrupted; batches and rides that are complete are kept.
     """
     plan = scenario if isinstance(scenario, Plan) else judge_scenario(scenario)
     packed = pack(plan.parts)
+    ride_cache.make_writable()  # now, so that workers share the folder that stands in for it
     with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
         checkpoint = Checkpoint(Path(spare)) if checkpoint is None else checkpoint
         loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only, batch_cells)

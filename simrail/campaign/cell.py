@@ -5,23 +5,26 @@ a cell do not depend on which cells ran before it, or with it. Who runs which ce
 where, is decided in `simrail.campaign.campaign`.
 """
 
+import errno
 import math
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from simrail.campaign.fence import MOST_PRINTED, digest, fenced, handed
+from simrail.campaign.time_limit import FIRST_CALL_S, LimitedEstimator, Outcome, estimate_here
 from simrail.core.errors import InputError
 from simrail.core.interrupts import Check, interruptible
 from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
-from simrail.estimation.estimate import Estimate, Estimator, estimate_many
+from simrail.estimation.estimate import Estimate, Estimator
 from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.grades import imu_sheet
 from simrail.ride.ride import simulate
@@ -42,6 +45,9 @@ if TYPE_CHECKING:
     from simrail.campaign.progress import Watcher  # how it is shown decides no score
 
 STAGES = ("simulate", "measure", "estimate", "score")
+
+_OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE)
+"""What the machine lacks, whoever finds it out; any other `OSError` of an estimator is its own failure."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +114,8 @@ class BatchTally:
         How each is tuned, by the same names.
     warm : set of str
         Estimators whose kernels have been compiled in this process.
+    limits_s : mapping of str to float
+        How long an estimator may take for a recording, by the names of those that have such a limit.
     figures : list of (pandas.DataFrame, dict)
         Figures of one estimate, and their labels.
     failures : list of Failure
@@ -122,6 +130,7 @@ class BatchTally:
     estimators: Mapping[str, Estimator]
     tunings: Mapping[str, str]
     warm: set[str] = field(default_factory=set)
+    limits_s: Mapping[str, float] = field(default_factory=dict)
     figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     printed: dict[str, str] = field(default_factory=dict)
@@ -188,6 +197,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
             recorded.append(_record(cell, truth, parts, tally))
         except Exception as error:
             check()
+            unless_of_the_machine(error)
             for name in tally.estimators:
                 tally.fail(cell, name, error)
         if cell.sensor_draw == cell.map_draw == 0:  # neither changes anything of the ride itself
@@ -195,6 +205,7 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
                 _score_ride(cell, truth, parts, tally)
             except Exception as error:
                 check()
+                unless_of_the_machine(error)
                 tally.fail(cell, RIDE, error)
     if not recorded:
         return
@@ -210,7 +221,14 @@ def run_cells(cells: Sequence[Cell], truth: Truth, parts: Parts, tally: BatchTal
                 _score(one, name, *outcome, parts, tally)
             except Exception as error:
                 check()
+                unless_of_the_machine(error)
                 tally.fail(one.cell, name, error)
+
+
+def unless_of_the_machine(error: BaseException) -> None:
+    """Raise an error that is no property of a cell: it ends the campaign, which goes on when it is mended."""
+    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+        raise error
 
 
 def record_cell(
@@ -246,7 +264,9 @@ def record_cell(
         recording = with_sheets_of(recording, told)
     if resolved.odometry is None:
         return recording
-    return with_odometry(recording, resolved.odometry, source=cell.spec.odometry)
+    with fenced():
+        estimated = with_odometry(handed(recording), resolved.odometry, source=cell.spec.odometry)
+    return replace(recording, odometry=estimated.odometry, odometry_source=estimated.odometry_source)
 
 
 def with_sheets_of(recording: Recording, told: ResolvedCell) -> Recording:
@@ -265,7 +285,7 @@ def simulated(cell: Cell, parts: Parts, watcher: "Watcher", number: int, count: 
     watcher.ride_begins(number, count, cell.ride.name)
     with interruptible() as check:
         try:
-            truth = simulate(parts.ride(cell), progress=watcher.ride_goes, warn=False)
+            truth = simulate(parts.ride(cell), progress=watcher.ride_goes, told=watcher.told, warn=False)
         except Exception:
             check()  # an engine in C++ may have made an error of its own of Ctrl-C
             raise
@@ -280,8 +300,9 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
     recording = record_cell(cell, truth, parts)
     estimates = {}
     for name, estimator in tally.estimators.items():
-        with suppress(Exception), fenced():
-            (estimates[name],) = estimate_many(estimator, [handed(recording)])
+        (outcome,) = estimates_of(name, estimator, [recording], tally, lambda: None)
+        if not isinstance(outcome, Exception):
+            estimates[name] = outcome[0]
     speaks_of_rails = any(estimate.geometry is not None for estimate in estimates.values())
     rails = parts.rails(cell) if speaks_of_rails else None
     labels = {"scenario": tally.scenario, **cell_record(cell)}
@@ -310,28 +331,52 @@ def _record(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally, *, again:
 
 
 def estimates_of(
-    name: str, estimator: Estimator, recordings: list[Recording], tally: BatchTally, check: Check
+    name: str, estimator: Estimator, recordings: Sequence[Recording], tally: BatchTally, check: Check
 ) -> Iterator[tuple[Estimate, float] | Exception]:
     """Each estimate and the microseconds per sample that it took, or what went wrong with it.
 
     A method that takes many recordings at once takes them all; if one of them upsets it, it takes them
-    one by one, so that only that one fails.
+    one by one, so that only that one fails. One with a time limit runs in a process of its own.
     """
+    limit_s = tally.limits_s.get(name)
+    if limit_s is None:
+        yield from _outcomes(name, estimator, recordings, partial(estimate_here, estimator), tally, check)
+        return
+    limited = LimitedEstimator(estimator, limit_s)
+    try:
+        # Every process of its own loads its kernels, or compiles them.
+        with tally.timed("estimate"), suppress(Exception):
+            limited.estimate([beginning(recordings[0], samples=64)], at_least_s=FIRST_CALL_S)
+        tally.warm.add(name)
+        yield from _outcomes(name, estimator, recordings, limited.estimate, tally, check)
+    finally:
+        limited.close()
+
+
+def _outcomes(
+    name: str,
+    estimator: Estimator,
+    recordings: Sequence[Recording],
+    run: Callable[[Sequence[Recording]], Outcome],
+    tally: BatchTally,
+    check: Check,
+) -> Iterator[tuple[Estimate, float] | Exception]:
+    """What `estimates_of` yields, by a way to run an estimator."""
     if name not in tally.warm:
         # The first call of a kernel compiles it or loads it from disk: that is no property of the method.
-        with tally.timed("estimate"), suppress(Exception), fenced():
-            estimate_many(estimator, [beginning(recordings[0], samples=64)])
+        with tally.timed("estimate"), suppress(Exception):
+            run([beginning(recordings[0], samples=64)])
         tally.warm.add(name)
-    groups = [recordings] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
+    groups = [list(recordings)] if hasattr(estimator, "estimate_many") else [[one] for one in recordings]
     while groups:
         group = groups.pop(0)
         try:
-            given = [handed(one) for one in group]
-            with tally.timed("estimate"), fenced() as printed:
-                begun = time.perf_counter()
-                estimates = estimate_many(estimator, given)
-                seconds = time.perf_counter() - begun
-            tally.note_print(name, printed.getvalue())
+            with tally.timed("estimate"):
+                outcome = run(group)
+            if name in tally.limits_s:
+                tally.cpu_s["estimate"] += outcome.cpu_s  # of another process
+            tally.note_print(name, outcome.printed)
+            estimates = outcome.estimates
             if len(estimates) != len(group):
                 raise ValueError(f"estimate_many gave {len(estimates)} estimates of {len(group)} recordings")
         except Exception as error:
@@ -341,7 +386,7 @@ def estimates_of(
             else:
                 yield error
             continue
-        us_per_sample = 1e6 * seconds / sum(len(one.imu) for one in group)
+        us_per_sample = 1e6 * outcome.wall_s / sum(len(one.imu) for one in group)
         yield from ((estimate, us_per_sample) for estimate in estimates)
 
 

@@ -18,12 +18,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from datetime import datetime
+from glob import escape
 from pathlib import Path
 from typing import Literal
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from simrail.campaign.cell import Failure
 from simrail.campaign.worker import BatchResult
@@ -154,12 +155,16 @@ def _locked(folder: Path) -> Iterator[None]:
     lock = FileLock(folder / ".lock")
     try:
         lock.acquire(blocking=False)
-    except OSError as error:  # also where one that has just ended took its folder with it
+    except (
+        Timeout,
+        FileNotFoundError,
+    ) as error:  # also where one that has just ended took its folder with it
         raise InputError(
             "this plan is being run by another process, into the same folder",
             field="--out",
             value=folder.name,
             remedy="wait for it, or choose another folder with --out",
+            limit="one process at a time",
         ) from error
     try:
         yield
@@ -169,7 +174,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 def _drop_abandoned(results: Path) -> None:
     """Drop unfinished runs into a folder of results that nobody has gone on with for a month."""
-    for folder in results.parent.glob(f".{results.name}.unfinished-*"):
+    for folder in results.parent.glob(f".{escape(results.name)}.unfinished-*"):
         with suppress(OSError):
             if time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:
                 shutil.rmtree(folder)

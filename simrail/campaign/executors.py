@@ -87,7 +87,13 @@ def executor_of(workers: int | None, cluster: str | None, *, cells: int) -> Iter
     """
     if cluster is not None and workers is not None:
         remedy = "leave out --workers, or --cluster"
-        raise InputError("a cluster has its own workers", field="--workers", value=workers, remedy=remedy)
+        raise InputError(
+            "a cluster has its own workers",
+            field="--workers",
+            value=workers,
+            remedy=remedy,
+            limit="--workers or --cluster",
+        )
     if workers is None:
         from joblib import cpu_count  # those that this process may use; slow to import
 
@@ -167,7 +173,13 @@ class _Cluster(Executor):
             import distributed
         except ImportError:
             problem, remedy = "a cluster needs dask, which is not installed", 'pip install -e ".[cluster]"'
-            raise InputError(problem, field="--cluster", value=address, remedy=remedy) from None
+            raise InputError(
+                problem,
+                field="--cluster",
+                value=address,
+                remedy=remedy,
+                limit="a scheduler with workers of the same simrail",
+            ) from None
         self._address = address
         self._log = logging.getLogger("distributed")
         self._log_level = self._log.level
@@ -196,7 +208,13 @@ class _Cluster(Executor):
         """Refuse a cluster without workers, or one whose workers run another simrail."""
 
         def refusal(problem: str, value: str, remedy: str) -> InputError:
-            return InputError(problem, field="--cluster", value=value, remedy=remedy)
+            return InputError(
+                problem,
+                field="--cluster",
+                value=value,
+                remedy=remedy,
+                limit="a scheduler with workers of the same simrail",
+            )
 
         begun = time.perf_counter()
         while not self._client.nthreads():

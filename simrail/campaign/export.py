@@ -13,6 +13,7 @@ import pandas as pd
 from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
 from simrail.core.atomic_files import draft_of
+from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
 from simrail.recording.files.ned import Frame, in_ned
@@ -110,7 +111,7 @@ def export(
                     {"folder": name} | {key: value for key, value in labels if key not in OF_A_RUN}
                 )
                 watcher.recording_written(len(records), len(chosen), name)
-        pd.DataFrame.from_records(records).to_csv(draft / INDEX_FILE, index=False)
+        write_csv(pd.DataFrame.from_records(records), draft / INDEX_FILE, float_format=None)
     return list(names.values())
 
 

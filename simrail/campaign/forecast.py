@@ -233,8 +233,8 @@ def _vibration_s(ride: Ride) -> float:
 
 def _bytes_of(ride: Ride) -> float:
     """Disk that a ride takes in the cache, or its short waves if it has any."""
-    place = ride_cache.folder() / ride_cache.key_of(ride.describe())
-    return sum(file.stat().st_size for file in place.iterdir()) if place.exists() else 0.0
+    places = ride_cache.places_of(ride_cache.key_of(ride.describe()))
+    return float(sum(file.stat().st_size for file in places[-1].iterdir())) if places else 0.0
 
 
 def print_forecast(console: Console, expected: Forecast) -> None:

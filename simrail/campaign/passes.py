@@ -6,7 +6,7 @@ What is kept of a ride while the next is run is what it says of the rails.
 
 from collections.abc import Callable, Sequence
 
-from simrail.campaign.cell import BatchTally, estimates_of, record_cell, wanted_of
+from simrail.campaign.cell import BatchTally, estimates_of, record_cell, unless_of_the_machine, wanted_of
 from simrail.core.interrupts import Check
 from simrail.estimation.estimate import Estimate
 from simrail.estimators.rails.fuse import fuse, rails_and_place_of
@@ -41,6 +41,8 @@ def run_passes(
                 recording = record_cell(one, truth, parts)
         except Exception as error:
             check()
+            if isinstance(error, OSError):
+                raise  # of the cache, no property of a pass
             for outcomes in found.values():
                 outcomes.append(error)
             continue
@@ -57,6 +59,7 @@ def run_passes(
                 _score_fused(cell, name, outcomes[: len(cell.passes)], first, parts, tally)
             except Exception as error:
                 check()
+                unless_of_the_machine(error)
                 tally.fail(cell, name, error)
 
 

@@ -8,12 +8,18 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+SILENT_S = 2.0
+"""So long nothing is said of the judging of a scenario."""
+
 _EVERY_S = 10.0
 """On a plain stream, how often the progress is told."""
 
 
 class Watcher:
     """Is told how a campaign goes; this one keeps silent. Subclass it to show progress."""
+
+    def judging(self, done: int, count: int) -> None:
+        """So many cells of `count` have been judged, before anything is run."""
 
     def ride_begins(self, number: int, count: int, name: str) -> None:
         """Ride `number` (from 1) of `count` is simulated, or found in the cache, from now on."""
@@ -54,8 +60,11 @@ class ProgressWatcher(Watcher):
             disable=not console.is_terminal,
         )
         self._ride: TaskID | None = None
+        self._judged: TaskID | None = None
+        self._judged_from = 0.0
         self._cells: TaskID | None = None
-        self._begun = self._cells_begun = self._said = 0.0
+        self._begun = self._cells_begun = 0.0
+        self._said = -_EVERY_S
         self._before = self._done = 0
         self._by_worker: dict[str, int] = {}
         self._searches: dict[str, TaskID] = {}
@@ -69,6 +78,20 @@ class ProgressWatcher(Watcher):
     ) -> None:
         self._progress.__exit__(kind, error, trace)
 
+    def judging(self, done: int, count: int) -> None:
+        """See `Watcher`."""
+        now = time.perf_counter()
+        self._judged_from = self._judged_from or now
+        if now < self._judged_from + SILENT_S:
+            return
+        if self._judged is None:
+            self._judged = self._progress.add_task("judging", total=count, note="")
+        note = f"{done} of {count} cells judged"
+        self._progress.update(self._judged, completed=done, note=note)
+        if not self._console.is_terminal and now > self._said + _EVERY_S:
+            self._said = now
+            self._console.print(note, highlight=False)
+
     def ride_begins(self, number: int, count: int, name: str) -> None:
         """See `Watcher`."""
         if self._ride is not None:
@@ -77,7 +100,7 @@ class ProgressWatcher(Watcher):
         self._ride = self._progress.add_task(f"ride {name}{which}", total=None, note="")
         self._begun = time.perf_counter()
         if not self._console.is_terminal:
-            self._console.print(f"ride {name}{which}", highlight=False)
+            self._console.print(f"ride {name}{which}", highlight=False, markup=False)
 
     def ride_goes(self, done_s: float, total_s: float, speed_mps: float) -> None:
         """See `Watcher`."""
@@ -126,7 +149,7 @@ class ProgressWatcher(Watcher):
 
     def told(self, line: str) -> None:
         """See `Watcher`."""
-        self._console.print(line, highlight=False, soft_wrap=True)
+        self._console.print(line, highlight=False, soft_wrap=True, markup=False)
 
     def recording_written(self, number: int, count: int, name: str) -> None:
         """See `Watcher`."""

@@ -6,7 +6,6 @@ estimates is large, and no batch hands it on.
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -177,6 +176,10 @@ def _examples(plan: Plan, packed: bytes, listed: list[Cell], failures: list[Fail
         if cell.track_draw == cell.sample == 0 and first and not lost:
             shown.add(key)
             noise_shown |= cell.imu.noise_added
-            with suppress(Exception):
+            try:
                 examples.append(example_of(packed, cell))
+            except OSError:
+                raise
+            except Exception:
+                continue
     return examples

@@ -263,7 +263,12 @@ def _reason(scores: pd.DataFrame, cells: pd.DataFrame, estimator: str) -> str:
 def sensitivity_table(found: Sequence[Sensitivity]) -> pd.DataFrame:
     """Every index as one table, a row for each value of each figure, the most influential first."""
     if not found:
-        raise InputError("there are no scores to analyse", field="--estimator")
+        raise InputError(
+            "there are no scores to analyse",
+            field="--estimator",
+            limit="an estimator with scores in every sample",
+            remedy="name another with --estimator",
+        )
     rows = []
     for one in found:
         labels = {"case": one.case, "estimator": one.estimator, **one.figure._asdict(), "unit": one.unit}

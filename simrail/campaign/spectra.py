@@ -51,6 +51,7 @@ def scenario_spectra(
             file=scenario.file,
             field="vibration",
             remedy="add the table [vibration]; its defaults will do",
+            limit="a scenario with a table [vibration]",
         )
     numbers = sorted({number for number, _ in chosen})
     levels: dict[tuple[str, MountKind, float], FloatArray] = {}

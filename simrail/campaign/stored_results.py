@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from simrail.core.atomic_files import restore
 from simrail.core.errors import InputError
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.scoring.table import SCORE_COLUMNS
@@ -64,12 +65,15 @@ def read_results(folder: Path, *, field: str, remedy: str) -> StoredResults:
     InputError
         If one of the files is missing, cannot be read, or lacks what today's simrail writes into it.
     """
+    restore(folder)
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         scores, cells = (pd.read_parquet(folder / f"{name}.parquet") for name in ("scores", "cells"))
     except (OSError, ValueError) as error:
         problem = "there are no finished results there"
-        raise InputError(problem, field=field, value=str(folder), remedy=remedy) from error
+        raise InputError(
+            problem, field=field, value=str(folder), remedy=remedy, limit="a folder of finished results"
+        ) from error
     if "map" not in scores:
         # Written before trains had maps of their own: each knew the line as it was laid.
         scores["map"], cells["map"] = "exact", "exact"
@@ -84,5 +88,7 @@ def read_results(folder: Path, *, field: str, remedy: str) -> StoredResults:
         missing = [name for name in needed if name not in names]
         if missing:
             problem = f"its {what} does not say {missing[0]}"
-            raise InputError(problem, field=field, value=str(folder), remedy=remedy)
+            raise InputError(
+                problem, field=field, value=str(folder), remedy=remedy, limit="a folder of finished results"
+            )
     return StoredResults(folder, manifest, scores, cells)

@@ -5,7 +5,6 @@ a known output are those that were laid: a measured reference without error. Wha
 that says what there is to search (`simrail.estimation.tunable`).
 """
 
-import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -17,6 +16,7 @@ import pandas as pd
 
 from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
+from simrail.core.atomic_files import can_be_made
 from simrail.core.errors import InputError, one_of
 from simrail.core.interrupts import interruptible
 from simrail.core.toml_files import blame
@@ -35,6 +35,10 @@ from simrail.scenario.tables import EstimatorPart
 from simrail.track.bands import SAMPLES_PER_WAVE, Band
 
 STEP_M = 0.25
+
+MOST_PLACES = 10_000_000
+"""Of a reference of the rails."""
+
 """Distance of the places of a reference, unless another is given."""
 
 
@@ -109,7 +113,17 @@ def tune_scenario(
     band, step_m = chosen_settings.get("band"), float(chosen_settings.get("step_m", STEP_M))
     if method == "cml" and (band is not None or within_m is not None):
         field = "--band" if band is not None else "--within"
-        raise InputError("belongs to a known output", field=field, remedy="use --method kom, or leave it out")
+        value = band if band is not None else within_m
+        raise InputError(
+            "belongs to a known output",
+            field=field,
+            value=value,
+            limit="--method kom",
+            remedy="use --method kom, or leave it out",
+        )
+    if within_m is not None and not within_m[0] < within_m[1]:
+        given, limit = list(within_m), "two places, m, the smaller first"
+        raise InputError("is no range", field="--within", value=given, limit=limit, remedy="swap them")
     for field, number, least in (
         ("--evaluations", evaluations, 0),
         ("--at-most", at_most, 1),
@@ -213,6 +227,7 @@ def estimator_named(scenario: Scenario, parts: Parts, estimator: str) -> Estimat
             field="--estimator",
             value=", ".join(variants),
             remedy=f"choose one with --set estimator.{estimator}.options.NAME=VALUE",
+            limit="one of them",
         )
     (only,) = variants.values()
     return only
@@ -263,6 +278,15 @@ def reference_of(
             field="--within",
             value=[first, last],
             limit=f"{track.start_m:g} to {track.end_m:g} m, the smaller first",
+            remedy="give places within the limit",
+        )
+    if (last - first) / step_m > MOST_PLACES:
+        raise InputError(
+            "gives too many places",
+            field="--step",
+            value=step_m,
+            limit=f">= {(last - first) / MOST_PLACES:.3g} m, {MOST_PLACES:,} places",
+            remedy="take a longer step, or a shorter --within",
         )
     place = np.linspace(first, last, max(2, round((last - first) / step_m) + 1))
     return parts.rails(cell).irregularities(place)
@@ -296,11 +320,12 @@ def _judge_file(out: Path) -> None:
         return InputError(problem, field="--out", value=str(out), limit=limit, remedy=remedy)
 
     if out.suffix != ".toml":
-        raise refusal("is no TOML file", limit="a name that ends with .toml")
+        limit, remedy = "a name that ends with .toml", "call it so"
+        raise refusal("is no TOML file", limit=limit, remedy=remedy)
     if not folder.is_dir():
-        raise refusal("no such folder", remedy="make the folder first")
-    if not os.access(folder, os.W_OK):
-        raise refusal("the folder cannot be written", remedy="choose another")
+        raise refusal("no such folder", limit="a folder that is there", remedy="make the folder first")
+    if not can_be_made(out):
+        raise refusal("the folder cannot be written", limit="one that can be", remedy="choose another")
     if out.exists():
         try:
             is_tuning = "hyperparameters" in tomllib.loads(out.read_text(encoding="utf-8"))

@@ -6,7 +6,6 @@ Nothing here knows which batches there are, nor who runs them: see `simrail.camp
 `simrail.campaign.executors`.
 """
 
-import errno
 import os
 import pickle
 import socket
@@ -81,7 +80,8 @@ class _Worker:
     def tally(self, sample: int) -> BatchTally:
         """What gathers one batch; with the estimators of a sample."""
         parts = self.parts
-        return BatchTally(parts.scenario.name, parts.estimators(sample), parts.tunings(sample), self.warm)
+        estimators, tunings = parts.estimators(sample), parts.tunings(sample)
+        return BatchTally(parts.scenario.name, estimators, tunings, self.warm, parts.time_limits_s)
 
     def take_sample(self, tally: BatchTally, sample: int) -> None:
         """Give a batch the estimators of another sample; their names are the same in every one."""
@@ -127,6 +127,7 @@ def pack(parts: Parts) -> bytes:
                 field="estimator",
                 value=name,
                 remedy="make it a frozen dataclass of plain values",
+                limit="what can be pickled",
             ) from error
     sources = sources_of([estimator for _, estimator in estimators])
     return pickle.dumps((score_code_hash(), sources, pickle.dumps(parts)))
@@ -140,7 +141,7 @@ def run_ride(packed: bytes, cells: tuple[Cell, ...], progress: Progress | None =
     InputError
         If this process runs other code than the one that packed the plan.
     OSError
-        If the disk is full.
+        If the cache of rides cannot be read or written.
     """
     return _run(packed, cells, progress, ride_only=True)
 
@@ -164,8 +165,8 @@ def _run(
                     worker.truth(cell, notes, progress)
         except Exception as error:
             check()
-            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-                raise  # no property of a cell: it ends the campaign, which goes on when there is room
+            if isinstance(error, OSError):
+                raise  # of the cache, no property of a cell: it ends the campaign, which goes on afterwards
             for cell in cells:
                 for name in tally.estimators:
                     tally.fail(cell, name, error)
@@ -224,6 +225,7 @@ def _at_work_on(packed: bytes) -> Iterator[tuple[_Worker, Check]]:
                     "the worker runs other code than the campaign, and would give other bits",
                     value=_name(),
                     remedy="change no source while a campaign runs, and install the same on every machine",
+                    limit="the code of the campaign",
                 )
             install(sources)
             _worker = _Worker(packed, pickle.loads(parts))

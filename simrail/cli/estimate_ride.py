@@ -95,7 +95,13 @@ def estimate_ride(
     estimate = estimator.estimate(recording)
     us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)
     if not len(estimate.states.columns):
-        raise InputError("concludes nothing", field="--estimator", value=method)
+        raise InputError(
+            "concludes nothing",
+            field="--estimator",
+            value=method,
+            limit="an estimate with states",
+            remedy="choose another estimator",
+        )
     states = estimate.states
     if {*ODOMETRY} <= {*states.columns}:
         # A method that finds the place itself says where its figures belong.

@@ -96,7 +96,13 @@ def grades_of(name: str) -> list[str]:
         return [str(one) for one in each(first.grade)]
     names = [part.strip() for part in name.split(",") if part.strip()]
     if not names:
-        raise InputError("names no IMU", field="IMU", value=name, remedy="name a grade, a file, or all")
+        raise InputError(
+            "names no IMU",
+            field="IMU",
+            value=name,
+            remedy="name a grade, a file, or all",
+            limit="a grade, a file, or all",
+        )
     # A file is named as seen from here, not from the scenario's folder.
     return [str(find("imu", one).resolve()) if _is_file(one) else one for one in names if find("imu", one)]
 

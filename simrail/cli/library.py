@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from simrail.cli.options import DONE, number
+from simrail.cli.options import DONE, finite, judge_out, number
 from simrail.core.errors import InputError
 
 FOLDERS = {
@@ -120,10 +120,16 @@ def vehicle(
         Path | None, typer.Option("--out", metavar="DIR", help="Write an HTML page with figures there, too.")
     ] = None,
     speed: Annotated[
-        float, typer.Option("--speed", metavar="KMH", min=1.0, max=1000.0, help="Speed of the mode table.")
+        float,
+        typer.Option(
+            "--speed", metavar="KMH", min=1.0, max=1000.0, callback=finite, help="Speed of the mode table."
+        ),
     ] = 80.0,
     top: Annotated[
-        float, typer.Option("--to", metavar="KMH", min=10.0, max=1000.0, help="Highest speed searched.")
+        float,
+        typer.Option(
+            "--to", metavar="KMH", min=10.0, max=1000.0, callback=finite, help="Highest speed searched."
+        ),
     ] = 400.0,
 ) -> int:
     """Show a vehicle: masses, wheel loads, natural frequencies, conicity and critical speed."""
@@ -134,6 +140,7 @@ def vehicle(
     from simrail.vehicle.file import VehicleFile
     from simrail.vehicle.study import study_vehicle
 
+    judge_out(out)
     path = find("vehicle", name)
     model = judge(VehicleFile, read_toml(path), file=label(path)).model(path.stem)
     console = Console(stderr=True)
@@ -189,6 +196,7 @@ def imu(
     from simrail.recording.sheets.imu_file import load_imu
     from simrail.report.tables.imu_text import print_imu
 
+    judge_out(out)
     file, grade = load_imu(name)
     print_imu(Console(), file, grade)
     if out is not None:

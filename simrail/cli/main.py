@@ -4,7 +4,11 @@ Exit codes: 0 done, 1 a cell failed, 2 bad input (one message, no traceback), 13
 imports stand inside the commands, so that those that need little answer at once.
 """
 
+import builtins
+import io
+import os
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +26,7 @@ from simrail.cli.schema import schema
 from simrail.cli.sensitivity import sensitivity
 from simrail.cli.spectra import spectra
 from simrail.cli.tune import tune
-from simrail.core.errors import InputError
+from simrail.core.errors import MOST_SHOWN, InputError, one_line
 
 app = typer.Typer(
     name="simrail",
@@ -38,6 +42,13 @@ UsageFault: type[Any] = next(kind for kind in typer.BadParameter.__mro__ if kind
 
 def main() -> None:
     """Entry point of the command ``simrail``."""
+    if not sys.warnoptions:  # what numbers do on the way to a refusal is nothing that its reader can mend
+        for kind in ("RuntimeWarning", "FutureWarning"):
+            warnings.filterwarnings("ignore", category=getattr(builtins, kind))
+        os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning,ignore::FutureWarning")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks a letter shows its code
+            stream.reconfigure(errors="backslashreplace")
     sys.exit(call(sys.argv[1:]))
 
 
@@ -49,20 +60,29 @@ def call(arguments: list[str]) -> int:
         say(f"simrail: {error}")
         return BAD_INPUT
     except UsageFault as error:
-        error.show()
+        _say_usage(error)
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED  # newer versions of typer return this code by themselves
     except OSError as error:
         place = f" ({Path(str(error.filename)).name})" if error.filename else ""
-        say(
-            f"simrail: {error.strerror or error}{place}; former results are as they were, "
-            "and a run goes on from where it was"
-        )
+        words = one_line(f"{error.strerror or error}{place}", MOST_SHOWN)
+        say(f"simrail: {words}; former results are as they were, and a run goes on from where it was")
         return CELL_FAILED
     if code == INTERRUPTED:
         say("simrail: interrupted; former results are as they were, and a run goes on from where it was")
     return int(code or DONE)
+
+
+def _say_usage(error: Any) -> None:
+    """Tell of words that are no command line, in one line; without any word, the help."""
+    context = getattr(error, "ctx", None)
+    if context is None or type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        return
+    text = one_line(" ".join(error.format_message().split()).rstrip("."), 2 * MOST_SHOWN)
+    command = "simrail" if context.parent is None else f"simrail {context.info_name}"
+    say(f"simrail: {text}; limit: what the help lists; remedy: see '{command} --help'")
 
 
 def _version(wanted: bool) -> None:

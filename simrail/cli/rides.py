@@ -18,7 +18,7 @@ def export(
     scenario: Scenario,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new folder for the recordings.")],
     form: Form = "csv",
-    draw: Annotated[int, typer.Option("--draw", min=0, help="Draw of the sensors.")] = 0,
+    draw: Annotated[int, typer.Option("--draw", min=0, max=999_999, help="Draw of the sensors.")] = 0,
     truth: Annotated[
         bool, typer.Option("--truth", help="Write the true motion beside each recording, too.")
     ] = False,

@@ -71,6 +71,7 @@ def run(
             "these options do not go together",
             field=" ".join(f"--{name}" for name in [*wanted, *named]),
             remedy="choose one of them; --cell runs in this process",
+            limit="one of them",
         )
     console = Console()
     with ProgressWatcher(Console(stderr=True)) as watcher:
@@ -136,6 +137,9 @@ def check(
     settings: Settings = None,
 ) -> int:
     """Judge a scenario without running it, or say what a recorded ride shows of itself."""
+    from rich.console import Console
+
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.check_ride import check_ride, is_ride, refuse_ride_option
 
     if is_ride(scenario):
@@ -159,7 +163,8 @@ def check(
     elif files:
         read = read.without_own_files()
         say(f"judged without {', '.join(files)}, and without the methods in it")
-    plan = judge_scenario(read)
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        plan = judge_scenario(read, progress=watcher.judging)
     for warning in plan.warnings:
         say(f"warning: {warning}")
     for note in plan.notes:

@@ -44,7 +44,7 @@ def spectra(
     read = load_scenario(scenario, overrides=settings or [], seed=seed)
     published = [read_spectrum(name) for name in against] if against else shipped_spectra()
     if out is not None and out.is_dir():
-        raise InputError("is a folder", field="--out", value=out, remedy="name a file")
+        raise InputError("is a folder", field="--out", value=out, remedy="name a file", limit="a file")
     with ProgressWatcher(Console(stderr=True)) as watcher:
         table = scenario_spectra(read, published, watcher=watcher)
     _show(Console(), table)

@@ -14,6 +14,7 @@ import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from shlex import quote
 from string import Template
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -72,15 +73,18 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
     if data is not None:
         text, logged = ride_template(name)
         data.write_text(logged, encoding="utf-8")
-        next_step = f"its data: {label(data)}\ntry it: simrail estimate {label(path)}"
+        next_step = f"its data: {label(data)}\ntry it: simrail estimate {quote(label(path))}"
     elif kind in ("estimator", "odometry"):
         text, next_step = _of_class(kind, name, path)
     elif kind == "scenario":
-        text, next_step = _copy("scenario", "quick_kinematic", name), f"run it: simrail run {label(path)}"
+        text, next_step = (
+            _copy("scenario", "quick_kinematic", name),
+            f"run it: simrail run {quote(label(path))}",
+        )
     else:
         source, use, look = SHIPPED[kind]
         text = imu_template(name) if kind == "imu" else _copy(kind, source, name)
-        next_step = look.format(path=label(path))
+        next_step = look.format(path=quote(label(path)))
         next_step += f"use it in a scenario beside it: {use.format(file=path.name)}"
     path.write_text(text, encoding="utf-8")
     return path, next_step
@@ -153,16 +157,17 @@ def _of_class(kind: str, name: str, path: Path) -> tuple[str, str]:
     class_name = "".join(word[:1].upper() + word[1:] for word in name.split("_") if word)
     text = _filled(f"{kind}.py.txt", Class=class_name)
     if kind == "odometry":
+        setting = quote(f'odometry="{label(path)}:{class_name}"')
         return text, (
             f'use it in a scenario beside it: odometry = "./{path.name}:{class_name}"\n'
-            f"or try it at once: simrail run quick_kinematic --set 'odometry=\"{label(path)}:{class_name}\"'"
+            f"or try it at once: simrail run quick_kinematic --set {setting}"
         )
     return text, (
         f'use it in a scenario beside it:\n\n    [[estimator]]\n    name = "{name}"\n'
         f'    method = "{path.name}:{class_name}"\n\n'
         f"or try it at once: simrail run quick_kinematic "
         # Quoted: some shells take brackets for a pattern of file names.
-        f"--set 'estimator[0].method={label(path)}:{class_name}' "
+        f"--set {quote(f'estimator[0].method={label(path)}:{class_name}')} "
         f"--set 'estimator[0].name={name}' --set 'estimator[0].options={{}}'"
     )
 

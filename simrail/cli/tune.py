@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from simrail.cli.options import DONE, Scenario, Seed, Settings
+from simrail.cli.options import DONE, Scenario, Seed, Settings, finite
 from simrail.core.errors import InputError, one_of
 
 if TYPE_CHECKING:
@@ -93,7 +93,11 @@ def tune(
     step: Annotated[
         float | None,
         typer.Option(
-            "--step", metavar="M", min=0.001, help="KOM: distance of the places; 0.25 if not given."
+            "--step",
+            metavar="M",
+            min=0.001,
+            callback=finite,
+            help="KOM: distance of places; 0.25 if not given.",
         ),
     ] = None,
     evaluations: Annotated[

@@ -159,4 +159,5 @@ def require(frame: pd.DataFrame, columns: Iterable[str], *, what: str = "frame")
             field=what,
             value=sorted(map(str, frame.columns)),
             remedy="add the column or map it from the file's own name",
+            limit=f"with {listed}",
         )

@@ -13,6 +13,9 @@ from contextlib import contextmanager
 MOST_TOLD = 6
 """Faults of one input that are told at once."""
 
+MOST_SHOWN, MOST_SAID = 200, 1000
+"""Characters of what was found that are shown, and of what would be accepted or is to be done."""
+
 
 class InputError(ValueError):
     """Input that cannot be used, said so that its author can mend it.
@@ -59,11 +62,32 @@ class InputError(ValueError):
 
     @property
     def line(self) -> str:
-        """The fault in one line, without those beside it."""
-        value = None if self.value is None else repr(self.value)
-        more = (("found", value), ("limit:", self.limit), ("remedy:", self.remedy))
-        text = "".join(f"{place}: " for place in (self.file, self.field) if place is not None)
-        return text + self.problem + "".join(f"; {word} {words}" for word, words in more if words is not None)
+        """The fault in one line, without those beside it: what it names is cut, what does not print shown."""
+        value = None if self.value is None else one_line(repr(self.value), MOST_SHOWN)
+        more = (("found", value), ("limit:", self.limit), ("remedy:", self.remedy or self._usual_remedy))
+        places = (one_line(str(place), MOST_SHOWN) for place in (self.file, self.field) if place is not None)
+        text = "".join(f"{place}: " for place in places) + one_line(self.problem, 2 * MOST_SHOWN)
+        said = ((word, one_line(words, MOST_SAID)) for word, words in more if words is not None)
+        return text + "".join(f"; {word} {words}" for word, words in said)
+
+    @property
+    def _usual_remedy(self) -> str | None:
+        """What to do where nothing else is said than the limit."""
+        if self.limit is None:
+            return None
+        return "choose one of them" if self.limit.startswith("one of ") else "keep to the limit"
+
+
+def one_line(text: str, most: int) -> str:
+    """A text in one line of at most so many characters; what does not print is shown by its code."""
+    if len(text) > most:
+        text = f"{text[: most - 30]} ... ({len(text)} characters)"
+    return "".join(letter if letter.isprintable() else _code(letter) for letter in text)
+
+
+def _code(letter: str) -> str:
+    """A character that does not print, as Python writes it; spaces of other kinds are spaces."""
+    return " " if letter in "\xa0\u202f\u2009" else repr(letter)[1:-1]
 
 
 class Faults:
@@ -120,4 +144,4 @@ def refuse_unless(good: bool, field: str, value: object, limit: str) -> None:
         Naming field, value and limit.
     """
     if not good:
-        raise InputError("is impossible", field=field, value=value, limit=limit)
+        raise InputError("is impossible", field=field, value=value, limit=limit, remedy="keep to the limit")

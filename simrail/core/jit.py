@@ -5,11 +5,15 @@ of a record), so its disk cache can silently hold old physics. Here the cache fo
 every source that a kernel can take something from, and of numba's version: a changed source is a new folder.
 """
 
+import atexit
 import hashlib
 import multiprocessing
 import os
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -45,7 +49,29 @@ def kernel_hash() -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-_KERNELS = str(cache_folder() / "kernels" / kernel_hash())
+def _kernel_folder() -> Path:
+    """Where kernels are kept: in the cache, or in a temporary folder where that cannot be written.
+
+    numba would put them beside their sources, where they go stale.
+    """
+    if _SPARE in os.environ:
+        return Path(os.environ[_SPARE])
+    folder = cache_folder() / "kernels" / kernel_hash()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        Path(tempfile.mkdtemp(prefix=".", dir=folder)).rmdir()
+        return folder
+    except OSError:
+        spare = tempfile.mkdtemp(prefix="simrail-kernels-")
+    os.environ[_SPARE] = spare  # processes that this one starts share it
+    atexit.register(shutil.rmtree, spare, ignore_errors=True)
+    with suppress(OSError, shutil.Error):
+        shutil.copytree(folder, spare, dirs_exist_ok=True)
+    return Path(spare)
+
+
+_SPARE = "SIMRAIL_SPARE_KERNELS"
+_KERNELS = str(_kernel_folder())
 # numba reads its settings anew from the environment whenever a variable of its own has changed there.
 os.environ["NUMBA_CACHE_DIR"] = _KERNELS
 numba.config.CACHE_DIR = _KERNELS  # type: ignore[attr-defined]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +27,14 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 FOLDERS = {"scenario": "", "track": "tracks", "vehicle": "vehicles", "imu": "imus", "spectrum": "spectra"}
+
+
+MOST = 1e12
+"""No number of a file is as large: the stiffest is a modulus of elasticity, 2e11 N/m2."""
+
+
+MOST_LETTERS = 10_000
+"""Of one text of a file."""
 
 
 class Part(BaseModel):
@@ -69,6 +78,14 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; not where its name cannot be one, or its folder may not be entered."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def existing_file(name: str, folder: Path | None, *, also: Path | None = None) -> Path:
     """A file by its path, seen from a folder (that of the scenario), from here, or from one more folder.
 
@@ -78,13 +95,14 @@ def existing_file(name: str, folder: Path | None, *, also: Path | None = None) -
         If there is none; the message names the nearest file in the folders of ``also``.
     """
     for candidate in (*([folder / name] if folder else []), Path(name), *([also / name] if also else [])):
-        if candidate.is_file():
+        if is_file(candidate):
             return candidate
     shown = [path.relative_to(also).as_posix() for path in sorted(also.glob("*/*.toml"))] if also else []
     near = difflib.get_close_matches(name, shown, n=1)
     raise InputError(
         "no such file",
         value=name,
+        limit="the path of a file that is there",
         remedy="mend the path; it is seen from the scenario's folder"
         + (f" (shipped: {near[0]})" if near else ""),
     )
@@ -101,7 +119,7 @@ def find(kind: str, name: str, *, folder: Path | None = None) -> Path:
     looks_like_path = name.endswith(".toml") or "/" in name or "\\" in name
     if looks_like_path:
         for candidate in (*([folder / name] if folder else []), Path(name)):
-            if candidate.is_file():
+            if is_file(candidate):
                 return candidate
         raise InputError(
             "no such file",
@@ -134,9 +152,19 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from error
+        limit, remedy = "a file that may be read", "mend the path, or its rights"
+        raise InputError(
+            "cannot be read", file=label(path), value=error.strerror, limit=limit, remedy=remedy
+        ) from error
     except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8 text", file=label(path), remedy="save the file as UTF-8") from error
+        bad = error.object[error.start : error.start + 8]
+        raise InputError(
+            f"is not UTF-8 text, at byte {error.start}",
+            file=label(path),
+            value=bad,
+            limit="UTF-8",
+            remedy="save the file as UTF-8",
+        ) from error
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -148,12 +176,22 @@ def parse_toml(text: str, *, file: object) -> dict[str, Any]:
     """Parse TOML text, or say in which line it is broken."""
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # also a whole number of more digits than Python reads
         raise InputError(
             f"is not valid TOML: {error}",
             file=file,
+            value=_around(text, str(error)),
+            limit="TOML 1.0",
             remedy='mend that place; text stands in quotes, numbers do not: name = "go20A", speed_kmh = 20.0',
         ) from error
+
+
+def _around(text: str, said: str) -> str:
+    """The line of a text that an error of its reader speaks of; its beginning where none is named."""
+    lines = text.splitlines() or [""]
+    number = re.search(r"at line (\d+)", said)
+    at = int(number[1]) - 1 if number else 0
+    return lines[min(at, len(lines) - 1)].strip()[:60]
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
@@ -180,7 +218,9 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Pat
     """
     try:
         # JSON is the mode in which pydantic is strict about numbers and still takes arrays for tuples.
-        return model.model_validate_json(json.dumps(data, default=str), context={"folder": folder})
+        part = model.model_validate_json(json.dumps(data, default=str), context={"folder": folder})
+        _refuse_absurd(data, file)
+        return part
     except ValidationError as error:
         faults = error.errors()
         found = _input_errors(faults, model, file)
@@ -190,6 +230,23 @@ def judge(model: type[_Part], data: dict[str, Any], *, file: object, folder: Pat
             gathered.found = [*found, *model.others({k: v for k, v in data.items() if k not in bad})]
             gathered.refuse()
         raise
+
+
+def _refuse_absurd(data: Any, file: object, field: str = "") -> None:
+    """Refuse a number beyond all that these files speak of, which overflows somewhere, and endless texts."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            if key not in ("seed", "options"):
+                _refuse_absurd(value, file, f"{field}.{key}" if field else str(key))
+    elif isinstance(data, list | tuple):
+        for i, value in enumerate(data):
+            _refuse_absurd(value, file, f"{field}[{i}]")
+    elif isinstance(data, str) and len(data) > MOST_LETTERS:
+        limit = f"at most {MOST_LETTERS} characters"
+        raise InputError("is too long", file=file, field=field, value=data, limit=limit, remedy="shorten it")
+    elif isinstance(data, int | float) and abs(data) >= MOST:
+        limit, remedy = f"below {MOST:g}", "mind the unit, which is in the name of the field"
+        raise InputError("is out of range", file=file, field=field, value=data, limit=limit, remedy=remedy)
 
 
 def load(model: type[_Part], kind: str, name: str, *, folder: Path | None = None) -> _Part:
@@ -258,7 +315,7 @@ def _input_error(fault: ErrorDetails, model: type[Part], file: object) -> InputE
         field = field.removesuffix(".[key]")
     message = _message(fault, model)
     value = fault.get("input")
-    if not message.with_value or (isinstance(value, (dict, list)) and len(repr(value)) > 60):
+    if not message.with_value:
         value = None
     return InputError(
         message.problem,
@@ -292,21 +349,37 @@ def _message(fault: ErrorDetails, model: type[Part]) -> _Message:
     if kind in ("too_short", "too_long"):
         return _Message("has the wrong number of items", fault["msg"].split(" after ")[0])
     return {
-        "missing": _Message("is required", remedy="add it", with_value=False),
-        "value_error": _Message(str(context.get("error"))),
+        "missing": _Message("is required", "this key, with a value", "add it", with_value=False),
+        "value_error": _Message(*_split(str(context.get("error")))),
         "finite_number": _Message("is not a finite number", "a finite number", "replace NaN or infinity"),
         "string_pattern_mismatch": _Message("is no name", f"what matches {context.get('pattern')}"),
-    }.get(kind, _Message(fault["msg"]))
+        "string_too_long": _Message(
+            "is too long", f"at most {context.get('max_length')} characters", "shorten it"
+        ),
+        "string_too_short": _Message(
+            "is too short", f"{context.get('min_length')} characters or more", "write it"
+        ),
+    }.get(
+        kind, _Message("cannot be taken", fault["msg"].removeprefix("Input should be "), "write it like that")
+    )
+
+
+def _split(words: str) -> tuple[str, str, str | None]:
+    """What a check of a model said, as a fault, a limit and a remedy, which it may have put behind it."""
+    problem, _, remedy = words.partition("; ")
+    limit = "see the remedy" if remedy else "what the key is for"
+    return problem, limit, remedy or "change it"
 
 
 def _unknown_key(model: type[Part], place: tuple[int | str, ...], value: Any) -> _Message:
     explained = _explained(model, place, value)
     if explained is not None:
-        return _Message("unknown key", remedy=explained)
+        return _Message("unknown key", "the keys that are known here", explained)
     allowed = _fields_at(model, place[:-1])
     guess = did_you_mean(place[-1], allowed)
     # A guess is worth more than a list that nobody reads.
-    limit = "one of " + ", ".join(allowed) if allowed and not (guess and len(allowed) > 25) else None
+    short = allowed and not (guess and len(allowed) > 25)
+    limit = "one of " + ", ".join(allowed) if short else f"one of the {len(allowed)} keys that are known here"
     return _Message("unknown key", limit, guess or "remove it")
 
 

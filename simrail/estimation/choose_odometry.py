@@ -58,7 +58,12 @@ def odometry_named(name: str, folder: Path | None = None) -> Estimator:
     try:
         return class_named(method, folder)(**options)
     except TypeError as error:
-        raise InputError(f"cannot be made without options: {error}", value=name) from error
+        raise InputError(
+            f"cannot be made without options: {error}",
+            value=name,
+            limit="an odometry whose options have defaults",
+            remedy="give its options defaults",
+        ) from error
 
 
 def with_odometry(recording: Recording, odometry: str | Estimator, *, source: str = "") -> Recording:
@@ -89,6 +94,7 @@ def with_odometry(recording: Recording, odometry: str | Estimator, *, source: st
                 field="odometry",
                 value=recording.odometry_source or NONE,
                 remedy='measure it with odometry="truth"',
+                limit="a recording with the true odometry",
             )
         return recording
     estimator = odometry_named(odometry) if isinstance(odometry, str) else odometry

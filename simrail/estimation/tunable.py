@@ -184,6 +184,7 @@ def refuse_settings(estimator: object, settings: Mapping[str, Any], *, known: Se
                 f"{type(estimator).__name__} has no such setting of its search",
                 field=name,
                 remedy="leave it out",
+                limit="the settings of its search",
             )
 
 
@@ -212,7 +213,19 @@ class TunedValues:
         try:
             table = tomllib.loads(file.read_text(encoding="utf-8")).get("hyperparameters")
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InputError(f"cannot be read: {error}", file=file.name, remedy="mend the path") from error
+            raise InputError(
+                f"cannot be read: {error}",
+                file=file.name,
+                remedy="mend the path",
+                limit="a TOML file of a tuning",
+            ) from error
         if not isinstance(table, dict) or not all(type(value) in (int, float) for value in table.values()):
-            raise InputError("has no table of numbers", file=file.name, field="hyperparameters", value=table)
+            raise InputError(
+                "has no table of numbers",
+                file=file.name,
+                field="hyperparameters",
+                value=table,
+                limit="a table [hyperparameters] of numbers",
+                remedy="write it by simrail tune",
+            )
         return cls({name: float(value) for name, value in table.items()})

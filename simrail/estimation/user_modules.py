@@ -41,7 +41,12 @@ def class_named(name: str, folder: Path | None) -> type[Estimator]:
     try:
         module = _module(file.read_bytes(), str(file))
     except Exception as error:
-        raise InputError(f"cannot be imported: {type(error).__name__}: {error}", value=path_name) from error
+        raise InputError(
+            f"cannot be imported: {type(error).__name__}: {error}",
+            value=path_name,
+            limit="a Python file that can be imported",
+            remedy="mend it; python FILE shows where",
+        ) from error
     found = getattr(module, class_name, None)
     if not isinstance(found, type) or not callable(getattr(found, "estimate", None)):
         raise InputError(

@@ -118,7 +118,12 @@ def check_recording(recording: Recording) -> None:
         if name in SHEETS:
             sheet, worth, remedy = SHEETS[name]
             if getattr(recording, sheet) is None:
-                raise InputError(f"{name} without its sheet {worth}", field=sheet, remedy=remedy)
+                raise InputError(
+                    f"{name} without its sheet {worth}",
+                    field=sheet,
+                    remedy=remedy,
+                    limit="a signal with its sheet",
+                )
     _check_uniform(recording.imu.index.to_numpy(), recording.imu_sheet.rate_hz)
     second = recording.second_imu_sheet
     if recording.second_imu is not None and second is not None:

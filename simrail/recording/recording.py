@@ -375,6 +375,7 @@ def odometry_of(recording: Recording) -> pd.DataFrame:
             field="odometry",
             value=recording.name,
             remedy='choose one, e.g. simrail.with_odometry(recording, "curve_matched")',
+            limit="a recording with an odometry",
         )
     return recording.odometry
 

@@ -3,26 +3,37 @@
 A ride is a folder under the user's cache; a folder is written under another name and renamed when it
 is complete, so an interrupted or killed run leaves nothing that looks like a ride. Any number of processes
 may use it at once. The cache keeps below a size limit by dropping the rides that were used longest ago.
+
+A cache that cannot be written is read all the same; what it lacks goes into a temporary folder, which is gone
+when the process ends.
 """
 
+import atexit
+import errno
 import hashlib
 import json
 import os
 import secrets
 import shutil
+import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from simrail.core.errors import InputError
 from simrail.core.jit import cache_folder
+from simrail.core.sealed_files import HEADER, DamagedError, plain_of
 
 LIMIT_GB = 20.0
 
-HEADER = "truth.json"
-"""File of a folder that is written last: without it a folder was interrupted and is no ride."""
+SPARE = "SIMRAIL_SPARE_RIDES"
+"""Names the temporary folder to the processes that this one starts."""
+
+_CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
+"""What a folder says that nobody may write to."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +47,24 @@ class CachedRide:
 
 
 def limit_bytes() -> int:
-    """Size limit of the cache: ``SIMRAIL_CACHE_GB`` in the environment, or 20 GB."""
-    return int(float(os.environ.get("SIMRAIL_CACHE_GB", LIMIT_GB)) * 1e9)
+    """Size limit of the cache: ``SIMRAIL_CACHE_GB`` in the environment, or 20 GB.
+
+    Raises
+    ------
+    InputError
+        If that is no size.
+    """
+    said = os.environ.get("SIMRAIL_CACHE_GB", str(LIMIT_GB))
+    try:
+        return int(float(said) * 1e9)
+    except (ValueError, OverflowError):
+        raise InputError(
+            "is no size of a cache",
+            field="SIMRAIL_CACHE_GB",
+            value=said,
+            limit="a number of GB, e.g. 20",
+            remedy="set it to a number, or unset it",
+        ) from None
 
 
 def folder() -> Path:
@@ -46,21 +73,56 @@ def folder() -> Path:
     return Path(named) if named else cache_folder() / "rides"
 
 
+def places_of(key: str) -> list[Path]:
+    """The folders that a ride may be in and that are there: in the cache, and in the temporary folder.
+
+    Raises
+    ------
+    OSError
+        If the cache cannot be looked at.
+    """
+    folders = [folder(), *([Path(os.environ[SPARE])] if SPARE in os.environ else [])]
+    return [place for place in (one / key for one in folders) if place.exists()]
+
+
+def make_writable() -> bool:
+    """Whether the cache can be written; if not, rides go into a temporary folder from now on.
+
+    For who is about to start other processes: they then share it.
+
+    Raises
+    ------
+    InputError
+        If its size is none.
+    """
+    limit_bytes()
+    if SPARE not in os.environ:
+        try:
+            folder().mkdir(parents=True, exist_ok=True)
+            Path(tempfile.mkdtemp(prefix=".", dir=folder())).rmdir()
+        except OSError as error:
+            if error.errno not in _CLOSED:
+                raise
+            _make_spare()
+    return SPARE not in os.environ
+
+
 def key_of(description: dict[str, Any]) -> str:
     """SHA-256 of a JSON description, in hexadecimal."""
     return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()
 
 
-def rides() -> list[CachedRide]:
-    """Every complete ride in the cache, the most recently used first."""
+def rides(where: Path | None = None) -> list[CachedRide]:
+    """Every complete ride in the cache, or in another folder, the most recently used first."""
     cached = []
-    for place in folder().glob(f"[!.]*/{HEADER}"):
+    for place in (where or folder()).glob(f"[!.]*/{HEADER}"):
         with suppress(OSError):  # another process may drop it meanwhile
             size = sum(file.stat().st_size for file in place.parent.iterdir())
             used = place.stat().st_mtime
             try:
-                name = json.loads(place.read_text(encoding="utf-8"))["manifest"].get("ride", "?")
-            except (ValueError, KeyError):
+                manifest = plain_of(place.parent).get("manifest")
+                name = str(manifest.get("ride", "?")) if isinstance(manifest, dict) else "?"
+            except DamagedError:
                 name = "damaged"
             cached.append(CachedRide(place.parent.name, name, size, used))
     return sorted(cached, key=lambda ride: -ride.last_used_s)
@@ -79,30 +141,63 @@ def touch(place: Path) -> None:
         os.utime(place / HEADER)
 
 
-def drop(key: str) -> None:
-    """Take a ride out of the cache, at once."""
-    gone = folder() / f".{key}.{secrets.token_hex(8)}"
+def drop(place: Path) -> None:
+    """Take a ride out of the cache, at once; where the cache cannot be written, it stays."""
+    gone = place.with_name(f".{place.name}.{secrets.token_hex(8)}")
     with suppress(OSError):
-        (folder() / key).replace(gone)
+        place.replace(gone)
     shutil.rmtree(gone, ignore_errors=True)
 
 
 @contextmanager
-def new_ride(key: str) -> Iterator[Path]:
-    """A folder to write a ride into; it enters the cache when the block ends without an exception."""
-    folder().mkdir(parents=True, exist_ok=True)
-    _drop_leftovers()
-    draft = folder() / f".{key}.{secrets.token_hex(8)}"
+def new_ride(key: str, told: Callable[[str], None] | None = None) -> Iterator[Path]:
+    """A folder to write a ride into; it enters the cache when the block ends without an exception.
+
+    ``told`` is called with one line if the cache cannot be written.
+
+    Raises
+    ------
+    OSError
+        If the ride cannot be written: the disk is full, or broken.
+    """
+    draft = _draft(key, told)
+    place = draft.with_name(key)
     try:
         yield draft
-        _make_room(sum(file.stat().st_size for file in draft.iterdir()))
+        _make_room(draft.parent, sum(file.stat().st_size for file in draft.iterdir()))
         try:
-            draft.replace(folder() / key)
+            draft.replace(place)
         except OSError:
-            if not (folder() / key).exists():  # else another process was faster with the same ride
+            if not place.exists():  # else another process was faster with the same ride
                 raise
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _draft(key: str, told: Callable[[str], None] | None) -> Path:
+    """A new folder for a ride to be written into: in the cache, or in the temporary folder."""
+    name = f".{key}.{secrets.token_hex(8)}"
+    if make_writable():
+        _drop_leftovers()
+        return folder() / name
+    spare = Path(os.environ[SPARE])
+    if told is not None:
+        told(f"the cache of rides cannot be written ({folder()}): new ones go to {spare}, for now")
+    return spare / name
+
+
+def _make_spare() -> None:
+    """Make the temporary folder, which goes with this process."""
+    spare = tempfile.mkdtemp(prefix="simrail-rides-")
+    os.environ[SPARE] = spare
+    atexit.register(drop_spare)
+
+
+def drop_spare() -> None:
+    """Drop the temporary folder, if there is one."""
+    spare = os.environ.pop(SPARE, None)
+    if spare is not None:
+        shutil.rmtree(spare, ignore_errors=True)
 
 
 def _drop_leftovers() -> None:
@@ -113,10 +208,10 @@ def _drop_leftovers() -> None:
                 shutil.rmtree(draft, ignore_errors=True)
 
 
-def _make_room(size: int) -> None:
-    stored = rides()
+def _make_room(where: Path, size: int) -> None:
+    stored = rides(where)
     total = size + sum(ride.size_bytes for ride in stored)
     while stored and total > limit_bytes():
         oldest = stored.pop()
-        drop(oldest.key)
+        drop(where / oldest.key)
         total -= oldest.size_bytes

@@ -16,6 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
+from simrail.core.sealed_files import HEADER, DamagedError
 from simrail.core.shown import Facts, Shown
 from simrail.core.source_hash import source_hash
 from simrail.ride import cache as ride_cache
@@ -60,7 +61,7 @@ _SOURCES = (
         "ride/truth_files.py",
         "ride/truth_rows.py",
     ),
-    *("core/rotation.py", "core/seeds.py", "core/jit.py"),
+    *("core/rotation.py", "core/seeds.py", "core/jit.py", "core/sealed_files.py"),
 )
 _VIBRATION_SOURCES = ("ride/vibration",)
 
@@ -204,7 +205,8 @@ def is_cached(ride: Ride) -> bool:
     """Whether `simulate` would find this ride on disk, its vibration included."""
     if ride.vibration is not None and not is_cached(ride.without_vibration):
         return False
-    return (ride_cache.folder() / ride_cache.key_of(ride.describe()) / ride_cache.HEADER).is_file()
+    places = ride_cache.places_of(ride_cache.key_of(ride.describe()))
+    return any((place / HEADER).is_file() for place in places)
 
 
 def simulate(
@@ -223,7 +225,8 @@ def simulate(
     progress : callable, optional
         Called now and then with (seconds done, seconds in all, speed).
     told : callable, optional
-        Called with one line if a ride in the cache was damaged; it is dropped and simulated again.
+        Called with one line if a ride in the cache was damaged, it is dropped and simulated again; or if the
+        cache cannot be written.
     warn : bool
         Warn (`UserWarning`) of a speed at which the vehicle hunts. A campaign, whose check has said so, does
         not say it again.
@@ -237,6 +240,8 @@ def simulate(
     ------
     simrail.vehicle.engines.derailment.DerailedError
         If a wheel leaves the rail.
+    OSError
+        If the cache cannot be read, or the disk is full.
     """
     if ride.vibration is not None:
         truth = simulate(ride.without_vibration, progress=progress, told=told, warn=warn)
@@ -249,7 +254,7 @@ def simulate(
     kept = _kept_before(key, load_truth, told, f"ride {ride.name}", "simulated again")
     if kept is not None:
         return kept
-    with ride_cache.new_ride(key) as draft:
+    with ride_cache.new_ride(key, told) as draft:
         if ride.engine == "kinematic":
             save_truth(_follow(ride), draft)
         else:
@@ -257,25 +262,30 @@ def simulate(
                 _drive(ride, draft, progress)
             except DerailedError as error:
                 raise DerailedError(with_hunting(error.derailment, ride, rails_of(ride))) from error
-    return load_truth(ride_cache.folder() / key)
+    return load_truth(ride_cache.places_of(key)[-1])
 
 
 def _kept_before(
     key: str, read: Callable[[Path], T], told: Callable[[str], None] | None, name: str, again: str
 ) -> T | None:
-    """What the cache has of a key; None if it has nothing, or what was damaged and is dropped."""
-    place = ride_cache.folder() / key
-    if not place.exists():
-        return None
-    try:
-        found = read(place)
-    except (OSError, ValueError, KeyError) as error:
-        ride_cache.drop(key)
-        if told is not None:
-            told(f"{name} in the cache was damaged ({error}): {again}")
-        return None
-    ride_cache.touch(place)
-    return found
+    """What the cache has of a key; None if it has nothing, or what was damaged and is dropped.
+
+    Raises
+    ------
+    OSError
+        If the cache cannot be read, which says nothing of what it holds.
+    """
+    for place in ride_cache.places_of(key):
+        try:
+            found = read(place)
+        except DamagedError as error:
+            ride_cache.drop(place)
+            if told is not None:
+                told(f"{name} in the cache was damaged ({error}): {again}")
+            continue
+        ride_cache.touch(place)
+        return found
+    return None
 
 
 def _shaken(ride: Ride, truth: Truth, told: Callable[[str], None] | None) -> ShortWaves:
@@ -286,10 +296,10 @@ def _shaken(ride: Ride, truth: Truth, told: Callable[[str], None] | None) -> Sho
     kept = _kept_before(key, read, told, f"vibration of ride {ride.name}", "worked out again")
     if kept is not None:
         return kept
-    with ride_cache.new_ride(key) as draft:
+    with ride_cache.new_ride(key, told) as draft:
         manifest = {"ride": f"{ride.name} (vibration)", "vehicle": ride.vehicle.name}
         write_short_waves(ride.vibration, truth, ride.vehicle, draft, seed=ride.track_seed, manifest=manifest)
-    return read(ride_cache.folder() / key)
+    return read(ride_cache.places_of(key)[-1])
 
 
 def _follow(ride: Ride) -> Truth:

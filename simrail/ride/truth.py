@@ -204,6 +204,7 @@ class Truth(Shown):
                 field="contact_rate_hz",
                 value=0.0,
                 remedy="set contact_rate_hz, e.g. to 200.0; the kinematic engine has no forces",
+                limit="> 0 Hz",
             )
         index = pd.Index(self.time_s[:: self.contact_every], name="time_s")
         frame = pd.DataFrame(np.array(self.contacts[name]), index=index, columns=list(CONTACT))

@@ -4,18 +4,18 @@ Large arrays are mapped, not copied, so a long ride neither needs nor takes memo
 is said in `simrail.ride.truth`; which rides are kept, in `simrail.ride.cache`.
 """
 
-import json
 import os
-import zlib
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from simrail.core.columns import CONTACT
 from simrail.core.jit import FloatArray
-from simrail.ride.cache import HEADER
+from simrail.core.sealed_files import DamagedError, damage_told, read_sealed, seal
 from simrail.ride.truth import BODY_ARRAYS, BodyMotion, Truth
 from simrail.track.design import TrackDesign
 
@@ -94,27 +94,6 @@ def read_array(folder: Path, name: str) -> FloatArray:
     return array
 
 
-def seal(folder: Path, plain: dict[str, Any]) -> None:
-    """Write the header of a folder, with the checksums of its arrays; done last."""
-    whole = {**plain, "crc32": {file.name: _crc32(file) for file in sorted(folder.glob("*.npy"))}}
-    (folder / HEADER).write_text(json.dumps(whole), encoding="utf-8")
-
-
-def read_sealed(folder: Path) -> dict[str, Any]:
-    """The header of a folder, of which the arrays are what was written.
-
-    Raises
-    ------
-    OSError, ValueError, KeyError
-        If the folder is incomplete or damaged.
-    """
-    plain: dict[str, Any] = json.loads((folder / HEADER).read_text(encoding="utf-8"))
-    for name, crc32 in plain["crc32"].items():
-        if _crc32(folder / name) != crc32:
-            raise ValueError(f"{name} is not what was written")
-    return plain
-
-
 def write_header(
     folder: Path,
     *,
@@ -183,16 +162,39 @@ def load_truth(folder: Path) -> Truth:
 
     Raises
     ------
-    OSError, ValueError, KeyError
-        If the folder is incomplete or damaged.
+    DamagedError
+        If the folder is incomplete, or not what was written.
+    OSError
+        If it cannot be read.
     """
-    plain, read = read_sealed(folder), partial(read_array, folder)
+    plain, names = read_sealed(folder)
+    with damage_told():
+        return _truth_of(_Header.model_validate(plain), names, partial(read_array, folder))
+
+
+class _Header(BaseModel):
+    """What a header says beside the arrays."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    track: dict[str, Any]
+    bodies: dict[str, tuple[float, float]]
+    wheels: dict[str, float]
+    gravity_mps2: float
+    manifest: dict[str, Any]
+    contact_every: int
+    contact_wheels: list[str]
+    axle_offsets_m: dict[str, float]
+
+
+def _truth_of(header: _Header, names: set[str], read: Callable[[str], FloatArray]) -> Truth:
+    """A truth of its header and its arrays."""
     time_s = np.array(read("time_s"))
     bodies = {}
-    for i, (name, (offset, height)) in enumerate(plain["bodies"].items()):
+    for i, (name, (offset, height)) in enumerate(header.bodies.items()):
         stored = read(f"body_{i}")
         if len(stored) != len(time_s):
-            raise ValueError(f"body_{i}.npy has {len(stored)} rows, not {len(time_s)}")
+            raise DamagedError(f"body_{i}.npy has {len(stored)} rows, not {len(time_s)}")
         if stored.shape[1] == 3 * len(DOUBLE):
             rates = read(f"rates_{i}")
             parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(DOUBLE)}
@@ -200,33 +202,22 @@ def load_truth(folder: Path) -> Truth:
         else:
             parts = {key: stored[:, 3 * j : 3 * j + 3] for j, key in enumerate(BODY_ARRAYS)}
         bodies[name] = BodyMotion(offset_m=offset, height_m=height, **parts)
-    wheels = plain["wheels"]
-    has_contacts = (folder / "contact_0.npy").exists()
-    has_states = (folder / "wheel_state_0.npy").exists()
+    has_contacts, has_states = "contact_0" in names, "wheel_state_0" in names
     return Truth(
         time_s=time_s,
-        track=TrackDesign.from_dict(plain["track"]),
+        track=TrackDesign.from_dict(header.track),
         reference_position_m=np.array(read("reference_position_m")),
         bodies=bodies,
-        wheel_angles={wheel: read(f"wheel_{i}") for i, wheel in enumerate(wheels)},
-        wheel_states={wheel: read(f"wheel_state_{i}") for i, wheel in enumerate(wheels)}
+        wheel_angles={wheel: read(f"wheel_{i}") for i, wheel in enumerate(header.wheels)},
+        wheel_states={wheel: read(f"wheel_state_{i}") for i, wheel in enumerate(header.wheels)}
         if has_states
         else {},
-        wheel_radius_m=wheels,
-        gravity_mps2=plain["gravity_mps2"],
-        manifest=plain["manifest"],
-        contacts={wheel: read(f"contact_{i}") for i, wheel in enumerate(plain["contact_wheels"])}
+        wheel_radius_m=header.wheels,
+        gravity_mps2=header.gravity_mps2,
+        manifest=header.manifest,
+        contacts={wheel: read(f"contact_{i}") for i, wheel in enumerate(header.contact_wheels)}
         if has_contacts
         else {},
-        contact_every=plain["contact_every"],
-        axle_offsets_m=plain["axle_offsets_m"],
+        contact_every=header.contact_every,
+        axle_offsets_m=header.axle_offsets_m,
     )
-
-
-def _crc32(file: Path) -> int:
-    """Checksum of a file: a disk, or a copy between machines, may change bits in silence."""
-    checksum = 0
-    with file.open("rb") as stream:
-        while block := stream.read(1 << 20):
-            checksum = zlib.crc32(block, checksum)
-    return checksum

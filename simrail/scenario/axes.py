@@ -16,6 +16,7 @@ from pydantic import GetJsonSchemaHandler, WrapValidator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
 from simrail.scenario.distributions import (
     FORMS,
@@ -42,10 +43,11 @@ def _one_or_list(value: Any, handler: Callable[[Any], Any]) -> Any:
     if not isinstance(value, (list, tuple)):
         return handler(value)
     if not value:
-        raise ValueError("is an empty list: give at least one value")
+        raise InputError("is an empty list", value=[], limit="at least one value", remedy="give one")
     items = Axis(handler(item) for item in value)
     if len(set(items)) < len(items):
-        raise ValueError(f"lists a value twice: {list(items)}")
+        limit = "each value once"
+        raise InputError("lists a value twice", value=list(items), limit=limit, remedy="take one of them out")
     return items
 
 

@@ -366,6 +366,13 @@ class Parts:
         return self._tunings[sample]
 
     @property
+    def time_limits_s(self) -> dict[str, float]:
+        """How long an estimator may take for a recording, by name in the tables; of those with a limit."""
+        usual = self.scenario.spec.time_limit_s
+        limits = {method.name: method.part.time_limit_s or usual for method in methods(self.scenario)}
+        return {name: limit for name, limit in limits.items() if limit is not None}
+
+    @property
     def draws_estimators(self) -> bool:
         """Whether an option of an estimator is a distribution."""
         return any(distributions_of(part) for part in self.scenario.spec.estimator)
@@ -387,6 +394,7 @@ class Parts:
                     field=f"estimator[{method.index}].name",
                     value=method.name,
                     remedy="give each a name of its own",
+                    limit="each name once",
                 )
             shared = None if is_drawn else first.get(method.name)
             estimators[method.name] = shared or estimator_of(self.scenario, method)

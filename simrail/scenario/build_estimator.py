@@ -118,6 +118,7 @@ def construct(known_class: type[Any], options: dict[str, Any], *, folder: Path |
             "is no dataclass, so its options cannot be judged",
             value=known_class.__qualname__,
             remedy="make the estimator a frozen dataclass, as in 'simrail new estimator'",
+            limit="a dataclass",
         )
     known = {entry.name for entry in dataclasses.fields(judged) if entry.init and entry.name != "causal"}
     types = get_type_hints(known_class)
@@ -137,7 +138,12 @@ def construct(known_class: type[Any], options: dict[str, Any], *, folder: Path |
     except InputError:
         raise
     except (TypeError, ValueError) as error:
-        raise InputError(f"{known_class.__name__} refuses them: {error}", value=options) from error
+        raise InputError(
+            f"{known_class.__name__} refuses them: {error}",
+            value=options,
+            limit="options that the class takes",
+            remedy="mend them",
+        ) from error
     return made
 
 

@@ -6,8 +6,10 @@ returns a `Plan` that says what will be run, with warnings. Each ride is judged 
 (`simrail.scenario.check_sensors`).
 """
 
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from simrail.core.errors import InputError, one_of
 from simrail.core.toml_files import blame
@@ -29,6 +31,9 @@ from simrail.track.laid_track import LaidTrack
 from simrail.vehicle.contact.profile_files import profile_notes
 
 MOST_CELLS = 1_000_000
+
+LEAST_CELL_BYTES = 1000
+"""What the scores of a cell take at least."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,13 @@ class Plan:
     notes: tuple[str, ...] = ()
 
 
-def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool = False) -> Plan:
+def judge_scenario(
+    scenario: Scenario,
+    parts: Parts | None = None,
+    *,
+    many: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Plan:
     """Judge everything about a scenario that can be judged without running it.
 
     Parameters
@@ -77,6 +88,8 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
         Its parts, to share what is read.
     many : bool
         Accept more than `MOST_CELLS` cells.
+    progress : callable, optional
+        Called now and then with (cells judged so far, cells in all).
 
     Raises
     ------
@@ -101,7 +114,10 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
             for sample in range(1, sample_count(scenario.spec)):
                 parts.estimators(sample)
         judge_requirements(scenario.spec, [*estimators, *_judge_ride_figures(scenario, estimators)])
-        simulated, unusual, notes = _judge_cells(scenario, parts)
+        _judge_disk("cells", total, total * LEAST_CELL_BYTES, "shorten a list or take fewer draws")
+        simulated, unusual, notes = _judge_cells(
+            scenario, parts, lambda done: (progress or _silent)(done, total)
+        )
         warnings = [*_judge_samples(scenario), *_judge_twist(scenario, estimators), *unusual]
     return Plan(
         scenario,
@@ -116,7 +132,26 @@ def judge_scenario(scenario: Scenario, parts: Parts | None = None, *, many: bool
     )
 
 
-def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], list[str]]:
+def _silent(_done: int, _count: int) -> None:
+    """Tell nobody."""
+
+
+def _judge_disk(field: str, value: object, least_bytes: float, remedy: str) -> None:
+    """Refuse what the disk here cannot hold, even if it held nothing else."""
+    free = shutil.disk_usage(Path.cwd()).total
+    if least_bytes > free:
+        raise InputError(
+            f"leaves {least_bytes / 1e9:.3g} GB at least, more than the disk holds",
+            field=field,
+            value=value,
+            limit=f"{free / 1e9:.3g} GB",
+            remedy=remedy,
+        )
+
+
+def _judge_cells(
+    scenario: Scenario, parts: Parts, progress: Callable[[int], None]
+) -> tuple[float, list[str], list[str]]:
     """Judge each ride, draws aside, and each set of sensors on it; simulated time of all, warnings, notes."""
     warnings: list[str] = []
     notes: list[str] = []
@@ -127,6 +162,7 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
     shaken: set[tuple[int, Vibration]] = set()
     judged_rails: tuple[tuple[object, ...], LaidTrack] | None = None
     for cell in first_cells(scenario):
+        progress(cell.number)
         resolved = parts.resolve(cell)
         ride = resolved.ride
         way = (
@@ -145,6 +181,9 @@ def _judge_cells(scenario: Scenario, parts: Parts) -> tuple[float, list[str], li
             same = judged_rails[1] if judged_rails is not None and judged_rails[0] == rails_key else None
             durations[ride_key], unusual, laid = judge_ride(resolved, shaken=shaken, known_rails=same)
             judged_rails = rails_key, laid
+            rows = ride.profile.duration_s * ride.rate_hz
+            least = rows * len(ride.kept_bodies) * (144 if ride.kept is None else 96)
+            _judge_disk("ride", ride.name, least, "shorten the ride, or lower truth_rate_hz")
             judge_requirements_of_ride(scenario.spec, ride.track, resolved.bands, cell.ride.reach_m)
             warnings += unusual
             notes += [f"vibration: {words}" for words in [step_words(ride)] if words]
@@ -188,6 +227,7 @@ def _judge_ride_figures(scenario: Scenario, estimators: Mapping[str, Estimator])
             field="estimator",
             value=RIDE,
             remedy="give the estimator another name",
+            limit="another name",
         )
     return [RIDE]
 

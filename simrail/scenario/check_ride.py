@@ -72,6 +72,7 @@ def judge_ride(
                     field=f"runs[{i}].end_m" if words.runs else "end_m",
                     value=end,
                     remedy="end_m > start_m runs forward, end_m < start_m backward",
+                    limit="another place than start_m",
                 )
         low, high = words.reach_m
         _judge_restrictions(words)
@@ -238,6 +239,7 @@ def _judge_places(resolved: ResolvedCell) -> None:
                 field=f"{field}.stops[{i}].position_m",
                 value=stop.position_m,
                 remedy="list each stop of the line once; every run that passes makes it",
+                limit="each place once",
             )
         if not first < stop.position_m < last:
             raise InputError(

@@ -130,4 +130,5 @@ def _judge_encoder(resolved: ResolvedCell) -> None:
             field="encoder.radius",
             value=encoder.radius,
             remedy='set radius = "drawing", or let the ride move',
+            limit="a ride that moves",
         )

@@ -142,7 +142,13 @@ def read_distribution(table: dict[str, Any], judge: Callable[[Any], Any] | None 
 
 def _choice(given: object, bounds: object) -> Distribution:
     if bounds is not None:
-        raise InputError("a choice has no bounds", field="bounds", value=bounds, remedy="remove them")
+        raise InputError(
+            "a choice has no bounds",
+            field="bounds",
+            value=bounds,
+            remedy="remove them",
+            limit="a choice without bounds",
+        )
     if not isinstance(given, list) or not given:
         raise InputError(
             "is an empty choice" if given == [] else "is no list of values",
@@ -158,7 +164,11 @@ def _continuous(kind: str, pair: tuple[float, float], bounds: object) -> Distrib
     if kind != "normal":
         if bounds is not None:
             raise InputError(
-                f"{kind} has its bounds already", field="bounds", value=bounds, remedy="remove them"
+                f"{kind} has its bounds already",
+                field="bounds",
+                value=bounds,
+                remedy="remove them",
+                limit="a normal distribution",
             )
         _ordered(pair, kind)
         if kind == "log_uniform" and pair[0] <= 0.0:
@@ -196,7 +206,11 @@ def _continuous(kind: str, pair: tuple[float, float], bounds: object) -> Distrib
 def _ordered(pair: tuple[float, float], field: str) -> None:
     if pair[0] >= pair[1]:
         raise InputError(
-            "is not (lowest, highest)", field=field, value=list(pair), remedy="give the smaller bound first"
+            "is not (lowest, highest)",
+            field=field,
+            value=list(pair),
+            remedy="give the smaller bound first",
+            limit="the smaller bound first",
         )
 
 

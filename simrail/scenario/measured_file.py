@@ -103,7 +103,12 @@ class MeasuredPart(DataPart):
             given_of_pair = [key for key in pair if key in self.columns]
             if len(given_of_pair) == 1:
                 missing = next(key for key in pair if key not in self.columns)
-                raise InputError("both rails are needed", field=f"columns.{missing}", remedy="add it")
+                raise InputError(
+                    "both rails are needed",
+                    field=f"columns.{missing}",
+                    remedy="add it",
+                    limit="left and right",
+                )
         if not set(self.columns) - {"position"}:
             raise InputError(
                 "names no quantity", field="columns", limit="one or more of " + ", ".join(QUANTITIES)
@@ -115,7 +120,9 @@ class MeasuredPart(DataPart):
         columns, units = self.columns.get(key, ()), self.units.get(key, ())
         many = len(columns) if key == "position" else 1
         if not columns:
-            raise InputError("is required", field=f"columns.{key}", remedy="add it")
+            raise InputError(
+                "is required", field=f"columns.{key}", remedy="add it", limit="this key, with a value"
+            )
         if len(columns) != many or len(units) != many:
             raise InputError(
                 "has no unit" if not units else "has not one unit for each column",
@@ -163,7 +170,9 @@ def read_measured(part: MeasuredPart, folder: Path | None) -> MeasuredRails:
     read = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
     with blame(label(path)):
         if not len(read[names[0]]):
-            raise InputError("holds no samples", remedy="write one line per place")
+            raise InputError(
+                "holds no samples", remedy="write one line per place", limit="two samples or more"
+            )
         part = _less_nominal(part, read, notes)
         rails = measured_rails(
             label(path),

@@ -31,12 +31,20 @@ def override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals or not key.strip():
-            raise InputError("is not key=value", file="--set", value=setting, remedy=_EXAMPLE)
+            raise InputError(
+                "is not key=value", file="--set", value=setting, remedy=_EXAMPLE, limit="key=value"
+            )
         steps: list[str | int] = []
         for step in key.strip().split("."):
             match = _STEP.match(step)
             if match is None:
-                raise InputError("is not a dotted path of keys", file="--set", value=key, remedy=_EXAMPLE)
+                raise InputError(
+                    "is not a dotted path of keys",
+                    file="--set",
+                    value=key,
+                    remedy=_EXAMPLE,
+                    limit="keys with dots between them",
+                )
             steps.append(match[1])
             if match[2] is not None:
                 steps.append(int(match[2]))
@@ -74,21 +82,42 @@ def _set(place: Any, steps: list[str | int], value: Any, key: str) -> None:
             else:
                 targets, rest = list(place), steps
         if not rest:
-            raise InputError("sets a whole table", file="--set", field=key, remedy=_EXAMPLE)
+            raise InputError(
+                "sets a whole table", file="--set", field=key, remedy=_EXAMPLE, limit="one value of the table"
+            )
         for target in targets:
             _set(target, rest, value, key)
         return
     if not isinstance(place, dict) or isinstance(step, int):
-        raise InputError("leads into something that is no table", file="--set", field=key, remedy=_EXAMPLE)
+        raise InputError(
+            "leads into something that is no table",
+            file="--set",
+            field=key,
+            remedy=_EXAMPLE,
+            limit="a key of a table",
+        )
     if not rest:
         place[step] = value
         return
     if step not in place:
         if rest and isinstance(rest[0], int):
-            raise InputError("the scenario has no such array", file="--set", field=key, remedy=_EXAMPLE)
+            raise InputError(
+                "the scenario has no such array",
+                file="--set",
+                field=key,
+                remedy=_EXAMPLE,
+                limit="an array of the scenario",
+            )
         guess = did_you_mean(step, map(str, place))
         if guess:
-            raise InputError("unknown key", file="--set", field=key, value=step, remedy=guess)
+            raise InputError(
+                "unknown key",
+                file="--set",
+                field=key,
+                value=step,
+                remedy=guess,
+                limit="a key of the scenario",
+            )
         place[step] = {}
     _set(place[step], rest, value, key)
 

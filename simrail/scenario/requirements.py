@@ -75,6 +75,7 @@ def judge_requirements(spec: ScenarioFile, estimators: Collection[str]) -> None:
             field="stop.verdicts",
             value=True,
             remedy="add a [[require]], or say whose interval is to be narrow",
+            limit="a scenario with a [[require]]",
         )
 
 
@@ -86,7 +87,11 @@ def _judge_words(part: RequirePart, spec: ScenarioFile, at: str) -> None:
     if part.window.startswith(CURVE_PREFIX):
         if kept is not None and not {part.window, EVERY_CURVE}.intersection(kept):
             raise InputError(
-                "is not kept by [score]", field=f"{at}.window", value=part.window, remedy="add it to windows"
+                "is not kept by [score]",
+                field=f"{at}.window",
+                value=part.window,
+                remedy="add it to windows",
+                limit="one of those that [score] keeps",
             )
     else:
         one_of(part.window, WINDOWS if kept is None else kept, "is not scored", field=f"{at}.window")

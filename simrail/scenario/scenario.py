@@ -7,6 +7,7 @@ Only the form of each field is judged here; whether track, vehicle, rides and se
 is judged by `simrail.scenario.check`, and what is run is listed by `simrail.scenario.cells`.
 """
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
@@ -46,6 +47,7 @@ class ScenarioFile(Part):
     rate at which forces between wheels and rails are kept, ``truth_rate_hz`` over a whole number; 0 keeps
     none. ``passes`` is over how many of the rides the rails are fused
     (`simrail.estimators.rails.fuse`); a cell is then so many rides, and its scores are of the rails alone.
+    ``time_limit_s`` is that of every estimator which names none of its own.
     """
 
     title: str
@@ -74,6 +76,8 @@ class ScenarioFile(Part):
     odometry: Listed[str] = ""
     """The odometry that the methods work with, by its short name, class or file; with an [encoder]
     curve_matched if left out, else none."""
+    time_limit_s: tables.TimeLimit | None = None
+    """Longest time of a method for a recording, s; one that takes longer is ended, and its row says so."""
     irregularity: tables.IrregularityPart | None = None
     """How the rails deviate from the design; without it they do not."""
     vibration: VibrationPart | None = None
@@ -120,7 +124,9 @@ class ScenarioFile(Part):
     def _divides_the_output(cls, value: float | Axis | Distribution) -> float | Axis | Distribution:
         for step in each(value):
             if abs(0.001 / float(step) - round(0.001 / float(step))) > 1e-6:
-                raise ValueError(f"does not divide the output interval of 0.001 s: {step}; try 0.0005")
+                limit, remedy = "0.001 s over a whole number", "try 0.0005"
+                problem = "does not divide the output interval of 0.001 s"
+                raise InputError(problem, value=step, limit=limit, remedy=remedy)
         return value
 
     @field_validator("truth_rate_hz")
@@ -130,9 +136,8 @@ class ScenarioFile(Part):
             if float(rate) in (2000.0, 4000.0):
                 continue
             if abs(1000.0 / float(rate) - round(1000.0 / float(rate))) > 1e-9:
-                raise ValueError(
-                    f"is not 1000 Hz divided by a whole number, 2000 or 4000 Hz: {rate}; try 250.0"
-                )
+                limit = "1000 Hz divided by a whole number, 2000 or 4000 Hz"
+                raise InputError("is no such rate", value=rate, limit=limit, remedy="try 250.0")
         return value
 
     @field_validator("ride", "imu", "estimator")
@@ -141,7 +146,9 @@ class ScenarioFile(Part):
         names = [(part.name, getattr(part, "vehicle", None)) for part in value]
         for name, vehicle in names:
             if names.count((name, vehicle)) > 1 or (vehicle and (name, None) in names):
-                raise ValueError(f"two of them are named {name!r}; give each a name of its own")
+                limit, remedy = "each name once", "give each a name of its own"
+                problem = f"two of them are named {name!r}"
+                raise InputError(problem, value=name, limit=limit, remedy=remedy)
         return value
 
     @model_validator(mode="after")
@@ -172,13 +179,18 @@ class ScenarioFile(Part):
         vehicles = [str(vehicle) for vehicle in each(self.vehicle)]
         for i, part in enumerate(self.imu):
             if part.vehicle is not None and part.vehicle not in vehicles:
-                raise ValueError(
-                    f"imu[{i}].vehicle is none of the scenario's: found {part.vehicle!r}; "
-                    f"limit: one of {', '.join(vehicles)}"
+                raise InputError(
+                    "is none of the scenario's",
+                    field=f"imu[{i}].vehicle",
+                    value=part.vehicle,
+                    limit=f"one of {', '.join(vehicles)}",
+                    remedy="choose one of them",
                 )
         for vehicle in vehicles:
             if not any(part.is_on(vehicle) for part in self.imu):
-                raise ValueError(f"no imu is on {vehicle!r}; add an [[imu]] with vehicle = {vehicle!r}")
+                limit, remedy = "an imu on each vehicle", f"add an [[imu]] with vehicle = {vehicle!r}"
+                problem = f"no imu is on {vehicle!r}"
+                raise InputError(problem, value=vehicle, limit=limit, remedy=remedy)
         return self
 
 
@@ -252,6 +264,7 @@ class Scenario(Shown):
                 field="estimator" if not kept else "odometry",
                 value=", ".join(self.own_files),
                 remedy="judge it with them, or name a shipped method beside them",
+                limit="a shipped method, or --plugins",
             )
         odometry = self.spec.odometry if len(usual) == len(each(self.spec.odometry)) else Axis(usual)
         spec = self.spec.model_copy(update={"estimator": kept, "odometry": odometry})
@@ -261,6 +274,19 @@ class Scenario(Shown):
     def called(self) -> str:
         """What a command calls it: a shipped one by its name, a person's own by its file."""
         return self.name if self.folder in (None, shipped_folder()) else self.file
+
+    @property
+    def command(self) -> str:
+        """The command that runs it with its settings, quoted for a shell; a setting always, to be read."""
+        called = f"./{self.called}" if self.called.startswith("-") else self.called
+        settings = [f"--set {in_quotes(setting)}" for setting in self.overrides]
+        return " ".join(["simrail run", shlex.quote(called), *settings])
+
+
+def in_quotes(text: str) -> str:
+    """A text in quotes of a shell, within which it takes nothing for a command."""
+    inside = text.replace("'", "'\"'\"'")
+    return f"'{inside}'"
 
 
 def _is_own(name: str) -> bool:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from simrail.core.errors import InputError
 from simrail.core.toml_files import Part
 from simrail.recording.recording import SecondImuSheet
 from simrail.recording.sheets.grades import ImuGrade
@@ -44,9 +45,12 @@ class SlipPart(Part):
     @model_validator(mode="after")
     def _ramps_fit(self) -> SlipPart:
         if self.ramp_s > 0.5 * self.duration_s:
-            raise ValueError(
-                f"rises and falls for longer than it lasts: ramp_s = {self.ramp_s:g}, at most half of "
-                f"duration_s = {self.duration_s:g}"
+            raise InputError(
+                f"rises and falls for longer than it lasts: ramp_s = {self.ramp_s:g}",
+                field="ramp_s",
+                value=self.ramp_s,
+                limit=f"at most half of duration_s = {self.duration_s:g}",
+                remedy="shorten ramp_s",
             )
         return self
 
@@ -140,9 +144,11 @@ class SteelPart(Part):
     @model_validator(mode="after")
     def _ordered(self) -> SteelPart:
         if not 1.5 <= self.beside_m[0] <= self.beside_m[1]:
-            raise ValueError(f"beside_m is not (least, largest), from 1.5 m on: {list(self.beside_m)}")
+            given, limit = list(self.beside_m), "[least, largest], from 1.5 m on"
+            raise InputError("is no range", field="beside_m", value=given, limit=limit, remedy="mend it")
         if not self.height_m[0] <= self.height_m[1]:
-            raise ValueError(f"height_m is not (least, largest): {list(self.height_m)}")
+            given, limit = list(self.height_m), "[least, largest]"
+            raise InputError("is no range", field="height_m", value=given, limit=limit, remedy="swap them")
         return self
 
 

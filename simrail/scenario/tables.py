@@ -47,12 +47,23 @@ Positive = Annotated[float, Field(gt=0.0)]
 OnBoard = Annotated[float, Field(ge=-50.0, le=50.0)]
 """A coordinate of something that a vehicle carries, m from its reference point."""
 
+
+def _refuse_on_standstill(field: str, problem: str) -> None:
+    raise InputError(
+        f"a standstill, without end_m, {problem}",
+        field=field,
+        limit="a ride with end_m",
+        remedy=f"remove {field}, or add end_m and speed_kmh",
+    )
+
+
 Draws = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 def _ordered(wavelengths_m: tuple[float, float]) -> tuple[float, float]:
     if wavelengths_m[0] >= wavelengths_m[1]:
-        raise ValueError(f"are not (shortest, longest): {list(wavelengths_m)}")
+        limit = "[shortest, longest]"
+        raise InputError("are no range", value=list(wavelengths_m), limit=limit, remedy="swap them")
     return wavelengths_m
 
 
@@ -286,13 +297,15 @@ class RidePart(Part):
             )
         if (self.end_m is None) != (self.speed_kmh is None):
             missing = "end_m" if self.end_m is None else "speed_kmh"
-            raise ValueError(f"{missing} is missing: a ride needs end_m and speed_kmh, a standstill neither")
+            limit = "end_m and speed_kmh for a ride, neither for a standstill"
+            raise InputError(f"{missing} is missing", limit=limit, remedy=f"add {missing}")
         if self.end_m is None and self.stops:
-            raise ValueError("a standstill, without end_m, has no stops on the way")
+            _refuse_on_standstill("stops", "has no stops on the way")
         if self.end_m is None and any(each(self.reverse)):
-            raise ValueError("a standstill, without end_m, cannot be reversed")
+            _refuse_on_standstill("reverse", "cannot be reversed")
         if self.end_m is None and (self.restriction or self.coasting):
-            raise ValueError("a standstill, without end_m, has neither restrictions nor coasting")
+            field = "restriction" if self.restriction else "coasting"
+            _refuse_on_standstill(field, "has neither restrictions nor coasting")
         return self
 
     def _check_runs(self) -> None:
@@ -532,17 +545,23 @@ class TemperaturePart(Part):
     """How fast, s."""
 
 
+TimeLimit = Annotated[float, Field(ge=0.01, le=86400.0)]
+
+
 class EstimatorPart(Part):
     """``[[estimator]]``: a method under a name, with the keyword arguments of its class.
 
     ``stands_for`` says which row of the paper's table it is set beside, by the words of the page of that
-    paper (`simrail.report.papers`).
+    paper (`simrail.report.papers`). ``time_limit_s`` is how long it may take for a recording; it is then
+    ended, and its row says so. Without one, nothing ends it.
     """
 
     name: Name
     """Name of the method in tables."""
     method: str
     """Its class by name, or FILE.py:CLASS for one of your own."""
+    time_limit_s: TimeLimit | None = None
+    """Longest time for a recording, s, in place of the scenario's."""
     stands_for: Name | None = None
     """The row of the paper's table that it is set beside."""
     options: dict[str, Any] = Field(default_factory=dict)
@@ -741,5 +760,6 @@ class GeometryPart(Part):
     def _bands(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
         for name in value:
             if name in ("full", "D0", "D1", "D2", "D3"):
-                raise ValueError(f"{name} is a name that is taken; give the band another one")
+                limit, remedy = "another name than full, D0 to D3", "give the band another name"
+                raise InputError("is a name that is taken", value=name, limit=limit, remedy=remedy)
         return value

@@ -175,7 +175,10 @@ def mean_comfort(acceleration: FloatArray, rate_hz: float, *, counts: npt.NDArra
     running = period_rms(counts.astype(np.float64), rate_hz) == 1.0
     if not running.any():
         raise InputError(
-            "the vehicle does not run for one period of 5 s", field="ride_comfort", remedy="ride farther"
+            "the vehicle does not run for one period of 5 s",
+            field="ride_comfort",
+            remedy="ride farther",
+            limit=">= 5 s of riding",
         )
     x, y, z = (float(np.percentile(one[running], PERCENTILE)) for one in rms)
     return MeanComfort(6.0 * float(np.sqrt(x**2 + y**2 + z**2)), x, y, z, int(running.sum()))

@@ -113,9 +113,20 @@ def reference_of(truth: Truth | pd.DataFrame, recording: Recording) -> Reference
     motion = truth if isinstance(truth, pd.DataFrame) else truth_at_imu(truth, recording, SCORED)
     require(motion, (*ATTITUDE, *ODOMETRY), what="truth")
     if len(motion) != len(recording.imu):
-        raise InputError("the truth is not at the IMU's times", field="truth", value=len(motion))
+        raise InputError(
+            "the truth is not at the IMU's times",
+            field="truth",
+            value=len(motion),
+            limit="a row for each sample of the IMU",
+            remedy="take it by truth_at_imu",
+        )
     if not np.isfinite(motion[[n for n in MOTION if n in motion.columns]].to_numpy()).all():
-        raise InputError("the truth holds a value that is not finite", field="truth")
+        raise InputError(
+            "the truth holds a value that is not finite",
+            field="truth",
+            limit="finite numbers",
+            remedy="simulate the ride again",
+        )
     position = motion["position_m"].to_numpy()
     frame = track.frame(position)
     design = np.column_stack((frame.roll_rad, frame.pitch_rad, frame.yaw_rad))
@@ -164,7 +175,12 @@ def score(
     if estimate.mount != recording.mount:
         raise InputError("the estimate speaks of another mount", value=estimate.mount, limit=recording.mount)
     if not np.array_equal(states.index.to_numpy(), recording.imu.index.to_numpy()):
-        raise InputError("the estimate is not at the recording's IMU times", field="states.time_s")
+        raise InputError(
+            "the estimate is not at the recording's IMU times",
+            field="states.time_s",
+            limit="the times of recording.imu",
+            remedy="index the states by them",
+        )
     chosen = chosen_windows(against.windows, windows)
     keep = chosen_metrics(metrics)
     rows: list[Row] = []

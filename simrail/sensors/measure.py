@@ -136,7 +136,12 @@ def measure(
     seen = None
     if rail_sensor is not None and motion is not None:
         if rails is None:
-            raise InputError("a rail sensor needs rails to see", field="rails", remedy="give rails_of(ride)")
+            raise InputError(
+                "a rail sensor needs rails to see",
+                field="rails",
+                remedy="give rails_of(ride)",
+                limit="rails of the ride",
+            )
         seen = sample_rails(motion, imu.index, rail_sensor, rails, seed=seed, draw=draw, name=mount.name)
     if odometry not in (None, "truth"):
         raise InputError(

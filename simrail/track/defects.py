@@ -173,6 +173,7 @@ def check_defects(defects: Sequence[Defect], start_m: float, end_m: float) -> No
                 field=f"{field}.hold_m",
                 value=at.hold_m,
                 remedy="remove it, or take a ramp, step or twist",
+                limit="a form that stays",
             )
         if at.form == "twist" and (at.rails != "both" or at.direction != "vertical"):
             name, value = ("rails", at.rails) if at.rails != "both" else ("direction", at.direction)
@@ -181,6 +182,7 @@ def check_defects(defects: Sequence[Defect], start_m: float, end_m: float) -> No
                 field=f"{field}.{name}",
                 value=value,
                 remedy=f"remove {name}, or take a ramp",
+                limit="no such key in a twist",
             )
         last = at.at_m + at.length_m if at.end_m == math.inf else at.end_m
         if not (start_m <= at.at_m and last <= end_m):

@@ -28,6 +28,13 @@ SMOOTH_STEP = np.array([6.0, -15.0, 10.0, 0.0, 0.0, 0.0])
 """The quintic from 0 to 1 with zero slope and bend at both ends, highest power first."""
 
 
+LEAST_LENGTH_M = 1e-6
+"""Of one element: of shorter ones places cannot be told apart along a track."""
+
+MOST_LENGTH_M = 1e6
+"""Of one element: the longest straight there is has 478 km (figure from memory)."""
+
+
 def cross_slope(cant_m: float, curvature_1pm: float) -> float:
     """Height of the left above the right rail; a left curve and a straight have the right one raised.
 

@@ -82,6 +82,7 @@ class SegmentPart(Part):
                 "a curve needs its radius",
                 field="radius_m",
                 remedy="add it; positive to the left",
+                limit="not 0 m",
             )
         for field, kinds in _KINDS_OF.items():
             if getattr(self, field) is not None and self.kind not in kinds:
@@ -404,4 +405,5 @@ def _thousandths(value: float, field: str) -> float:
         field=field,
         value=value,
         remedy=f"take {middle!r} / 1000 instead: it differs in the last of its 53 bits",
+        limit="a decimal in mm or permil",
     )

@@ -150,7 +150,7 @@ def check_elements(
 
 def _check_numbers(element: Element, here: str, *, rail_base_m: float, has_stations: bool) -> None:
     """Refuse numbers of an element that are none, or that belong elsewhere."""
-    require_number(element.length_m, f"{here}.length_m", above=0.0)
+    require_number(element.length_m, f"{here}.length_m", above=LEAST_LENGTH_M, within=MOST_LENGTH_M)
     if isinstance(element, Curve):
         require_number(element.radius_m, f"{here}.radius_m", zero=False)
     if isinstance(element, Transition):

@@ -304,7 +304,12 @@ def _with_defects(
         if defect.kind == "coarse_curve":
             ends = [changed[i] for i in (index - 1, index + 1) if 0 < i < len(changed) - 1]
             if len(ends) < 2 or not all(isinstance(end, Transition) for end in ends):
-                raise InputError("a coarse curve needs a transition at either end", field="at_m")
+                raise InputError(
+                    "a coarse curve needs a transition at either end",
+                    field="at_m",
+                    limit="a curve between two transitions",
+                    remedy="choose another curve",
+                )
             require_number(defect.size_m, "chord_m", least=1.0)
             changed[index - 2 : index + 3] = _polyline(design, changed[index - 2 : index + 3], defect.size_m)
         else:

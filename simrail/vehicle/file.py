@@ -198,7 +198,11 @@ class VehicleFile(Part):
         twice = {name for name in names if names.count(name) > 1}
         if twice:
             raise InputError(
-                "two bodies share a name", field="name", value=sorted(twice)[0], remedy="rename one"
+                "two bodies share a name",
+                field="name",
+                value=sorted(twice)[0],
+                remedy="rename one",
+                limit="each name once",
             )
         asked = [
             (f"{kind}[{i}].between", name)
@@ -238,6 +242,7 @@ class VehicleFile(Part):
                         field=f"suspension[{i}].series_stiffness_npm",
                         value=spring.series_stiffness_npm,
                         remedy="give that axis damping, or 0 in series",
+                        limit="0 without damping",
                     )
         for i, entry in enumerate(self.tabled):
             x, force = zip(*entry.points, strict=True)
@@ -266,6 +271,7 @@ class VehicleFile(Part):
                         field=f"rod[{i}].ends_m",
                         value=(first, second),
                         remedy="set its ends apart, or take a [[suspension]] with stiffness along one axis",
+                        limit="> 0 m",
                     )
         axles = {axle.name: axle for axle in self.axle}
         for i, arm in enumerate(self.trailing_arm):
@@ -325,6 +331,7 @@ class VehicleFile(Part):
                     field=f"axle[{i}].name" if i < axles else f"body[{i - axles}].name",
                     value=name,
                     remedy="mount it with a [[suspension]]",
+                    limit="a suspension that leads to it",
                 )
 
     def _check_traction(self, names: list[str]) -> None:
@@ -496,7 +503,13 @@ def _shares(traction: Traction, kind: str, wheels: Sequence[Wheel]) -> dict[str,
             )
         for spin in spins:
             if spin in shares:
-                raise InputError("a wheel has its share twice", field=kind, value=name, remedy="name it once")
+                raise InputError(
+                    "a wheel has its share twice",
+                    field=kind,
+                    value=name,
+                    remedy="name it once",
+                    limit="each wheel once",
+                )
             shares[spin] = share / len(spins)
     total = sum(shares.values())
     if abs(total - 1.0) > 1e-6:

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from simrail.core.atomic_files import whole_file
 from simrail.core.errors import InputError
 from simrail.core.jit import cache_folder
+from simrail.core.sealed_files import DamagedError, damage_told, read_sealed_file, write_sealed_file
 from simrail.core.source_hash import source_hash
 from simrail.track.laid_track import LaidTrack
 from simrail.vehicle.contact.contact_tables import contacts_of
@@ -106,17 +106,16 @@ def critical_below(model: VehicleModel, top_mps: float, *, gravity_mps2: float =
     float or None
         To 0.05 m/s; None if no oscillation grows at the speeds tried, or the vehicle has no steady running.
     """
-    file = cache_folder() / "critical_speeds" / f"{_key(model, gravity_mps2)}.json"
+    file = cache_folder() / "critical_speeds" / f"{_key(model, gravity_mps2)}.sealed"
     known: dict[str, Any] = {"stable_mps": 0.0, "critical_mps": None}
-    with suppress(OSError, ValueError):
-        known |= json.loads(file.read_text(encoding="utf-8"))
+    with suppress(OSError, DamagedError), damage_told():
+        known |= json.loads(read_sealed_file(file))
     if known["critical_mps"] is None and known["stable_mps"] < top_mps:
         critical = _search(model, float(known["stable_mps"]), top_mps, gravity_mps2)
         known = {"stable_mps": top_mps, "critical_mps": critical}
         with suppress(OSError):
             file.parent.mkdir(parents=True, exist_ok=True)
-            with whole_file(file) as stream:
-                stream.write(json.dumps(known).encode())
+            write_sealed_file(file, json.dumps(known).encode())
     found: float | None = known["critical_mps"]
     return found if found is not None and found < top_mps else None
 

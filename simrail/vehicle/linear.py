@@ -203,6 +203,7 @@ class RunningVehicle:
                 field="speed",
                 value=f"{3.6 * speed_mps:.1f} km/h, {left:.1e} m/s2 left",
                 remedy="look for a body that nothing holds",
+                limit="a steady state",
             )
         return state
 

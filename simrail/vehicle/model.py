@@ -457,6 +457,7 @@ class VehicleModel(Shown):
                 file=f"vehicle {self.name}",
                 field=name,
                 remedy="give it a suspension with vertical stiffness on both sides",
+                limit="vertical forces in balance",
             )
         self._check_thrust(forces[springs + wheels : -1], 1e-6 * np.sum(weight))
         return forces
@@ -490,4 +491,5 @@ class VehicleModel(Shown):
                 file=f"vehicle {self.name}",
                 field=self.bodies[i].name,
                 remedy="lay rods level, or in pairs whose level thrusts balance",
+                limit="level forces in balance",
             )

@@ -87,3 +87,20 @@ def test_a_setting_of_numba_after_the_import_leaves_the_cache_where_it_is(tmp_pa
     assert [path.name for path in sources.rglob("*")] == ["late_kernel.py"]
     kept = {path.name.partition("-")[0] for path in (tmp_path / "cache").rglob("*.nbi")}
     assert kept == {"late_kernel.once", "late_kernel.twice"}
+
+
+def test_kernels_of_a_cache_that_cannot_be_written_go_into_a_temporary_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not beside their sources, where numba would put them and they go stale."""
+    monkeypatch.delenv(jit._SPARE, raising=False)
+    monkeypatch.setattr(jit.atexit, "register", lambda *arguments, **keywords: None)
+    (tmp_path / "no folder").touch()
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "no folder")
+    monkeypatch.setattr(jit.tempfile, "tempdir", str(tmp_path))
+    spare = jit._kernel_folder()
+    assert spare.parent == tmp_path and spare.is_dir()
+    assert jit._kernel_folder() == spare, "found again, also by a process that this one starts"
+    monkeypatch.delenv(jit._SPARE)
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "cache")
+    assert jit._kernel_folder().is_relative_to(tmp_path / "cache")

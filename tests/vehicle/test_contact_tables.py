@@ -131,8 +131,7 @@ def test_a_table_from_the_disk_is_the_one_that_was_built(
         damaged = bytearray(whole)
         damaged[at] ^= 0x10
         file.write_bytes(bytes(damaged))
-        found = contact_tables._read(file)
-        assert found is None or found.coef.tobytes() == built.coef.tobytes()
+        assert contact_tables._read(file) is None
     file.write_bytes(whole[: len(whole) // 2])
     assert fresh().coef.tobytes() == built.coef.tobytes() and builds == [1]
     contact_tables._built.cache_clear()

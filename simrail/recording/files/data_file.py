@@ -142,6 +142,7 @@ def open_data(part: DataPart, folder: Path, *, table: str) -> DataFile:
             field=f"{table}.file",
             value=part.file,
             remedy="mend the path; it is seen from the folder of the ride file",
+            limit="a file that is there",
         )
     if path.suffix.lower() in TABLES:
         table_file = TABLES[path.suffix.lower()](path)
@@ -225,6 +226,7 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             f"{file} has one column only, whose name holds a {_SEPARATORS[other]}",
             field=f"{table}.separator",
             value=part.separator,
+            limit="what sets the columns apart",
             remedy=f"set separator = {other!r}".replace("'", '"'),
         )
     if not data.named:

@@ -329,6 +329,7 @@ class OdometerPart(SignalPart):
                 "is required with a distance",
                 field="resolution_m",
                 remedy="give the odometer's step, e.g. 0.1",
+                limit="> 0 m",
             )
         return self
 
@@ -432,6 +433,7 @@ class RideFile(Part):
                 field=said[0],
                 value=getattr(value, said[0]),
                 remedy="remove it, or exact = true",
+                limit="exact = true, or errors",
             )
         return value
 
@@ -472,6 +474,9 @@ class RideFile(Part):
     def _one_way(self) -> Self:
         if self.encoder is not None and self.odometer is not None:
             raise InputError(
-                "says twice how far the train went", field="odometer", remedy="remove [odometer] or [encoder]"
+                "says twice how far the train went",
+                field="odometer",
+                remedy="remove [odometer] or [encoder]",
+                limit="one of them",
             )
         return self

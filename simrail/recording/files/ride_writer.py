@@ -55,7 +55,9 @@ def write_ride(recording: Recording, folder: Path, *, format: Format = "csv", ax
 def refuse_existing(folder: Path) -> None:
     """Refuse to write where there is something already."""
     if folder.exists():
-        raise InputError("exists already", file=folder, remedy="remove it or choose another name")
+        raise InputError(
+            "exists already", file=folder, remedy="remove it or choose another name", limit="a new name"
+        )
 
 
 def write_parts(recording: Recording, folder: Path, *, format: Format, axes: Frame = "flu") -> None:

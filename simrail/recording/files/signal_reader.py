@@ -256,6 +256,7 @@ def _si(
                 field=name,
                 value=float(values[int(np.argmax(broken))]),
                 remedy="give a distance as [odometer]" if quantity.key == "count" else None,
+                limit="whole numbers",
             )
         return values.astype(np.int64)
     unit = part.units.get(quantity.key, next(iter(quantity.units)))

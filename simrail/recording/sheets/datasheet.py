@@ -98,6 +98,7 @@ def _figure(key: str, number: Any, said: dict[str, str]) -> Figure:
             field=key,
             value=number,
             remedy=explain(key, number) or "see simrail.recording.sheets.figures.FIGURES",
+            limit="a figure of a data sheet",
         )
     figure = FIGURES[key]
     if figure.field in said:
@@ -114,7 +115,9 @@ def _figure(key: str, number: Any, said: dict[str, str]) -> Figure:
 def _in_si(key: str, number: float, si: float) -> float:
     """One figure in SI units, multiplied in the order in which its unit is made up."""
     if isinstance(number, bool) or not isinstance(number, int | float):
-        raise InputError("is no number", field=key, value=number)
+        raise InputError(
+            "is no number", field=key, value=number, limit="a number", remedy="write it without quotes"
+        )
     if key.endswith("_degph"):
         return math.radians(number) / 3600.0
     if key.endswith("_ugpsqrthz"):

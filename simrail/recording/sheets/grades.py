@@ -379,6 +379,7 @@ def _judge_nonlinearity(grade: ImuGrade) -> None:
                     field=f"imu grade {grade.name}: {kind}_nonlinearity",
                     value=terms.nonlinearity,
                     remedy=f"give {kind}_range_{unit} as well",
+                    limit="a full scale beside it",
                 )
     faults.refuse()
 

@@ -132,6 +132,7 @@ class SheetBodyPart(Part):
                 field="rests_on",
                 value=self.rests_on,
                 remedy="give one place, the middle of them",
+                limit="each body once",
             )
         if self.wheelset is not None and self.rests_on:
             raise InputError(
@@ -229,6 +230,7 @@ class VehicleSheetPart(Part):
                 field="bogie_wheelbase_m",
                 value=self.bogie_wheelbase_m,
                 remedy="for an IMU on a bogie frame give axles_m, on an axle other_axle_m",
+                limit="a body on two bogies",
             )
         if self.other_axle_m == 0.0:
             raise InputError(
@@ -260,12 +262,17 @@ class VehicleSheetPart(Part):
                     field=key,
                     value=getattr(self, key),
                     remedy="give it in a [[vehicle_sheet.body]], or remove these",
+                    limit="one body",
                 )
         names: list[str] = []
         for i, part in enumerate(self.body):
             if part.name in names:
                 raise InputError(
-                    "two bodies share a name", field=f"body[{i}].name", value=part.name, remedy="rename one"
+                    "two bodies share a name",
+                    field=f"body[{i}].name",
+                    value=part.name,
+                    remedy="rename one",
+                    limit="each name once",
                 )
             for on in part.rests_on:
                 if on not in names:

@@ -1,5 +1,6 @@
 """The section itself: tables and figures over the axes of a campaign, gathered for the template."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -47,7 +48,10 @@ def campaign_section(data: PageData) -> list[Section]:
     if not axes or not (scores["quantity"] == "roll").any():
         return []
     # What stands beside a run has no part in one of its cells.
-    command, *_ = str(data.manifest.get("command", f"simrail run {data.scenario.called}")).split(" --beside ")
+    command = str(data.manifest.get("command", data.scenario.command))
+    words = shlex.split(command)
+    if words[-2:-1] == ["--beside"]:
+        command = command.removesuffix(f" --beside {shlex.quote(words[-1])}")
     tables = campaign_tables(scores, cells, axes, styles, command=command)
     odometries = odometry_frames(scores, cells)
     if tables["methods"].empty:

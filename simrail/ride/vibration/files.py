@@ -4,16 +4,20 @@ Motions are kept as float32: relative to their size of some millimetres and metr
 a ten-millionth. A folder without its header was interrupted, and is no vibration.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
+from simrail.core.jit import FloatArray
+from simrail.core.sealed_files import DamagedError, damage_told, read_sealed, seal
 from simrail.ride.mount_motion import give_back
 from simrail.ride.truth import Truth
-from simrail.ride.truth_files import create_array, read_array, read_sealed, seal
+from simrail.ride.truth_files import create_array, read_array
 from simrail.ride.vibration.run import Shaker
 from simrail.ride.vibration.short_waves import COLUMNS, ShortWaves
 from simrail.ride.vibration.sources import Vibration
@@ -98,23 +102,46 @@ def read_short_waves(folder: Path, rows: int) -> ShortWaves:
 
     Raises
     ------
-    OSError, ValueError, KeyError
-        If the folder is incomplete or damaged, or not of ``rows`` rows.
+    DamagedError
+        If the folder is incomplete, not what was written, or not of ``rows`` rows.
+    OSError
+        If it cannot be read.
     """
-    plain, read = read_sealed(folder), partial(read_array, folder)
-    motions = {body: read(f"motion_{i}") for i, body in enumerate(plain["bodies"])}
+    plain, _ = read_sealed(folder)
+    with damage_told():
+        return _short_waves_of(_Header.model_validate(plain), rows, partial(read_array, folder))
+
+
+class _Header(BaseModel):
+    """What a header says beside the arrays."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    manifest: dict[str, Any]
+    sources: dict[str, str]
+    longest_wave_m: float
+    bodies: list[str]
+    bendings: list[dict[str, Any]]
+    wheels: list[str]
+    least_share_of_load: dict[str, float]
+
+
+def _short_waves_of(header: _Header, rows: int, read: Callable[[str], FloatArray]) -> ShortWaves:
+    """The short-wave part of its header and its arrays."""
+    motions = {body: read(f"motion_{i}") for i, body in enumerate(header.bodies)}
     for body, motion in motions.items():
         if motion.shape != (rows, len(COLUMNS)):
-            raise ValueError(f"vibration of {body} has shape {motion.shape}, not ({rows}, {len(COLUMNS)})")
+            shape = (rows, len(COLUMNS))
+            raise DamagedError(f"vibration of {body} has shape {motion.shape}, not {shape}")
     bendings = {
-        bent["body"]: (Bending(**bent), read(f"bending_{i}")) for i, bent in enumerate(plain["bendings"])
+        bent["body"]: (Bending(**bent), read(f"bending_{i}")) for i, bent in enumerate(header.bendings)
     }
-    loads = read("loads") if plain["wheels"] else np.zeros((0, 0))
+    loads = read("loads") if header.wheels else np.zeros((0, 0))
     return ShortWaves(
-        sources=plain["sources"],
-        longest_wave_m=plain["longest_wave_m"],
+        sources=header.sources,
+        longest_wave_m=header.longest_wave_m,
         motions=motions,
         bendings=bendings,
-        loads={wheel: loads[:, w] for w, wheel in enumerate(plain["wheels"])},
-        least_share_of_load=plain["least_share_of_load"],
+        loads={wheel: loads[:, w] for w, wheel in enumerate(header.wheels)},
+        least_share_of_load=header.least_share_of_load,
     )

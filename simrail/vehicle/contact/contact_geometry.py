@@ -271,12 +271,14 @@ def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:
             "the flange never meets the rail within 60 mm of lateral shift",
             field="gauge_m",
             remedy="check gauge, tape circles and profiles against each other",
+            limit="<= 60 mm",
         )
     if slope[0] > 0.5:
         raise InputError(
             "the centred wheelset already stands on its flanges",
             field="gauge_m",
             remedy="check gauge, tape circles and profiles against each other",
+            limit="some play between flange and rail",
         )
     past = np.flatnonzero(slope[steepest:] < 0.5 * slope[steepest])
     last = steepest + int(past[0]) if past.size else u.size - 1

@@ -88,6 +88,7 @@ def incline(rail: RailProfile, inclination: float, *, gauge_depth_m: float) -> R
             "the rail's head has no highest point inside its profile",
             field=f"{rail.name}.depth_m",
             remedy="depth is positive downward",
+            limit="a head whose top is inside",
         )
     top = float(flat[np.argmin(zs(flat))])
     e_top, z_top = float(es(top)), float(zs(top))

@@ -7,10 +7,9 @@ Not here: making one table (`simrail.vehicle.contact.contact_geometry`).
 """
 
 import hashlib
+import io
 import json
 import math
-import zipfile
-import zlib
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -19,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from simrail.core.atomic_files import whole_file
 from simrail.core.jit import FloatArray, cache_folder
+from simrail.core.sealed_files import DamagedError, damage_told, read_sealed_file, write_sealed_file
 from simrail.core.source_hash import source_hash
 from simrail.vehicle.contact.contact import static_height
 from simrail.vehicle.contact.contact_geometry import CONST, ContactTable, build_contact
@@ -76,7 +75,7 @@ def _built(
 
     ``shape`` is the digest of the profiles: a file that has changed is another key.
     """
-    file = cache_folder() / FOLDER / f"{_key(pair, shape, wheel_radius_m, load_n, grid_load_n)}.npz"
+    file = cache_folder() / FOLDER / f"{_key(pair, shape, wheel_radius_m, load_n, grid_load_n)}.table"
     table = _read(file)
     if table is None:
         table = build_contact(
@@ -109,9 +108,9 @@ def _key(pair: WheelRail, *rest: object) -> str:
 
 
 def _read(file: Path) -> ContactTable | None:
-    """A table that was written; None where there is none, or it is damaged (the archive has checksums)."""
+    """A table that was written; None where there is none, or it is damaged."""
     try:
-        with np.load(file, allow_pickle=False) as held:
+        with damage_told(), np.load(io.BytesIO(read_sealed_file(file)), allow_pickle=False) as held:
             split = float(held["split_m"])
             return ContactTable(
                 name=str(held["name"]),
@@ -121,24 +120,25 @@ def _read(file: Path) -> ContactTable | None:
                 smoothing_m=float(held["smoothing_m"]),
                 split_m=None if math.isnan(split) else split,
             )
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+    except (OSError, DamagedError):
         return None
 
 
 def _write(file: Path, table: ContactTable) -> None:
     """Keep a table for other processes; where the disk does not let us, each builds its own."""
+    stream = io.BytesIO()
+    np.savez(
+        stream,
+        name=table.name,
+        coef=table.coef,
+        const=np.array([table.const]),
+        static_load_n=table.static_load_n,
+        smoothing_m=table.smoothing_m,
+        split_m=math.nan if table.split_m is None else table.split_m,
+    )
     with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(file) as stream:
-            np.savez(
-                stream,
-                name=table.name,
-                coef=table.coef,
-                const=np.array([table.const]),
-                static_load_n=table.static_load_n,
-                smoothing_m=table.smoothing_m,
-                split_m=math.nan if table.split_m is None else table.split_m,
-            )
+        write_sealed_file(file, stream.getvalue())
 
 
 def rest_drops_m(model: VehicleModel, *, gravity_mps2: float) -> FloatArray:

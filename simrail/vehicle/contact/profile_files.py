@@ -214,5 +214,6 @@ def _path(text: str, beside: Path | None, own: tuple[str, ...], *, field: str, n
             field=field,
             value=text,
             remedy="a relative path starts at the file that names it",
+            limit="a file that is there",
         )
     return path

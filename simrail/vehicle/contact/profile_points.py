@@ -294,6 +294,7 @@ def _finite(rows: list[tuple[float, float, int]], field: str) -> Points:
             field=f"line {int(at[i])}",
             value=(float(y[i]), float(z[i])),
             remedy="leave out points that were not measured",
+            limit="finite numbers",
         )
     return y, z, at
 
@@ -302,7 +303,9 @@ def _number(text: str, field: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError("not a number", field=field, value=text, remedy="decimals have a point") from None
+        raise InputError(
+            "not a number", field=field, value=text, remedy="decimals have a point", limit="a number"
+        ) from None
 
 
 def _in_metres(

@@ -108,7 +108,12 @@ def check_profile(profile: WheelProfile | RailProfile) -> None:
             limit="at least 8 points each",
         )
     if not (np.isfinite(y).all() and np.isfinite(z).all()):
-        raise InputError("a profile's points must be finite numbers", field=profile.name)
+        raise InputError(
+            "a profile's points must be finite numbers",
+            field=profile.name,
+            limit="finite numbers",
+            remedy="leave out the others",
+        )
     steps = np.diff(y)
     if not (steps > 0.0).all():
         where = int(np.argmin(steps))

@@ -209,6 +209,7 @@ def _traction(model: VehicleModel, profile: SpeedProfile, drive: str) -> tuple[R
             file=f"vehicle {model.name}",
             field="traction",
             remedy='give it a [traction], or ride with drive = "guide"',
+            limit="a vehicle with traction",
         )
     _, _, *limits, _ = astuple(means)  # in the order of TRACTION
     traction[0] = (1, profile.direction, *limits, _BRAKE_WINDUP_RAD, _BRAKE_DAMPING_S)

@@ -1,0 +1,175 @@
+"""An estimator with a time limit: run in a process of its own, which is killed when the time is over.
+
+A signal ends no compiled loop and a thread none at all: only a process can be ended for sure. It is a copy of
+this one (a fork, where the system has it), so that what is compiled is there, and takes one batch after the
+other; estimators without a limit have no such process. Where the one that waits is killed itself, a timer of
+the system ends the other one.
+"""
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import pickle
+import signal
+import time
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from simrail.campaign.fence import MOST_PRINTED, fenced, handed
+from simrail.estimation.estimate import Estimate, Estimator, estimate_many
+from simrail.recording.recording import Recording
+
+FIRST_CALL_S = 20.0
+"""What the first call may take, which compiles kernels, where the limit is shorter."""
+
+_GRACE_S = 2.0
+"""After the limit, until the system's own timer ends the process."""
+
+
+class OverTimeError(RuntimeError):
+    """An estimator took longer than it may."""
+
+
+class EstimatorDiedError(RuntimeError):
+    """An estimator took its process with it."""
+
+
+class Outcome(NamedTuple):
+    """What an estimator did: its estimates, the time that they took, and what it printed."""
+
+    estimates: list[Estimate]
+    wall_s: float
+    cpu_s: float
+    printed: str
+
+
+def estimate_here(estimator: Estimator, recordings: Sequence[Recording]) -> Outcome:
+    """Run an estimator in this process, fenced."""
+    given = [handed(one) for one in recordings]
+    with fenced() as printed:
+        begun, worked = time.perf_counter(), time.process_time()
+        estimates = estimate_many(estimator, given)
+        wall_s, cpu_s = time.perf_counter() - begun, time.process_time() - worked
+    return Outcome(estimates, wall_s, cpu_s, printed.getvalue()[: 10 * MOST_PRINTED])
+
+
+class LimitedEstimator:
+    """One estimator and the process that runs it, begun when it is needed.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        What is run.
+    limit_s : float
+        How long it may take for each recording, s.
+    """
+
+    def __init__(self, estimator: Estimator, limit_s: float) -> None:
+        self._estimator, self._limit_s = estimator, limit_s
+        self._process: Any = None
+        self._pipe: Any = None
+
+    def estimate(self, recordings: Sequence[Recording], *, at_least_s: float = 0.0) -> Outcome:
+        """Run the estimator.
+
+        Parameters
+        ----------
+        recordings : sequence of Recording
+            What it is given.
+        at_least_s : float
+            What it may take in any case.
+
+        Raises
+        ------
+        OverTimeError, EstimatorDiedError
+            If it was ended, or ended its process.
+        Exception
+            What the estimator raised.
+        """
+        allowed_s = max(self._limit_s * len(recordings), at_least_s)
+        try:
+            if self._process is None:
+                self._begin()
+            self._pipe.send((recordings, allowed_s))
+            if not self._pipe.poll(allowed_s):
+                raise OverTimeError(f"took longer than time_limit_s = {self._limit_s:g}, and was ended")
+            done, content = self._pipe.recv()
+        except (EOFError, ConnectionError):
+            raise self._death() from None
+        except BaseException:
+            self.close()
+            raise
+        if not done:
+            raise content
+        outcome: Outcome = content
+        return outcome
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._pipe.close()
+            self._process = self._pipe = None
+
+    def _begin(self) -> None:
+        ways = multiprocessing.get_all_start_methods()
+        context: Any = multiprocessing.get_context("fork" if "fork" in ways else "spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=_run, args=(other, self._pipe, self._estimator), daemon=True)
+        with _allowed_children():
+            self._process.start()
+        other.close()
+
+    def _death(self) -> RuntimeError:
+        """What is said of a process that has ended by itself."""
+        self._process.join(_GRACE_S)
+        code = self._process.exitcode
+        self.close()
+        if code == -getattr(signal, "SIGALRM", 0):
+            return OverTimeError(f"took longer than time_limit_s = {self._limit_s:g}, and was ended")
+        by = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+        return EstimatorDiedError(f"it ended the process that ran it ({by})")
+
+
+@contextlib.contextmanager
+def _allowed_children() -> Any:
+    """Let a worker that is a daemon itself, as those of a cluster are, have a child."""
+    config: dict[str, Any] = multiprocessing.current_process()._config  # type: ignore[attr-defined]
+    before = config.get("daemon")
+    config["daemon"] = False
+    try:
+        yield
+    finally:
+        config["daemon"] = before
+
+
+def _run(pipe: Any, parents: Any, estimator: Estimator) -> None:
+    """Run what is asked for, until nobody asks any more: the child's part."""
+    parents.close()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    has_timer = hasattr(signal, "setitimer")
+    if has_timer:
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    with contextlib.suppress(EOFError, ConnectionError):
+        while True:
+            recordings, allowed_s = pipe.recv()
+            if has_timer:
+                signal.setitimer(signal.ITIMER_REAL, allowed_s + _GRACE_S)
+            try:
+                answer: tuple[bool, Any] = True, estimate_here(estimator, recordings)
+                packed = pickle.dumps(answer)
+            except Exception as error:
+                packed = pickle.dumps((False, _portable(error)))
+            if has_timer:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+            pipe.send_bytes(packed)
+
+
+def _portable(error: Exception) -> Exception:
+    """An error that another process can read, with its own words."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

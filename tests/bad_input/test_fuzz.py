@@ -1,0 +1,48 @@
+"""A sample of the fuzzer's inputs; all of them by command: ``python tests/bad_input/fuzz.py``."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def fuzzer() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("fuzz", Path(__file__).with_name("fuzz.py"))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["fuzz"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.slow)])
+def test_every_mutated_input_is_answered_in_one_line(count: int, fuzzer: ModuleType, tmp_path: Path) -> None:
+    answers = fuzzer.fuzz(7, range(count), tmp_path, told=lambda answer: None)
+    assert len(answers) == count
+    assert [(answer.case, answer.fault, answer.said) for answer in answers if answer.fault] == []
+    assert sum(answer.code == 2 for answer in answers) > 0.5 * count
+
+
+def test_the_fuzzer_sees_what_is_wrong(fuzzer: ModuleType) -> None:
+    """Planted answers of every wrong kind."""
+    case = fuzzer.Case(0, "scenario", must_refuse=True)
+    good = "simrail: a.toml: key: is wrong; found 3; limit: 4; remedy: mend it\n"
+    for code, said, words in (
+        (0, "", "silently accepted"),
+        (1, good, "exit code 1"),
+        (2, "", "something else"),
+        (2, "RuntimeWarning: overflow\n" + good, "something else"),
+        (2, good.replace("; limit: 4", ""), "lacks limit"),
+        (2, good.replace("; remedy: mend it", ""), "lacks remedy"),
+        (2, good.replace("; found 3", ""), "lacks what was found"),
+        (2, good.replace("wrong", "\x1b[31m"), "control character"),
+        (2, good.replace("wrong", "x" * 5000), "more than 4000"),
+        (2, good, ""),
+    ):
+        told = fuzzer.judge(fuzzer.Answer(case, code, said, 0.0))
+        assert words in told and bool(words) == bool(told)
