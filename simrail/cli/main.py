@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from simrail.cli.figure import figure
 from simrail.cli.grade import grade
 from simrail.cli.library import cache, imu, list_parts, new, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
@@ -78,6 +79,20 @@ def _options(
     pass
 
 
-for _command in (run, check, grade, export, estimate, tune, sensitivity, spectra, vehicle, imu, new, cache):
+for _command in (
+    run,
+    check,
+    figure,
+    grade,
+    export,
+    estimate,
+    tune,
+    sensitivity,
+    spectra,
+    vehicle,
+    imu,
+    new,
+    cache,
+):
     app.command()(_command)
 app.command(name="list")(list_parts)

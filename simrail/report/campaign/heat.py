@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -11,16 +12,17 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
+from simrail.report.campaign.axes import CampaignAxis, draws_of, finest, held
 from simrail.report.figures.canvas import (
     INK,
     MUTED,
-    WIDTH_IN,
     add_panel,
+    drawn,
     log_ticks,
     look,
     panels_beside,
     to_svg,
+    width_in,
 )
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, waves_words
 from simrail.report.tables.methods import MethodStyle
@@ -97,7 +99,7 @@ def heat_maps(
     left, right, gap, title_in = 0.35 + 0.075 * max(len(word) for word in down.words), 0.85, 0.22, 0.34
     wide = max(CELL_IN[0], 0.075 * max(len(word) for word in across.words)) * len(across.words)
     tall = CELL_IN[1] * len(down.words)
-    room = WIDTH_IN - left - right
+    room = width_in() - left - right
     per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
     rows = -(-len(tables) // per_row)
     per_row = -(-len(tables) // rows)
@@ -109,7 +111,7 @@ def heat_maps(
             tall_in=tall,
             across=per_row,
             left_in=left,
-            right_in=WIDTH_IN - end + gap,
+            right_in=width_in() - end + gap,
             top_in=title_in,
             gap_in=gap,
             row_gap_in=title_in,
@@ -161,20 +163,25 @@ def rails_figures(
     if not shown:
         return []
     down = Side("method", [(s.name,) for s in shown], [s.label for s in shown], ["estimator"])
-    by_column = {axis.column: axis for axis in finest(axes, cells)}
-    sides = {}
+    fine = finest(axes, cells)
+    by_column = {axis.column: axis for axis in fine}
+    sides: dict[str, tuple[CampaignAxis, ...]] = {}
     if "speed_kmh" in by_column and "direction" in by_column:
         both = by_column.pop("speed_kmh"), by_column.pop("direction")
-        sides["speed and direction of travel"] = side_of(*both)
-    sides |= {axis.name: side_of(axis) for axis in by_column.values()}
-    return [
-        (
-            f"Rails: standard deviation of the error {waves_words(band, known)}, by method and {title}; mean "
-            "over all other axes and draws.",
-            heat_maps(draws, across, down, unit="mm", what=f"Errors of the rails by method and {title}"),
+        sides["speed and direction of travel"] = both
+    sides |= {axis.name: (axis,) for axis in by_column.values()}
+    figures = []
+    for title, across in sides.items():
+        kept = held(fine, *across)
+        own = {quantity: kept.of(rows) for quantity, rows in draws.items()}
+        averaged = "draws and ways to ride" if len(fine) > len(across) + len(kept.values) else "draws"
+        caption = (
+            f"Rails: standard deviation of the error {waves_words(band, known)}, by method and {title}; "
         )
-        for title, across in sides.items()
-    ]
+        caption += f"mean over {averaged}{f'; {kept.words}' if kept.words else ''}."
+        make = partial(heat_maps, own, side_of(*across), down, unit="mm", what=caption)
+        figures.append((caption, drawn(f"rails-by-{title.replace(' ', '-')}", make)))
+    return figures
 
 
 def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
@@ -198,7 +205,8 @@ def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
         text, colour = "\u2013", MUTED
         if np.isfinite(value):
             is_dark = float(norm(max(value, norm.vmin or value))) > 0.5
-            text, colour = short_number(value), "white" if is_dark else INK
+            # Colours of the cell, not of the page: they are the same in dark mode.
+            text, colour = short_number(value), "#fefefe" if is_dark else "#1b2431"
         axis.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
 
 

@@ -1,6 +1,7 @@
 """First section of a page with requirements: the verdict in a sentence, its chart, and the table."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,12 @@ def verdicts_section(data: PageData) -> list[Section]:
             {
                 "sentence": verdict_sentence(rows, data.styles),
                 "devices": devices_words(rows),
-                "chart": decision_chart(rows, devices, wanted[number], data.styles) if drawn else "",
+                "chart": canvas.drawn(
+                    f"verdict-{len(groups) + 1}",
+                    partial(decision_chart, rows, devices, wanted[number], data.styles),
+                )
+                if drawn
+                else "",
                 "columns": [style.label for style in judged_methods(rows, data.styles)],
                 "rows": list(_table_rows(rows, judged_methods(rows, data.styles))),
                 "budgets": list(_budgets(data.budgets, number, vehicle, mount)),
@@ -114,7 +120,8 @@ def _budgets(
     ]
     for imu, budget in own.groupby("imu", sort=False):
         sentence = f"{imu}: {budget_sentence(budget)}."
-        yield sentence, budget_chart(budget, sentence)
+        name = f"budget-{number + 1}-{vehicle}-{mount}-{imu}"
+        yield sentence, canvas.drawn(name, partial(budget_chart, budget, sentence))
 
 
 def budget_chart(budget: pd.DataFrame, description: str) -> str:
@@ -209,7 +216,7 @@ def decision_chart(
     imus = list(dict.fromkeys(rows["imu"].astype(str)))
     best = best_method(rows, styles)
     with canvas.look():
-        figure, (panel,) = canvas.panels([2.7], top_in=0.75)
+        figure, (panel,) = canvas.slots_panel(2.7, imus, top_in=0.75)
         for slot, style in enumerate(methods):
             for i, imu in enumerate(imus):
                 own = finite[(finite["imu"] == imu) & (finite["estimator"] == style.name)]["value"]
@@ -221,7 +228,6 @@ def decision_chart(
         low, high = finite["value"].min(), finite["value"].max()
         panel.set_ylim(0.7 * min(low, 0.8 * wanted.limit), 1.6 * max(high, 1.25 * wanted.limit))
         canvas.log_scale(panel.yaxis)
-        canvas.categories(panel, [_in_lines(imu) for imu in imus], size=8.0 if len(imus) < 9 else 7.0)
         unit = "\u00b0" if wanted.unit == "deg" else wanted.unit
         panel.set_ylabel(f"{wanted.what}, {unit}")
         if best is not None:
@@ -264,13 +270,3 @@ def _write_shares(panel: Axes, rows: pd.DataFrame, imus: Sequence[str]) -> None:
             weight="bold",
             color=colour,
         )
-
-
-def _in_lines(name: str) -> str:
-    """A grade's name in lines of some ten letters, parted at underscores."""
-    lines = [""]
-    for part in name.replace(".imu.toml", "").replace(".toml", "").split("_"):
-        if lines[-1] and len(lines[-1]) + len(part) > 9:
-            lines.append("")
-        lines[-1] += ("_" if lines[-1] else "") + part
-    return "\n".join(lines)

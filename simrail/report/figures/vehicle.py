@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
+from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, look, panels, to_svg, width_in
 from simrail.report.tables.vehicle_text import MOST_HZ
 from simrail.vehicle.contact.contact_pair import incline
 from simrail.vehicle.contact.profile_files import profiles_of
@@ -30,8 +30,8 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     lift = float(head.depth(np.array([at + offset]))[0])
     touch = float(np.interp(at, wheel.lateral_m, wheel.depth_m))
     with look():
-        figure = Figure(figsize=(WIDTH_IN, 4.0))
-        axis = figure.add_axes((LEFT_IN / WIDTH_IN, 0.13, (WIDTH_IN - LEFT_IN - 0.2) / WIDTH_IN, 0.83))
+        figure = Figure(figsize=(width_in(), 4.0))
+        axis = figure.add_axes((LEFT_IN / width_in(), 0.13, (width_in() - LEFT_IN - 0.2) / width_in(), 0.83))
         rail_z = -1e3 * (head.depth(e) - lift)
         wheel_z = -1e3 * (wheel.depth_m - touch)
         rail_y, wheel_y = -1e3 * (e - offset), -1e3 * wheel.lateral_m
@@ -89,10 +89,10 @@ def locus_figure(study: VehicleStudy) -> str:
     speed = 3.6 * study.locus.speed_mps
     values = study.locus.eigenvalues_1ps
     with look():
-        figure = Figure(figsize=(WIDTH_IN, 6.7))
-        wide = (WIDTH_IN - LEFT_IN - 0.2) / WIDTH_IN
-        plane = figure.add_axes((LEFT_IN / WIDTH_IN, 0.41, wide, 0.56))
-        below = figure.add_axes((LEFT_IN / WIDTH_IN, 0.08, wide, 0.22))
+        figure = Figure(figsize=(width_in(), 6.7))
+        wide = (width_in() - LEFT_IN - 0.2) / width_in()
+        plane = figure.add_axes((LEFT_IN / width_in(), 0.41, wide, 0.56))
+        below = figure.add_axes((LEFT_IN / width_in(), 0.08, wide, 0.22))
         frequency = values.imag / (2.0 * np.pi)
         shown = (frequency > SLOWEST_HZ) & (frequency < _MOST_HZ) & (values.real > -40.0)
         tint = np.broadcast_to(speed[:, None], values.shape)
