@@ -1,4 +1,4 @@
-"""How fast the explorer of a page is: ``python results/reference/pages.py``, beside plotly if it is installed.
+"""How fast the explorer of a page is, beside plotly if that is there: ``python results/reference/pages.py``.
 
 Six panels of five series of 4000 points, offline, in headless Chromium at 1200 x 900: time until they are
 painted, for a zoom of all panels, for a series that is switched off, elements of the page, and its size.

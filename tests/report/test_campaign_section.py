@@ -423,10 +423,11 @@ def test_the_page_has_the_section_and_its_tables(small_page: Path) -> None:
         'id="campaign"',
         "864 cells over",
         "Attitude, consumer",
+        "Attitude, tactical",
         "Pairs of methods",
         "Consistency",
         "Worst cell of each method",
-        "R -150",
+        "R \u2212150",
         "--cell ",
         "R +300",
     ):

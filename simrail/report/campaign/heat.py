@@ -18,7 +18,6 @@ from simrail.report.figures.canvas import (
     MUTED,
     add_panel,
     drawn,
-    log_ticks,
     look,
     panels_beside,
     to_svg,
@@ -221,7 +220,11 @@ def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: floa
     axis = add_panel(figure, left, height - top - tall, 0.11, tall)
     bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
     bar.outline.set_visible(False)
-    log_ticks(axis.yaxis)
+    # Its ends are told, and what decades lie well between them.
+    low, high = float(norm.vmin or 1.0), float(norm.vmax or 1.0)
+    decades = 10.0 ** np.arange(np.ceil(np.log10(low)), np.floor(np.log10(high)) + 1.0)
+    marks = [low, *(mark for mark in decades if 1.8 * low < mark < high / 1.8), high]
+    bar.set_ticks(marks, labels=[short_number(mark) for mark in marks])
     axis.grid(visible=False)
     axis.minorticks_off()
     axis.set_title(unit, fontsize=8.5, pad=5.0)

@@ -83,7 +83,7 @@ def campaign_section(data: PageData) -> list[Section]:
                 _pairs_table(_of(tables["pairs"], words), by_name),
                 _consistency_table(_of(tables["consistency"], words), by_name),
             )
-            for words in list(dict.fromkeys(tables["methods"]["of"]))[:MOST_GROUPS]
+            for words in _real_first(tables["methods"]["of"])[:MOST_GROUPS]
         ],
         "groups_left_out": max(tables["methods"]["of"].nunique() - MOST_GROUPS, 0),
         "worst": [
@@ -173,7 +173,10 @@ def curve_side(curves: pd.DataFrame) -> Side:
     found = {name: re.search(r" R(-?[\d.]+)$", name) for name in names}
     radius = {name: float(match[1]) for name, match in found.items() if match}
     names.sort(key=lambda name: 1.0 / radius[name] if name in radius else 0.0)
-    words = [f"R {radius[name]:+g}" if name in radius else name.removeprefix(CURVE_PREFIX) for name in names]
+    words = [
+        signed(f"R {radius[name]:+g}") if name in radius else name.removeprefix(CURVE_PREFIX)
+        for name in names
+    ]
     return Side("curve radius, m", [(name,) for name in names], words, ["window"])
 
 
@@ -185,6 +188,11 @@ def _words_of(example: CellResult, axes: Sequence[CampaignAxis]) -> str:
             unit = axis.title.partition(", ")[2]
             words.append(f"{word} {unit}" if unit in ("km/h", "m", "s") else word)
     return " \u00b7 ".join(words[:3])
+
+
+def _real_first(groups: pd.Series) -> list[str]:
+    """IMUs and mounts in their order, those of an ideal IMU last: they are floors."""
+    return sorted(dict.fromkeys(groups), key=lambda words: str(words).startswith("ideal"))
 
 
 def _of(frame: pd.DataFrame, words: str) -> pd.DataFrame:

@@ -14,6 +14,8 @@ from simrail.core.jit import FloatArray
 from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.tiles import Tile
+from simrail.report.words.sentences import significant
 from simrail.report.words.verdicts import (
     MARKS,
     best_method,
@@ -43,6 +45,9 @@ LABELS = {FLOOR: "the method's own floor", TOGETHER: "together"}
 
 COLOURS = {ENOUGH: "#15803d", NOT_ENOUGH: "#b42318"}
 """Of verdicts; any other is muted."""
+
+TONES = {ENOUGH: "good", NOT_ENOUGH: "bad"}
+"""The same as variables of the page."""
 
 
 def verdicts_section(data: PageData) -> list[Section]:
@@ -74,10 +79,41 @@ def verdicts_section(data: PageData) -> list[Section]:
         )
     shown = {
         "groups": groups,
+        "tiles": verdict_tiles(groups_of(table), data.styles, wanted),
         "chance": 100.0 * max(one.chance for one in wanted),
         "overview": overview(table, data.styles) if len(groups) >= MANY else None,
     }
     return [Section("verdict", "Verdict", "campaign/verdicts.html.j2", shown)]
+
+
+def verdict_tiles(
+    groups: Iterator[tuple[int, str, str, pd.DataFrame]],
+    styles: Sequence[MethodStyle],
+    wanted: Sequence[Requirement],
+) -> list[Tile]:
+    """How many IMUs are enough, what the best of them keeps to, and what no IMU at all does; of the first."""
+    number, _, mount, rows = next(groups)
+    best, requirement = best_method(rows, styles), wanted[number]
+    if best is None:
+        return []
+    unit = "\u00b0" if requirement.unit == "deg" else f" {requirement.unit}"
+    own = rows[(rows["estimator"] == best.name) & rows["devices"].gt(0)]
+    enough = own.loc[own["verdict"] == ENOUGH, "imu"].astype(str).unique()
+    count = len(own["imu"].unique())
+    tiles = [Tile("IMUs that are enough", f"{len(enough)} of {count}", f"on the {mount}, with {best.label}")]
+    asked = f"{100.0 * requirement.share:g} % of the devices stay below"
+    if own["at_share"].notna().any():
+        least = own.loc[own["at_share"].idxmin()]
+        note = f"{least['imu']}: {asked}; asked are {requirement.limit:g}{unit}"
+        tiles.append(Tile("the best IMU", f"{significant(least['at_share'])}{unit}", note))
+    floors = [style for style in styles if not style.uses_imu]
+    zero = rows[rows["estimator"].isin([style.name for style in floors]) & rows["at_share"].notna()]
+    if len(zero):
+        value = float(zero["at_share"].median())
+        beats = tiles[1:] and value < float(own["at_share"].min())
+        note = "beats every IMU" if beats else "what is known without any sensor"
+        tiles.append(Tile("no IMU at all", f"{significant(value)}{unit}", note))
+    return tiles
 
 
 def overview(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> dict[str, Any]:
@@ -186,7 +222,7 @@ def _cell(row: pd.Series) -> dict[str, Any]:
     return {
         "mark": MARKS[row["verdict"]],
         "verdict": row["verdict"],
-        "colour": COLOURS.get(row["verdict"], canvas.MUTED),
+        "colour": f"var(--{TONES.get(row['verdict'], 'muted')})",
         "share": f"{row['passed']} of {row['devices']}" if row["devices"] else row["reason"],
         "interval": f"{100.0 * row['low95']:.0f} to {100.0 * row['high95']:.0f} %" if row["devices"] else "",
         "at_share": f"{row['at_share']:.3g}" if row["devices"] else "",

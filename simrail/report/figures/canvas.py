@@ -60,6 +60,8 @@ _VARIABLES = {
     CURVE_TINT: "curve",
     TRANSITION_TINT: "transition",
     "#ffffff": "page",
+    "#15803d": "good",
+    "#b42318": "bad",
 }
 """Variables of the page that stand for colours of the figures, so that dark mode has its own."""
 
@@ -203,7 +205,7 @@ def panels(
     for tall in heights_in:
         axis = add_panel(figure, LEFT_IN, edge - tall, wide, tall, sharex=axes[0] if axes else None)
         # A fixed place, so that no label depends on the width of its tick labels.
-        axis.yaxis.set_label_coords(-0.56 / wide, 0.5)
+        axis.yaxis.set_label_coords(-0.64 / wide, 0.5)
         axes.append(axis)
         edge -= tall + gap
     for axis in axes[:-1]:

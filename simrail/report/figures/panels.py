@@ -53,6 +53,7 @@ def panels_figure(
         for axis, panel in zip(axes, drawn, strict=True):
             _draw(axis, view, panel, looks, keys)
             parted = ",\n" if len(panel.title) > MOST_IN_LINE else ", "
+            axis.tick_params(axis="y", labelsize=8.2)
             axis.set_ylabel(f"{panel.title}{parted}{panel.unit}", fontsize=8.4)
         canvas.legend_above(*axes)
         x = np.concatenate([view.axes[panel.axis][0] for panel in drawn])

@@ -1,5 +1,6 @@
 """First section of a page without requirements: its answer in a sentence, a chart and three tiles."""
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -154,12 +155,8 @@ def answer_chart(question: Question, *, what: str) -> str:
         values = drawn.loc[drawn["estimator"].isin(names), "value"]
         panel.set_ylim(0.75 * values.min(), 1.35 * values.max())
         canvas.log_scale(panel.yaxis)
-        panel.set_ylabel(
-            f"{question.words.replace(' in curves', '') if len(slots) > 1 else question.words}, "
-            f"{question.unit.strip()}",
-            fontsize=8.4,
-            wrap=True,
-        )
+        words = question.words.replace(" in curves", "") if len(slots) > 1 else question.words
+        panel.set_ylabel(textwrap.fill(f"{words}, {question.unit.strip()}", 34), fontsize=8.4)
         handles = [
             Line2D([], [], color=s.colour, marker="o", mfc="none" if s.baseline else s.colour, lw=0, ms=5.0)
             for s in styles

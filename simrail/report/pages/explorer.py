@@ -1,10 +1,10 @@
 """Sections on rides: errors over distance of the best methods, and the explorer of all that is kept of them.
 
-The explorer is some 390 lines of our own on canvases (``page.js``, 20 kB). With 6 panels of 5 series of 4000
-points, offline, in headless Chromium on a shared machine (``results/reference/pages.py``), its page has 0.7 MB
-and 69 elements and is painted in 1.5 to 2.0 s; with plotly, the only such library whose bundle has a home on
-PyPI, it has 6.2 MB and 1027 elements and takes 4.6 to 10 s. uPlot is as light as ours, but its home is npm, so
-that a wheel would have to carry a copy of it. Ours saves what is seen as SVG and follows the page's dark mode.
+The explorer is some 390 lines of our own on canvases (``page.js``, 20 kB). With 6 panels of 5 series of
+4000 points, offline, in headless Chromium on a shared machine (``results/reference/pages.py``), its page has
+0.7 MB and 69 elements and is painted in 1.5 to 2.0 s. With plotly, the only such library with a bundle on
+PyPI, it has 6.2 MB and 1027 elements and takes 4.6 to 10 s. uPlot is as light as ours, but its home is npm,
+so that a wheel would have to carry a copy of it. Ours saves what is seen as SVG, and follows dark mode.
 """
 
 import json
@@ -20,8 +20,8 @@ from simrail.report.figures.views import ATTITUDES, ERRORS, RAILS, Look, View, a
 from simrail.report.pages.section import PageData, Section
 from simrail.report.words.findings import one_of_each
 
-OPEN = (RAILS, ERRORS, ATTITUDES)
-"""Groups of panels of which the first two are open at first."""
+OPEN = (ERRORS, ATTITUDES)
+"""Groups of panels that are open at first where there are no rails."""
 
 
 def explorer_section(data: PageData) -> list[Section]:
@@ -54,7 +54,7 @@ def explorer_data(
         Series that are switched off at first.
     """
     groups = list(dict.fromkeys(panel.group for panel in views[0].panels))
-    opened = [group for group in OPEN if group in groups][:2] or groups[:1]
+    opened = [RAILS] if RAILS in groups else [group for group in OPEN if group in groups] or groups[:1]
     used = {one.key for view in views for panel in view.panels for one in panel.series}
     data = {
         "looks": {

@@ -69,10 +69,12 @@
   };
 
   // ---- one panel -------------------------------------------------------------------------------------------
-  const rangeOf = (view, panel, shown, [from, to]) => {
+  const rangeOf = (view, panel, looks, shown, [from, to]) => {
     let low = Infinity, high = -Infinity;
-    for (const one of panel.series) {
-      if (!shown(one.key)) continue;
+    // Scaled to what is no baseline, if any is shown: a baseline may leave the panel.
+    const all = panel.series.filter(one => shown(one.key));
+    const leading = all.filter(one => looks[one.key].kind !== "baseline");
+    for (const one of leading.length ? leading : all) {
       for (const name of one.y ? ["y"] : ["low", "high"]) {
         const y = numbers(one[name]), x = numbers(view.axes[panel.axis][name === "y" ? "x2" : "x"]);
         for (let i = 0; i < y.length; i++) {
@@ -89,7 +91,7 @@
   };
 
   const draw = (pen, view, panel, looks, shown, zoom, wide, tall, isFirst, isLast) => {
-    const [from, to] = zoom, [low, high] = rangeOf(view, panel, shown, zoom);
+    const [from, to] = zoom, [low, high] = rangeOf(view, panel, looks, shown, zoom);
     const bottom = tall - BOTTOM - (isLast ? AXIS : 0), right = wide - RIGHT;
     const px = x => LEFT + (x - from) / (to - from) * (right - LEFT);
     const py = y => TOP + (high - y) / (high - low) * (bottom - TOP);

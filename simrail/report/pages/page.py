@@ -168,7 +168,7 @@ def _rails(data: PageData) -> list[Section]:
     table = overview_table(data.shown_cases, data.styles, known=data.bands)
     if table is None:
         return []
-    return [_section("rails", "Rails", folded=len(table.rows) > MOST_ROWS, rails=table)]
+    return [_section("rails", "Rails", folded=True, rails=table)]
 
 
 def _running(data: PageData) -> list[Section]:

@@ -120,12 +120,10 @@ class PageData:
     @cached_property
     def leading(self) -> list[MethodStyle]:
         """The two best methods at what the scenario asks for, and the one without an IMU."""
-        question = self.question
-        ranked = question.ranked if question else []
-        own = [style for style in self.styles if style.name in {one.name for one in ranked}]
-        ranked = [style for one in ranked for style in own if style.name == one.name][:2]
-        ranked = ranked or [style for style in self.attitude_styles if not style.baseline][:2]
-        return ranked + [style for style in self.attitude_styles if not style.uses_imu][:1]
+        ranked = [style.name for style in self.question.ranked] if self.question else []
+        tested = [style for style in self.kept_styles if not style.baseline]
+        tested.sort(key=lambda style: ranked.index(style.name) if style.name in ranked else len(ranked))
+        return tested[:2] + [style for style in self.attitude_styles if not style.uses_imu][:1]
 
     @cached_property
     def asks_of_ride(self) -> bool:

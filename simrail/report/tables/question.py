@@ -82,8 +82,9 @@ class Question:
 
     @property
     def without(self) -> MethodStyle | None:
-        """The method that uses no IMU."""
-        return next((style for style in self.methods if not style.uses_imu), None)
+        """The method that uses no IMU, of those that have the figure."""
+        there = set(self.judged["estimator"].unique())
+        return next((s for s in self.methods if not s.uses_imu and s.name in there), None)
 
     @property
     def real(self) -> set[str]:
@@ -154,7 +155,8 @@ def _question(rows: pd.DataFrame, words: str, unit: str, styles: Sequence[Method
     rows = rows[rows["estimator"].isin([style.name for style in styles])]
     if rows.empty:
         return None
-    window = "curve" if (rows["window"] == "curve").any() else "whole"
+    # Of roll, curves are where methods differ.
+    window = "curve" if words.startswith("roll") and (rows["window"] == "curve").any() else "whole"
     if not (rows["window"] == window).any():
         return None
     varying = [name for name in UNLIKE if name in rows and len(rows[name].unique()) > 1]
