@@ -24,6 +24,9 @@ EACH_MOUNT = ("veillard_2016",)
 MOST_EXAMPLES = 6
 """Recordings that are kept for the report's figures."""
 
+MOST_WORST = 5
+"""The same beside no publication: the fewer there are, the finer is each."""
+
 JUDGED = (("vertical_profile", "sd"), ("roll", "rms"), ("position", "rms"))
 """By what a recording is the worst: the first figure that a method under test has."""
 
@@ -54,7 +57,7 @@ def examples_of(
     else:
         chosen = worst_cells(alive, _errors(plan, scores))
     examples: list[CellResult] = []
-    for cell in chosen[:MOST_EXAMPLES]:
+    for cell in chosen[: MOST_EXAMPLES if plan.scenario.spec.paper is not None else MOST_WORST]:
         with suppress(Exception):
             examples.append(example_of(packed, cell))
     return examples

@@ -32,6 +32,9 @@ HEAT = LinearSegmentedColormap.from_list(
 )
 """One hue, from light to dark: more error is darker, in print as well."""
 
+MOST_CELLS = 800
+"""Of all maps of a figure: of more, nobody reads the numbers, and files hold them."""
+
 CELL_IN = (0.46, 0.27)
 """Least width and height of a cell of a heat map: its number must be read."""
 
@@ -91,7 +94,7 @@ def heat_maps(
     tables = [(title, table) for title, table in tables if np.isfinite(table).any()]
     shown = np.array([table for _, table in tables])
     positive = shown[np.isfinite(shown) & (shown > 0.0)]
-    if len(positive) == 0:
+    if len(positive) == 0 or shown.size > MOST_CELLS:
         return ""
     low, high = float(positive.min()), float(positive.max())
     norm = LogNorm(low, max(high, 1.05 * low))

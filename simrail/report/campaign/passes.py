@@ -26,7 +26,7 @@ _MARKS = "osv^D"
 
 def passes_section(data: PageData) -> list[Section]:
     """What becomes of the error of the rails with the number of passes; nothing where there is one number."""
-    shown = []
+    shown: list[tuple[str, canvas.Drawing, Table]] = []
     for group in groups_of(data.cases):
         for style in mappers(group[0], data.styles):
             labels = group[0].labels

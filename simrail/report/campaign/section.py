@@ -27,6 +27,7 @@ from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle, readable
 from simrail.report.tables.tables import NONE, Cell, Row, Table, method_row, number_cell, signed
 from simrail.report.words.ablations import WORDS
+from simrail.report.words.sentences import listed
 from simrail.scoring.ablations import ABLATIONS, has_both, without_ablations
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE
 
@@ -35,6 +36,9 @@ MOST_METHODS = 8
 
 MOST_GROUPS = 6
 """IMUs and mounts with tables of their own on the page; the files hold all."""
+
+MOST_MAPS = 6
+"""Axes whose values are mapped."""
 
 MOST_BOXES = 6
 """Axes along which the spread is drawn."""
@@ -126,7 +130,9 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
         kept = held(fine, *shown)
         own = kept.of(draws)
         by_method = {style.label: own[own["estimator"] == style.name] for style in styles}
-        caption = f"{what}{f'; {kept.words}' if kept.words else ''}."
+        others = [axis.name for axis in fine if axis not in shown and axis.column not in kept.values]
+        caption = f"{what}; mean over {listed(['draws', *others])}"
+        caption += f"; {kept.words}." if kept.words else "."
         make = partial(heat_maps, by_method, across, down, unit="\u00b0", what=caption, muted=muted)
         return caption, canvas.drawn(name, make)
 
@@ -136,12 +142,12 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
     maps = []
     if len(down.keys) > 1:
         where = "in each curve of the line (radius by design, positive to the left)"
-        what = f"Rms roll error {where} by speed; mean over draws"
+        what = f"Rms roll error {where} by speed"
         maps.append(heat("curves", curves, speeds, down, what))
-    arrows = ". Arrows: direction of travel" if direction is not None else ""
-    for axis in fine:
+    arrows = " (arrows: direction of travel)" if direction is not None else ""
+    for axis in fine[:MOST_MAPS]:
         if axis.column not in across.columns:
-            what = f"Rms roll error over the whole ride by {named} and {axis.name}; mean over draws{arrows}"
+            what = f"Rms roll error over the whole ride by {named} and {axis.name}{arrows}"
             maps.append(heat(f"roll-by-{axis.name.replace(' ', '-')}", roll, across, side_of(axis), what))
     unlike = {example.cell.get("speed_kmh"): example for example in reversed(data.examples)}
     rides = list(reversed(unlike.values()))

@@ -103,7 +103,7 @@ def verdict_tiles(
     tiles = [Tile("IMUs that are enough", f"{len(enough)} of {count}", f"on the {mount}, with {best.label}")]
     asked = f"{100.0 * requirement.share:g} % of the devices stay below"
     if own["at_share"].notna().any():
-        least = own.loc[own["at_share"].idxmin()]
+        least = own.iloc[int(np.nanargmin(own["at_share"].to_numpy()))]
         note = f"{least['imu']}: {asked}; asked are {requirement.limit:g}{unit}"
         tiles.append(Tile("the best IMU", f"{significant(least['at_share'])}{unit}", note))
     floors = [style for style in styles if not style.uses_imu]

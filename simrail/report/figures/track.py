@@ -112,7 +112,7 @@ def profile_words(track: TrackDesign) -> str:
 
 def _profile(track: TrackDesign) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Distance, height and cant (positive with the right rail raised), m."""
-    s = np.linspace(track.start_m, track.end_m, 1200)
+    s = np.linspace(track.start_m, track.end_m, 700)
     frame = track.frame(s)
     return s, frame.position[:, 2], -track.rail_base_m * np.sin(frame.roll_rad)
 

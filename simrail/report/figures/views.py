@@ -28,8 +28,8 @@ from simrail.report.tables.geometry import JUDGED, QUANTITIES, is_zero
 from simrail.report.tables.methods import MethodStyle
 from simrail.track.bands import Band
 
-MOST_NUMBERS = 240_000
-"""In all views of a page: as base64 of float32, 1.3 MB."""
+MOST_NUMBERS = 130_000
+"""In all views of a page: as base64 of float32, 0.7 MB."""
 
 LEAST_BINS, MOST_BINS = 60, 1500
 """Of one view."""
@@ -321,11 +321,17 @@ def has_attitude(example: CellResult, name: str) -> bool:
     return found is not None and all(angle in found.states for angle in ATTITUDE)
 
 
-def bins_for(recordings: int, methods: int) -> int:
-    """Bins of each series, so that all views of a page hold at most `MOST_NUMBERS`."""
-    # Of a method some 5 lines of attitude and 6 of rails; 6 ranges of the IMU, and what the ride was like.
-    each = 22 * methods + 40
-    return int(np.clip(MOST_NUMBERS // max(recordings * each, 1), LEAST_BINS, MOST_BINS))
+def bins_for(recordings: int, methods: int, mappers: int) -> int:
+    """Bins of each series, so that all views of a page hold at most `MOST_NUMBERS`: the first, twice as many.
+
+    Parameters
+    ----------
+    recordings, methods, mappers : int
+        Views, methods in each, and how many of those say what the rails look like.
+    """
+    # A line has two numbers to a bin: 5 of attitude, 6 of rails and their intervals; 6 ranges of the IMU.
+    each = 10 * methods + 20 * mappers + 50
+    return int(np.clip(MOST_NUMBERS // ((recordings + 1) * each), LEAST_BINS, MOST_BINS // 2))
 
 
 # ---- as text, for the page

@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,12 @@ MOST_SLOTS = 12
 MOST_DOTS = 60
 """Recordings that are drawn of a method at an IMU, evenly by rank."""
 
+FEW = 12
+"""So many dots are drawn as marks, hollow for a baseline; more are small, and smaller for a baseline."""
+
+DOT = 0.003
+"""Half the length of the stroke that a dot is, in slots: what has no length would not be drawn."""
+
 MOST_NAMED = 4
 
 _WINDOWS = ("straight", "transition", "curve", "whole")
@@ -30,13 +37,13 @@ _WINDOWS = ("straight", "transition", "curve", "whole")
 def answer_section(data: PageData) -> list[Section]:
     """Make the section; none where requirements have their own, or nothing was scored."""
     if data.asks_of_ride:
-        case = next(iter(data.shown_cases), None)
-        tiles = running_tiles(case, derailment_limit=data.derailment_limit) if case else []
+        tiles = running_tiles(data.shown_cases[0], derailment_limit=data.derailment_limit)
         sentence = "; ".join(f"{tile.title} {tile.value} ({tile.note})" for tile in tiles[:3])
         if not tiles:
             return []
-        first = f"{sentence}." if len(data.shown_cases) == 1 else f"{case.labels['ride']}: {sentence}."
-        return [_section(first, tiles[:3], canvas.Drawing(), "")]
+        if len(data.shown_cases) > 1:
+            sentence = f"{data.shown_cases[0].labels['ride']}: {sentence}"
+        return [_section(f"{sentence}.", tiles[:3], canvas.Drawing(), "")]
     question = data.question
     if question is None or not question.ranked:
         return []
@@ -44,11 +51,11 @@ def answer_section(data: PageData) -> list[Section]:
     chart = canvas.drawn("answer", lambda: answer_chart(question, what=sentence))
     recordings = question.judged["cell"].nunique()
     many = f"A dot for each of {recordings:,} recordings" if recordings > 1 else "One recording"
+    ranked = ", at most 60 of a method by rank" if recordings > MOST_DOTS else ""
     caption = (
-        f"{question.words[:1].upper()}{question.words[1:]}. {many}"
-        f"{', at most 60 of a method by rank' if recordings > MOST_DOTS else ''}; hollow: baselines; dashed: "
-        "no IMU at all."
+        f"{question.words[:1].upper()}{question.words[1:]}. {many}{ranked}; hollow or small: baselines; "
     )
+    caption += "dashed: no IMU at all."
     return [_section(sentence, answer_tiles(question), chart, caption)]
 
 
@@ -103,7 +110,7 @@ def answer_tiles(question: Question) -> list[Tile]:
         note = "beats it" if beats else f"{zero / max(medians[slot], 1e-12):.1f} times as much"
         tiles.append(Tile("no IMU at all", question.said(zero), f"{floor.label}: {note}"))
     if count > 1:
-        worst = own.loc[own["value"].idxmax()]
+        worst = own.iloc[int(own["value"].to_numpy().argmax())]
         note = f"of {count:,} of the same, cell {worst['cell']}"
         tiles.append(Tile("worst recording", question.said(float(worst["value"])), note))
     else:
@@ -177,6 +184,13 @@ def _draw_dots(panel: Axes, own: pd.DataFrame, style: MethodStyle, middle: float
     shown = ranked[np.unique(np.linspace(0, len(ranked) - 1, MOST_DOTS).round().astype(int))]
     wide = min(0.62 / count, 0.006 * len(shown)) if len(shown) > 1 else 0.0
     x = middle + np.linspace(-0.5, 0.5, len(shown)) * wide if len(shown) > 1 else [middle]
-    face = "none" if style.baseline else style.colour
-    size = 4.6 if len(shown) < 12 else 2.6
-    panel.plot(x, shown, "o", ms=size, mfc=face, mec=style.colour, mew=0.8, zorder=3)
+    if len(shown) < FEW:
+        face = "none" if style.baseline else style.colour
+        panel.plot(x, shown, "o", ms=4.6, mfc=face, mec=style.colour, mew=0.8, zorder=3)
+        return
+    # Many dots as one line of very short strokes, whose ends are round: an element in place of sixty.
+    gap = np.full(len(shown), np.nan)
+    ends = np.column_stack((x - DOT, x + DOT, gap)).ravel()
+    size, alpha = (1.6, 0.8) if style.baseline else (3.0, 1.0)
+    dots: dict[str, Any] = {"lw": size, "alpha": alpha, "solid_capstyle": "round", "zorder": 3}
+    panel.plot(ends, np.repeat(shown, 3), color=style.colour, **dots)

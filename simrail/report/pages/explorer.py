@@ -21,7 +21,7 @@ from simrail.report.pages.section import PageData, Section
 from simrail.report.words.findings import one_of_each
 
 OPEN = (ERRORS, ATTITUDES)
-"""Groups of panels that are open at first where there are no rails."""
+"""Groups of panels that are open at first where the scenario does not ask for rails."""
 
 
 def explorer_section(data: PageData) -> list[Section]:
@@ -30,7 +30,8 @@ def explorer_section(data: PageData) -> list[Section]:
     if not views:
         return []
     off = [s.name for s in data.styles if s.baseline and s.uses_imu]
-    shown = explorer_data(views, data.looks, off=off)
+    first = (RAILS,) if data.asks_of_rails else OPEN
+    shown = explorer_data(views, data.looks, off=off, first=first)
     case = next(iter(data.shown_cases), None)
     unlike = one_of_each(case, data.styles) if case else data.styles
     kept = {style.name for style in data.kept_styles}
@@ -40,7 +41,11 @@ def explorer_section(data: PageData) -> list[Section]:
 
 
 def explorer_data(
-    views: Sequence[View], looks: Mapping[str, Look], *, off: Sequence[str] = ()
+    views: Sequence[View],
+    looks: Mapping[str, Look],
+    *,
+    off: Sequence[str] = (),
+    first: Sequence[str] = OPEN,
 ) -> dict[str, Any]:
     """What the template of an explorer shows.
 
@@ -52,9 +57,11 @@ def explorer_data(
         Of their series.
     off : sequence of str
         Series that are switched off at first.
+    first : sequence of str
+        Groups of panels that are open at first, of those that there are.
     """
     groups = list(dict.fromkeys(panel.group for panel in views[0].panels))
-    opened = [RAILS] if RAILS in groups else [group for group in OPEN if group in groups] or groups[:1]
+    opened = [group for group in first if group in groups] or groups[:1]
     used = {one.key for view in views for panel in view.panels for one in panel.series}
     data = {
         "looks": {
@@ -102,7 +109,7 @@ def distance_figures(data: PageData) -> list[tuple[str, canvas.Drawing]]:
     figures = []
     groups = {panel.group for panel in view.panels}
     for group, words in ((RAILS, "Rails"), (ERRORS, "Errors")):
-        if group not in groups:
+        if group not in groups or (group == RAILS and not data.asks_of_rails):
             continue
         caption = f"{words} over distance, {view.title}: {by_method}."
         keys = [style.name for style in leading]

@@ -217,9 +217,16 @@ def _scores(data: PageData) -> list[Section]:
         make = partial(bands_figure, first, data.styles, known=data.bands)
         drawings.append((BANDS_CAPTION, canvas.drawn("bands", make)))
     said = [] if first is None or campaign else _said(data, first)
-    words = {"rows": len(data.scores), "cases_left_out": max(len(cases) - MOST_TABLES, 0)}
-    words |= {"opened": not campaign, "indicators": _indicators(data)}
-    return [_section("scores", "Errors and scores", cases=shown, drawings=drawings, findings=said, **words)]
+    words = {
+        "cases": shown,
+        "drawings": drawings,
+        "findings": said,
+        "rows": len(data.scores),
+        "cases_left_out": max(len(cases) - MOST_TABLES, 0),
+        "opened": not campaign,
+        "indicators": _indicators(data),
+    }
+    return [Section("scores", "Errors and scores", "pages/sections/scores.html.j2", words)]
 
 
 def _indicators(data: PageData) -> dict[str, Any] | None:

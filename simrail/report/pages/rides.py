@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from simrail.campaign.cell import CellResult
+from simrail.report.figures.geometry import has_rails
 from simrail.report.figures.ride import direction_of, runs_of
 from simrail.report.figures.views import View, bins_for, ride_view
 from simrail.report.tables.methods import MethodStyle
@@ -48,7 +49,8 @@ def views_of(
     if question is not None and question.ranked:
         judged = question.judged
         errors = judged[judged["estimator"] == question.ranked[0].name].set_index("cell")["value"]
-    bins = bins_for(len(examples), len(styles))
+    rails = max((sum(has_rails(one, style) for style in styles) for one in examples), default=0)
+    bins = bins_for(len(examples), len(styles), rails)
     ordered = sorted(examples, key=lambda one: -float(errors.get(one.cell.get("cell"), -np.inf)))
     return [
         ride_view(
@@ -56,10 +58,10 @@ def views_of(
             styles,
             picks=_picks(example, errors, cells),
             facts=[*ride_facts(example), *vibration_facts(example.shaken)],
-            bins=bins,
+            bins=bins if place else 2 * bins,
             band=band,
         )
-        for example in ordered
+        for place, example in enumerate(ordered)
     ]
 
 
@@ -70,7 +72,7 @@ def shown_styles(
     question: Question | None,
     case: Case | None,
 ) -> list[MethodStyle]:
-    """Methods that are kept of each ride: the best under test, and the baselines; of alike ones the first.
+    """Methods that are kept of each ride: the best under test and a baseline of each kind; of alike ones one.
 
     Parameters
     ----------
@@ -87,8 +89,16 @@ def shown_styles(
     tested = [style for style in unlike if not style.baseline]
     tested.sort(key=lambda style: order.get(style.name, len(order)))
     kept = {style.name for style in tested[:MOST_TESTED]}
-    told_apart = {style.name for style in attitude}
-    return [s for s in unlike if s.name in kept or (s.baseline and s.name in told_apart)]
+    # Beside them what uses no IMU, the best one's own without compensation, and a general-purpose filter.
+    apart = [style for style in attitude if style.baseline]
+    twin = next((style.twin for style in tested if style.twin), "")
+    for group in (
+        [style for style in apart if not style.uses_imu],
+        [style for style in apart if style.name == twin],
+        [style for style in apart if style.baseline == "general purpose"],
+    ):
+        kept |= {style.name for style in group[:1]}
+    return [style for style in unlike if style.name in kept]
 
 
 def _picks(example: CellResult, errors: pd.Series, cells: pd.DataFrame) -> dict[str, str]:
@@ -106,11 +116,12 @@ def _picks(example: CellResult, errors: pd.Series, cells: pd.DataFrame) -> dict[
 
 def _rank_words(number: object, errors: pd.Series, cells: pd.DataFrame) -> str:
     """Which of the recordings of its case a cell is."""
-    if "case" not in cells or number not in errors.index:
+    known = {int(cell): float(error) for cell, error in errors.items()}  # type: ignore[call-overload]
+    if "case" not in cells or not isinstance(number, int) or number not in known:
         return ""
-    case = cells.set_index("cell")["case"]
-    own = errors[errors.index.map(case) == case[number]]
-    rank = int((own > errors[number]).sum()) + 1
+    case = dict(zip(cells["cell"], cells["case"], strict=True))
+    own = [error for cell, error in known.items() if case[cell] == case[number]]
+    rank = sum(error > known[number] for error in own) + 1
     if len(own) < 2:
         return ""
     return f"the worst of {len(own)}" if rank == 1 else f"number {rank} of {len(own)}, the worst first"

@@ -93,6 +93,11 @@ class PageData:
             self.scores, self.styles, attitude=self.attitude_styles, band=self.judged_band, known=self.bands
         )
 
+    @property
+    def asks_of_rails(self) -> bool:
+        """Whether rails are what is asked for."""
+        return self.question is not None and self.question.of_rails
+
     @cached_property
     def looks(self) -> dict[str, Look]:
         """Looks of all series over distance."""

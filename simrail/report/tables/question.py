@@ -23,6 +23,8 @@ UNLIKE = ("vehicle", "mount", "imu", "odometry", "track", "engine")
 IDEAL = "ideal"
 """Grade without errors: it is a floor, and no answer."""
 
+RAILS_UNIT = " mm"
+
 _ODOMETRY = "odometry:"
 
 
@@ -50,6 +52,11 @@ class Question:
     methods: list[MethodStyle]
     draws: pd.DataFrame
     window: str
+
+    @property
+    def of_rails(self) -> bool:
+        """Whether it asks what the rails look like."""
+        return self.unit == RAILS_UNIT
 
     @property
     def judged(self) -> pd.DataFrame:
@@ -122,7 +129,7 @@ def question_of(
         rows = _rows(scores, quantity, "sd", band)
         if rows["estimator"].isin(tested).any():
             where = f"in {band_words(band, known)}" if band != FULL else "unfiltered"
-            return _question(rows, f"error of the {QUANTITIES[quantity]} {where}, sd", " mm", shown)
+            return _question(rows, f"error of the {QUANTITIES[quantity]} {where}, sd", RAILS_UNIT, shown)
     rows = _rows(scores, "roll", "rms", FULL)
     odometries = _odometries(scores)
     if rows["estimator"].isin(tested).any() or (len(rows) and not odometries):
