@@ -60,6 +60,9 @@ _VARIABLES = {
     CURVE_TINT: "curve",
     TRANSITION_TINT: "transition",
     "#ffffff": "page",
+    "#dfe4ea": "line",
+    "#e8ebf0": "line",
+    "#dbe9f4": "tint",
     "#15803d": "good",
     "#b42318": "bad",
 }

@@ -1,6 +1,8 @@
 """The page of an IMU: its figures, and analytic beside simulated Allan deviation; one self-contained file."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from simrail.recording.sheets.allan import overlapping_allan
 from simrail.recording.sheets.figures import FIGURES
 from simrail.recording.sheets.grades import ImuGrade, silent_noise
 from simrail.recording.sheets.imu_file import ImuHead
-from simrail.report.figures.canvas import INK, legend_above, log_scale, look, panels, to_svg
+from simrail.report.figures.canvas import INK, drawn, legend_above, log_scale, look, panels, to_svg
 from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.imu_text import device_rows, triad_rows
 from simrail.sensors.imu import sample_imu
@@ -30,7 +32,7 @@ def write_imu_page(folder: Path, file: ImuHead, grade: ImuGrade, *, seed: int = 
         device=device_rows(grade),
         triads=triad_rows(grade),
         warnings=silent_noise(grade),
-        allan=allan_figure(grade, seed=seed),
+        allan=drawn("allan", partial(allan_figure, grade, *simulated_allan(grade, seed=seed))),
     )
     return write_page(folder, grade.name, text)
 
@@ -44,21 +46,31 @@ def at_rest(grade: ImuGrade, *, seconds: float, seed: int) -> pd.DataFrame:
     return sample_imu(motion, resting, seed=seed, draw=0, name="imu")[0]
 
 
-def allan_figure(grade: ImuGrade, *, seed: int) -> str:
-    """Allan deviation of one simulated hour, each axis, beside the closed form; "" if it shows nothing."""
+def simulated_allan(grade: ImuGrade, *, seed: int) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Averaging times (n,) s, and the Allan deviation (n,) of one simulated hour of each axis, SI.
+
+    The deviations are none if the device has no noise.
+    """
     whole = np.unique(np.rint(np.geomspace(1.0, 0.2 * HOUR_S * grade.rate_hz, 36)))
     tau: FloatArray = whole / grade.rate_hz
-    analytic = grade.allan(tau)
     frame = at_rest(grade, seconds=HOUR_S, seed=seed)
     if not (frame[list(IMU)].to_numpy() != frame[list(IMU)].iloc[0].to_numpy()).any():
+        return tau, {}
+    return tau, {name: overlapping_allan(frame[name].to_numpy(), grade.rate_hz, tau) for name in IMU}
+
+
+def allan_figure(grade: ImuGrade, tau: FloatArray, simulated: Mapping[str, FloatArray]) -> str:
+    """Allan deviation of each axis (`simulated_allan`), beside the closed form; "" if it shows nothing."""
+    if not simulated:
         return ""
+    analytic = grade.allan(tau)
     units = {"gyro": FIGURES["gyro_bias_instability_degph"], "accel": FIGURES["accel_bias_instability_ug"]}
     with look():
         figure, axes = panels([2.6, 2.6])
         for axis, kind, columns in zip(axes, ("gyro", "accel"), (GYRO, ACCEL), strict=True):
             unit = units[kind]
             for colour, column in zip(_COLOURS, columns, strict=True):
-                deviation = overlapping_allan(frame[column].to_numpy(), grade.rate_hz, tau) / unit.si
+                deviation = simulated[column] / unit.si
                 shown = deviation > 0.0
                 axis.plot(tau[shown], deviation[shown], ".", color=colour, label=column.split("_")[1])
             if np.any(analytic[kind] > 0.0):

@@ -375,7 +375,10 @@
     const svg = figure.querySelector("svg");
     const one = make("button", {type: "button", className: "save", textContent: "save as SVG"});
     one.addEventListener("click", () => {
-      const paper = {ink: "#1b2430", muted: "#667085", line: "#e4e7ec", page: "#ffffff"};
+      const paper = {
+        ink: "#1b2430", muted: "#667085", line: "#e4e7ec", axis: "#98a1af", page: "#ffffff",
+        curve: "#eef1e6", transition: "#f6f8f2", tint: "#dbe9f4", good: "#15803d", bad: "#b42318",
+      };
       const text = svg.outerHTML.replace(/var\(--([\w-]+)\)/g, (_, name) => paper[name] || css(`--${name}`));
       download(`${figure.dataset.name}.svg`, text);
     });
