@@ -80,22 +80,25 @@ def estimate_view(recording: Recording, estimate: Estimate) -> View:
 
 
 def _attitude(recording: Recording, estimate: Estimate, bins: Bins) -> Iterator[Panel]:
-    frame = recording.track.frame_extended(place_of(recording)[bins.first])
-    for name, sd, design in zip(
-        ATTITUDE, ATTITUDE_SD, (frame.roll_rad, frame.pitch_rad, frame.yaw_rad), strict=True
-    ):
+    frame = recording.track.frame_extended(place_of(recording))
+    designs = frame.roll_rad, frame.pitch_rad, frame.yaw_rad
+    for name, sd, design in zip(ATTITUDE, ATTITUDE_SD, designs, strict=True):
         if name not in estimate.states:
             continue
-        series = []
-        if recording.odometry is not None:
-            series.append(Series("design", y=np.repeat(np.rad2deg(bins.parted(design)), 2)))
-        angle = np.rad2deg(estimate.states[name].to_numpy(dtype=np.float64))
+        series, title = [], name.removesuffix("_rad")
+        angle = estimate.states[name].to_numpy(dtype=np.float64)
+        if recording.odometry is not None and title == "yaw":
+            # Yaw is the way of the line, beside which nothing would be seen of what the method does.
+            angle, title = (angle - design + np.pi) % (2.0 * np.pi) - np.pi, "yaw less design"
+        elif recording.odometry is not None:
+            series.append(Series("design", y=np.repeat(np.rad2deg(bins.parted(design[bins.first])), 2)))
+        angle = np.rad2deg(angle)
         if sd in estimate.states:
             wide = 1.96 * np.rad2deg(estimate.states[sd].to_numpy(dtype=np.float64))
             low, high = bins.envelope(angle - wide).mean, bins.envelope(angle + wide).mean
             series.append(Series(METHOD, low=low, high=high))
         series.append(line(METHOD, bins, angle))
-        yield Panel("attitude", name.removesuffix("_rad"), "\u00b0", "motion", tuple(series))
+        yield Panel("attitude", title, "\u00b0", "motion", tuple(series))
 
 
 def _rails(estimate: Estimate, axes: Axes) -> Iterator[Panel]:

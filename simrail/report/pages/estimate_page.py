@@ -8,10 +8,7 @@ import numpy as np
 from simrail.core.resample import GAPS
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording, odometry_of
-from simrail.report.figures import canvas
 from simrail.report.figures.estimate import estimate_looks, estimate_view, place_of, shown_bands
-from simrail.report.figures.panels import panels_figure
-from simrail.report.figures.views import View
 from simrail.report.pages.explorer import explorer_data
 from simrail.report.pages.frame import page_text
 from simrail.report.tables.geometry import BAND, indicator_table
@@ -20,9 +17,6 @@ from simrail.report.words.sentences import recording_facts
 from simrail.track.bands import BANDS
 
 MOST_GAPS = 20
-
-FIRST = ("attitude", "rails in D1")
-"""Groups of panels that have a figure of their own on the page."""
 
 
 def write_estimate_page(
@@ -54,21 +48,10 @@ def write_estimate_page(
         tiles=_tiles(recording, estimate, us_per_sample),
         facts=ride_facts(recording),
         data=shown["data"],
-        figures=[
-            (f"{group}: {label}, ride {recording.name}.", _figure(view, group, label))
-            for group in dict.fromkeys(panel.group for panel in view.panels)
-            if group in FIRST
-        ],
         quality=_quality(estimate),
         gaps=_gaps(recording),
     )
     path.write_text(text, encoding="utf-8")
-
-
-def _figure(view: View, group: str, label: str) -> canvas.Drawing:
-    what = f"{group} of ride {view.title} as {label} has it"
-    looks = estimate_looks(label)
-    return canvas.drawn(group.replace(" ", "-"), lambda: panels_figure(view, group, looks, what=what))
 
 
 def _quality(estimate: Estimate) -> Table | None:

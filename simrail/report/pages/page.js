@@ -258,6 +258,7 @@
         return one;
       }));
       facts.replaceChildren(...view.facts.map(fact => make("li", {textContent: fact})));
+      about.hidden = view.facts.length === 0;
       const panels = panelsOf();
       const tall = panels.length > 6 ? 78 : panels.length > 4 ? 96 : 120;
       box.replaceChildren(...panels.map((panel, i) => {
