@@ -16,6 +16,7 @@ from simrail.report.campaign.axes import CampaignAxis, draws_of, finest, held
 from simrail.report.figures.canvas import (
     INK,
     MUTED,
+    Drawing,
     add_panel,
     drawn,
     look,
@@ -140,7 +141,7 @@ def rails_figures(
     *,
     band: str,
     known: Mapping[str, Band],
-) -> list[tuple[str, str]]:
+) -> list[tuple[str, Drawing]]:
     """Caption and heat maps for each axis, methods by its values; [] if no method says what rails look like.
 
     Parameters

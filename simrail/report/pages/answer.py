@@ -183,7 +183,7 @@ def _draw_dots(panel: Axes, own: pd.DataFrame, style: MethodStyle, middle: float
         return
     shown = ranked[np.unique(np.linspace(0, len(ranked) - 1, MOST_DOTS).round().astype(int))]
     wide = min(0.62 / count, 0.006 * len(shown)) if len(shown) > 1 else 0.0
-    x = middle + np.linspace(-0.5, 0.5, len(shown)) * wide if len(shown) > 1 else [middle]
+    x = middle + wide * (np.linspace(-0.5, 0.5, len(shown)) if len(shown) > 1 else np.zeros(1))
     if len(shown) < FEW:
         face = "none" if style.baseline else style.colour
         panel.plot(x, shown, "o", ms=4.6, mfc=face, mec=style.colour, mew=0.8, zorder=3)
