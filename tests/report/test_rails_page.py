@@ -18,6 +18,7 @@ from simrail.estimation.estimate import Estimate
 from simrail.report.figures.canvas import fitting_columns, legend_above, look, panels
 from simrail.report.figures.geometry import lines_of, rails_figure, stretch_of, stretch_words
 from simrail.report.figures.track import profile_figure, profile_words
+from simrail.report.pages.answer import answer_sentence, answer_tiles
 from simrail.report.pages.explorer import stored_rides
 from simrail.report.pages.page import write_report
 from simrail.report.pages.rides import shown_styles
@@ -34,10 +35,9 @@ from simrail.report.tables.geometry import (
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases
-from simrail.report.tables.tiles import tiles
 from simrail.report.words.findings import alike, findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
-from simrail.report.words.sentences import degrees, significant, unbroken
+from simrail.report.words.sentences import significant, unbroken
 from simrail.results import describe
 from simrail.scenario.build import bands_by_name
 from simrail.scenario.scenario import Scenario, read_scenario
@@ -277,28 +277,33 @@ def test_a_drawn_legend_ends_within_the_figure() -> None:
 # ---- tiles, tables and sentences ---------------------------------------------------------------
 
 
-def test_tiles_tell_rails_first_and_nothing_twice(ran: Ran) -> None:
-    case = ran.cases[0]
-    told = tiles(case, ran.styles, known=ran.known)
-    assert [tile.title for tile in told] == [
-        "vertical profile error",
-        "cross-level error",
-        "alignment error",
-        "roll error in curves",
-        "position error",
-    ]
-    for quantity, tile in zip(JUDGED, told, strict=False):
-        sds = [case.get(name, quantity, "sd", band="paper").value for name in ("smoother", "camera_free")]
-        assert float(tile.value.split()[0]) == pytest.approx(min(sds), rel=6e-3, abs=6e-5)
-        zero = case.get("zero_track", quantity, "sd", band="paper").value
-        assert "paper (0.3\u20137 m)" in tile.note
-        assert float(tile.note.rpartition("no IMU: ")[2].split()[0]) == pytest.approx(zero, rel=6e-3)
-    assert len({(tile.title, tile.value) for tile in told}) == len(told)
-    design = case.get("design_angles", "roll", "rms", window="curve").value
-    assert told[3].note.endswith(f"; no IMU: {degrees(design)}")
-    # Without such a method nothing stands for it, least of all the method's uncompensated twin.
-    alone = [replace(ran.styles[0], twin="camera_free")]
-    assert "no IMU" not in tiles(case, alone, known=ran.known)[3].note
+def test_the_answer_is_of_the_rails_and_beside_no_imu(ran: Ran) -> None:
+    case, question = ran.cases[0], ran.data.question
+    assert question is not None and question.of_rails
+    best, without, second = answer_tiles(question)
+    sds = {
+        name: case.get(name, JUDGED[0], "sd", band="paper").value
+        for name in ("smoother", "camera_free", "zero_track")
+    }
+    least = min(sds, key=lambda name: sds[name])
+    assert best.note.startswith(least.replace("_", " "))
+    assert float(best.value.split()[0]) == pytest.approx(sds[least], rel=6e-3)
+    assert without.title == "no IMU at all" and without.note.startswith("zero track")
+    assert float(without.value.split()[0]) == pytest.approx(sds["zero_track"], rel=6e-3)
+    assert second.title == "the next best"
+    said = answer_sentence(question)
+    assert (
+        "vertical profile in paper (0.3\u20137 m), sd" in said
+        and f"no IMU at all has {without.value}" in said
+    )
+    # Where no IMU at all errs less, the sentence says so, and the tile.
+    worse = question.draws["value"].where(question.draws["estimator"] != "zero_track", 0.01)
+    lost = replace(question, draws=question.draws.assign(value=worse))
+    assert answer_sentence(lost).endswith("beaten by no IMU at all, 0.0100 mm.")
+    assert answer_tiles(lost)[1].note == "zero track: beats it"
+    # Without such a method nothing stands for it.
+    alone = replace(question, methods=[one for one in question.methods if one.uses_imu])
+    assert answer_sentence(alone).endswith("whether that beats no IMU at all was not run.")
 
 
 def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
