@@ -30,7 +30,7 @@ def explorer_section(data: PageData) -> list[Section]:
     if not views:
         return []
     off = [s.name for s in data.styles if s.baseline and s.uses_imu]
-    first = (RAILS,) if data.asks_of_rails else OPEN
+    first = (RAILS,) if data.asks_of_rails else ("ride", "forces") if data.asks_of_ride else OPEN
     shown = explorer_data(views, data.looks, off=off, first=first)
     case = next(iter(data.shown_cases), None)
     unlike = one_of_each(case, data.styles) if case else data.styles

@@ -336,5 +336,6 @@ def in_order(data: PageData) -> list[SectionMaker]:
     first = [] if requirements_of(data.scenario.spec) else [answer_section]
     if not data.asks_of_ride:
         return [*first, *SECTIONS]
-    places: dict[SectionMaker, int] = {_failures: -2, _running: -1, _scores: SECTIONS.index(_tracks)}
+    after = SECTIONS.index(_tracks) + 0.5
+    places: dict[SectionMaker, float] = {_failures: -2, _running: -1, _scores: after, campaign_section: after}
     return [*first, *sorted(SECTIONS, key=lambda make: places.get(make, SECTIONS.index(make)))]
