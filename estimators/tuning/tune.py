@@ -176,7 +176,14 @@ def _key(
         values = [getattr(recording, entry.name) for entry in fields(recording)]
         frames += [value for value in values if isinstance(value, pd.DataFrame)]
         plain = [value for value in values if not isinstance(value, pd.DataFrame)]
-        digest.update(repr([asdict(value) if is_dataclass(value) else value for value in plain]).encode())
+        digest.update(
+            repr(
+                [
+                    asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+                    for value in plain
+                ]
+            ).encode()
+        )
     for frame in frames:
         digest.update(repr(list(frame.columns)).encode() + frame.index.to_numpy().tobytes())
         digest.update(np.ascontiguousarray(frame.to_numpy(dtype=np.float64)).tobytes())

@@ -4,7 +4,6 @@ Scores come from the batches only. The examples for figures are cells run once m
 estimates is large, and no batch hands it on.
 """
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +13,8 @@ import pandas as pd
 
 from simrail.campaign.cell import STAGES, CellResult, Failure
 from simrail.campaign.checkpoint import Checkpoint
-from simrail.campaign.worker import BatchResult, example_of
+from simrail.campaign.examples import examples_of
+from simrail.campaign.worker import BatchResult
 from simrail.scenario.cells import Cell, cell_record, cells
 from simrail.scenario.check import Plan
 from simrail.scenario.requirements import VerdictState, looks_of, requirements_of, stop_rule_of
@@ -22,12 +22,6 @@ from simrail.scenario.stop_rule import StopState
 from simrail.scoring.ablations import without_ablations
 from simrail.scoring.table import concat_scores, in_order
 from simrail.scoring.verdicts import verdict_table
-
-EACH_MOUNT = ("veillard_2016",)
-"""Publications whose section draws a ride as each of its mounts recorded it."""
-
-MOST_EXAMPLES = 6
-"""Recordings that are kept for the report's figures, one per ride."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +35,7 @@ class CampaignResult:
     cells : pandas.DataFrame
         One row per cell: its labels, and the values of the scenario's axes under their dotted names.
     examples : list of CellResult
-        First draw of each ride, for figures.
+        Recordings for figures (`simrail.campaign.examples`).
     rides : list of dict
         What each engine said of its run; plain values.
     wall_s, cpu_s : dict of str to float
@@ -131,10 +125,11 @@ def gather(
             rides[result.ride_number] = result.ride
     table = pd.DataFrame.from_records([cell_record(cell) for cell in listed])
     drawn = set(without_ablations(table)["cell"]) if listed else set()
+    scores = in_order(concat_scores(result.scores for result in results))
     return CampaignResult(
-        scores=in_order(concat_scores(result.scores for result in results)),
+        scores=scores,
         cells=table,
-        examples=_examples(plan, packed, [cell for cell in listed if cell.number in drawn], failures),
+        examples=examples_of(plan, packed, [one for one in listed if one.number in drawn], scores, failures),
         rides=[rides[number] for number in sorted(rides)],
         wall_s={stage: sum(result.wall_s[stage] for result in results) for stage in STAGES},
         cpu_s={stage: sum(result.cpu_s[stage] for result in results) for stage in STAGES},
@@ -155,31 +150,3 @@ def _without_others(results: list[BatchResult], numbers: set[int]) -> list[Batch
         if numbers.intersection(result.cells):
             batches.append(result)
     return batches
-
-
-def _examples(plan: Plan, packed: bytes, listed: list[Cell], failures: list[Failure]) -> list[CellResult]:
-    """The first cell of each ride over the first draw that did not fail altogether, and of added noise.
-
-    Of each mount, where the publication beside it is of `EACH_MOUNT`.
-    """
-    failed = Counter(failure.cell for failure in failures)
-    by_mount = plan.scenario.spec.paper in EACH_MOUNT
-    shown: set[tuple[int, str]] = set()
-    noise_shown = False
-    examples: list[CellResult] = []
-    for cell in sorted(listed, key=lambda cell: cell.ride_number):
-        if len(examples) == MOST_EXAMPLES:
-            break
-        lost = failed[cell.number] >= len(plan.estimators)
-        key = cell.ride_number, cell.imu.name if by_mount else ""
-        first = key not in shown or (cell.imu.noise_added and not noise_shown)
-        if cell.track_draw == cell.sample == 0 and first and not lost:
-            shown.add(key)
-            noise_shown |= cell.imu.noise_added
-            try:
-                examples.append(example_of(packed, cell))
-            except OSError:
-                raise
-            except Exception:
-                continue
-    return examples

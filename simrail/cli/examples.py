@@ -11,6 +11,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "spectra": ("simrail spectra shaking",),
     "vehicle": ("simrail vehicle metro_irw_bogie", "simrail vehicle my_vehicle.toml --out page"),
     "imu": ("simrail imu lord_3dm_gx4_25", "simrail imu my_imu.toml --out page"),
+    "figure": ("simrail figure results/go20a", "simrail figure results/go20a answer --out answer.pdf"),
     "film": ("simrail film go20a --from 380 --to 600", "simrail film go20a --gif ride.gif"),
     "lesson": ("simrail lesson", "simrail lesson drift"),
     "new": ("simrail new scenario --out my_scenario.toml", "simrail new imu --out my_imu.toml"),

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from simrail.cli.examples import below
+from simrail.cli.figure import figure
 from simrail.cli.film import film
 from simrail.cli.grade import grade
 from simrail.cli.lesson import lesson
@@ -104,7 +105,7 @@ def _options(
 
 for _command in (
     *(run, check, grade, export, estimate, tune, sensitivity, spectra),
-    *(film, lesson, vehicle, imu, new, schema, cache),
+    *(figure, film, lesson, vehicle, imu, new, schema, cache),
 ):
     app.command(epilog=below(_command.__name__))(_command)
 app.command(name="list", epilog=below("list"))(list_parts)

@@ -109,7 +109,9 @@ def estimate(
             rms = design_difference_deg(recording, estimated, angle)
             print(f"{angle.removesuffix('_rad')} less design: {rms:.3f} deg rms")
     print("there is no truth beside a recording, hence no scores")
-    print(f"wrote {folder / f'estimate.{form}'} and {folder / 'estimate.html'}")
+    frames = [name for name in ("innovations", "geometry") if getattr(estimated, name) is not None]
+    files = [folder / f"{name}.{form}" for name in ("estimate", *frames)]
+    print(f"wrote {', '.join(str(file) for file in files)} and {folder / 'estimate.html'}")
     return DONE
 
 

@@ -24,7 +24,7 @@ from simrail.ride.ride import Ride
 from simrail.ride.truth import Truth
 from simrail.track.design import TrackDesign
 from simrail.track.laid_track import LaidTrack
-from simrail.vehicle.model import Body, VehicleModel
+from simrail.vehicle.model import Body, SeriesDamper, Suspension, Tabled, VehicleModel
 
 AXES = ("#0072B2", "#D55E00", "#009E73")
 """Colours of X, Y and Z."""
@@ -85,7 +85,7 @@ def _(x: TrackDesign) -> Figure:
     figure, axes = panels([2.2, 1.2, 1.2, 1.2])
     plan, rest = axes[0], axes[1:]
     plan.remove()
-    plan = figure.add_axes(plan.get_position(), label="plan")
+    plan = figure.add_axes(plan.get_position().bounds, label="plan")
     plan.plot(*frame.position[:, :2].T, color=INK)
     plan.plot(*frame.position[0, :2], "o", color=INK, ms=5)
     plan.set(xlabel="east, m", ylabel="north, m", title=f"{x.name}: plan, begins at the dot")
@@ -123,7 +123,7 @@ def _(x: LaidTrack) -> Figure:
 
 @_draw.register
 def _(x: VehicleModel) -> Figure:
-    joints = [*x.suspensions, *x.series, *x.tabled]
+    joints: list[Suspension | SeriesDamper | Tabled] = [*x.suspensions, *x.series, *x.tabled]
     half = x.wheel_rail.tape_circle_half_m
     parts = {
         body.name: [joint.position_m for joint in joints if body.name in (joint.inner, joint.outer)]
@@ -225,7 +225,9 @@ def _(x: Estimate, *, recording: Recording | None = None, truth: pd.DataFrame | 
     drawn = [f"{name}_rad" for name in ANGLES] + ["position_m", "speed_mps", "lateral_m", "vertical_m"]
     drawn = [name for name in drawn if name in x.states]
     if not drawn:
-        raise InputError("has no state that can be drawn", field="states", value=", ".join(x.states))
+        raise InputError(
+            "has no state that can be drawn", field="states", value=", ".join(map(str, x.states))
+        )
     across, label = _across(x, recording)
     every = max(1, len(x.states) // (4 * SMALL))
     figure, axes = panels([1.3] * len(drawn))

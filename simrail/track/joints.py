@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 from simrail.core.errors import InputError
 from simrail.track.elements import (
+    LEAST_LENGTH_M,
     MAX_CANT_PER_BASE,
+    MOST_LENGTH_M,
     RAIL_BASE_M,
     CantStation,
     Curve,

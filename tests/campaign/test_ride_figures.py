@@ -8,6 +8,8 @@ import pytest
 from rich.console import Console
 
 from simrail.cli.score_tables import print_scores
+from simrail.report.pages.answer import answer_section
+from simrail.report.pages.explorer import stored_rides
 from simrail.report.pages.page import SECTIONS, in_order
 from simrail.report.pages.section import PageData
 from simrail.report.tables.pivot import cases
@@ -120,23 +122,27 @@ def test_the_page_and_the_printed_lines(results, capsys):
 
 def test_the_page_begins_with_the_ride_where_no_method_is_under_test(results):
     page = (results.folder / "report.html").read_text(encoding="utf-8")
-    first, *anchors = re.findall(r'<h2 id="([\w-]+)"', page)
-    assert first == "failures"  # what a standing vehicle has not
-    rides = [name for name in anchors if name.startswith("ride-")]
-    assert anchors[0] == "running" and anchors[1 : 1 + len(rides)] == rides
-    assert anchors.index("track") < anchors.index("campaign") < anchors.index("scores")
-    of_ride = page[page.index('<h2 id="ride-out') : page.index('<h2 id="track"')]
-    places = [
-        of_ride.index(words) for words in ("least Q/Q", "True speed over distance", "Attitude over dist")
-    ]
-    assert places == sorted(places)
-    assert "Position error of the odometry" not in page  # it is the true one
+    anchors = re.findall(r'<(?:h2|details class="part") id="([\w-]+)"', page)
+    assert anchors[:4] == [
+        "answer",
+        "failures",
+        "running",
+        "explorer",
+    ]  # failed: what a standing vehicle has not
+    assert anchors.index("track") < anchors.index("scores") < anchors.index("campaign")
+    answer = page[page.index('id="answer"') : page.index('id="failures"')]
+    assert "least Q/Q" in answer and "greatest Y/Q" in answer
+    views, _ = stored_rides(page)
+    titles = [panel.title for view in views for panel in view.panels]
+    assert {"speed", "Q", "Y/Q"} <= set(titles)
+    assert "position error of the odometry" not in titles  # it is the true one
 
 
 def test_the_page_of_a_method_under_test_keeps_its_order(results):
     scenario = SimpleNamespace(scores=results.campaign.scores, styles=[SimpleNamespace(baseline="")])
-    assert not PageData.asks_of_ride.fget(scenario)
-    assert in_order(SimpleNamespace(asks_of_ride=False)) == list(SECTIONS)
+    assert not PageData.asks_of_ride.func(scenario)
+    page = SimpleNamespace(asks_of_ride=False, scenario=results.scenario)
+    assert in_order(page) == [answer_section, *SECTIONS]
 
 
 def test_the_table_of_the_page_holds_y_over_q_against_the_limit_of_the_scenario(results):

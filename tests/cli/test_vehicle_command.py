@@ -42,7 +42,8 @@ def test_prints_what_is_asked_of_a_vehicle(bogie: tuple[str, str, float]) -> Non
 
 def test_page_stands_alone_and_shows_three_figures(bogie: tuple[str, str, float]) -> None:
     page = bogie[1]
-    assert page.count("<svg") == 3 and "<script" not in page
+    assert page.count('role="img" aria-label') == 2 * 3, "for a desk and for a phone"
+    assert page.count("<script") == 1 and "fetch(" not in page
     assert "No equivalent conicity is given" in page
     assert "What is reduced" in page and "trailing arms" not in page  # it has none
     assert not re.search(r"""(?:src|href)=["'](?:https?:)?//""", page)

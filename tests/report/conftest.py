@@ -179,7 +179,7 @@ def tables() -> Callable[..., tuple[pd.DataFrame, pd.DataFrame]]:
 def no_pictures_of_rides() -> Iterator[None]:
     """Pages without the sections on single rides and tracks, whose pictures take half of their time."""
     with pytest.MonkeyPatch.context() as patch:
-        pictures = (page.ride_sections, page._tracks)
+        pictures = (page.explorer_section, page._tracks)
         patch.setattr(page, "SECTIONS", tuple(make for make in page.SECTIONS if make not in pictures))
         yield
 

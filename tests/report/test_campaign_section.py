@@ -304,7 +304,10 @@ def test_rails_are_mapped_in_the_band_that_counts(small: Scores, styles: list[Me
     captions = [caption for caption, _ in made]
     assert ["speed and direction" in captions[0], "IMU" in captions[1]] == [True, True]
     assert len(made) == 3 and all("in wavelengths of 3\u201325 m (D1)" in caption for caption in captions)
+    assert captions[0].endswith("mean over draws and ways to ride; IMU tactical.")
+    assert "tactical" not in captions[1], "IMUs are never averaged over: one is held, or all are shown"
     plain = roll(small)
+    plain = plain[plain["imu"] == "tactical"]
     for speed in SPEEDS:
         at = (plain["speed_kmh"] == speed) & (plain["direction"] == "forward")
         mean = plain.loc[at & (plain["estimator"] == styles[0].name), "value"].mean()
@@ -365,7 +368,7 @@ def test_pairs_compare_the_same_recordings(small: Scores, tables: Frames) -> Non
 def test_worst_cells_are_the_worst_and_say_how_to_make_them_again(small: Scores, tables: Frames) -> None:
     cells, plain = small[1], roll(small)
     ours = plain[plain["estimator"] == "ekf_compensated"].sort_values("value", ascending=False)
-    assert tables["worst"]["cell"].tolist() == ours["cell"].head(3).tolist()
+    assert tables["worst"]["cell"].tolist() == ours["cell"].head(1).tolist(), "one of each method"
     assert set(tables["worst"]["method"]) == {"ekf_compensated"}  # baselines have no worst cells
     for row in tables["worst"].to_dict("records"):
         cell = cells[cells["cell"] == row["cell"]].iloc[0]
@@ -419,12 +422,14 @@ def test_the_page_has_the_section_and_its_tables(small_page: Path) -> None:
     for words in (
         'id="campaign"',
         "864 cells over",
-        "Attitude, IMU by IMU",
+        "Attitude, consumer",
+        "Attitude, tactical",
         "Pairs of methods",
         "Consistency",
-        "Worst cells",
+        "Worst cell of each method",
+        "R \u2212150",
         "--cell ",
-        CURVES[0].removeprefix("curve:"),
+        "R +300",
     ):
         assert words in page, words
     assert {path.suffix for path in (small_page.parent / TABLES).iterdir()} == {".csv", ".tex"}
@@ -461,7 +466,7 @@ def test_methods_that_fail_leave_the_rest_standing(made_up: Scenario, small: Sco
 
 
 @pytest.mark.slow
-def test_a_million_rows_are_read_and_shown_within_half_a_minute(made_up: Scenario, tmp_path: Path) -> None:
+def test_a_million_rows_are_read_and_shown_within_twenty_seconds(made_up: Scenario, tmp_path: Path) -> None:
     """Processor time, since the machine is shared."""
     scores, cells = campaign(tracks=10, sensors=25)
     assert len(scores) > 1_000_000 and set(scores["estimator"]) == set(METHODS)
@@ -469,5 +474,6 @@ def test_a_million_rows_are_read_and_shown_within_half_a_minute(made_up: Scenari
     cells.to_parquet(tmp_path / "cells.parquet")
     begun = time.process_time()
     read = pd.read_parquet(tmp_path / "scores.parquet"), pd.read_parquet(tmp_path / "cells.parquet")
-    page_of(made_up, *read, tmp_path)
-    assert time.process_time() - begun < 30.0
+    page = page_of(made_up, *read, tmp_path)
+    assert time.process_time() - begun < 20.0
+    assert len(page) < 2_000_000, "however large the campaign is"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 
 import numpy as np
@@ -37,7 +36,7 @@ def test_sentences_are_looked_up_in_the_scores(scenario: Scenario, example: Ride
         in text
     )
     assert "beats EKF compensated in roll" not in text
-    assert re.search(r"Of the baselines.*plain filter in roll \(0.250\u00b0 against 0.500\u00b0 rms\)", text)
+    assert "beats plain filter" not in text and "beats VQF" not in text, "baselines against a baseline"
     assert "VQF is worse than EKF compensated in roll: 0.400\u00b0 against 0.100\u00b0 rms" in text
     assert "No ideal IMU was run" in text
     assert "odometry 'encoder'; its position error is 0.500 m rms" in text

@@ -15,6 +15,7 @@ import pytest
 from simrail.campaign.cell import CellResult
 from simrail.core.columns import ACCEL, GYRO, IMU
 from simrail.estimation.estimate import Estimate
+from simrail.report.pages.explorer import stored_rides
 from simrail.report.pages.page import write_report
 from simrail.report.words.sentences import axis_words
 from simrail.scenario.scenario import Scenario
@@ -77,11 +78,14 @@ def test_page_is_well_formed_and_self_contained(page: str) -> None:
     checker.feed(page)
     assert checker.open == []
     assert checker.sources == [], "nothing may be fetched"
-    assert "<script" not in page and "@import" not in page and "<link" not in page
+    assert "@import" not in page and "<link" not in page
+    # What explores the rides: its numbers, and the page's own script, which fetches nothing either.
+    assert re.findall(r"<script[^>]*>", page) == ['<script type="application/json" id="rides">', "<script>"]
+    assert not re.search(r"fetch\(|XMLHttpRequest|import\(|https?://(?!www\.w3\.org)", page)
     assert checker.wanted <= set(checker.ids)
-    sections = [name for name in checker.ids if not re.fullmatch(r"[a-z]?[0-9a-f]{8,}", name)]
-    anchors = [name for name in sections if name in {"track", "scores", "odometry", "parts", "again"}]
-    assert len(anchors) == len(set(anchors)) == 5
+    anchors = re.findall(r'<a href="#([^"]*)">', page[: page.index("<main>")])
+    assert anchors == ["answer", "scores", "explorer", "track", "odometry", "words", "parts", "again"]
+    assert all(checker.ids.count(name) == 1 for name in anchors)
 
 
 def test_text_of_a_person_is_escaped(page: str) -> None:
@@ -90,33 +94,40 @@ def test_text_of_a_person_is_escaped(page: str) -> None:
 
 def test_page_holds_every_part(page: str) -> None:
     for part in (
-        "Plan, turned",
-        "curvature",
-        "True speed",
-        "What the IMU recorded",
-        "Attitude over distance",
-        "with and without compensation",
+        "best with an IMU",
+        "no IMU at all",
         "Errors over distance",
-        "Position error",
+        "What the scores say",
         "Against the truth",
         "Against the design angles",
         "Consistency and time",
+        "Plan, turned",
+        "curvature",
         "Parts and sources",
         "simrail run test",
     ):
         assert part in page, part
-    assert page.count("<svg") == 2 * 8 + 2
-    assert "nan" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL).lower().split()
+    # The answer, errors over distance, plan and profile: each for a desk and for a phone.
+    assert page.count('<svg viewBox="0') == 2 * 4
+    assert "nan" not in re.sub(r"<(style|script).*?</\1>", "", page, flags=re.DOTALL).lower().split()
+
+
+def test_what_a_paper_has_is_told_on_its_own_page_only(page: str) -> None:
+    assert "as Fig" not in page
 
 
 def test_direction_of_travel_is_stated(page: str) -> None:
-    forward, back = page.split('id="ride-back')
-    assert (
-        "towards increasing distance" in forward
-        and "travel \u2192" in forward
-        and "\u2190 travel" not in forward
-    )
-    assert "towards decreasing distance" in back and "\u2190 travel" in back
+    (forward, back), _ = stored_rides(page)
+    assert forward.travel == 1 and any("towards increasing distance" in fact for fact in forward.facts)
+    assert back.travel == -1 and any("towards decreasing distance" in fact for fact in back.facts)
+
+
+def test_drawings_say_the_headline_number_and_follow_dark_mode(page: str) -> None:
+    alt = re.search(r'data-name="answer">\s*<div class="wide"><svg[^>]*aria-label="([^"]*)"', page)
+    assert alt is not None and "EKF compensated, 0.1" in alt[1]
+    svg = page[alt.start() : page.index("</svg>", alt.start())]
+    assert "var(--ink)" in svg and "#1b2430" not in svg
+    assert "prefers-color-scheme: dark" in page
 
 
 def test_what_is_synthetic_is_called_so(page: str) -> None:

@@ -16,10 +16,12 @@ from simrail.campaign.campaign import run_campaign
 from simrail.campaign.cell import CellResult
 from simrail.estimation.estimate import Estimate
 from simrail.report.figures.canvas import fitting_columns, legend_above, look, panels
-from simrail.report.figures.geometry import rails_figure, stretch_of, stretch_words
+from simrail.report.figures.geometry import lines_of, rails_figure, stretch_of, stretch_words
 from simrail.report.figures.track import profile_figure, profile_words
+from simrail.report.pages.answer import answer_sentence, answer_tiles
+from simrail.report.pages.explorer import stored_rides
 from simrail.report.pages.page import write_report
-from simrail.report.pages.ride import geometry_view, ride_data
+from simrail.report.pages.rides import shown_styles
 from simrail.report.pages.section import PageData
 from simrail.report.papers.gonzalez_2023.parts import PAPER
 from simrail.report.papers.gonzalez_2023.section import FULL_SIZE, SCALED, peak_of, section
@@ -33,10 +35,9 @@ from simrail.report.tables.geometry import (
 )
 from simrail.report.tables.methods import MethodStyle, attitude_methods, method_styles
 from simrail.report.tables.pivot import Case, Mean, cases
-from simrail.report.tables.tiles import tiles
 from simrail.report.words.findings import alike, findings, one_of_each
 from simrail.report.words.geometry_findings import geometry_findings
-from simrail.report.words.sentences import degrees, significant, unbroken
+from simrail.report.words.sentences import significant, unbroken
 from simrail.results import describe
 from simrail.scenario.build import bands_by_name
 from simrail.scenario.scenario import Scenario, read_scenario
@@ -198,19 +199,31 @@ def test_captions_say_how_long_a_stretch_is(ran: Ran) -> None:
 
 
 def test_no_figure_of_rails_leaves_the_track(ran: Ran) -> None:
-    view = geometry_view(ran.example, ran.cases[0], ran.styles, limits={}, known=ran.known)
-    assert view is not None and len(view["rails"]) == 2
-    captions = [stretch for _, stretch, _ in view["rails"]]
-    assert "all 88 m of the ride, unfiltered" in captions[0]
-    assert "35 m in the middle of the ride in wavelengths of 0.3\u20137 m (paper)" in captions[1]
+    views, _ = stored_rides(ran.page)
+    titles = [panel.title for panel in views[0].panels if panel.axis == "rails"]
+    assert titles[:3] == [f"{words} in paper" for words in ("vertical profile", "cross-level", "alignment")]
+    assert titles[3:] == ["vertical profile", "cross-level", "alignment"], "and unfiltered"
+    for view in views:
+        places = view.axes["rails"][0]
+        assert np.nanmin(places) > -0.1 and 85.0 < np.nanmax(places) < 90.1
     drawings = ran.paper["drawings"]
     assert len(drawings) == 2
-    for *_, svg in [*view["rails"], *drawings]:
+    for _, svg in drawings:
         places = places_of(str(svg))
         assert max(places) > 30.0
         assert min(places) > -20.0 and max(places) < 90.0
     assert "60 m in the middle of the ride out" in drawings[0][0]
-    assert "0.3\u20137 m" in view["bands"], "the panels of the bands tell wavelengths"
+    assert "0.3\u20137 m" in ran.page, "the panels of the bands tell wavelengths"
+
+
+def test_the_truth_of_rails_lies_within_the_numbers_that_the_page_keeps(ran: Ran) -> None:
+    """Extremes of the bins are those of the rails, and the page's numbers are theirs."""
+    views, _ = stored_rides(ran.page)
+    (panel,) = [one for one in views[0].panels if one.title == "alignment"]
+    true = next(one.y for one in panel.series if one.key == "truth")
+    assert true is not None
+    _, known, _, _ = lines_of(ran.example, "smoother", "alignment", None)
+    assert [true.min(), true.max()] == pytest.approx([known.min(), known.max()], rel=1e-6)
 
 
 def test_a_stretch_that_is_too_long_would_be_seen(ran: Ran) -> None:
@@ -264,28 +277,33 @@ def test_a_drawn_legend_ends_within_the_figure() -> None:
 # ---- tiles, tables and sentences ---------------------------------------------------------------
 
 
-def test_tiles_tell_rails_first_and_nothing_twice(ran: Ran) -> None:
-    case = ran.cases[0]
-    told = tiles(case, ran.styles, known=ran.known)
-    assert [tile.title for tile in told] == [
-        "vertical profile error",
-        "cross-level error",
-        "alignment error",
-        "roll error in curves",
-        "position error",
-    ]
-    for quantity, tile in zip(JUDGED, told, strict=False):
-        sds = [case.get(name, quantity, "sd", band="paper").value for name in ("smoother", "camera_free")]
-        assert float(tile.value.split()[0]) == pytest.approx(min(sds), rel=6e-3, abs=6e-5)
-        zero = case.get("zero_track", quantity, "sd", band="paper").value
-        assert "paper (0.3\u20137 m)" in tile.note
-        assert float(tile.note.rpartition("no IMU: ")[2].split()[0]) == pytest.approx(zero, rel=6e-3)
-    assert len({(tile.title, tile.value) for tile in told}) == len(told)
-    design = case.get("design_angles", "roll", "rms", window="curve").value
-    assert told[3].note.endswith(f"; no IMU: {degrees(design)}")
-    # Without such a method nothing stands for it, least of all the method's uncompensated twin.
-    alone = [replace(ran.styles[0], twin="camera_free")]
-    assert "no IMU" not in tiles(case, alone, known=ran.known)[3].note
+def test_the_answer_is_of_the_rails_and_beside_no_imu(ran: Ran) -> None:
+    case, question = ran.cases[0], ran.data.question
+    assert question is not None and question.of_rails
+    best, without, second = answer_tiles(question)
+    sds = {
+        name: case.get(name, JUDGED[0], "sd", band="paper").value
+        for name in ("smoother", "camera_free", "zero_track")
+    }
+    least = min(sds, key=lambda name: sds[name])
+    assert best.note.startswith(least.replace("_", " "))
+    assert float(best.value.split()[0]) == pytest.approx(sds[least], rel=6e-3)
+    assert without.title == "no IMU at all" and without.note.startswith("zero track")
+    assert float(without.value.split()[0]) == pytest.approx(sds["zero_track"], rel=6e-3)
+    assert second.title == "the next best"
+    said = answer_sentence(question)
+    assert (
+        "vertical profile in paper (0.3\u20137 m), sd" in said
+        and f"no IMU at all has {without.value}" in said
+    )
+    # Where no IMU at all errs less, the sentence says so, and the tile.
+    worse = question.draws["value"].where(question.draws["estimator"] != "zero_track", 0.01)
+    lost = replace(question, draws=question.draws.assign(value=worse))
+    assert answer_sentence(lost).endswith("beaten by no IMU at all, 0.0100 mm.")
+    assert answer_tiles(lost)[1].note == "zero track: beats it"
+    # Without such a method nothing stands for it.
+    alone = replace(question, methods=[one for one in question.methods if one.uses_imu])
+    assert answer_sentence(alone).endswith("whether that beats no IMU at all was not run.")
 
 
 def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
@@ -362,28 +380,27 @@ def test_a_goal_is_asked_of_d1_alone() -> None:
 def test_the_page_has_every_sentence_once_and_rails_before_the_attitude(ran: Ran) -> None:
     said = re.findall(r'<li class="(?:good|bad|note)">(.*?)</li>', ran.page)
     assert len(said) == len(set(said))
-    ride = ran.page[ran.page.index('id="ride-out') :]
     order = [
-        ride.index(words)
+        ran.page.index(words)
         for words in (
-            "vertical profile error",
+            "rror of the vertical profile in paper",
+            "Rails over distance",
+            "Errors over distance",
             "What the scores say",
             "the vertical profile of smoother is off by",
             "The attitudes of smoother and camera free differ by less than 1\u00a0%",
-            "What the rails look like",
-            "Attitude, by kind of track",
-            "Attitude over distance",
+            'id="explorer"',
         )
     ]
     assert order == sorted(order)
-    assert "smoother and 1 alike" in ride and "400 m" not in ran.page
+    assert "smoother and 1 alike" in ran.page
     assert "The track here is 1:10 as well." in ran.page
     assert "1 ride, 1 IMU in 2 grades" in ran.page
     assert re.search(r"0\.\d+\u00a0mm", ran.page) and not re.search(r"is off by 0\.\d+ mm", ran.page)
 
 
 def test_the_words_of_the_page_are_told_once_with_the_bands_of_the_scenario(ran: Ran) -> None:
-    words = ran.page.partition('<h2 id="words">')[2].partition("<h2 ")[0]
+    words = ran.page.partition('id="words">')[2].partition("</details>")[0]
     told = re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", words)
     assert len({name for name, _ in told}) == len(told)
     by_name = dict(told)
@@ -400,22 +417,19 @@ def test_one_line_stands_for_all_that_are_alike(ran: Ran) -> None:
     assert labels == ["smoother and 1 alike", "design angles", "zero track"]
 
 
-def test_beside_rails_few_attitudes_are_drawn_and_the_rest_counted(
+def test_few_methods_are_kept_of_each_ride_and_the_rest_counted(
     ran: Ran, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for other in ("rms", "curves", "speed", "imu", "error", "odometry"):
-        monkeypatch.setattr(f"simrail.report.pages.ride.{other}_figure", lambda *_, **__: "")
-    monkeypatch.setattr("simrail.report.pages.ride.geometry_view", lambda *_, **__: "rails")
+    def kept() -> list[str]:
+        styles = shown_styles(ran.styles, attitude=ran.styles, question=ran.data.question, case=ran.cases[0])
+        return [style.name for style in styles if not style.baseline]
 
-    def drawn() -> tuple[int, bool]:
-        shown = ride_data(ran.data, ran.example)
-        return shown["left_out"], "camera free" in shown["attitude"]
-
-    assert drawn() == (0, False), "it is alike to the smoother"
-    monkeypatch.setattr("simrail.report.pages.ride.one_of_each", lambda _, styles: styles)
-    assert drawn() == (0, True)
-    monkeypatch.setattr("simrail.report.pages.ride.MOST_DRAWN", 1)
-    assert drawn() == (1, False)
+    assert kept() == ["smoother"], "the other is alike to it"
+    assert "more methods under test are in the tables only" not in ran.page
+    monkeypatch.setattr("simrail.report.pages.rides.one_of_each", lambda _, styles: styles)
+    assert kept() == ["smoother", "camera_free"]
+    monkeypatch.setattr("simrail.report.pages.rides.MOST_TESTED", 1)
+    assert len(kept()) == 1
 
 
 def test_only_what_is_drawn_beside_the_paper_has_a_colour_in_its_table(ran: Ran) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.report.campaign.verdicts import decision_chart, overview
+from simrail.report.campaign.verdicts import decision_chart, groups_of, overview, verdict_tiles
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.words.verdicts import best_method, devices_words, verdict_sentence
 from simrail.scoring.requirement import Requirement
@@ -92,3 +92,13 @@ def test_the_chart_has_a_stroke_for_each_device_and_the_limit() -> None:
 def test_a_verdict_can_fall(verdict: str) -> None:
     own = verdicts(one=(verdict, 0.97))
     assert f": {verdict}: one." in verdict_sentence(own[own["mount"] == "axle"], STYLES)
+
+
+def test_the_tiles_say_how_many_are_enough_and_whether_no_imu_beats_them() -> None:
+    enough, best, without = verdict_tiles(groups_of(TABLE), STYLES, [WANTED])
+    assert (enough.value, enough.note) == ("1 of 3", "on the axle, with good")
+    assert best.value == "0.100\u00b0" and "asked are 0.1\u00b0" in best.note
+    assert without.value == "0.100\u00b0" and "beats" not in without.note
+    better = TABLE.assign(at_share=TABLE["at_share"].where(TABLE["estimator"] != "design", 0.02))
+    *_, without = verdict_tiles(groups_of(better), STYLES, [WANTED])
+    assert without.note == "beats every IMU"

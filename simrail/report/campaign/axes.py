@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from simrail.report.tables.question import UNLIKE
 from simrail.report.words.ablations import value_words
 from simrail.report.words.sentences import axis_name
 from simrail.scenario.axes import axes_of
@@ -120,6 +121,40 @@ def draws_of(
 def beside_ablations(axes: Sequence[CampaignAxis]) -> list[CampaignAxis]:
     """The axes but those of ablations."""
     return [axis for axis in axes if axis.column not in COLUMNS]
+
+
+@dataclass(frozen=True)
+class Held:
+    """Values of what somebody chooses, at which a figure over other axes is held: it is never averaged over.
+
+    Attributes
+    ----------
+    values : dict of str to object
+        By column of the table of cells.
+    words : str
+        The same for a caption; "" if nothing is held.
+    """
+
+    values: dict[str, object]
+    words: str
+
+    def of(self, draws: pd.DataFrame) -> pd.DataFrame:
+        """Draws at these values."""
+        for column, value in self.values.items():
+            draws = draws[draws[column] == value]
+        return draws
+
+
+def held(axes: Sequence[CampaignAxis], *shown: CampaignAxis) -> Held:
+    """Hold what somebody chooses, but what is shown: at its first value that is no ideal."""
+    columns = {axis.column for axis in shown}
+    values, words = {}, []
+    for axis in axes:
+        if axis.column in UNLIKE and axis.column not in columns:
+            real = next((value for value in axis.values if value != "ideal"), axis.values[0])
+            values[axis.column] = real
+            words.append(f"{axis.name} {axis.word_of(real)}")
+    return Held(values, ", ".join(words))
 
 
 def along(draws: pd.DataFrame, axis: CampaignAxis) -> pd.DataFrame:

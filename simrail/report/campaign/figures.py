@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from simrail.campaign.cell import CellResult
 from simrail.core.jit import FloatArray
-from simrail.report.campaign.axes import CampaignAxis, along
+from simrail.report.campaign.axes import CampaignAxis, along, held
 from simrail.report.figures import canvas
 from simrail.report.figures.attitude import angle_error
 from simrail.report.tables.methods import MethodStyle
@@ -28,7 +28,10 @@ MOST_IN_ONE_LINE = 4
 def box_figure(
     draws: pd.DataFrame, styles: Sequence[MethodStyle], axes: Sequence[CampaignAxis], *, what: str
 ) -> str:
-    """How the figure spreads over all cells with a value of an axis, for each axis a panel."""
+    """How the figure spreads over cells with a value of an axis, for each axis a panel.
+
+    What somebody chooses is held (`simrail.report.campaign.axes.held`) but along its own axis.
+    """
     styles = [style for style in styles if (draws["estimator"] == style.name).any()]
     positive = draws.loc[draws["value"] > 0.0, "value"]
     if not styles or not axes or positive.empty:
@@ -38,7 +41,7 @@ def box_figure(
     with canvas.look():
         figure, panels = canvas.panels_beside(len(axes), tall_in=2.2, across=across, gap_in=0.7, right_in=0.2)
         for number, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
-            _draw_boxes(panel, along(draws, axis), styles, axis)
+            _draw_boxes(panel, held(axes, axis).of(along(draws, axis)), styles, axis)
             panel.set_ylim(*limits)
             canvas.log_scale(panel.yaxis)
             if number % across == 0:

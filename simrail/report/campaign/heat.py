@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -11,16 +12,17 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.campaign.axes import CampaignAxis, draws_of, finest
+from simrail.report.campaign.axes import CampaignAxis, draws_of, finest, held
 from simrail.report.figures.canvas import (
     INK,
     MUTED,
-    WIDTH_IN,
+    Drawing,
     add_panel,
-    log_ticks,
+    drawn,
     look,
     panels_beside,
     to_svg,
+    width_in,
 )
 from simrail.report.tables.geometry import JUDGED, QUANTITIES, waves_words
 from simrail.report.tables.methods import MethodStyle
@@ -30,6 +32,9 @@ HEAT = LinearSegmentedColormap.from_list(
     "heat", ["#f4f8fb", "#cfe1ee", "#93bfdb", "#4a92c3", "#1c639c", "#0a3560"], N=64
 )
 """One hue, from light to dark: more error is darker, in print as well."""
+
+MOST_CELLS = 800
+"""Of all maps of a figure: of more, nobody reads the numbers, and files hold them."""
 
 CELL_IN = (0.46, 0.27)
 """Least width and height of a cell of a heat map: its number must be read."""
@@ -90,14 +95,14 @@ def heat_maps(
     tables = [(title, table) for title, table in tables if np.isfinite(table).any()]
     shown = np.array([table for _, table in tables])
     positive = shown[np.isfinite(shown) & (shown > 0.0)]
-    if len(positive) == 0:
+    if len(positive) == 0 or shown.size > MOST_CELLS:
         return ""
     low, high = float(positive.min()), float(positive.max())
     norm = LogNorm(low, max(high, 1.05 * low))
     left, right, gap, title_in = 0.35 + 0.075 * max(len(word) for word in down.words), 0.85, 0.22, 0.34
     wide = max(CELL_IN[0], 0.075 * max(len(word) for word in across.words)) * len(across.words)
     tall = CELL_IN[1] * len(down.words)
-    room = WIDTH_IN - left - right
+    room = width_in() - left - right
     per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
     rows = -(-len(tables) // per_row)
     per_row = -(-len(tables) // rows)
@@ -109,7 +114,7 @@ def heat_maps(
             tall_in=tall,
             across=per_row,
             left_in=left,
-            right_in=WIDTH_IN - end + gap,
+            right_in=width_in() - end + gap,
             top_in=title_in,
             gap_in=gap,
             row_gap_in=title_in,
@@ -136,7 +141,7 @@ def rails_figures(
     *,
     band: str,
     known: Mapping[str, Band],
-) -> list[tuple[str, str]]:
+) -> list[tuple[str, Drawing]]:
     """Caption and heat maps for each axis, methods by its values; [] if no method says what rails look like.
 
     Parameters
@@ -161,20 +166,25 @@ def rails_figures(
     if not shown:
         return []
     down = Side("method", [(s.name,) for s in shown], [s.label for s in shown], ["estimator"])
-    by_column = {axis.column: axis for axis in finest(axes, cells)}
-    sides = {}
+    fine = finest(axes, cells)
+    by_column = {axis.column: axis for axis in fine}
+    sides: dict[str, tuple[CampaignAxis, ...]] = {}
     if "speed_kmh" in by_column and "direction" in by_column:
         both = by_column.pop("speed_kmh"), by_column.pop("direction")
-        sides["speed and direction of travel"] = side_of(*both)
-    sides |= {axis.name: side_of(axis) for axis in by_column.values()}
-    return [
-        (
-            f"Rails: standard deviation of the error {waves_words(band, known)}, by method and {title}; mean "
-            "over all other axes and draws.",
-            heat_maps(draws, across, down, unit="mm", what=f"Errors of the rails by method and {title}"),
+        sides["speed and direction of travel"] = both
+    sides |= {axis.name: (axis,) for axis in by_column.values()}
+    figures = []
+    for title, across in sides.items():
+        kept = held(fine, *across)
+        own = {quantity: kept.of(rows) for quantity, rows in draws.items()}
+        averaged = "draws and ways to ride" if len(fine) > len(across) + len(kept.values) else "draws"
+        caption = (
+            f"Rails: standard deviation of the error {waves_words(band, known)}, by method and {title}; "
         )
-        for title, across in sides.items()
-    ]
+        caption += f"mean over {averaged}{f'; {kept.words}' if kept.words else ''}."
+        make = partial(heat_maps, own, side_of(*across), down, unit="mm", what=caption)
+        figures.append((caption, drawn(f"rails-by-{title.replace(' ', '-')}", make)))
+    return figures
 
 
 def _means(draws: pd.DataFrame, across: Side, down: Side) -> FloatArray:
@@ -198,7 +208,8 @@ def _draw_heat(axis: Axes, table: FloatArray, norm: LogNorm) -> None:
         text, colour = "\u2013", MUTED
         if np.isfinite(value):
             is_dark = float(norm(max(value, norm.vmin or value))) > 0.5
-            text, colour = short_number(value), "white" if is_dark else INK
+            # Colours of the cell, not of the page: they are the same in dark mode.
+            text, colour = short_number(value), "#fefefe" if is_dark else "#1b2431"
         axis.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
 
 
@@ -213,7 +224,11 @@ def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: floa
     axis = add_panel(figure, left, height - top - tall, 0.11, tall)
     bar = figure.colorbar(ScalarMappable(norm, HEAT), cax=axis)
     bar.outline.set_visible(False)
-    log_ticks(axis.yaxis)
+    # Its ends are told, and what decades lie well between them.
+    low, high = float(norm.vmin or 1.0), float(norm.vmax or 1.0)
+    decades = 10.0 ** np.arange(np.ceil(np.log10(low)), np.floor(np.log10(high)) + 1.0)
+    marks = [low, *(mark for mark in decades if 1.8 * low < mark < high / 1.8), high]
+    bar.set_ticks(marks, labels=[short_number(mark) for mark in marks])
     axis.grid(visible=False)
     axis.minorticks_off()
     axis.set_title(unit, fontsize=8.5, pad=5.0)

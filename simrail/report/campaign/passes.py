@@ -1,6 +1,7 @@
 """Section of several passes: errors of fused rails over their number, beside its root, and coverage."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -25,12 +26,14 @@ _MARKS = "osv^D"
 
 def passes_section(data: PageData) -> list[Section]:
     """What becomes of the error of the rails with the number of passes; nothing where there is one number."""
-    shown = []
+    shown: list[tuple[str, canvas.Drawing, Table]] = []
     for group in groups_of(data.cases):
         for style in mappers(group[0], data.styles):
             labels = group[0].labels
             title = f"{style.label}: IMU {labels['mount']} ({labels['imu']}), {state_words(labels)}"
-            shown.append((title, passes_figure(group, style), passes_table(group, style)))
+            name = f"passes-{len(shown) + 1}"
+            drawing = canvas.drawn(name, partial(passes_figure, group, style, what=title))
+            shown.append((title, drawing, passes_table(group, style)))
     if not shown:
         return []
     return [Section("passes", "Several passes", "campaign/passes.html.j2", {"shown": shown})]
@@ -53,7 +56,7 @@ def passes_of(case: Case) -> int:
     return int(case.labels[PASSES])
 
 
-def passes_figure(group: Sequence[Case], style: MethodStyle) -> str:
+def passes_figure(group: Sequence[Case], style: MethodStyle, *, what: str) -> str:
     """Root mean square of the error by band over the number of passes, on logarithmic axes.
 
     Dashed beside each: its value at the fewest passes, falling by the root of their number.
@@ -75,7 +78,9 @@ def passes_figure(group: Sequence[Case], style: MethodStyle) -> str:
             axis.set_title(QUANTITIES[quantity], color=canvas.INK)
         axes[0].set_ylabel("rms of the error, mm")
         canvas.figure_legend(figure, *axes[0].get_legend_handles_labels(), left_in=0.62)
-        return canvas.to_svg(figure, description="Error of the fused rails by band over the number of passes")
+        return canvas.to_svg(
+            figure, description=f"Error of the fused rails by band over the number of passes, {what}"
+        )
 
 
 def passes_table(group: Sequence[Case], style: MethodStyle) -> Table:

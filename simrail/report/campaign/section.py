@@ -1,5 +1,6 @@
 """The section itself: tables and figures over the axes of a campaign, gathered for the template."""
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -15,16 +16,19 @@ from simrail.report.campaign.axes import (
     campaign_axes,
     draws_of,
     finest,
+    held,
     is_campaign,
 )
 from simrail.report.campaign.figures import box_figure, curvature_figure
 from simrail.report.campaign.heat import Side, heat_maps, rails_figures, side_of
 from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.tables import HEADLINES, campaign_tables, write_tables
+from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle, readable
 from simrail.report.tables.tables import NONE, Cell, Row, Table, method_row, number_cell, signed
 from simrail.report.words.ablations import WORDS
+from simrail.report.words.sentences import listed
 from simrail.scoring.ablations import ABLATIONS, has_both, without_ablations
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE
 
@@ -33,6 +37,9 @@ MOST_METHODS = 8
 
 MOST_GROUPS = 6
 """IMUs and mounts with tables of their own on the page; the files hold all."""
+
+MOST_MAPS = 6
+"""Axes whose values are mapped."""
 
 MOST_BOXES = 6
 """Axes along which the spread is drawn."""
@@ -84,7 +91,7 @@ def campaign_section(data: PageData) -> list[Section]:
                 _pairs_table(_of(tables["pairs"], words), by_name),
                 _consistency_table(_of(tables["consistency"], words), by_name),
             )
-            for words in list(dict.fromkeys(tables["methods"]["of"]))[:MOST_GROUPS]
+            for words in _real_first(tables["methods"]["of"])[:MOST_GROUPS]
         ],
         "groups_left_out": max(tables["methods"]["of"].nunique() - MOST_GROUPS, 0),
         "worst": [
@@ -99,11 +106,15 @@ def campaign_section(data: PageData) -> list[Section]:
         **_drawings(data, axes),
     }
     title, template = "The campaign as a whole", "campaign/section.html.j2"
-    return [Section("campaign", title, template, shown, partial(write_tables, tables=tables | odometries))]
+    write = partial(write_tables, tables=tables | odometries)
+    return [Section("campaign", title, template, shown, write_beside=write)]
 
 
 def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
-    """Maps of the roll error over axes, its spread along each, and over curvature; "" where there is none."""
+    """Maps of the roll error over axes, its spread along each, and over curvature, with captions.
+
+    What somebody chooses, as the IMU, is held at one value in all that does not show it.
+    """
     styles = sorted(data.attitude_styles, key=lambda style: bool(style.baseline))[:MOST_METHODS]
     muted = {style.label for style in styles if style.baseline}
     of_all = draws_of(data.scores, data.cells, axes)
@@ -116,50 +127,67 @@ def _drawings(data: PageData, axes: Sequence[CampaignAxis]) -> dict[str, Any]:
     by_column = {axis.column: axis for axis in fine}
     speed, direction = by_column.get("speed_kmh"), by_column.get("direction")
 
-    def heat(draws: pd.DataFrame, across: Side, down: Side, what: str) -> str:
-        by_method = {style.label: draws[draws["estimator"] == style.name] for style in styles}
-        return heat_maps(by_method, across, down, unit="\u00b0", what=f"Roll error by {what}", muted=muted)
+    def heat(
+        name: str, draws: pd.DataFrame, across: Side, down: Side, what: str
+    ) -> tuple[str, canvas.Drawing]:
+        shown = [axis for axis in fine if axis.column in (*across.columns, *down.columns)]
+        kept = held(fine, *shown)
+        own = kept.of(draws)
+        by_method = {style.label: own[own["estimator"] == style.name] for style in styles}
+        others = [axis.name for axis in fine if axis not in shown and axis.column not in kept.values]
+        caption = f"{what}; mean over {listed(['draws', *others])}"
+        caption += f"; {kept.words}." if kept.words else "."
+        make = partial(heat_maps, by_method, across, down, unit="\u00b0", what=caption, muted=muted)
+        return caption, canvas.drawn(name, make)
 
-    down, speeds = _curve_side(curves, data.examples), side_of(speed or fine[0])
+    down, speeds = curve_side(curves), side_of(speed or fine[0])
     across = side_of(speed, direction) if speed and direction else speeds
+    named = f"{across.title.partition(',')[0]}"
+    maps = []
+    if len(down.keys) > 1:
+        where = "in each curve of the line (radius by design, positive to the left)"
+        what = f"Rms roll error {where} by speed"
+        maps.append(heat("curves", curves, speeds, down, what))
+    arrows = " (arrows: direction of travel)" if direction is not None else ""
+    for axis in fine[:MOST_MAPS]:
+        if axis.column not in across.columns:
+            what = f"Rms roll error over the whole ride by {named} and {axis.name}{arrows}"
+            maps.append(heat(f"roll-by-{axis.name.replace(' ', '-')}", roll, across, side_of(axis), what))
     unlike = {example.cell.get("speed_kmh"): example for example in reversed(data.examples)}
     rides = list(reversed(unlike.values()))
     words = [_words_of(example, axes) for example in rides]
-    many = len(down.keys) > 1
-    return {
-        "curves": heat(curves, speeds, down, "speed and curve radius") if many else "",
-        "maps": [
-            (
-                across.title.partition(",")[0],
-                axis.name,
-                heat(roll, across, side_of(axis), f"Roll by {axis.title}"),
-            )
-            for axis in fine
-            if axis.column not in across.columns
-        ],
-        "arrows": direction is not None,
-        "spread": box_figure(of_all, styles, axes[:MOST_BOXES], what="Spread of the roll error by axis"),
-        "curvature": curvature_figure(rides, styles, words=words, what="Roll error against curvature"),
-    }
+    spread = (
+        "How the rms roll error over the whole ride spreads over cells with a value of an axis: box from 25 "
+        "to 75 %, white line at the median, strokes from 5 to 95 %"
+    )
+    kept = held(axes)
+    spread += f"; {kept.words}, but along that axis itself." if kept.words else "."
+    curvature = (
+        "Mean roll error where the track has a curvature, in single rides. A line through zero that rises or "
+        "falls is an error that the track itself causes; a level one is a bias."
+    )
+    more = [
+        (spread, canvas.drawn("spread", lambda: box_figure(of_all, styles, axes[:MOST_BOXES], what=spread))),
+        (
+            curvature,
+            canvas.drawn("curvature", lambda: curvature_figure(rides, styles, words=words, what=curvature)),
+        ),
+    ]
+    maps = [(caption, drawing) for caption, drawing in maps if drawing]
+    return {"maps": maps[:1], "more": [*maps[1:], *((caption, one) for caption, one in more if one)]}
 
 
-def _curve_side(curves: pd.DataFrame, examples: Sequence[CellResult]) -> Side:
-    """Rows of the heat map over curves, from the sharpest right to the sharpest left one."""
+def curve_side(curves: pd.DataFrame) -> Side:
+    """Rows of the heat map over curves, from the sharpest right to the sharpest left one, by their design."""
     names = [str(name) for name in curves["window"].unique()]
-    radius: dict[str, float] = {}
-    for example in examples:
-        track = example.line
-        place = np.arange(track.start_m, track.end_m, 1.0)
-        bend, number = track.frame(place).k[:, 2], np.asarray(track.segment(place))
-        for k in np.unique(number):
-            middle = float(np.median(bend[number == k]))
-            if middle != 0.0:
-                radius.setdefault(CURVE_PREFIX + track.segment_name(int(k)), 1.0 / middle)
+    found = {name: re.search(r" R(-?[\d.]+)$", name) for name in names}
+    radius = {name: float(match[1]) for name, match in found.items() if match}
     names.sort(key=lambda name: 1.0 / radius[name] if name in radius else 0.0)
     words = [
-        f"{radius[name]:+.0f} m" if name in radius else name.removeprefix(CURVE_PREFIX) for name in names
+        signed(f"R {radius[name]:+g}") if name in radius else name.removeprefix(CURVE_PREFIX)
+        for name in names
     ]
-    return Side("curve radius", [(name,) for name in names], words, ["window"])
+    return Side("curve radius, m", [(name,) for name in names], words, ["window"])
 
 
 def _words_of(example: CellResult, axes: Sequence[CampaignAxis]) -> str:
@@ -170,6 +198,11 @@ def _words_of(example: CellResult, axes: Sequence[CampaignAxis]) -> str:
             unit = axis.title.partition(", ")[2]
             words.append(f"{word} {unit}" if unit in ("km/h", "m", "s") else word)
     return " \u00b7 ".join(words[:3])
+
+
+def _real_first(groups: pd.Series) -> list[str]:
+    """IMUs and mounts in their order, those of an ideal IMU last: they are floors."""
+    return sorted(dict.fromkeys(groups), key=lambda words: str(words).startswith("ideal"))
 
 
 def _of(frame: pd.DataFrame, words: str) -> pd.DataFrame:

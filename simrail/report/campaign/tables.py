@@ -16,6 +16,7 @@ import pandas as pd
 
 from simrail.report.campaign.axes import CampaignAxis, along, beside_ablations, draws_of
 from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.question import UNLIKE
 from simrail.scoring.ablations import without_ablations
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.statistics import anees_bounds, compare, coverage_bounds, levels
@@ -31,10 +32,7 @@ HEADLINES = {
 TABLES = "tables"
 """Folder beside the page for the tables of a campaign, as CSV and LaTeX."""
 
-UNLIKE = ("vehicle", "mount", "imu", "odometry", "track", "engine")
-"""What somebody chooses: figures are averaged over what a ride meets alone, its speeds, rails and ways."""
-
-WORST_PER_METHOD = 3
+WORST_PER_METHOD = 1
 MOST_PAIRS = 16
 
 

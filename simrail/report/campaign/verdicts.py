@@ -1,6 +1,7 @@
 """First section of a page with requirements: the verdict in a sentence, its chart, and the table."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from simrail.core.jit import FloatArray
 from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
 from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.tiles import Tile
+from simrail.report.words.sentences import significant
 from simrail.report.words.verdicts import (
     MARKS,
     best_method,
@@ -43,6 +46,9 @@ LABELS = {FLOOR: "the method's own floor", TOGETHER: "together"}
 COLOURS = {ENOUGH: "#15803d", NOT_ENOUGH: "#b42318"}
 """Of verdicts; any other is muted."""
 
+TONES = {ENOUGH: "good", NOT_ENOUGH: "bad"}
+"""The same as variables of the page."""
+
 
 def verdicts_section(data: PageData) -> list[Section]:
     """Make the section; none for a scenario that asks for nothing."""
@@ -60,7 +66,12 @@ def verdicts_section(data: PageData) -> list[Section]:
             {
                 "sentence": verdict_sentence(rows, data.styles),
                 "devices": devices_words(rows),
-                "chart": decision_chart(rows, devices, wanted[number], data.styles) if drawn else "",
+                "chart": canvas.drawn(
+                    f"verdict-{len(groups) + 1}",
+                    partial(decision_chart, rows, devices, wanted[number], data.styles),
+                )
+                if drawn
+                else "",
                 "columns": [style.label for style in judged_methods(rows, data.styles)],
                 "rows": list(_table_rows(rows, judged_methods(rows, data.styles))),
                 "budgets": list(_budgets(data.budgets, number, vehicle, mount)),
@@ -68,10 +79,41 @@ def verdicts_section(data: PageData) -> list[Section]:
         )
     shown = {
         "groups": groups,
+        "tiles": verdict_tiles(groups_of(table), data.styles, wanted),
         "chance": 100.0 * max(one.chance for one in wanted),
         "overview": overview(table, data.styles) if len(groups) >= MANY else None,
     }
     return [Section("verdict", "Verdict", "campaign/verdicts.html.j2", shown)]
+
+
+def verdict_tiles(
+    groups: Iterator[tuple[int, str, str, pd.DataFrame]],
+    styles: Sequence[MethodStyle],
+    wanted: Sequence[Requirement],
+) -> list[Tile]:
+    """How many IMUs are enough, what the best of them keeps to, and what no IMU at all does; of the first."""
+    number, _, mount, rows = next(groups)
+    best, requirement = best_method(rows, styles), wanted[number]
+    if best is None:
+        return []
+    unit = "\u00b0" if requirement.unit == "deg" else f" {requirement.unit}"
+    own = rows[(rows["estimator"] == best.name) & rows["devices"].gt(0)]
+    enough = own.loc[own["verdict"] == ENOUGH, "imu"].astype(str).unique()
+    count = len(own["imu"].unique())
+    tiles = [Tile("IMUs that are enough", f"{len(enough)} of {count}", f"on the {mount}, with {best.label}")]
+    asked = f"{100.0 * requirement.share:g} % of the devices stay below"
+    if own["at_share"].notna().any():
+        least = own.iloc[int(np.nanargmin(own["at_share"].to_numpy()))]
+        note = f"{least['imu']}: {asked}; asked are {requirement.limit:g}{unit}"
+        tiles.append(Tile("the best IMU", f"{significant(least['at_share'])}{unit}", note))
+    floors = [style for style in styles if not style.uses_imu]
+    zero = rows[rows["estimator"].isin([style.name for style in floors]) & rows["at_share"].notna()]
+    if len(zero):
+        value = float(zero["at_share"].median())
+        beats = tiles[1:] and value < float(own["at_share"].min())
+        note = "beats every IMU" if beats else "what is known without any sensor"
+        tiles.append(Tile("no IMU at all", f"{significant(value)}{unit}", note))
+    return tiles
 
 
 def overview(table: pd.DataFrame, styles: Sequence[MethodStyle]) -> dict[str, Any]:
@@ -114,7 +156,8 @@ def _budgets(
     ]
     for imu, budget in own.groupby("imu", sort=False):
         sentence = f"{imu}: {budget_sentence(budget)}."
-        yield sentence, budget_chart(budget, sentence)
+        name = f"budget-{number + 1}-{vehicle}-{mount}-{imu}"
+        yield sentence, canvas.drawn(name, partial(budget_chart, budget, sentence))
 
 
 def budget_chart(budget: pd.DataFrame, description: str) -> str:
@@ -179,7 +222,7 @@ def _cell(row: pd.Series) -> dict[str, Any]:
     return {
         "mark": MARKS[row["verdict"]],
         "verdict": row["verdict"],
-        "colour": COLOURS.get(row["verdict"], canvas.MUTED),
+        "colour": f"var(--{TONES.get(row['verdict'], 'muted')})",
         "share": f"{row['passed']} of {row['devices']}" if row["devices"] else row["reason"],
         "interval": f"{100.0 * row['low95']:.0f} to {100.0 * row['high95']:.0f} %" if row["devices"] else "",
         "at_share": f"{row['at_share']:.3g}" if row["devices"] else "",
@@ -209,7 +252,7 @@ def decision_chart(
     imus = list(dict.fromkeys(rows["imu"].astype(str)))
     best = best_method(rows, styles)
     with canvas.look():
-        figure, (panel,) = canvas.panels([2.7], top_in=0.75)
+        figure, (panel,) = canvas.slots_panel(2.7, imus, top_in=0.75)
         for slot, style in enumerate(methods):
             for i, imu in enumerate(imus):
                 own = finite[(finite["imu"] == imu) & (finite["estimator"] == style.name)]["value"]
@@ -221,7 +264,6 @@ def decision_chart(
         low, high = finite["value"].min(), finite["value"].max()
         panel.set_ylim(0.7 * min(low, 0.8 * wanted.limit), 1.6 * max(high, 1.25 * wanted.limit))
         canvas.log_scale(panel.yaxis)
-        canvas.categories(panel, [_in_lines(imu) for imu in imus], size=8.0 if len(imus) < 9 else 7.0)
         unit = "\u00b0" if wanted.unit == "deg" else wanted.unit
         panel.set_ylabel(f"{wanted.what}, {unit}")
         if best is not None:
@@ -264,13 +306,3 @@ def _write_shares(panel: Axes, rows: pd.DataFrame, imus: Sequence[str]) -> None:
             weight="bold",
             color=colour,
         )
-
-
-def _in_lines(name: str) -> str:
-    """A grade's name in lines of some ten letters, parted at underscores."""
-    lines = [""]
-    for part in name.replace(".imu.toml", "").replace(".toml", "").split("_"):
-        if lines[-1] and len(lines[-1]) + len(part) > 9:
-            lines.append("")
-        lines[-1] += ("_" if lines[-1] else "") + part
-    return "\n".join(lines)

@@ -1,15 +1,20 @@
-"""How figures look, and how they become inline SVG.
+"""How figures look, and how they become inline SVG, or a file.
 
 Figures are `matplotlib.figure.Figure` objects made under `look()`; pyplot and its global state are
-not used. Text stays text, so it is set in the page's own fonts and can be searched.
+not used. Text stays text, so it is set in the page's own fonts and can be searched. `drawn` makes a figure
+twice, for a desk and for a phone, with the page's variables as its colours, so that it follows dark mode;
+`only` makes one figure of a page as a file instead.
 """
 
 import re
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from html import escape
 from io import StringIO
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -22,20 +27,46 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.decimate import Bins, Envelope
+from simrail.report.figures.decimate import Bins
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Mean
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
 
-WIDTH_IN = 11.25
-"""Width of a figure: 1080 CSS pixels."""
+WIDE_IN, NARROW_IN = 11.25, 3.67
+"""Width of a figure on a desk and on a phone: 1080 and 352 CSS pixels."""
+
+_WIDTH: ContextVar[float] = ContextVar("width", default=WIDE_IN)
 
 LEFT_IN = 0.84
 """Margin left of the axes: tick labels such as -0.25, then two lines of label."""
 
+MOST_UPRIGHT = 3
+"""Words of slots on a phone that are written level; more stand upright."""
+
 INK, MUTED, GRID = "#1b2430", "#667085", "#e4e7ec"
 TRUTH, DESIGN = "#c2c8d1", "#111111"
 CURVE_TINT, TRANSITION_TINT = "#eef1e6", "#f6f8f2"
+
+_VARIABLES = {
+    INK: "ink",
+    MUTED: "muted",
+    "#6b7280": "muted",
+    GRID: "line",
+    "#d0d5dd": "line",
+    "#f2f4f7": "line",
+    "#b8bec8": "axis",
+    "#98a1af": "axis",
+    DESIGN: "ink",
+    CURVE_TINT: "curve",
+    TRANSITION_TINT: "transition",
+    "#ffffff": "page",
+    "#dfe4ea": "line",
+    "#e8ebf0": "line",
+    "#dbe9f4": "tint",
+    "#15803d": "good",
+    "#b42318": "bad",
+}
+"""Variables of the page that stand for colours of the figures, so that dark mode has its own."""
 
 _CURVE_NAME: dict[str, Any] = {
     "textcoords": "offset points",
@@ -53,6 +84,7 @@ _RC: dict[Any, Any] = {
     "svg.hashsalt": "simrail",
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
+    "text.color": INK,
     "axes.edgecolor": "#b8bec8",
     "axes.labelcolor": INK,
     "axes.linewidth": 0.7,
@@ -79,6 +111,74 @@ _RC: dict[Any, Any] = {
 }
 
 
+def width_in() -> float:
+    """Width of the figure that is being made."""
+    return _WIDTH.get()
+
+
+def is_narrow() -> bool:
+    """Whether it is made for a phone."""
+    return width_in() < WIDE_IN
+
+
+class Drawing(Markup):
+    """Inline SVG of a figure, with the name by which `simrail figure` makes it again."""
+
+    name: str = ""
+
+
+@dataclass
+class Order:
+    """A figure that is wanted as a file, and the names of all that were met while it was looked for."""
+
+    wanted: str
+    path: Path
+    names: list[str] = field(default_factory=list)
+    written: bool = False
+
+
+_ORDER: ContextVar[Order | None] = ContextVar("order", default=None)
+
+
+@contextmanager
+def only(wanted: str, path: Path) -> Iterator[Order]:
+    """Context in which `drawn` makes one figure, and writes it: SVG or PDF by the end of the file's name."""
+    order = Order(wanted, path)
+    token = _ORDER.set(order)
+    try:
+        yield order
+    finally:
+        _ORDER.reset(token)
+
+
+def drawn(name: str, make: Callable[[], str]) -> Drawing:
+    """A figure of the page, for a desk and for a phone; "" if there is nothing to draw.
+
+    Parameters
+    ----------
+    name : str
+        By which it is asked for; once on a page.
+    make : callable
+        Makes it: what `to_svg` returned, or "".
+    """
+    order = _ORDER.get()
+    if order is not None:
+        order.names.append(name)
+        order.written |= name == order.wanted and bool(make())
+        return Drawing()
+    wide = make()
+    if not wide:
+        return Drawing()
+    token = _WIDTH.set(NARROW_IN)
+    try:
+        narrow = make()
+    finally:
+        _WIDTH.reset(token)
+    drawing = Drawing(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
+    drawing.name = name
+    return drawing
+
+
 def look() -> AbstractContextManager[None]:
     """Context in which figures are made and written."""
     return mpl.rc_context(_RC)
@@ -92,21 +192,23 @@ def add_panel(
     return figure.add_axes((left_in / wide, low_in / tall, wide_in / wide, tall_in / tall), **options)
 
 
-def panels(heights_in: Sequence[float], *, top_in: float = 0.42) -> tuple[Figure, list[Axes]]:
+def panels(
+    heights_in: Sequence[float], *, top_in: float = 0.42, bottom_in: float = 0.5
+) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels above each other over one x axis.
 
     Margins are in inches, so that the axes of all figures of the page stand at the same place.
     """
-    gap, bottom, right = 0.14, 0.5, 0.2
+    gap, bottom, right = 0.14, bottom_in, 0.2
     height = top_in + bottom + sum(heights_in) + gap * (len(heights_in) - 1)
-    figure = Figure(figsize=(WIDTH_IN, height))
+    figure = Figure(figsize=(width_in(), height))
     axes: list[Axes] = []
     edge = height - top_in
-    wide = WIDTH_IN - LEFT_IN - right
+    wide = width_in() - LEFT_IN - right
     for tall in heights_in:
         axis = add_panel(figure, LEFT_IN, edge - tall, wide, tall, sharex=axes[0] if axes else None)
         # A fixed place, so that no label depends on the width of its tick labels.
-        axis.yaxis.set_label_coords(-0.56 / wide, 0.5)
+        axis.yaxis.set_label_coords(-0.64 / wide, 0.5)
         axes.append(axis)
         edge -= tall + gap
     for axis in axes[:-1]:
@@ -128,10 +230,11 @@ def panels_beside(
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels beside each other, in rows; lengths in inches."""
     bottom = 0.5
+    across = 1 if is_narrow() else across
     rows = -(-count // across)
     height = top_in + rows * tall_in + (rows - 1) * row_gap_in + bottom
-    wide = (WIDTH_IN - left_in - right_in - gap_in * (across - 1)) / across
-    figure = Figure(figsize=(WIDTH_IN, height))
+    wide = (width_in() - left_in - right_in - gap_in * (across - 1)) / across
+    figure = Figure(figsize=(width_in(), height))
     axes: list[Axes] = []
     for number in range(count):
         row, column = divmod(number, across)
@@ -139,6 +242,30 @@ def panels_beside(
         left = left_in + column * (wide + gap_in)
         axes.append(add_panel(figure, left, low, wide, tall_in, sharey=axes[0] if share_y and axes else None))
     return figure, axes
+
+
+def slots_panel(tall_in: float, words: Sequence[str], *, top_in: float = 0.42) -> tuple[Figure, list[Axes]]:
+    """Make a figure of one panel with a slot of its x axis for each word; upright words on a phone."""
+    upright = is_narrow() and len(words) > MOST_UPRIGHT
+    lines = [parted(word) for word in words]
+    longest = max((len(word) for word in words), default=0)
+    rows = max((line.count("\n") for line in lines), default=0)
+    bottom = 0.15 + 0.07 * longest if upright else 0.32 + 0.14 * rows
+    figure, axes = panels([tall_in], top_in=top_in, bottom_in=bottom)
+    categories(axes[0], words if upright else lines, size=8.0 if len(words) < 9 else 7.0)
+    if upright:
+        axes[0].tick_params(axis="x", labelrotation=90.0)
+    return figure, axes
+
+
+def parted(name: str, *, longest: int = 10) -> str:
+    """A name in lines of some ten letters, parted at blanks and underscores."""
+    lines = [""]
+    for part in re.split(r"(?<=[_ ])", name.replace(".imu.toml", "").replace(".toml", "")):
+        if lines[-1] and len(lines[-1]) + len(part.rstrip()) > longest:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(line.rstrip(" ") for line in lines)
 
 
 def categories(axis: Axes, words: Sequence[str], *, size: float | None = None) -> None:
@@ -191,14 +318,6 @@ def draw_marks(
         lw=1.0,
         label=style.label,
     )
-
-
-def draw_envelope(axis: Axes, bins: Bins, signal: FloatArray, *, colour: str) -> Envelope:
-    """Draw the range and the mean of a signal (n,) by bins; returns them."""
-    envelope = bins.envelope(signal)
-    axis.fill_between(bins.x, envelope.low, envelope.high, color=colour, alpha=0.28, lw=0)
-    axis.plot(bins.x, envelope.mean, color=colour, lw=1.1)
-    return envelope
 
 
 def draw_truth(axis: Axes, bins: Bins, angle_rad: FloatArray) -> FloatArray:
@@ -261,6 +380,30 @@ def fitting_columns(labels: Sequence[str], width_in: float) -> int:
     return 1
 
 
+LEGEND_ROW_IN = 0.175
+"""Height of a row of a legend."""
+
+
+def _make_room(figure: Figure, count: int, columns: int, *, free_in: float) -> None:
+    """Grow a figure at its top where a legend needs more than is free there."""
+    more = LEGEND_ROW_IN * -(-count // columns) + 0.06 - free_in
+    if more <= 0.0:
+        return
+    wide, tall = figure.get_size_inches()
+    figure.set_size_inches(wide, tall + more)
+    for axis in figure.axes:
+        box = axis.get_position()
+        axis.set_position(
+            (box.x0, box.y0 * tall / (tall + more), box.width, box.height * tall / (tall + more))
+        )
+
+
+def _free_above(figure: Figure) -> float:
+    """Height above the topmost panel, in inches."""
+    top = max(axis.get_position().y1 for axis in figure.axes)
+    return float((1.0 - top) * figure.get_size_inches()[1])
+
+
 def legend_above(*axes: Axes) -> None:
     """Put the legend of some panels above the first, outside of the data; truth and design first."""
     by_label = {
@@ -269,12 +412,16 @@ def legend_above(*axes: Axes) -> None:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
     labels = sorted(by_label, key=lambda label: {"truth": 0, "design": 1}.get(label, 2))
+    columns = fitting_columns(labels, width_in() - LEFT_IN)
+    figure = axes[0].get_figure(root=True)
+    assert figure is not None
+    _make_room(figure, len(labels), columns, free_in=_free_above(figure))
     axes[0].legend(
         [by_label[label] for label in labels],
         labels,
         loc="lower left",
         bbox_to_anchor=(-0.005, 1.0),
-        ncols=fitting_columns(labels, WIDTH_IN - LEFT_IN),
+        ncols=columns,
         borderaxespad=0.15,
         columnspacing=1.4,
     )
@@ -284,43 +431,68 @@ def figure_legend(
     figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left_in: float = LEFT_IN
 ) -> None:
     """Put a legend at the top of a figure."""
+    columns = fitting_columns(labels, width_in() - (0.0 if is_narrow() else left_in))
+    titles_in = 0.22 if any(axis.get_title(loc="left") for axis in figure.axes) else 0.0
+    _make_room(figure, len(labels), columns, free_in=_free_above(figure) - titles_in)
     figure.legend(
         handles,
         labels,
         loc="upper left",
-        bbox_to_anchor=(left_in / WIDTH_IN - 0.01, 1.0),
-        ncols=fitting_columns(labels, WIDTH_IN - left_in),
+        bbox_to_anchor=((0.0 if is_narrow() else left_in / WIDE_IN - 0.01), 1.0),
+        ncols=columns,
         borderaxespad=0.1,
     )
 
 
-def shade_track(axes: Sequence[Axes], track: TrackDesign, *, limits: tuple[float, float]) -> None:
-    """Tint curves and transitions of a plot over distance, and name the curves in the first panel."""
-    low, high = limits
-    start, last_label = track.start_m, -np.inf
+@dataclass(frozen=True)
+class Place:
+    """A curve or a transition of the line, between two places in metres; its words are of its design."""
+
+    start: float
+    end: float
+    kind: str
+    words: str = ""
+
+
+def places_of(track: TrackDesign) -> tuple[Place, ...]:
+    """Curves and transitions of a line, curves with the radius that they were designed with."""
+    places, start = [], track.start_m
     for element in track.elements:
         end = start + element.length_m
-        if end > low and start < high and element.kind in (CURVE, TRANSITION):
-            tint = CURVE_TINT if element.kind == CURVE else TRANSITION_TINT
-            for axis in axes:
-                axis.axvspan(max(start, low), min(end, high), color=tint, lw=0, zorder=-5)
-            middle = 0.5 * (start + end)
-            has_room = middle - last_label > 0.05 * (high - low) and low < middle < high
-            if isinstance(element, Curve) and has_room:
-                text = f"{abs(element.radius_m):.0f} m {'left' if element.radius_m > 0 else 'right'}"
-                at_top = axes[0].get_xaxis_transform()
-                axes[0].annotate(text, (middle, 1.0), (0, -3), xycoords=at_top, **_CURVE_NAME)
-                last_label = middle
+        if element.kind in (CURVE, TRANSITION):
+            words = ""
+            if isinstance(element, Curve):
+                words = f"R {abs(element.radius_m):g} {'left' if element.radius_m > 0 else 'right'}"
+            places.append(Place(start, end, "curve" if element.kind == CURVE else "transition", words))
         start = end
+    return tuple(places)
+
+
+def shade_places(axes: Sequence[Axes], places: Sequence[Place], *, limits: tuple[float, float]) -> None:
+    """Tint curves and transitions of a plot over distance, and name the curves in the first panel."""
+    low, high = limits
+    last_label, room = -np.inf, (0.3 if is_narrow() else 0.05) * (high - low)
+    for place in places:
+        if place.end > low and place.start < high:
+            tint = CURVE_TINT if place.kind == "curve" else TRANSITION_TINT
+            for axis in axes:
+                axis.axvspan(max(place.start, low), min(place.end, high), color=tint, lw=0, zorder=-5)
+            middle = 0.5 * (place.start + place.end)
+            if place.words and middle - last_label > room and low < middle < high:
+                at_top = axes[0].get_xaxis_transform()
+                axes[0].annotate(place.words, (middle, 1.0), (0, -3), xycoords=at_top, **_CURVE_NAME)
+                last_label = middle
     axes[0].set_xlim(low, high)
 
 
-def distance_axis(axis: Axes, *, direction: int | None = None) -> None:
+def distance_axis(
+    axis: Axes, *, direction: int | None = None, words: str = "distance along the track, m"
+) -> None:
     """Label the x axis of a plot over distance, with the direction of travel where there is one."""
-    axis.set_xlabel("distance along the track, m")
-    if direction is None:
+    axis.set_xlabel(words.replace(" along the track", "") if is_narrow() else words)
+    if not direction:
         return
-    arrow, side, x = ("travel \u2192", "right", 1.0) if direction >= 0 else ("\u2190 travel", "left", 0.0)
+    arrow, side, x = ("travel \u2192", "right", 1.0) if direction > 0 else ("\u2190 travel", "left", 0.0)
     look_of: dict[str, Any] = {"textcoords": "offset points", "ha": side, "color": INK, "weight": "bold"}
     axis.annotate(arrow, (x, 0.0), (0, -29), xycoords="axes fraction", **look_of)
 
@@ -341,6 +513,10 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     description : str
         What it shows, for those who cannot see it.
     """
+    order = _ORDER.get()
+    if order is not None:
+        figure.savefig(order.path, metadata={"Title": description} if order.path.suffix != ".png" else None)
+        return Markup(description)
     out = StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = out.getvalue()
@@ -354,6 +530,9 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     # The page chooses the fonts; matplotlib's versions write them in two ways.
     text = re.sub(r'font-family: [^;"]*;? ?', "", text)
     text = re.sub(r'font: ([\d.]+px) [^;"]*', r"font-size: \1", text)
+    text = re.sub(
+        r"#[0-9a-f]{6}", lambda m: f"var(--{_VARIABLES[m[0]]})" if m[0] in _VARIABLES else m[0], text
+    )
     view = re.search(r'viewBox="[^"]*"', text)
     assert view is not None
     link = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'

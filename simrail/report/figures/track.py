@@ -1,11 +1,21 @@
-"""Figures of the track: its plan, profile, curvature and cant (as Figs. 8 to 10 of Briales et al. 2021)."""
+"""Figures of the track: its plan, profile, curvature and cant."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, look, panels, shade_track, to_svg
+from simrail.report.figures.canvas import (
+    INK,
+    MUTED,
+    add_panel,
+    look,
+    panels,
+    places_of,
+    shade_places,
+    to_svg,
+    width_in,
+)
 from simrail.report.words.sentences import listed
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 
@@ -30,10 +40,10 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
         xy = track.frame(s).position[:, :2]
         turned = _along_the_page(xy)
         span = np.ptp(turned, axis=0)
-        wide = WIDTH_IN - 0.9
+        wide = width_in() - 0.9
         tall = float(np.clip(wide * (span[1] / span[0]) + 1.1, 1.8, 4.2))
-        figure = Figure(figsize=(WIDTH_IN, tall + 0.4))
-        axis = figure.add_axes((0.45 / WIDTH_IN, 0.12 / (tall + 0.4), wide / WIDTH_IN, tall / (tall + 0.4)))
+        figure = Figure(figsize=(width_in(), tall + 0.4))
+        axis = add_panel(figure, 0.45, 0.12, wide, tall)
         kind = track.kind(s)
         steps = np.flatnonzero(np.diff(kind)) + 1
         named: set[int] = set()
@@ -80,7 +90,7 @@ def profile_figure(track: TrackDesign) -> str:
             rest[1].set_ylabel("cant, mm")
         for axis in rest:
             axis.axhline(0.0, color="#b8bec8", lw=0.7, zorder=-1)
-        shade_track(axes, track, limits=(track.start_m, track.end_m))
+        shade_places(axes, places_of(track), limits=(track.start_m, track.end_m))
         axes[-1].set_xlabel("distance along the track, m")
         return to_svg(figure, description=profile_words(track))
 
@@ -102,7 +112,7 @@ def profile_words(track: TrackDesign) -> str:
 
 def _profile(track: TrackDesign) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Distance, height and cant (positive with the right rail raised), m."""
-    s = np.linspace(track.start_m, track.end_m, 1200)
+    s = np.linspace(track.start_m, track.end_m, 700)
     frame = track.frame(s)
     return s, frame.position[:, 2], -track.rail_base_m * np.sin(frame.roll_rad)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, WIDTH_IN, look, panels, to_svg
+from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, is_narrow, look, panels, to_svg, width_in
 from simrail.report.tables.vehicle_text import MOST_HZ
 from simrail.vehicle.contact.contact_pair import incline
 from simrail.vehicle.contact.profile_files import profiles_of
@@ -30,8 +30,8 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     lift = float(head.depth(np.array([at + offset]))[0])
     touch = float(np.interp(at, wheel.lateral_m, wheel.depth_m))
     with look():
-        figure = Figure(figsize=(WIDTH_IN, 4.0))
-        axis = figure.add_axes((LEFT_IN / WIDTH_IN, 0.13, (WIDTH_IN - LEFT_IN - 0.2) / WIDTH_IN, 0.83))
+        figure = Figure(figsize=(width_in(), 4.0))
+        axis = figure.add_axes((LEFT_IN / width_in(), 0.13, (width_in() - LEFT_IN - 0.2) / width_in(), 0.83))
         rail_z = -1e3 * (head.depth(e) - lift)
         wheel_z = -1e3 * (wheel.depth_m - touch)
         rail_y, wheel_y = -1e3 * (e - offset), -1e3 * wheel.lateral_m
@@ -46,7 +46,7 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
         place = (float(rail_y.mean()), floor + 3.0 * size)
         axis.annotate(f"rail {rail.name}", place, va="bottom", ha="center", color=MUTED)
         axis.set_aspect("equal", adjustable="datalim")
-        below = "from the tape circle towards the middle of the track, mm"
+        below = "from the tape circle" + (", mm" if is_narrow() else " towards the middle of the track, mm")
         axis.set(ylim=(floor, roof), xlabel=below, ylabel="height over the contact, mm")
         return to_svg(figure, description=f"Wheel {wheel.name} in contact with rail {rail.name}")
 
@@ -89,15 +89,16 @@ def locus_figure(study: VehicleStudy) -> str:
     speed = 3.6 * study.locus.speed_mps
     values = study.locus.eigenvalues_1ps
     with look():
-        figure = Figure(figsize=(WIDTH_IN, 6.7))
-        wide = (WIDTH_IN - LEFT_IN - 0.2) / WIDTH_IN
-        plane = figure.add_axes((LEFT_IN / WIDTH_IN, 0.41, wide, 0.56))
-        below = figure.add_axes((LEFT_IN / WIDTH_IN, 0.08, wide, 0.22))
+        figure = Figure(figsize=(width_in(), 6.7))
+        wide = (width_in() - LEFT_IN - 0.2) / width_in()
+        scale = 0.45 / width_in() if is_narrow() else 0.0  # the numbers of the colour bar
+        plane = figure.add_axes((LEFT_IN / width_in(), 0.41, wide - scale, 0.56))
+        below = figure.add_axes((LEFT_IN / width_in(), 0.08, wide, 0.22))
         frequency = values.imag / (2.0 * np.pi)
         shown = (frequency > SLOWEST_HZ) & (frequency < _MOST_HZ) & (values.real > -40.0)
         tint = np.broadcast_to(speed[:, None], values.shape)
         marks = plane.scatter(
-            values.real[shown], frequency[shown], c=tint[shown], s=9, cmap="viridis_r", linewidths=0
+            values.real[shown], frequency[shown], c=tint[shown], s=9, cmap="plasma", linewidths=0
         )
         bar = figure.colorbar(marks, ax=plane, pad=0.01, aspect=30, fraction=0.03)
         bar.set_label("speed, km/h")

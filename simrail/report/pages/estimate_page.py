@@ -5,15 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from simrail.campaign.cell import CellResult
-from simrail.core.columns import ATTITUDE
 from simrail.core.resample import GAPS
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording, odometry_of
-from simrail.report.figures.estimate import estimated_attitude_figure, innovation_figure, moves, place_of
-from simrail.report.figures.ride import imu_figure, speed_figure
+from simrail.report.figures.estimate import estimate_looks, estimate_view, place_of, shown_bands
+from simrail.report.pages.explorer import explorer_data
 from simrail.report.pages.frame import page_text
+from simrail.report.tables.geometry import BAND, indicator_table
+from simrail.report.tables.tables import Table
 from simrail.report.words.sentences import recording_facts
+from simrail.track.bands import BANDS
 
 MOST_GAPS = 20
 
@@ -36,10 +37,8 @@ def write_estimate_page(
     us_per_sample : float
         Time that it took.
     """
-    # Where there is no truth, the odometry says where the figures of the ride are drawn.
-    ride = CellResult({}, recording, odometry_of(recording), {}) if moves(recording) else None
-    innovations = estimate.innovations
-    has_attitude = any(name in estimate.states for name in ATTITUDE)
+    view = estimate_view(recording, estimate)
+    shown = explorer_data([view], estimate_looks(label))
     text = page_text(
         "pages/estimate.html.j2",
         recording=recording,
@@ -48,15 +47,19 @@ def write_estimate_page(
         version=version("simrail"),
         tiles=_tiles(recording, estimate, us_per_sample),
         facts=ride_facts(recording),
-        attitude=estimated_attitude_figure(recording, estimate, label=label) if has_attitude else "",
-        speed=speed_figure(ride) if ride else "",
-        imu=imu_figure(ride) if ride else "",
-        innovations=innovation_figure(recording, estimate)
-        if innovations is not None and len(innovations) > 1
-        else "",
+        data=shown["data"],
+        quality=_quality(estimate),
         gaps=_gaps(recording),
     )
     path.write_text(text, encoding="utf-8")
+
+
+def _quality(estimate: Estimate) -> Table | None:
+    """Track quality of the rails by sections; None where there are none, or the ride is too short."""
+    geometry = estimate.geometry
+    if geometry is None or len(geometry) < 2 or BANDS[BAND] not in shown_bands(geometry.index.to_numpy()):
+        return None
+    return indicator_table(None, geometry, limits={}, band=BANDS[BAND])
 
 
 def ride_facts(recording: Recording) -> list[str]:

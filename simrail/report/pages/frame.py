@@ -1,10 +1,12 @@
 """The frame of every page: one self-contained HTML file, in which nothing is fetched when it is opened."""
 
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
 
 from simrail.core.errors import InputError
 from simrail.report.words.sentences import FILTERS
@@ -25,7 +27,13 @@ def _environment() -> Environment:
 
 def page_text(template: str, **data: Any) -> str:
     """Fill a template, which extends ``pages/frame.html.j2``."""
-    return _environment().get_template(template).render(data)
+    return _environment().get_template(template).render(data, script=_script())
+
+
+@cache
+def _script() -> Markup:
+    """What explores rides, saves figures and opens folded parts."""
+    return Markup(files("simrail.report").joinpath("pages/page.js").read_text(encoding="utf-8"))
 
 
 def write_page(folder: Path, name: str, text: str) -> Path:

@@ -4,6 +4,8 @@ What it says is computed from the scores (`simrail.report.words.findings`); how 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,35 +14,60 @@ from markupsafe import Markup
 
 from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
+from simrail.core.columns import IRREGULARITY
 from simrail.report.campaign.axes import is_campaign
 from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.passes import passes_section
 from simrail.report.campaign.section import campaign_section
 from simrail.report.campaign.verdicts import verdicts_section
+from simrail.report.figures import canvas
+from simrail.report.figures.geometry import bands_figure, has_rails
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
+from simrail.report.pages.answer import answer_section
+from simrail.report.pages.explorer import distance_figures, explorer_section
 from simrail.report.pages.frame import page_text
-from simrail.report.pages.ride import ride_sections
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers import SECTIONS as PAPERS
 from simrail.report.tables.ablations import cost_tables, pairs_of
-from simrail.report.tables.geometry import geometry_table, overview_table
+from simrail.report.tables.geometry import (
+    BAND,
+    JUDGED,
+    bands_of_case,
+    geometry_table,
+    indicator_table,
+    is_zero,
+    overview_table,
+)
 from simrail.report.tables.pivot import Case
 from simrail.report.tables.provenance import facts, parts
 from simrail.report.tables.running import decay_words, running_table
 from simrail.report.tables.tables import consistency_table, error_table, odometry_table
 from simrail.report.words.ablations import WORDS, state_words
-from simrail.report.words.sentences import axis_words
+from simrail.report.words.findings import findings
+from simrail.report.words.geometry_findings import geometry_findings
+from simrail.report.words.sentences import Finding, axis_words
+from simrail.scenario.build import goals_mm, limits_of
+from simrail.scenario.requirements import requirements_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.ablations import ABLATIONS
 from simrail.scoring.running_safety import TRACK_SHIFT_FACTOR
 from simrail.scoring.table import EXACT_MAP, is_failure
+from simrail.track.bands import BANDS, why_not
 from simrail.track.design import TrackDesign
 
 SETS_BESIDE = ("gonzalez_2023",)
 """Publications whose section can hold the results of a second scenario as well."""
 
-MOST_TABLES = 24
+MOST_TABLES = 6
 """Cases whose table is on the page; ``scores.csv`` holds all."""
+
+BANDS_CAPTION = (
+    "Standard deviation of the error by band of wavelengths; hollow: no IMU at all, whose error is the rails "
+    "themselves. Strokes: one standard deviation between draws."
+)
+
+MOST_ROWS = 12
+"""Rows of a table that is open at first."""
 
 
 def write_report(
@@ -64,7 +91,7 @@ def write_report(
         The campaign, see `PageData`.
     """
     data = PageData(scenario, scores, cells, examples, manifest, beside, budgets)
-    sections = [section for make in in_order(data) for section in make(data)]
+    sections = sections_of(data)
     spec = scenario.spec.monte_carlo
     text = page_text(
         "pages/page.html.j2",
@@ -77,7 +104,10 @@ def write_report(
         imus=scores["mount"].nunique(),
         grades=scores["imu"].nunique(),
         contents=[(section.anchor, section.title) for section in sections],
-        sections=[(one.anchor, one.title, Markup(page_text(one.template, **one.data))) for one in sections],
+        sections=[
+            (one.anchor, one.title, one.folded, Markup(page_text(one.template, **one.data)))
+            for one in sections
+        ],
     )
     path.write_text(text, encoding="utf-8")
     for section in sections:
@@ -85,8 +115,13 @@ def write_report(
             section.write_beside(path.parent)
 
 
-def _section(name: str, title: str, **data: Any) -> Section:
-    return Section(name, title, f"pages/sections/{name}.html.j2", data)
+def sections_of(data: PageData) -> list[Section]:
+    """All sections of a page, in its order."""
+    return [section for make in in_order(data) for section in make(data)]
+
+
+def _section(name: str, title: str, *, folded: bool = False, **data: Any) -> Section:
+    return Section(name, title, f"pages/sections/{name}.html.j2", data, folded)
 
 
 def _failures(data: PageData) -> list[Section]:
@@ -104,9 +139,10 @@ def _failures(data: PageData) -> list[Section]:
 
 
 def _paper(data: PageData) -> list[Section]:
-    """What stands beside a publication."""
-    name = data.scenario.spec.paper
-    return PAPERS[name](data) if name is not None else []
+    """What stands beside a publication; it needs the rides themselves, not what a page keeps of them."""
+    name = data.scenario.spec.paper if data.stored_views is None else None
+    sections = PAPERS[name](data) if name is not None else []
+    return [replace(section, folded=True) for section in sections]
 
 
 def _tracks(data: PageData) -> list[Section]:
@@ -117,15 +153,22 @@ def _tracks(data: PageData) -> list[Section]:
         tracks.setdefault(track.name, track)
         stops.setdefault(track.name, {"start": float(position.iloc[0]), "end": float(position.iloc[-1])})
     shown = [
-        (track, plan_figure(track, stops=stops[name]), profile_figure(track), profile_words(track))
+        (
+            track,
+            canvas.drawn(f"plan-{name}", partial(plan_figure, track, stops=stops[name])),
+            canvas.drawn(f"profile-{name}", partial(profile_figure, track)),
+            profile_words(track),
+        )
         for name, track in tracks.items()
     ]
-    return [_section("track", "Track", tracks=shown)]
+    return [_section("track", "Track", folded=len(shown) > 1, tracks=shown)] if shown else []
 
 
 def _rails(data: PageData) -> list[Section]:
     table = overview_table(data.shown_cases, data.styles, known=data.bands)
-    return [_section("rails", "Rails", rails=table)] if table is not None else []
+    if table is None:
+        return []
+    return [_section("rails", "Rails", folded=True, rails=table)]
 
 
 def _running(data: PageData) -> list[Section]:
@@ -143,7 +186,8 @@ def _running(data: PageData) -> list[Section]:
         "comfort": spec.ride_comfort is not None,
         "kicks": decay_words(data.cases),
     }
-    return [_section("running", "Running safety and comfort", **shown)]
+    folded = len(table.rows) > MOST_ROWS and not data.asks_of_ride
+    return [_section("running", "Running safety and comfort", folded=folded, **shown)]
 
 
 def _ablations(data: PageData) -> list[Section]:
@@ -158,14 +202,61 @@ def _ablations(data: PageData) -> list[Section]:
         if groups:
             shown = {"groups": groups, "legend": WORDS[one].legend, "own": WORDS[one].title[0]}
             template = "pages/sections/ablation.html.j2"
-            sections.append(Section(f"{one.column}-costs", WORDS[one].cost, template, shown))
+            sections.append(Section(f"{one.column}-costs", WORDS[one].cost, template, shown, folded=True))
     return sections
 
 
 def _scores(data: PageData) -> list[Section]:
-    shown = [_case(data, case) for case in data.shown_cases[:MOST_TABLES]]
-    left_out = max(len(data.shown_cases) - MOST_TABLES, 0)
-    return [_section("scores", "Scores", cases=shown, rows=len(data.scores), cases_left_out=left_out)]
+    """What the best methods err by over distance, what the scores say, and the tables of cases."""
+    cases = data.shown_cases
+    shown = [_case(data, case) for case in cases[:MOST_TABLES]]
+    first = next(iter(cases), None)
+    campaign = is_campaign(data.scenario) and len(cases) > 1
+    drawings = distance_figures(data)
+    if first is not None and bands_of_case(first):
+        make = partial(bands_figure, first, data.styles, known=data.bands)
+        drawings.append((BANDS_CAPTION, canvas.drawn("bands", make)))
+    said = [] if first is None or campaign else _said(data, first)
+    words = {
+        "cases": shown,
+        "drawings": drawings,
+        "findings": said,
+        "rows": len(data.scores),
+        "cases_left_out": max(len(cases) - MOST_TABLES, 0),
+        "opened": not campaign,
+        "indicators": _indicators(data),
+    }
+    return [Section("scores", "Errors and scores", "pages/sections/scores.html.j2", words)]
+
+
+def _indicators(data: PageData) -> dict[str, Any] | None:
+    """Indicators of track quality of the first ride that is long enough for them, by the best method."""
+    limits = limits_of(data.scenario.spec)
+    ranked = data.leading or data.styles
+    for example in data.examples:
+        mapped = (s for s in [*ranked, *data.styles] if not is_zero(s) and has_rails(example, s))
+        style = next(mapped, None)
+        geometry = example.estimates[style.name].geometry if style else None
+        if style is None or geometry is None or example.rails is None:
+            continue
+        places = geometry.index.to_numpy(dtype="float64")
+        step, band = float(places[1] - places[0]), BANDS[BAND]
+        if any(why_not(band.edges_m(q), count=len(places), step_m=step) for q in JUDGED):
+            continue
+        truth = example.rails.irregularities(places)[list(IRREGULARITY)].set_index(geometry.index)
+        table = indicator_table(truth, geometry, limits=limits, band=band)
+        ride = example.recording.name
+        return {"table": table, "method": style.label, "ride": ride, "limits": limits, "band": BAND}
+    return None
+
+
+def _said(data: PageData, case: Case) -> list[Finding]:
+    """What the scores of a case say; where rails are scored, they are what the ride was for."""
+    goals = goals_mm(data.scenario.spec)
+    return [
+        *geometry_findings(case, data.styles, data.cases, goals_mm=goals, known=data.bands),
+        *findings(case, data.attitude_styles, others=data.cases),
+    ]
 
 
 def _case(data: PageData, case: Case) -> dict[str, Any]:
@@ -193,19 +284,20 @@ def _odometry(data: PageData) -> list[Section]:
     # A campaign has them in a section of its own.
     frames = {} if is_campaign(data.scenario) else odometry_frames(data.scores, data.cells)
     shown = {"odometry": table, "over_all": page_tables(frames)}
-    return [_section("odometry", "Odometry", **shown)] if table.rows else []
+    folded = len(table.rows) > 1
+    return [_section("odometry", "Odometry", folded=folded, **shown)] if table.rows else []
 
 
 def _words(data: PageData) -> list[Section]:
     geometry = data.scenario.spec.geometry
     bands = [data.bands[name] for name in (*geometry.bands, *geometry.own_bands)]
     shown = {"scenario": data.scenario, "bands": bands, "rails": bool(_rails(data))}
-    return [_section("words", "Words of this page", **shown)]
+    return [_section("words", "Words of this page", folded=True, **shown)]
 
 
 def _parts(data: PageData) -> list[Section]:
     rows = parts(data.scenario, data.cells, data.examples)
-    return [_section("parts", "Parts and sources", parts=rows)]
+    return [_section("parts", "Parts and sources", folded=True, parts=rows)]
 
 
 def _again(data: PageData) -> list[Section]:
@@ -219,26 +311,31 @@ SectionMaker = Callable[[PageData], list[Section]]
 SECTIONS: tuple[SectionMaker, ...] = (
     verdicts_section,
     _failures,
+    _scores,
+    campaign_section,
+    explorer_section,
     _paper,
     passes_section,
-    campaign_section,
-    ride_sections,
     _tracks,
     _rails,
     _running,
     _ablations,
-    _scores,
     _odometry,
     _words,
     _parts,
     _again,
 )
-"""What the page holds, in its order; a function that has nothing to show makes no section."""
+"""What the page holds after its answer, in its order; what has nothing to show makes no section."""
 
 
 def in_order(data: PageData) -> list[SectionMaker]:
-    """The parts of the page; where the ride itself is asked for, its figures before what attitudes err by."""
+    """The parts of the page: the answer first, which is a verdict where the scenario has requirements.
+
+    Where the ride itself is asked for, its figures come before what attitudes err by.
+    """
+    first = [] if requirements_of(data.scenario.spec) else [answer_section]
     if not data.asks_of_ride:
-        return list(SECTIONS)
-    places: dict[SectionMaker, int] = {_failures: -2, _running: -1, campaign_section: SECTIONS.index(_scores)}
-    return sorted(SECTIONS, key=lambda make: places.get(make, SECTIONS.index(make)))
+        return [*first, *SECTIONS]
+    after = SECTIONS.index(_tracks) + 0.5
+    places: dict[SectionMaker, float] = {_failures: -2, _running: -1, _scores: after, campaign_section: after}
+    return [*first, *sorted(SECTIONS, key=lambda make: places.get(make, SECTIONS.index(make)))]

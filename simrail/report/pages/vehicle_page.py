@@ -1,10 +1,12 @@
 """The page of a vehicle, in the look of the reports."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from simrail.report.figures import canvas
 from simrail.report.figures.vehicle import conicity_figure, locus_figure, pair_figure, shift_figure
 from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.tables import signed
@@ -33,7 +35,7 @@ def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
         running=[_row(mode, mode.frequency_hz) for mode in listed(study.running)],
         running_kmh=3.6 * study.running_mps,
         critical=critical_words(study.critical),
-        locus=locus_figure(study),
+        locus=canvas.drawn("locus", partial(locus_figure, study)),
     )
     return write_page(folder, model.name, text)
 
@@ -85,8 +87,8 @@ def _contact(model: VehicleModel, contact: Conicity) -> dict[str, Any]:
         for i in range(0, len(rest.y_m), every)
     ]
     return {
-        "pair": pair_figure(model, contact),
-        "shift": shift_figure(contact),
-        "conicity": conicity_figure(contact) if contact.steers else None,
+        "pair": canvas.drawn("pair", partial(pair_figure, model, contact)),
+        "shift": canvas.drawn("shift", partial(shift_figure, contact)),
+        "conicity": canvas.drawn("conicity", partial(conicity_figure, contact)) if contact.steers else None,
         "rows": rows,
     }

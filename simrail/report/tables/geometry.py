@@ -217,26 +217,29 @@ def overview_table(
 
 
 def indicator_table(
-    truth: pd.DataFrame, found: pd.DataFrame, *, limits: Mapping[str, Limits], band: Band
+    truth: pd.DataFrame | None, found: pd.DataFrame, *, limits: Mapping[str, Limits], band: Band
 ) -> Table:
-    """Indicators per section of true rails and of an estimate; what is beyond a limit is marked."""
-    true, own = (
+    """Indicators per section of rails as found, beside the true ones if these are known.
+
+    What is beyond a limit is marked.
+    """
+    parts = [
         section_indicators(rails, band=band, limits=limits).set_index(["start_m", "quantity"])
         for rails in (truth, found)
-    )
-    both = true.index.intersection(own.index)
+        if rails is not None
+    ]
+    both = parts[0].index.intersection(parts[-1].index)
     quantities = [q for q in JUDGED if q in both.get_level_values("quantity")]
     rows = []
     for start in sorted(set(both.get_level_values("start_m"))):
         cells = []
         for place in ((start, quantity) for quantity in quantities):
             for what in ("sd_m", "peak_m"):
-                cells += [
-                    _indicator(part.loc[place], what) if place in both else NONE for part in (true, own)
-                ]
+                cells += [_indicator(part.loc[place], what) if place in both else NONE for part in parts]
         rows.append(Row(f"{start:.0f} to {start + 200.0:.0f} m", "", "", cells))
-    groups = [(QUANTITIES[q], 4) for q in quantities]
-    return Table(groups, ["sd", "found", "peak", "found"] * len(quantities), rows)
+    heads = ["sd", "peak"] if truth is None else ["sd", "found", "peak", "found"]
+    groups = [(QUANTITIES[q], len(heads)) for q in quantities]
+    return Table(groups, heads * len(quantities), rows)
 
 
 def _indicator(line: pd.Series, what: str) -> Cell:

@@ -107,6 +107,8 @@ def axis_words(name: str, value: object) -> str:
             ablation, ablation.ablated if str(value) == str(True) else ablation.own, title=True
         )
     words, unit = axis_name(name)
+    if words == "reverse":
+        return "backward" if str(value) == str(True) else "forward"
     return f"{words} {_number_or_text(value)} {unit}".rstrip()
 
 

@@ -36,7 +36,7 @@ from simrail.core.rotation import rotation_matrix
 from simrail.core.seeds import stream
 from simrail.estimation.conformance import standing, time_reversed
 from simrail.recording.recording import Recording
-from simrail.report.figures.estimate import innovation_figure
+from simrail.report.figures.estimate import estimate_view
 from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import construct
 from simrail.scoring.geometry import score_geometry
@@ -395,5 +395,5 @@ def test_a_scenario_can_make_it_and_the_report_can_draw_it(line_recording: Calla
     with pytest.raises(InputError, match="hyperparameters"):
         construct(TrajectorySmoother, {"hyperparameters": 3.0})
     recording = WHERE["curve"](line_recording)
-    figure = innovation_figure(recording, made.estimate(recording))
-    assert "rad/s" in figure
+    view = estimate_view(recording, made.estimate(recording))
+    assert "rad/s" in {panel.unit for panel in view.panels if panel.group == "innovations"}

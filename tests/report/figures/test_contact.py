@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from simrail.core.columns import CONTACT
-from simrail.report.figures.contact import contact_figure, leading_axle
+from simrail.report.figures.contact import leading_axle, wheel_forces
 from simrail.track.design import Straight, TrackDesign
 
 
@@ -35,7 +35,9 @@ def test_the_axle_that_runs_ahead_is_drawn(direction, axle):
         np.testing.assert_array_equal(rows, example.contacts[f"{axle}.{side}"])
 
 
-def test_the_figure_has_forces_quotient_and_both_wheels():
-    text = contact_figure(example_of(1))
-    for words in ("Q, kN", "Y, kN", "Y/Q", "left wheel", "right wheel", "distance along the track"):
-        assert words in text
+def test_forces_are_in_kilonewtons_and_press_outward_on_either_side():
+    drawn = {side: wheel_forces(side, rows) for side, rows in leading_axle(example_of(1)).items()}
+    assert drawn["left"]["Q"][0] == pytest.approx(41.9) and drawn["left"]["Y"][0] == pytest.approx(2.0)
+    # A force to the left presses the right rail outward, and not the left one.
+    assert drawn["left"]["Y/Q"][0] == pytest.approx(-2.0 / 41.9)
+    assert drawn["right"]["Y/Q"][0] == pytest.approx(2.0 / 39.9)

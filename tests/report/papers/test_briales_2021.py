@@ -281,7 +281,7 @@ def test_the_section_stands_on_the_page(tmp_path: Path, no_pictures_of_rides: No
         manifest=describe(scenario, result),
     )
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert '<h2 id="paper">Beside Briales et al. 2021</h2>' in text
+    assert '<details class="part" id="paper"><summary><h2>Beside Briales et al. 2021</h2>' in text
     assert "8.25" in text and "Does not reproduce." in text and "track acceleration" in text
 
 

@@ -550,7 +550,7 @@ def test_the_page_shows_rails_and_the_section(ran: Ran) -> None:
     page = ran[2].read_text(encoding="utf-8")
     for words in (
         "Beside Gonzalez-Carbajal et al. 2023",
-        "What the rails look like",
+        "Rails over distance",
         "not observable",
         "Track quality by sections of 200 m",
         "alignment sd 0.01 mm",
