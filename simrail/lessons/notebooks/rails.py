@@ -169,11 +169,11 @@ def rms_mm(estimate, recording, quantity: str, band: str) -> float:
 
 
 @app.cell(hide_code=True)
-def _(grade, device):
+def _(grade):
     _rows = {}
     for _name, _body in PLACES.items():
         for _words, _smoothed in (("smoother", True), ("filter", False)):
-            _estimate, _recording = seen(_body, grade.value, _smoothed, device.value)
+            _estimate, _recording = seen(_body, grade.value, _smoothed)
             _figures = score_geometry(
                 _estimate, short_ride().rails, _recording, windows=["whole"], metrics=["rms"]
             )
@@ -191,7 +191,7 @@ def _(grade, device):
         pick(_figures, "gauge", "rms"),
     ]
     mo.md(
-        "## All at once\n\nRms error, mm:\n\n"
+        "## All at once\n\nRms error of device 0, mm:\n\n"
         + markdown(_rows, ["vertical D0", "vertical D1", "vertical D2", "cross-level D1", "gauge"], digits=2)
     )
     return
