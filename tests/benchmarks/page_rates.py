@@ -44,7 +44,8 @@ def film(browser: Browser, path: Path) -> None:
         )
         print(
             f"  window {wide} x {tall}, picture {scene[0]} x {scene[1]} dots: "
-            f"first frame after {first:.1f} s, {frames / wall:.1f} frames/s, {run / wall:.3f} s of film in a second"
+            f"first frame after {first:.1f} s, {frames / wall:.1f} frames/s, "
+            f"{run / wall:.3f} s of film in a second"
         )
         page.close()
 

@@ -118,11 +118,11 @@ def _(band, grade, place, quantity, smoothed, device):
                         Panel(
                             f"{quantity.value}, mm",
                             [
-                                Line("true", _s, _true, "true", width=2.0),
-                                Line("estimated", _s, _found, "first"),
+                                Line("true", _s, _true, "true", width=3.0),
+                                Line("estimated", _s, _found, "second", width=1.2),
                             ],
                         ),
-                        Panel("error, mm", [Line("", _s, _found - _true, "second")]),
+                        Panel("error, mm", [Line("", _s, _found - _true, "ink")]),
                     ],
                     x_label="place along the line, m",
                     description="Shape of the rails, true and estimated",
