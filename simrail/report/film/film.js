@@ -223,7 +223,7 @@ function drawTrack(pen, camera) {
     }
   }
   pen.font = "12px system-ui, sans-serif"; pen.textAlign = "center";
-  const post = 20 * size, label = data.origin_m;
+  const power = 10 ** Math.floor(Math.log10(20 * size)), post = power * [1, 2, 5, 10].find(one => one * power >= 13 * size), label = data.origin_m;
   for (let n = Math.ceil((places[0] + label) / post); n * post - label < Math.min(camera.s + 110 * size, lineEnd); n++) {
     const s = n * post - label, foot = camera.project(onTrack(s, 2.9 * size, -0.4 * size)), head = camera.project(onTrack(s, 2.9 * size, 1.0 * size));
     if (!foot || !head) continue;

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from simrail.core.jit import FloatArray
@@ -165,8 +166,8 @@ def _fill(pen: ImageDraw.ImageDraw, dots: FloatArray, fill: str | tuple[int, ...
 def _ribbon(pen: ImageDraw.ImageDraw, camera: _Camera, a: FloatArray, b: FloatArray, fill: str) -> None:
     """A strip between two edges, those parts of it that are before the eye."""
     left, right = camera.project(a), camera.project(b)
-    good = np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)
-    for first in np.flatnonzero(good[:-1] & good[1:]):
+    good: npt.NDArray[np.bool_] = np.isfinite(np.hstack([left, right])).all(axis=1)
+    for first in np.flatnonzero(np.logical_and(good[:-1], good[1:])):
         _fill(pen, np.array([left[first], left[first + 1], right[first + 1], right[first]]), fill)
 
 
