@@ -74,6 +74,9 @@ def test_what_is_drawn_is_what_the_film_holds(opened, film):
 
 
 def test_scrub_moves_every_picture_and_the_cursor(opened):
+    # Without a method only what is true is left to move.
+    opened.page.evaluate("film.choose(null)")
+    opened.settle()
     before = {name: opened.picture(name) for name in ("scene", "front", "horizon")}
     moved = opened.page.evaluate("document.querySelector('#strips > div').style.transform")
     opened.page.locator("#scrub").fill("8")
@@ -106,6 +109,12 @@ def test_frames_follow_the_clock(opened):
     # The last frame was drawn at most one frame of the slowest machine ago, however few there were.
     assert state["t"] == pytest.approx((state["now"] - began) / 1e3, abs=0.6)
     assert state["drawn"] > 2
+    # A page that hangs draws nothing meanwhile; afterwards the film is where the clock is.
+    hung = "const t = film.state.t, now = performance.now(); while (performance.now() < now + 1500); [t, now]"
+    before = opened.page.evaluate(hung)
+    opened.page.wait_for_function(f"film.state.t > {before[0]} + 0.5")
+    after = opened.page.evaluate("[film.state.t, performance.now()]")
+    assert after[0] - before[0] == pytest.approx((after[1] - before[1]) / 1e3, abs=0.6)
     opened.page.select_option("#speed", "2")
     a = opened.page.evaluate("[film.state.t, performance.now()]")
     time.sleep(1.5)
