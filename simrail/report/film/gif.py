@@ -13,7 +13,6 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from simrail.core.jit import FloatArray
@@ -166,7 +165,8 @@ def _fill(pen: ImageDraw.ImageDraw, dots: FloatArray, fill: str | tuple[int, ...
 def _ribbon(pen: ImageDraw.ImageDraw, camera: _Camera, a: FloatArray, b: FloatArray, fill: str) -> None:
     """A strip between two edges, those parts of it that are before the eye."""
     left, right = camera.project(a), camera.project(b)
-    good: npt.NDArray[np.bool_] = np.isfinite(np.hstack([left, right])).all(axis=1)
+    both: FloatArray = left.sum(axis=1) + right.sum(axis=1)  # NaN where one of them is
+    good = np.isfinite(both)
     for first in np.flatnonzero(np.logical_and(good[:-1], good[1:])):
         _fill(pen, np.array([left[first], left[first + 1], right[first + 1], right[first]]), fill)
 
