@@ -1,6 +1,7 @@
 """A film in a real browser: what is drawn, what moves, what is chosen; and nothing leaves the machine."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -150,8 +151,16 @@ def test_sliders_cameras_and_colours_change_the_picture(opened):
     assert changed(drag)
 
 
-def test_fits_a_telephone(chromium, path):
-    one = Opened(chromium, path, "t=5&play=0", size=(390, 844))
+def test_fits_a_telephone_and_does_without_methods_and_forces(chromium, film, tmp_path):
+    bare = replace(
+        film,
+        estimated_rad={},
+        contacts={},
+        signals=tuple(replace(signal, methods={}) for signal in film.signals),
+    )
+    one = Opened(chromium, write_film(tmp_path / "bare.html", bare), "t=5&play=0", size=(390, 844))
     assert one.page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert one.page.locator("#method, #arrows").count() == 0
+    assert min(one.picture("front")) > 0
     one.page.close()
     assert one.errors == []
