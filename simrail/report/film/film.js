@@ -88,7 +88,8 @@ function shade(name, light) {
 const SUN = unit([0.35, 0.45, 0.82]);
 
 // ---- canvases -----------------------------------------------------------------------------------------------
-let quality = Math.min(window.devicePixelRatio || 1, 2);
+const FULL = Math.min(window.devicePixelRatio || 1, 2);
+let quality = FULL;
 function fit(canvas, ratio) {
   const box = canvas.getBoundingClientRect(), w = Math.max(2, Math.round(box.width * ratio)), h = Math.max(2, Math.round(box.height * ratio));
   if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
@@ -516,14 +517,16 @@ function play(on) {
   state.playing = on; anchor = { t: state.t, now: performance.now() };
   $("play").textContent = on ? "\u275A\u275A" : "\u25B6";
 }
-let gap = 20, before = 0;
+let gap = 20, before = 0, calm = 0;
 function tick(now) {
   if (state.playing) {
     state.t = Math.min(anchor.t + state.speed * Math.max(now - anchor.now, 0) / 1e3, length);
     state.dirty = true;
     if (state.t >= length) play(false);
     if (now - before < 500) gap += 0.08 * (now - before - gap);
-    if (gap > 52 && quality > 0.6) { quality *= 0.8; gap = 30; }   // fewer dots before fewer frames
+    if (gap > 52 && quality > 0.65) { quality *= 0.8; gap = 30; calm = 0; }   // fewer dots before fewer frames
+    if (gap > 20) calm = 0;
+    else if (quality < FULL && ++calm > 300) { quality = Math.min(FULL, quality / 0.8); calm = 0; }
   }
   before = now;
   if (state.dirty) draw();
