@@ -61,7 +61,8 @@ def film(
     if gif is not None:
         from simrail.report.film.gif import pace, write_gif
 
-        path, plays = write_gif(gif, made), f", plays {pace(made):.3g} times as fast"
+        path, times = write_gif(gif, made), pace(made)
+        plays = "" if times == 1.0 else f", plays {times:.3g} times as fast"
     else:
         path, plays = write_film(out or Path(f"{scenario.name}_film.html"), made), ""
     first, last = made.reference_m[0], made.reference_m[-1]

@@ -43,7 +43,7 @@ def about(words: str, value: float, expected: float, relative: float, unit: str 
 
 def table(claims: Sequence[Claim]) -> str:
     """The claims as a table in Markdown."""
-    rows = ["| | claim | found | bounds |", "|---|---|---|---|"]
+    rows = ["| | claim | found | bounds |", "|:-:|:--|--:|--:|"]
     for claim in claims:
         mark = "\N{CHECK MARK}" if claim.holds else "**\N{BALLOT X}**"
         value = f"{claim.value:.4g} {claim.unit}".rstrip()

@@ -103,6 +103,7 @@ ON_BODY = Mount("imu", "body", (0.0, 0.0, HEIGHT_M))
 """Where the IMU sits on the ride of `one_curve`."""
 
 
+@lru_cache(maxsize=1)
 def short_ride() -> Line:
     """The shipped ride: a bogie over the same curve by the compiled engine, its axle ``front`` and its frame.
 

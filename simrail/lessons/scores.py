@@ -40,7 +40,7 @@ def pick(
 
 def markdown(rows: Mapping[str, Sequence[float]], columns: Sequence[str], *, digits: int = 3) -> str:
     """A table in Markdown: one row per name."""
-    lines = ["| | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    lines = ["| | " + " | ".join(columns) + " |", "|:--" + "|--:" * len(columns) + "|"]
     for name, values in rows.items():
         cells = ("\N{EN DASH}" if value != value else f"{value:.{digits}f}" for value in values)
         lines.append(f"| {name} | " + " | ".join(cells) + " |")

@@ -1,6 +1,7 @@
 """A film in a real browser: what is drawn, what moves, what is chosen; and nothing leaves the machine."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,9 @@ def test_what_is_drawn_is_what_the_film_holds(opened, film):
 
 
 def test_scrub_moves_every_picture_and_the_cursor(opened):
+    # Without a method only what is true is left to move.
+    opened.page.evaluate("film.choose(null)")
+    opened.settle()
     before = {name: opened.picture(name) for name in ("scene", "front", "horizon")}
     moved = opened.page.evaluate("document.querySelector('#strips > div').style.transform")
     opened.page.locator("#scrub").fill("8")
@@ -106,6 +110,12 @@ def test_frames_follow_the_clock(opened):
     # The last frame was drawn at most one frame of the slowest machine ago, however few there were.
     assert state["t"] == pytest.approx((state["now"] - began) / 1e3, abs=0.6)
     assert state["drawn"] > 2
+    # A page that hangs draws nothing meanwhile; afterwards the film is where the clock is.
+    hung = "const t = film.state.t, now = performance.now(); while (performance.now() < now + 1500); [t, now]"
+    before = opened.page.evaluate(hung)
+    opened.page.wait_for_function(f"film.state.t > {before[0]} + 0.5")
+    after = opened.page.evaluate("[film.state.t, performance.now()]")
+    assert after[0] - before[0] == pytest.approx((after[1] - before[1]) / 1e3, abs=0.6)
     opened.page.select_option("#speed", "2")
     a = opened.page.evaluate("[film.state.t, performance.now()]")
     time.sleep(1.5)
@@ -141,8 +151,16 @@ def test_sliders_cameras_and_colours_change_the_picture(opened):
     assert changed(drag)
 
 
-def test_fits_a_telephone(chromium, path):
-    one = Opened(chromium, path, "t=5&play=0", size=(390, 844))
+def test_fits_a_telephone_and_does_without_methods_and_forces(chromium, film, tmp_path):
+    bare = replace(
+        film,
+        estimated_rad={},
+        contacts={},
+        signals=tuple(replace(signal, methods={}) for signal in film.signals),
+    )
+    one = Opened(chromium, write_film(tmp_path / "bare.html", bare), "t=5&play=0", size=(390, 844))
     assert one.page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert one.page.locator("#method, #arrows").count() == 0
+    assert min(one.picture("front")) > 0
     one.page.close()
     assert one.errors == []

@@ -12,8 +12,6 @@ import pytest
 
 from simrail.lessons import LESSONS
 
-pytest.importorskip("marimo")
-
 NAMES = ["drift", *(pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift")]
 LONG_S = 120.0
 """On a machine that compiles kernels first, and has other things to do."""

@@ -13,8 +13,6 @@ from simrail.cli.main import call
 from simrail.lessons import LESSONS, notebook, teacher_page
 from simrail.lessons.claims import Claim, ClaimError, about, insist, table
 
-pytest.importorskip("marimo")
-
 OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift"]
 
 

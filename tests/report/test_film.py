@@ -1,10 +1,12 @@
 """What a film holds: poses by an independent oracle, ranges, methods, faulty input; page and picture."""
 
 import base64
+import json
 import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
 
@@ -14,6 +16,7 @@ from simrail.report.film.film import FRAME_HZ, Film, film_of, scenario_of
 from simrail.report.film.gif import GIF_HZ, pace, write_gif
 from simrail.report.film.page import film_data, write_film
 from simrail.report.film.shapes import boxes_of, discs_of, profile_lines
+from simrail.scoring.table import SCORE_COLUMNS
 
 SHORT = ["ride.end_m=190.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "monte_carlo.sensor_draws=1"]
 
@@ -80,8 +83,6 @@ def test_range_is_where_the_vehicle_is_first(film, own_cache):
 
 def test_signals_of_the_imu_do_not_fold(own_cache):
     """A tone faster than the frames is averaged away, not shown as a slow one."""
-    import pandas as pd
-
     from simrail.report.film.film import _mean_at
 
     when = np.arange(0.0, 10.0, 0.001)
@@ -129,6 +130,14 @@ def test_results_have_their_own_settings(here):
         scenario_of(str(folder), overrides=["seed=2"])
     with pytest.raises(InputError, match="no finished results"):
         scenario_of(str(folder))
+    own = load_scenario("quick_kinematic", overrides=["seed=7", "ride.speed_kmh=33.0"])
+    manifest = {"scenario": "mine", "settings": ["ride.speed_kmh=33.0"], "seed": 7, "scenario_text": own.text}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    pd.DataFrame(columns=list(SCORE_COLUMNS)).to_parquet(folder / "scores.parquet")
+    pd.DataFrame(columns=["cell", "case", "map", "vibration"]).to_parquet(folder / "cells.parquet")
+    again = scenario_of(str(folder))
+    assert (again.name, again.spec.seed) == ("mine", 7)
+    assert again.spec.ride[0].speed_kmh == 33.0
 
 
 def test_picture_for_slides(film, tmp_path):

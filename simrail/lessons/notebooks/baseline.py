@@ -98,13 +98,14 @@ def _(imu, rough, surveyed):
         )
         for _name, _colour in (("EKF, compensated", "first"), ("design angles, no IMU", "second"))
     ]
-    _rows = {
-        _name: [
-            *(rms_deg(_one, _recording, _reference, _window) for _window in ("whole", "straight", "curve")),
-            rms_deg(_one, _recording, _reference, "whole", "design"),
+    _windows = ("whole", "straight", "curve")
+    _rows = {}
+    for _name, _one in _found.items():
+        _figures = score(_one, _reference, _recording, windows=_windows, metrics=["rms"])
+        _rows[_name] = [
+            *(pick(_figures, "roll", "rms", window=_window) for _window in _windows),
+            pick(_figures, "roll", "rms", reference="design"),
         ]
-        for _name, _one in _found.items()
-    }
     mo.vstack(
         [
             mo.Html(

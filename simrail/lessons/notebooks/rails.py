@@ -118,11 +118,11 @@ def _(band, grade, place, quantity, smoothed, device):
                         Panel(
                             f"{quantity.value}, mm",
                             [
-                                Line("true", _s, _true, "true", width=2.0),
-                                Line("estimated", _s, _found, "first"),
+                                Line("true", _s, _true, "true", width=3.0),
+                                Line("estimated", _s, _found, "second", width=1.2),
                             ],
                         ),
-                        Panel("error, mm", [Line("", _s, _found - _true, "second")]),
+                        Panel("error, mm", [Line("", _s, _found - _true, "ink")]),
                     ],
                     x_label="place along the line, m",
                     description="Shape of the rails, true and estimated",
@@ -169,11 +169,11 @@ def rms_mm(estimate, recording, quantity: str, band: str) -> float:
 
 
 @app.cell(hide_code=True)
-def _(grade, device):
+def _(grade):
     _rows = {}
     for _name, _body in PLACES.items():
         for _words, _smoothed in (("smoother", True), ("filter", False)):
-            _estimate, _recording = seen(_body, grade.value, _smoothed, device.value)
+            _estimate, _recording = seen(_body, grade.value, _smoothed)
             _figures = score_geometry(
                 _estimate, short_ride().rails, _recording, windows=["whole"], metrics=["rms"]
             )
@@ -191,7 +191,7 @@ def _(grade, device):
         pick(_figures, "gauge", "rms"),
     ]
     mo.md(
-        "## All at once\n\nRms error, mm:\n\n"
+        "## All at once\n\nRms error of device 0, mm:\n\n"
         + markdown(_rows, ["vertical D0", "vertical D1", "vertical D2", "cross-level D1", "gauge"], digits=2)
     )
     return

@@ -88,7 +88,8 @@ function shade(name, light) {
 const SUN = unit([0.35, 0.45, 0.82]);
 
 // ---- canvases -----------------------------------------------------------------------------------------------
-let quality = Math.min(window.devicePixelRatio || 1, 2);
+const FULL = Math.min(window.devicePixelRatio || 1, 2);
+let quality = FULL;
 function fit(canvas, ratio) {
   const box = canvas.getBoundingClientRect(), w = Math.max(2, Math.round(box.width * ratio)), h = Math.max(2, Math.round(box.height * ratio));
   if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
@@ -223,7 +224,7 @@ function drawTrack(pen, camera) {
     }
   }
   pen.font = "12px system-ui, sans-serif"; pen.textAlign = "center";
-  const post = 20 * size, label = data.origin_m;
+  const power = 10 ** Math.floor(Math.log10(20 * size)), post = power * [1, 2, 5, 10].find(one => one * power >= 13 * size), label = data.origin_m;
   for (let n = Math.ceil((places[0] + label) / post); n * post - label < Math.min(camera.s + 110 * size, lineEnd); n++) {
     const s = n * post - label, foot = camera.project(onTrack(s, 2.9 * size, -0.4 * size)), head = camera.project(onTrack(s, 2.9 * size, 1.0 * size));
     if (!foot || !head) continue;
@@ -516,14 +517,16 @@ function play(on) {
   state.playing = on; anchor = { t: state.t, now: performance.now() };
   $("play").textContent = on ? "\u275A\u275A" : "\u25B6";
 }
-let gap = 20, before = 0;
+let gap = 20, before = 0, calm = 0;
 function tick(now) {
   if (state.playing) {
     state.t = Math.min(anchor.t + state.speed * Math.max(now - anchor.now, 0) / 1e3, length);
     state.dirty = true;
     if (state.t >= length) play(false);
     if (now - before < 500) gap += 0.08 * (now - before - gap);
-    if (gap > 52 && quality > 0.6) { quality *= 0.8; gap = 30; }   // fewer dots before fewer frames
+    if (gap > 52 && quality > 0.65) { quality *= 0.8; gap = 30; calm = 0; }   // fewer dots before fewer frames
+    if (gap > 20) calm = 0;
+    else if (quality < FULL && ++calm > 300) { quality = Math.min(FULL, quality / 0.8); calm = 0; }
   }
   before = now;
   if (state.dirty) draw();

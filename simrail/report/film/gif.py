@@ -24,10 +24,11 @@ from simrail.report.film.shapes import Box, Disc, boxes_of, discs_of, scale_of
 WIDTH, HEIGHT = 720, 405
 """Size of the picture, in dots."""
 
-GIF_HZ = 10.0
-"""Pictures per second: a GIF counts hundredths of a second, and browsers slow down what is faster than 20."""
+GIF_HZ = 12.5
+"""Pictures per second: a GIF counts hundredths of a second, browsers slow down what is faster than 20, and it
+is every second frame of the film."""
 
-MOST_PICTURES = 120
+MOST_PICTURES = 150
 """Of a longer piece fewer pictures per second of the ride are drawn: it plays faster."""
 
 TIMES = 5.0
@@ -64,7 +65,7 @@ def write_gif(path: Path, film: Film) -> Path:
     palette = pictures[len(pictures) // 2].quantize(96)
     plain = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     stream = io.BytesIO()
-    # Of a piece that is thinned out each picture still stays its tenth of a second.
+    # Of a piece that is thinned out each picture still stays as long as any other.
     plain[0].save(
         stream,
         format="GIF",
@@ -165,8 +166,9 @@ def _fill(pen: ImageDraw.ImageDraw, dots: FloatArray, fill: str | tuple[int, ...
 def _ribbon(pen: ImageDraw.ImageDraw, camera: _Camera, a: FloatArray, b: FloatArray, fill: str) -> None:
     """A strip between two edges, those parts of it that are before the eye."""
     left, right = camera.project(a), camera.project(b)
-    good = np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)
-    for first in np.flatnonzero(good[:-1] & good[1:]):
+    both: FloatArray = left.sum(axis=1) + right.sum(axis=1)  # NaN where one of them is
+    good = np.isfinite(both)
+    for first in np.flatnonzero(np.logical_and(good[:-1], good[1:])):
         _fill(pen, np.array([left[first], left[first + 1], right[first + 1], right[first]]), fill)
 
 

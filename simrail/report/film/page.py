@@ -140,9 +140,8 @@ def _body(film: Film, name: str, origin: float) -> dict[str, Any]:
 
 def _place(film: Film) -> list[float]:
     """Where the IMU sits, from the centre of gravity of its body."""
-    return np.subtract(
-        film.mount.position_m, (0.0, 0.0, film.vehicle.body(film.mount.body).position_m[2])
-    ).tolist()
+    x, y, z = film.mount.position_m
+    return [x, y, z - film.vehicle.body(film.mount.body).position_m[2]]
 
 
 def _line(film: Film, size: float, origin: float) -> tuple[dict[str, Any], dict[str, Any]]:
