@@ -165,6 +165,11 @@ def _side_by_side(objective: Objective, cube: Cube, pool: Executor) -> Batch:
     return evaluate
 
 
+def _content(value: object) -> object:
+    """All that a value holds: what it shows when it is printed is less."""
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+
+
 def _key(
     tunable: Tunable, recordings: Sequence[Recording], references: Sequence[pd.DataFrame], *rest: object
 ) -> str:
@@ -176,14 +181,7 @@ def _key(
         values = [getattr(recording, entry.name) for entry in fields(recording)]
         frames += [value for value in values if isinstance(value, pd.DataFrame)]
         plain = [value for value in values if not isinstance(value, pd.DataFrame)]
-        digest.update(
-            repr(
-                [
-                    asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
-                    for value in plain
-                ]
-            ).encode()
-        )
+        digest.update(repr([_content(value) for value in plain]).encode())
     for frame in frames:
         digest.update(repr(list(frame.columns)).encode() + frame.index.to_numpy().tobytes())
         digest.update(np.ascontiguousarray(frame.to_numpy(dtype=np.float64)).tobytes())

@@ -19,7 +19,16 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
-from simrail.report.figures.canvas import INK, MUTED, WIDTH_IN, look, pad_limits, panels, shade_track
+from simrail.report.figures.canvas import (
+    INK,
+    MUTED,
+    WIDE_IN,
+    look,
+    pad_limits,
+    panels,
+    places_of,
+    shade_places,
+)
 from simrail.ride.ride import Ride
 from simrail.ride.truth import Truth
 from simrail.track.design import TrackDesign
@@ -99,7 +108,7 @@ def _(x: TrackDesign) -> Figure:
         axis.plot(s, line, color=AXES[0])
         axis.set_ylabel(label)
         pad_limits(axis, float(line.min()), float(line.max()), top=0.3)
-    shade_track(rest, x, limits=(x.start_m, x.end_m))
+    shade_places(rest, places_of(x), limits=(x.start_m, x.end_m))
     rest[-1].set_xlabel("distance along the track, m")
     # The plan has an axis of its own: leave room between both.
     low, wide = plan.get_position().y0, plan.get_position().width
@@ -116,7 +125,7 @@ def _(x: LaidTrack) -> Figure:
         axis.plot(s, 1e3 * rails[name], color=INK, lw=0.7)
         axis.set_ylabel(f"{_words(name)}, mm")
     axes[0].set_title(f"{x.design.name}: rails from {x.irregularity.spectrum}, seed {x.seed}", pad=14)
-    shade_track(axes, x.design, limits=(x.design.start_m, x.design.end_m))
+    shade_places(axes, places_of(x.design), limits=(x.design.start_m, x.design.end_m))
     axes[-1].set_xlabel("distance along the track, m")
     return figure
 
@@ -267,7 +276,8 @@ def _(x: pd.DataFrame, *, quantity: str = "", metric: str = "rms") -> Figure:
     """Scores: a dot for each draw, in the rows of the methods."""
     missing = [name for name in ("quantity", "metric", "estimator", "value", "window") if name not in x]
     if missing:
-        raise InputError("is no table of scores: it lacks", field="x", value=", ".join(missing))
+        limit = "a table of scores"
+        raise InputError("lacks columns", field="x", value=", ".join(missing), limit=limit)
     rows = x[(x["metric"] == metric) & (x["window"] == "whole") & x["value"].notna()]
     known = list(rows["quantity"].unique())
     chosen = quantity or next((name for name in ("roll", "position", *known) if name in known), "")
@@ -290,7 +300,7 @@ def _(x: pd.DataFrame, *, quantity: str = "", metric: str = "rms") -> Figure:
     axis.set_xlabel(f"{chosen}, {metric}{unit}: a dot for each draw, the mean as a bar")
     axis.set_xlim(left=0.0)
     left, low, wide, tall = axis.get_position().bounds
-    words = 0.075 * max(len(method) for method in methods) / WIDTH_IN  # what the names take of the figure
+    words = 0.075 * max(len(method) for method in methods) / WIDE_IN  # what the names take of the figure
     axis.set_position((left + words - 0.05, low, wide - words + 0.05, tall))
     return figure
 

@@ -55,7 +55,7 @@ def read_rest(path: Path) -> tuple[pd.DataFrame, float]:
     path = ride_file(path)
     reader = SignalReader(path.parent)
     said: dict[str, Any] = {"imu": {"file": path.name}}
-    if path.suffix.lower() not in TEXTS + TABLES:
+    if path.suffix.lower() not in (*TEXTS, *TABLES):
         said = read_toml(path)
     with blame(label(path)):
         if not isinstance(said.get("imu"), dict):
