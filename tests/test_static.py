@@ -16,7 +16,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = {
-    "campaign", "cli", "core", "estimation", "recording", "report",
+    "campaign", "cli", "core", "estimation", "lessons", "recording", "report",
     "ride", "scenario", "scoring", "sensors", "track", "vehicle",
 }  # fmt: skip
 

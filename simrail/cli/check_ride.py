@@ -14,6 +14,9 @@ from simrail.recording.evidence.judge import Evidence, weigh
 from simrail.recording.files.mend import write_mended
 from simrail.recording.files.ride_reader import RIDE_FILE, read_signals, ride_file
 
+MOST_LETTERS = 200
+"""Of a name; a longer one is no file that there is."""
+
 WIDEST = 110
 """Characters of a line that the table keeps to."""
 
@@ -21,6 +24,8 @@ WIDEST = 110
 def is_ride(name: str) -> bool:
     """Whether a name means a ride file, or the folder of one, and no scenario."""
     path = Path(name)
+    if len(name) > MOST_LETTERS or not path.exists():
+        return False  # a scenario by its name, or one that there is not
     if path.is_dir():
         return (path / RIDE_FILE).is_file()
     if path.suffix != ".toml" or not path.is_file():

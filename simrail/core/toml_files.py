@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -244,7 +245,9 @@ def _refuse_absurd(data: Any, file: object, field: str = "") -> None:
     elif isinstance(data, str) and len(data) > MOST_LETTERS:
         limit = f"at most {MOST_LETTERS} characters"
         raise InputError("is too long", file=file, field=field, value=data, limit=limit, remedy="shorten it")
-    elif isinstance(data, int | float) and abs(data) >= MOST:
+    elif (
+        isinstance(data, int | float) and MOST <= abs(data) < math.inf
+    ):  # models refuse infinity where it is none
         limit, remedy = f"below {MOST:g}", "mind the unit, which is in the name of the field"
         raise InputError("is out of range", file=file, field=field, value=data, limit=limit, remedy=remedy)
 

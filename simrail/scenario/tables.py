@@ -436,7 +436,7 @@ class ImuPart(Part):
     """Where, m: ahead of the body's reference point, left of the track's centre, above the rails, as it
     stands on level track."""
     roll_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0
-    """How it is turned on the body about X, degrees; the train knows it."""
+    """How it is turned on the body about X, degrees; nobody tells the train."""
     pitch_deg: Listed[Annotated[float, Field(ge=-90.0, le=90.0)]] = 0.0
     """The same about Y, degrees."""
     yaw_deg: Listed[Annotated[float, Field(ge=-180.0, le=180.0)]] = 0.0

@@ -389,7 +389,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         [
             "estimator[2].method",
             "'DesignAngle'",
-            "AttitudeEkf, AttitudeGda, ComplementaryFilter, CurveMatchedOdometry",
+            "AttitudeEkf, AttitudeGda, BogieDelayOdometry, ComplementaryFilter",
         ],
     ),
     "an estimator file that is missing": (
@@ -559,7 +559,7 @@ FAULTS: dict[str, tuple[str, str, list[str]]] = {
         '[score]\nmetrics = ["sd"]\n\n' + _require(),
         ["require[0].metric", "not kept", "'rms'", "sd"],
     ),
-    "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 28", "quotes"]),
+    "broken TOML": ("[[imu]]", "[[imu]", ["not valid TOML", "line 29", "quotes"]),
     "a key twice": ("seed = 1", "seed = 1\nseed = 2", ["not valid TOML"]),
     "a table where a list belongs": ("[[ride]]", "[ride]", ["ride", "array of tables"]),
     "no rides": ("[[ride]]", "[[rides]]", ["rides", "unknown key", "did you mean ride?"]),

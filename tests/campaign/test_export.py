@@ -21,6 +21,7 @@ from simrail.core.columns import CONTACT, ENCODER, IMU, MOTION, ODOMETRY, ODOMET
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import shipped
 from simrail.estimation.recorded_ride import read_ride
+from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
 from simrail.report.pages.explorer import stored_rides
 from simrail.ride.ride import simulate
@@ -99,7 +100,7 @@ roll_deg = 3.0
     assert len(names) == 6 == len(set(names))
     first = [cell for cell in cells(scenario) if cell.sensor_draw == 0]
     for cell, name in zip(first, names, strict=True):
-        again = read_ride(here / "out" / name)
+        again = read_signals(here / "out" / name)  # `read_ride` would say that the box is turned by 3 degrees
         assert again.mount == cell.imu.name and again.imu_sheet.grade == cell.imu.grade
         assert_same(recorded(scenario, cell), again)
 

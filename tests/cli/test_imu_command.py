@@ -57,7 +57,7 @@ def test_a_page_that_cannot_be_written_is_bad_input(
     taken = tmp_path / "taken"
     taken.write_text("mine", encoding="utf-8")
     assert call(["imu", "ideal", "--out", str(taken)]) == BAD_INPUT
-    assert "--out: the page cannot be written" in capsys.readouterr().err
+    assert "--out: the folder cannot be written" in capsys.readouterr().err
     assert taken.read_text(encoding="utf-8") == "mine"
 
 

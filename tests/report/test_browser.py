@@ -6,8 +6,6 @@ browser that is missing is a failure, or nobody would notice.
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -23,33 +21,18 @@ from simrail.scenario.scenario import Scenario, read_scenario
 Rides = Callable[..., CellResult]
 Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 MANIFEST = {"command": "simrail run test", "seed": 1}
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    if os.environ.get("SIMRAIL_NO_BROWSER") == "1":
-        pytest.skip("SIMRAIL_NO_BROWSER=1")
-    path = next((found for name in NAMES if (found := shutil.which(name))), None)
-    assert path, f"none of {', '.join(NAMES)} is installed; SIMRAIL_NO_BROWSER=1 leaves these tests out"
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield started
-        started.close()
-
-
 @pytest.fixture
-def opened(browser: Any) -> Iterator[Callable[..., Any]]:
+def opened(chromium: Any) -> Iterator[Callable[..., Any]]:
     """Open a page; at the end nothing may have been written to its console as an error."""
     errors: list[str] = []
     contexts = []
 
     def open_page(path: Path, *, width: int = 1200, dark: bool = False) -> Any:
         scheme = "dark" if dark else "light"
-        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        context = chromium.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
         contexts.append(context)
         page = context.new_page()
         page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)

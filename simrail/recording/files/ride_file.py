@@ -159,7 +159,7 @@ class ImuSignalPart(VectorPart):
         shared = {name: getattr(self, name) for name in kind.model_fields if name in self.model_fields_set}
         own: SensorPart | None = getattr(self, key)
         said = {} if own is None else own.model_dump(exclude_none=True)
-        for name in ("columns", "units", "lsb_per_unit"):
+        for name in ("columns", "units", "lsb_per_unit", "scale"):
             mine = {word: value for word, value in shared.get(name, {}).items() if word in (key, "time")}
             shared[name] = mine | said.pop(name, {})
         if "tick_rate_hz" in shared and shared["units"].get("time") != TICKS:
