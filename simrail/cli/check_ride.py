@@ -92,4 +92,9 @@ def print_evidence(console: Console, evidence: Evidence, *, title: str) -> None:
 
 def refuse_ride_option(option: str) -> None:
     """Refuse an option that says nothing to a recorded ride."""
-    raise InputError("is for scenarios, not for recorded rides", field=option, remedy="leave it out")
+    raise InputError(
+        "is for scenarios, not for recorded rides",
+        field=option,
+        limit="only for scenarios",
+        remedy="leave it out",
+    )

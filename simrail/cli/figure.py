@@ -33,7 +33,10 @@ def figure(
             _offer(results)
         except OSError as error:
             raise InputError(
-                f"the figure cannot be written: {error.strerror or error}", field="--out", value=str(path)
+                f"the figure cannot be written: {error.strerror or error}",
+                field="--out",
+                value=str(path),
+                limit="a file that can be written",
             ) from error
     if name is None:
         print("\n".join(order.names))
@@ -59,7 +62,11 @@ def _offer(results: Path) -> None:
     if page is None:
         remedy = "run a scenario, or estimate a ride, first"
         raise InputError(
-            "there is no page of results there", field="RESULTS", value=str(results), remedy=remedy
+            "there is no page of results there",
+            field="RESULTS",
+            value=str(results),
+            limit="a folder that holds " + " or ".join(PAGES),
+            remedy=remedy,
         )
     views, looks = stored_rides(page.read_text(encoding="utf-8"))
     if page.name == PAGES[0]:

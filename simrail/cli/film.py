@@ -52,7 +52,12 @@ def film(
     _check_ending("--out", out, ".html")
     _check_ending("--gif", gif, ".gif")
     if out is not None and gif is not None:
-        raise InputError("these options do not go together", field="--out --gif", remedy="choose one of them")
+        raise InputError(
+            "these options do not go together",
+            field="--out --gif",
+            limit="one of --out, --gif",
+            remedy="choose one of them",
+        )
     scenario = scenario_of(name, overrides=settings or [], seed=seed)
     with ProgressWatcher(Console(stderr=True)) as watcher:
         made = film_of(

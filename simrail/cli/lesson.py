@@ -45,6 +45,7 @@ def lesson(
             "lessons are served by marimo, which is not installed",
             field="NAME",
             value=name,
+            limit="marimo installed",
             remedy="pip install 'simrail[lessons]'",
         )
     return serve(name, edit=edit, headless=headless, port=port)

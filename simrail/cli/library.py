@@ -185,6 +185,7 @@ def imu(
             "needs either a name or a recording",
             field="NAME",
             value=name,
+            limit="NAME or --from-rest, not both",
             remedy="e.g. simrail imu lord_3dm_gx4_25, or simrail imu --from-rest rest.csv",
         )
     if from_rest is not None:
@@ -246,7 +247,13 @@ def new(
     ):
         if value is not None:
             remedy = "simrail new track NAME --from FILE"
-            raise InputError("belongs to a track from a file", field=option, value=str(value), remedy=remedy)
+            raise InputError(
+                "belongs to a track from a file",
+                field=option,
+                value=str(value),
+                limit="only for simrail new track with --from",
+                remedy=remedy,
+            )
     written, next_step = write_template(kind, name, folder=folder)
     print(f"wrote {written}\n{next_step}")
     return DONE

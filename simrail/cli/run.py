@@ -152,7 +152,13 @@ def check(
                 refuse_ride_option(option)
         return check_ride(Path(scenario), write)
     if write is not None:
-        raise InputError("is for recorded rides", field="--write", value=str(write), remedy="leave it out")
+        raise InputError(
+            "is for recorded rides",
+            field="--write",
+            value=str(write),
+            limit="only for recorded rides",
+            remedy="leave it out",
+        )
     from simrail.scenario.check import judge_scenario
     from simrail.scenario.scenario import load_scenario
 

@@ -101,11 +101,20 @@ def _place(name: str, folder: Path, ending: str) -> Path:
             remedy="e.g. my_filter",
         )
     if not folder.is_dir():
-        raise InputError("there is no such folder", field="--in", value=str(folder), remedy="make it first")
+        raise InputError(
+            "there is no such folder",
+            field="--in",
+            value=str(folder),
+            limit="a folder that exists",
+            remedy="make it first",
+        )
     path = folder / f"{name}{ending}"
     if path.exists():
         raise InputError(
-            "the file exists", file=label(path), remedy="choose another name, or move the file away"
+            "the file exists",
+            file=label(path),
+            limit="a file that does not exist yet",
+            remedy="choose another name, or move the file away",
         )
     return path
 

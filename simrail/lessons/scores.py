@@ -34,7 +34,12 @@ def pick(
     for column, value in wanted.items():
         rows = rows[rows[column] == value]
         if rows.empty:
-            raise InputError("the score table has no such figure", field=column, value=value)
+            raise InputError(
+                "the score table has no such figure",
+                field=column,
+                value=value,
+                limit=f"a {column} that the score table holds",
+            )
     return float(rows["value"].iloc[0])
 
 

@@ -159,7 +159,9 @@ def _check_gnss(frame: pd.DataFrame) -> None:
         )
     for name in columns:
         if not pd.api.types.is_numeric_dtype(frame[name]):
-            raise InputError("holds no numbers", field=f"gnss.{name}", value=str(frame[name].dtype))
+            raise InputError(
+                "holds no numbers", field=f"gnss.{name}", value=str(frame[name].dtype), limit="numbers"
+            )
         endless = np.isinf(frame[name].to_numpy(dtype=np.float64))
         if endless.any():
             raise InputError(

@@ -235,7 +235,10 @@ def _(x: Estimate, *, recording: Recording | None = None, truth: pd.DataFrame | 
     drawn = [name for name in drawn if name in x.states]
     if not drawn:
         raise InputError(
-            "has no state that can be drawn", field="states", value=", ".join(map(str, x.states))
+            "has no state that can be drawn",
+            field="states",
+            value=", ".join(map(str, x.states)),
+            limit="an angle, position or speed among the states",
         )
     across, label = _across(x, recording)
     every = max(1, len(x.states) // (4 * SMALL))

@@ -85,6 +85,7 @@ def _judge_second_imu(resolved: ResolvedCell) -> None:
             "is the name of an [[imu]] that it is recorded with",
             field="second_imu.name",
             value=second.mount.name,
+            limit="another name than that of the [[imu]]",
             remedy="give it a name of its own: by its name its noise is drawn",
         )
     check_pair(

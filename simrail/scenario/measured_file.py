@@ -85,7 +85,12 @@ class MeasuredPart(DataPart):
     @model_validator(mode="after")
     def _known_quantities(self) -> Self:
         if isinstance(self.band, tuple) and not self.band[0] < self.band[1]:
-            raise InputError("is not (shortest, longest), m", field="band", value=self.band)
+            raise InputError(
+                "is not (shortest, longest), m",
+                field="band",
+                value=self.band,
+                limit="0 m < shortest < longest",
+            )
         if not self.columns and not self.units:
             return self
         for table, given in (("columns", self.columns), ("units", self.units)):

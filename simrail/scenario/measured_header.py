@@ -107,7 +107,9 @@ def _layout(path: Path) -> tuple[str, str]:
         with path.open(encoding="utf-8-sig", errors="replace") as text:
             head, *lines = [text.readline() for _ in range(5)]
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from None
+        raise InputError(
+            f"cannot be read ({error.strerror})", file=label(path), limit="a file that can be read"
+        ) from None
     separator = max(";\t|,", key=lambda mark: (head.count(mark), mark != ","))
     comma = separator != "," and any(re.search(r"\d,\d", line) for line in lines)
     return separator, "," if comma else "."

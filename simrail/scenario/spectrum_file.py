@@ -48,7 +48,11 @@ def read_spectrum(path: Path) -> OwnSpectrum:
     try:
         values = np.array(rows, dtype=np.float64)
     except ValueError:
-        raise InputError("holds what is no number, or rows of several lengths", file=label(path)) from None
+        raise InputError(
+            "holds what is no number, or rows of several lengths",
+            file=label(path),
+            limit="numbers, as many in each row",
+        ) from None
     if len(values) < 2 or not (np.isfinite(values) & (values > 0.0)).all():
         raise InputError(
             "needs two rows of positive numbers or more", file=label(path), value=len(values), limit=">= 2"
@@ -57,7 +61,9 @@ def read_spectrum(path: Path) -> OwnSpectrum:
     frequency = 1.0 / axis if "wavelength" in _plain(names[0]) else axis
     order = np.argsort(frequency)
     if not (np.diff(frequency[order]) > 0.0).all():
-        raise InputError("has a frequency twice", file=label(path), field=names[0])
+        raise InputError(
+            "has a frequency twice", file=label(path), field=names[0], limit="each frequency once"
+        )
     none = TabledPsd((), ())
     densities = dict.fromkeys(IRREGULARITY, none)
     for i, name in enumerate(names[1:], start=1):
@@ -79,7 +85,9 @@ def _rows(path: Path) -> tuple[list[str], list[list[str]]]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read ({error})", file=label(path)) from None
+        raise InputError(
+            f"cannot be read ({error})", file=label(path), limit="a text file in UTF-8"
+        ) from None
     lines = [line for line in lines if line.strip() and not line.startswith("#")] or [""]
     mark = max(";\t,", key=lines[0].count)
     names, *rows = csv.reader(lines, delimiter=mark)

@@ -161,6 +161,7 @@ class IrregularityPart(Part):
                 raise InputError(
                     "is a file beside that of [irregularity.measured]",
                     value=str(self.spectrum),
+                    limit="one file of measured rails",
                     remedy="keep one of them",
                 )
             if is_spectrum(path):

@@ -54,10 +54,15 @@ def read_curvature_csv(path: Path) -> Drawn:
     table, rounding, words = _table(path)
     s = table["position"]
     if len(s) < 2:
-        raise InputError("has less than two rows", value=len(s))
+        raise InputError("has less than two rows", value=len(s), limit=">= 2 rows")
     fallen = np.flatnonzero(np.diff(s) < 0.0)
     if fallen.size:
-        raise InputError("places fall", field=f"row {int(fallen[0]) + 3}", value=float(s[fallen[0] + 1]))
+        raise InputError(
+            "places fall",
+            field=f"row {int(fallen[0]) + 3}",
+            value=float(s[fallen[0] + 1]),
+            limit="places that rise or stay",
+        )
     drawn = Drawn(path.stem, f"table {path.name}", float(s[0]), [])
     drawn.notes.append(f"columns known by name: {words}")
     if "curvature" in table:
@@ -82,10 +87,10 @@ def _table(path: Path) -> tuple[dict[str, FloatArray], dict[str, float], str]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read ({error})") from None
+        raise InputError(f"cannot be read ({error})", limit="a text file in UTF-8") from None
     lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
-        raise InputError("is empty")
+        raise InputError("is empty", limit="a line of column names, then >= 2 rows")
     mark = max(";\t,", key=lines[0].count)
     names, *rows = csv.reader(lines, delimiter=mark)
     table, rounding, words = {}, {}, []
@@ -139,7 +144,9 @@ def _number(cell: str, row: int, name: str, quantity: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value) and quantity != "radius":
-        raise InputError("is no number", field=f"{name.strip()}, row {row + 2}", value=cell)
+        raise InputError(
+            "is no number", field=f"{name.strip()}, row {row + 2}", value=cell, limit="a finite number"
+        )
     return value
 
 
@@ -271,6 +278,7 @@ def _level(drawn: Drawn, s: FloatArray, cant: FloatArray, bend: FloatArray) -> F
         raise InputError(
             "has both signs, and the curvature does not say which rail they raise",
             field="cant",
+            limit="cant whose side the curvature tells, or cross level",
             remedy="name the column 'cross level [mm]': the left rail above the right one",
         )
     drawn.notes.append(

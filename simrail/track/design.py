@@ -217,6 +217,7 @@ class TrackDesign(Shown):
             raise InputError(
                 "the method needs a map of the track, and the ride names none",
                 field="track",
+                limit="a ride with a map of its track",
                 remedy='name one in the ride file, e.g. track = "./my_line.toml" (simrail new track), or '
                 "choose a method that needs none",
             )

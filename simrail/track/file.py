@@ -90,6 +90,7 @@ class SegmentPart(Part):
                     "belongs to a " + " or a ".join(kinds),
                     field=field,
                     value=getattr(self, field),
+                    limit="only in a " + " or a ".join(kinds),
                     remedy=f"remove it: a transition takes it from {_TAKEN}"
                     if self.kind == "transition"
                     else f"remove it, or make the segment a {kinds[0]}",

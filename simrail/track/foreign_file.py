@@ -43,9 +43,14 @@ def design_from_file(
             remedy="export IFC as LandXML" if ending == ".ifc" else "export it as one of these",
         )
     if not path.is_file():
-        raise InputError("there is no such file", field="--from", value=str(path))
+        raise InputError("there is no such file", field="--from", value=str(path), limit="a file that exists")
     if alignment is not None and ending not in LANDXML:
-        raise InputError("belongs to LandXML: a table has one line", field="--alignment", value=alignment)
+        raise InputError(
+            "belongs to LandXML: a table has one line",
+            field="--alignment",
+            value=alignment,
+            limit="only with a LandXML file",
+        )
     with blame(label(path)):
         drawn = read_landxml(path, alignment=alignment) if ending in LANDXML else read_curvature_csv(path)
         return drawn_design(drawn, step_smoothing_m=step_smoothing_m), drawn.notes

@@ -119,7 +119,7 @@ def check_elements(
         Naming the element (counted from 0, as in ``segment[3]``) and its field.
     """
     if not elements:
-        raise InputError("has no elements", field="segment", remedy="add a straight")
+        raise InputError("has no elements", field="segment", limit=">= 1 element", remedy="add a straight")
     for i, element in enumerate(elements):
         _check_numbers(element, f"segment[{i}]", rail_base_m=rail_base_m, has_stations=has_stations)
     ends = end_values(elements)
@@ -134,6 +134,7 @@ def check_elements(
             "curvature or cant steps between two elements",
             field=f"segment[{index}]",
             value=elements[index],
+            limit="no step, or step_smoothing_m > 0 m",
             remedy="put a transition between them, or set step_smoothing_m of the track, the length over "
             "which a vehicle's base smooths a step, e.g. 5.0",
         )
@@ -163,6 +164,7 @@ def _check_numbers(element: Element, here: str, *, rail_base_m: float, has_stati
                 raise InputError(
                     "belongs to an end with a radius of its own",
                     field=f"{here}.{end}_cant_mm",
+                    limit=f"only beside {end}_radius_m",
                     remedy=f"add {end}_radius_m, inf where it is straight, or remove it",
                 )
             if radius is not None and not abs(radius) > 0.0:
@@ -176,6 +178,7 @@ def _check_numbers(element: Element, here: str, *, rail_base_m: float, has_stati
                 "the cant is said twice, by the segments and by [[cant]]",
                 field=f"{here}.{field.removesuffix('_m')}_mm",
                 value=1000.0 * cant,
+                limit="cant in one of the two",
                 remedy="remove it, or all of [[cant]]",
             )
 
@@ -191,12 +194,14 @@ def _check_said(elements: Sequence[Element], ends: Sequence[tuple[EndValue, EndV
         raise InputError(
             "the track begins in a transition, and nothing says from what curvature",
             field=f"{here}.start_radius_m",
+            limit="a curvature at the start of the track",
             remedy="say start_radius_m, or put a straight or a curve before it",
         )
     if after is None and element.end_radius_m is None and first == 0.0:
         raise InputError(
             "the track ends in a transition, and nothing says at what curvature",
             field=f"{here}.end_radius_m",
+            limit="a curvature at the end of the track",
             remedy="say end_radius_m, or put a straight or a curve after it",
         )
     if isinstance(after, Transition):
@@ -206,6 +211,7 @@ def _check_said(elements: Sequence[Element], ends: Sequence[tuple[EndValue, EndV
             raise InputError(
                 "two transitions meet, and nothing says at what curvature",
                 field=f"{here}.end_radius_m",
+                limit="a curvature where they meet",
                 remedy="say end_radius_m of the first, inf where they meet straight; only between opposite "
                 "curves that is taken",
             )
@@ -229,6 +235,7 @@ def _check_cant_said(elements: Sequence[Element], i: int) -> None:
             raise InputError(
                 "has a radius of its own in a line with cant, but no cant",
                 field=f"segment[{i}].{end}_cant_mm",
+                limit="a cant at this end, also 0.0 mm",
                 remedy="add it, 0.0 where there is none",
             )
 

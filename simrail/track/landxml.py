@@ -94,9 +94,11 @@ def _root(path: Path) -> ET.Element:
     try:
         root = ET.parse(path).getroot()
     except ET.ParseError as error:
-        raise InputError(f"is not readable XML ({error})", remedy="export the file again") from None
+        raise InputError(
+            f"is not readable XML ({error})", limit="well-formed XML", remedy="export the file again"
+        ) from None
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})") from None
+        raise InputError(f"cannot be read ({error.strerror})", limit="a file that can be read") from None
     if _tag(root) != "LandXML":
         raise InputError("is no LandXML", value=_tag(root), limit="a root element LandXML")
     return root
@@ -127,7 +129,7 @@ def _alignment(root: ET.Element, wanted: str | None) -> ET.Element:
     names = [one.get("name", "") for one in found]
     listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     if not found:
-        raise InputError("has no Alignment")
+        raise InputError("has no Alignment", limit=">= 1 Alignment")
     if wanted is None:
         if len(found) > 1:
             raise InputError(
@@ -256,7 +258,9 @@ def _spiral(element: ET.Element, unit: float) -> _Part:
     for key in ("radiusStart", "radiusEnd"):
         radius = unit * _float(element, key)
         if radius < 0.0:
-            raise InputError("is negative", field=f"Spiral.{key}", value=radius, remedy="rot says the side")
+            raise InputError(
+                "is negative", field=f"Spiral.{key}", value=radius, limit=">= 0 m", remedy="rot says the side"
+            )
         # Some programs write 0 for no curvature.
         bends.append(0.0 if radius in (0.0, math.inf) else side / radius)
     start, corner, end = (at.get(key) for key in ("Start", "PI", "End"))
@@ -406,11 +410,20 @@ def _profile(drawn: Drawn, alignment: ET.Element, unit: float) -> None:
             )
         cells = (element.text or "").split()
         if len(cells) < 2:
-            raise InputError("is no station and height", field=f"ProfAlign[{i}].{kind}", value=element.text)
+            raise InputError(
+                "is no station and height",
+                field=f"ProfAlign[{i}].{kind}",
+                value=element.text,
+                limit="two numbers: station and height",
+            )
         points.append((unit * float(cells[0]), unit * float(cells[1]), element))
     stations, heights = (np.array([point[k] for point in points]) for k in (0, 1))
     if len(points) < 2 or not (np.diff(stations) > 0.0).all():
-        raise InputError("the points of the profile do not rise in station", field="ProfAlign")
+        raise InputError(
+            "the points of the profile do not rise in station",
+            field="ProfAlign",
+            limit=">= 2 points, each with a greater station",
+        )
     slopes = np.diff(heights) / np.diff(stations)
     begin = int(np.clip(np.searchsorted(stations, drawn.start_m, side="right") - 1, 0, len(slopes) - 1))
     drawn.slope = float(slopes[0])
@@ -432,7 +445,9 @@ def _breaks(drawn: Drawn, alignment: ET.Element, unit: float) -> None:
         back = equation.get("staBack")
         inside = equation.get("staInternal")
         if inside is None and back is None:
-            raise InputError("says neither staBack nor staInternal", field="StaEquation")
+            raise InputError(
+                "says neither staBack nor staInternal", field="StaEquation", limit="staBack or staInternal"
+            )
         at = unit * _float(equation, "staInternal" if inside is not None else "staBack")
         before = at if back is None else unit * _float(equation, "staBack")
         drawn.breaks.append((at, before, ahead))

@@ -319,6 +319,7 @@ def _with_defects(
                     "needs a straight or a curve before and after the transition",
                     field="at_m",
                     value=defect.at_m,
+                    limit="a straight or a curve on both sides",
                 )
             before, after = neighbours
             spare = element.length_m - min(SHORT_M, element.length_m)

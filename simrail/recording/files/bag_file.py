@@ -16,7 +16,7 @@ import pandas as pd
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import label
-from simrail.recording.files.table_file import Table, library, refuse_texts
+from simrail.recording.files.table_file import Table, library, refuse_texts, unreadable
 
 LOG_TIME = "log_time"
 
@@ -81,7 +81,9 @@ def _mcap_messages(path: Path, topic: str | None, *, first: bool) -> Iterator[Me
     except InputError:
         raise
     except Exception as error:  # the library has errors of many kinds
-        raise InputError(f"is not readable MCAP ({type(error).__name__})", file=label(path)) from None
+        raise unreadable(
+            f"is not readable MCAP ({type(error).__name__})", path, "a whole MCAP file"
+        ) from None
 
 
 def _decoder(schema: Any, channel: Any, path: Path) -> Callable[[bytes], Any]:
@@ -122,7 +124,9 @@ def _rosbag_messages(path: Path, topic: str | None, *, first: bool) -> Iterator[
     except InputError:
         raise
     except Exception as error:  # the library has errors of many kinds
-        raise InputError(f"is not a readable rosbag ({type(error).__name__})", file=label(path)) from None
+        raise unreadable(
+            f"is not a readable rosbag ({type(error).__name__})", path, "a whole rosbag"
+        ) from None
 
 
 def _of(reader: Any, connection: Any) -> Iterator[tuple[int, bytes]]:

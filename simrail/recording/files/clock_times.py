@@ -64,7 +64,13 @@ def read_times(texts: pd.Series, *, file: str, field: str) -> TextTimes:
     filled = words.dropna()
     filled = filled[filled != ""]
     if not len(filled):
-        raise InputError("holds no times", file=file, field=field, limit=FORMS)
+        raise InputError(
+            "holds no times",
+            file=file,
+            field=field,
+            limit=FORMS,
+            remedy="name the column that holds the times",
+        )
     found = None
     if re.fullmatch(_CLOCK, filled.iloc[0]):
         found = _clock(words)

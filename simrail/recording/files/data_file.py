@@ -210,6 +210,7 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             f"{file} has several columns of this name",
             field=where,
             value=name,
+            limit="a name that one column has",
             remedy="rename them, or give the number of the column",
         )
     below = _names_below(name, data)
@@ -218,6 +219,7 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             f"{file} has the column names in line {below + 1}, below other text",
             field=f"{table}.skip_lines",
             value=part.skip_lines,
+            limit=f"{below}, the lines above the column names",
             remedy=f"set skip_lines = {below}",
         )
     other = next((mark for mark in _SEPARATORS if mark != part.separator and mark in "".join(found)), None)

@@ -46,14 +46,31 @@ def write_mended(path: Path, evidence: Evidence, out: Path) -> list[str]:
         If the new file exists, or nothing is wrong that a setting could mend.
     """
     if out.exists():
-        raise InputError("exists already", file=label(out), field="--write", remedy="choose another name")
+        raise InputError(
+            "exists already",
+            file=label(out),
+            field="--write",
+            limit="a file that does not exist yet",
+            remedy="choose another name",
+        )
     if not out.parent.is_dir():
-        raise InputError("no such folder", file=label(out.parent), field="--write", remedy="make it first")
+        raise InputError(
+            "no such folder",
+            file=label(out.parent),
+            field="--write",
+            limit="a folder that exists",
+            remedy="make it first",
+        )
     path = ride_file(path)
     data = read_toml(path)
     changes = mended(data, evidence)
     if not changes:
-        raise InputError("nothing is wrong that a setting could mend", file=label(path), field="--write")
+        raise InputError(
+            "nothing is wrong that a setting could mend",
+            file=label(path),
+            field="--write",
+            limit="a fault that a setting mends",
+        )
     _move(data, path.parent, out.parent)
     text = toml_text(data)
     judge(RideFile, data, file=label(out))

@@ -126,7 +126,10 @@ class ImuSignalPart(VectorPart):
         sensors = {key: getattr(self, key) for key in ("gyro", "accel")}
         if not self.file and not all(part is not None and part.file for part in sensors.values()):
             raise InputError(
-                "is required", field="file", remedy="add it, here or in [imu.gyro] and [imu.accel]"
+                "is required",
+                field="file",
+                limit="a data file for the IMU, or one each for gyro and accel",
+                remedy="add it, here or in [imu.gyro] and [imu.accel]",
             )
         for key, unit in (("gyro", "rad"), ("accel", "m/s")) if self.output == "increments" else ():
             self.units.setdefault(key, unit)
@@ -440,9 +443,16 @@ class RideFile(Part):
     @model_validator(mode="after")
     def _with_a_track_or_without(self) -> Self:
         if self.track is not None and self.start_position_m is None:
-            raise InputError("is required", field="start_position_m", remedy="add it")
+            raise InputError(
+                "is required",
+                field="start_position_m",
+                limit="where the ride starts on the track, m",
+                remedy="add it",
+            )
         if self.track is None and "map" in self.model_fields_set:
-            raise InputError("belongs to a track", field="map", remedy="add track, or remove it")
+            raise InputError(
+                "belongs to a track", field="map", limit="only beside track", remedy="add track, or remove it"
+            )
         return self
 
     @model_validator(mode="after")

@@ -128,6 +128,7 @@ class SignalPart(DataPart):
                 'belongs to units.time = "ticks", and that to it',
                 field="tick_rate_hz",
                 value=self.tick_rate_hz,
+                limit="both of them, or none",
                 remedy='give both, e.g. tick_rate_hz = 32768.0 and units.time = "ticks"',
             )
         return self

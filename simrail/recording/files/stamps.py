@@ -86,6 +86,7 @@ class RideClock:
                 "has dates where the IMU has none, or none where it has: no common clock",
                 field=f"{table}.units.time",
                 value=unit,
+                limit="dates in both, or in none",
                 remedy="give both in one clock",
             )
 

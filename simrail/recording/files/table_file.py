@@ -42,6 +42,23 @@ class Table:
     read: Read
 
 
+def joined(error: object) -> str:
+    """What a library says of its error, in one line."""
+    return " ".join(str(error).split())
+
+
+def unreadable(problem: str, path: Path, limit: str) -> InputError:
+    """The refusal of a file that its library cannot read, with its size: it is often cut."""
+    size = f"{path.stat().st_size} bytes" if path.exists() else "no file"
+    return InputError(
+        problem,
+        file=label(path),
+        value=size,
+        limit=limit,
+        remedy="write or copy the file again, or export it as CSV",
+    )
+
+
 def library(name: str, path: Path) -> Any:
     """A library that reads a kind of file.
 
@@ -56,6 +73,8 @@ def library(name: str, path: Path) -> Any:
         raise InputError(
             f"needs the library {name.partition('.')[0]}, which is not installed",
             file=label(path),
+            value=path.suffix,
+            limit="a kind of file whose library is installed",
             remedy="pip install 'simrail[loggers]', or export the logger's file as CSV",
         ) from None
 
@@ -65,7 +84,7 @@ def open_parquet(path: Path) -> Table:
     try:
         names = tuple(pq.read_schema(path).names)
     except (OSError, ValueError) as error:
-        raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
+        raise unreadable(f"is not readable Parquet ({joined(error)})", path, "a whole Parquet file") from None
 
     def read(wanted: Sequence[str], texts: Sequence[str]) -> dict[str, FloatArray | pd.Series]:
         return {name: _parquet_column(path, name, is_text=name in texts) for name in wanted}
@@ -86,7 +105,7 @@ def open_hdf5(path: Path) -> Table:
         with h5py.File(path, "r") as file:
             file.visititems(visit)
     except OSError:
-        raise InputError("is not readable HDF5", file=label(path)) from None
+        raise unreadable("is not readable HDF5", path, "a whole HDF5 file") from None
     places = _places(shapes)
 
     def read(wanted: Sequence[str], texts: Sequence[str]) -> dict[str, FloatArray | pd.Series]:
@@ -106,7 +125,7 @@ def open_mat(path: Path) -> Table:
     except NotImplementedError:
         return open_hdf5(path)
     except (OSError, ValueError, TypeError):
-        raise InputError("is not a readable MATLAB file", file=label(path)) from None
+        raise unreadable("is not a readable MATLAB file", path, "a whole MATLAB file") from None
     arrays = dict(_arrays(held, ""))
     places = _places({name: array.shape for name, array in arrays.items()})
 
@@ -121,13 +140,18 @@ def _parquet_column(path: Path, name: str, *, is_text: bool) -> FloatArray | pd.
     try:
         column = pq.read_table(path, columns=[name]).column(name)
     except (OSError, ValueError) as error:
-        raise InputError(f"is not readable Parquet ({error})", file=label(path)) from None
+        raise unreadable(f"is not readable Parquet ({joined(error)})", path, "a whole Parquet file") from None
     if is_text:
         series: pd.Series = column.to_pandas()
         return series
     if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
         raise InputError(
-            "holds no numbers", file=label(path), field=name, value=str(column.type), limit="numbers"
+            "holds no numbers",
+            file=label(path),
+            field=name,
+            value=str(column.type),
+            limit="numbers",
+            remedy="name a column of numbers, or write it as numbers",
         )
     numbers: FloatArray = column.to_numpy().astype(np.float64, copy=False)
     return numbers
@@ -173,6 +197,8 @@ def refuse_texts(path: Path, texts: Sequence[str]) -> None:
             "holds numbers, and no times as text",
             file=label(path),
             field=texts[0],
+            value='units.time = "iso"',
+            limit="times as numbers",
             remedy='set units.time to "s", "ms", "epoch_s", ...',
         )
 

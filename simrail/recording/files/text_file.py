@@ -21,6 +21,7 @@ import pyarrow.csv as pa_csv
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import label
+from simrail.recording.files.table_file import joined
 
 COMMENTS = ("#", "%", "//")
 """A line that begins so holds no data; it may hold the names, right above the data."""
@@ -111,6 +112,8 @@ def layout_of(path: Path, *, separator: str, skip_lines: int, units_row: bool | 
         raise InputError(
             "is empty" if not skip_lines else "has no line of column names",
             file=label(path),
+            value=f"{len(lines)} lines",
+            limit="column names, then samples",
             remedy="write the column names in one line, then one line per sample",
         )
     first = plain[0] if plain else rows[0]
@@ -294,9 +297,21 @@ def _first_lines(path: Path, count: int) -> list[str]:
         with path.open(encoding="utf-8-sig") as file:
             return [line.rstrip("\n") for line in islice(file, count)]
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=label(path)) from None
-    except UnicodeDecodeError:
-        raise InputError("is not UTF-8 text", file=label(path), remedy="save the file as UTF-8") from None
+        raise InputError(
+            f"cannot be read ({error.strerror})",
+            file=label(path),
+            value=path.name,
+            limit="a file that can be read",
+            remedy="see to its path and who may read it",
+        ) from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            "is not UTF-8 text",
+            file=label(path),
+            value=f"byte 0x{error.object[error.start]:02x}",
+            limit="UTF-8 text",
+            remedy="save the file as UTF-8",
+        ) from None
 
 
 def _uncommented(line: str) -> str:
@@ -350,6 +365,7 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
             file=label(path),
             field=column,
             value=value[1],
+            limit="numbers, or empty fields",
             remedy=_remedy_of_word(value[1], decimal, line == f" in line {layout.data_line + 1}"),
         )
     count = re.search(r"Expected (\d+) columns, got (\d+)", said)
@@ -362,7 +378,13 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
             remedy="mend that line; for text above the column names set skip_lines, for another separator "
             f"than {separator!r} set separator",
         )
-    return InputError(f"cannot be read as CSV: {said.splitlines()[0]}", file=label(path))
+    return InputError(
+        f"cannot be read as CSV: {joined(said)}",
+        file=label(path),
+        value=f"separator {separator!r}",
+        limit="one sample per line, as many fields in each",
+        remedy="mend the file, or set separator",
+    )
 
 
 def _remedy_of_word(word: str, decimal: str, in_first_line: bool) -> str:

@@ -134,6 +134,7 @@ def scenario_of(name: str, *, overrides: Sequence[str] = (), seed: int | None = 
         raise InputError(
             "results have the settings that they were made with",
             field="--set" if overrides else "--seed",
+            limit="only with a scenario",
             remedy="name the scenario instead of the folder of its results",
         )
     return read_results(folder, field="SCENARIO", remedy="name a scenario").scenario()
@@ -185,7 +186,11 @@ def film_of(
     seen = look_at(chosen, truth, parts, tally)
     if method is not None and method not in seen.estimates:
         raise InputError(
-            "this method failed on this ride", field="--method", value=method, remedy="run it to see why"
+            "this method failed on this ride",
+            field="--method",
+            value=method,
+            limit="a method that does not fail on this ride",
+            remedy="run it to see why",
         )
     if method is not None:
         first = {method: seen.estimates[method]}

@@ -104,6 +104,7 @@ def wheel_profile(
             "belongs to a profile from a file",
             field="tape_circle_mm",
             value=1e3 * tape_circle_m,
+            limit="only with a profile from a file",
             remedy=f"remove it: the formula of {text} knows its tape circle",
         )
     if text == "S1002":

@@ -83,7 +83,9 @@ def read_points(path: Path, *, kind: int) -> ReadPoints:
     try:
         lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
-        raise InputError("the profile cannot be read", value=error.strerror) from error
+        raise InputError(
+            "the profile cannot be read", value=error.strerror, limit="a file that can be read"
+        ) from error
     ending = path.suffix.lower()
     if ending not in (*TEXTS, *MINIPROF):
         y, z, line = _in_metres(*_parse_simpack(lines, kind=kind), said=True)
