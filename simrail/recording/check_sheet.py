@@ -283,7 +283,7 @@ def _check_stuck(
     The device must show noise otherwise, on another axis meanwhile or on both sides: a computed ride has
     none.
     """
-    span = float(time[-1] - time[0])
+    span = float(time[-1] - time[0]) if len(time) else 0.0
     if span <= 0.0:
         return  # stamps that go back are refused elsewhere
     rate = (len(time) - 1) / span

@@ -71,6 +71,9 @@ KINDS = {
 """What is judged, in the order in which it is told; ``by`` is what it needs, one of them at least."""
 
 
+DEARER = 0.05
+"""Share by which a fit has to be better for each figure that it blames."""
+
 _MUCH = {"gyro": 0.05, "wheel": 0.05, "shift": 10.0, "yaw": 0.05, "offset": 0.2, "drift": 3e-4}
 """What counts as far."""
 
@@ -160,9 +163,9 @@ def best_fit(ride: Ride) -> Fit:
     if _explains(ride, first) and not _blamed(first):
         return first
     fits = [first, *(fit(ride, x) for x in scan(ride))]
-    least = min(other.cost for other in fits)
-    # Of fits that are as good as one another, the one that blames the fewest things.
-    return min((other for other in fits if other.cost <= 1.02 * least + 1e-6), key=_blamed)
+    # Whatever a fit blames has to pay for itself: a ride on other rails, the other way, may look much like
+    # one whose gyro has the other sign.
+    return min(fits, key=lambda other: (other.cost + 1e-6) * (1.0 + DEARER * _blamed(other)))
 
 
 def _blamed(found: Fit) -> int:

@@ -46,6 +46,9 @@ def scan(ride: Ride) -> list[FloatArray]:
     starts = [sound]
     for x in likely:
         starts += _by_curves(ride, x, free=pushed is None)
+    mirrored = sound.copy()
+    mirrored[INDEX["gyro"]] = -1.0  # the curves' scan has no start for a gyro of the other sign
+    starts.append(mirrored)
     for angle in QUARTERS_RAD:
         turned = sound.copy()
         turned[INDEX["yaw"]] = angle

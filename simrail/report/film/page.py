@@ -55,8 +55,8 @@ def write_film(path: Path, film: Film, *, dark: bool | None = None) -> Path:
         methods=list(film.estimated_rad),
         axles=film.vehicle.axle_names,
         data=Markup(json.dumps(film_data(film), separators=(",", ":")).replace("<", "\\u003c")),
-        script=Markup((here / "film.js").read_text(encoding="utf-8")),
-        style=Markup((here / "film.css").read_text(encoding="utf-8")),
+        player=Markup((here / "film.js").read_text(encoding="utf-8")),
+        looks=Markup((here / "film.css").read_text(encoding="utf-8")),
     )
     return write_whole(path, text.encode())
 
