@@ -2,6 +2,7 @@
 
 import warnings
 from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +54,7 @@ def test_a_ride_that_reaches_the_critical_speed_is_warned_of_every_time():
 
 def test_nothing_is_warned_of_below_it_or_where_it_is_not_wanted(monkeypatch):
     monkeypatch.setattr(ride_module, "load_truth", lambda place, *_, **__: place)
+    monkeypatch.setattr(ride_cache, "places_of", lambda key: [Path(key)])
     monkeypatch.setattr(ride_cache, "new_ride", lambda *_, **__: nullcontext())
     for made in ("_drive", "_follow", "save_truth"):
         monkeypatch.setattr(ride_module, made, lambda *_, **__: None)

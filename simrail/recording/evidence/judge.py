@@ -71,8 +71,11 @@ KINDS = {
 """What is judged, in the order in which it is told; ``by`` is what it needs, one of them at least."""
 
 
-DEARER = 0.05
+DEARER = 0.15
 """Share by which a fit has to be better for each figure that it blames."""
+
+GOOD = 0.05
+"""Cost of a fit that is as good as any: what is better differs by what no part of the model holds."""
 
 _MUCH = {"gyro": 0.05, "wheel": 0.05, "shift": 10.0, "yaw": 0.05, "offset": 0.2, "drift": 3e-4}
 """What counts as far."""
@@ -165,7 +168,7 @@ def best_fit(ride: Ride) -> Fit:
     fits = [first, *(fit(ride, x) for x in scan(ride))]
     # Whatever a fit blames has to pay for itself: a ride on other rails, the other way, may look much like
     # one whose gyro has the other sign.
-    return min(fits, key=lambda other: (other.cost + 1e-6) * (1.0 + DEARER * _blamed(other)))
+    return min(fits, key=lambda other: (other.cost + GOOD) * (1.0 + DEARER * _blamed(other)))
 
 
 def _blamed(found: Fit) -> int:
