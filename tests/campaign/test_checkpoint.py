@@ -31,6 +31,8 @@ from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 
+pytestmark = pytest.mark.long
+
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 
 

@@ -29,6 +29,8 @@ from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.table import OK
 
+pytestmark = pytest.mark.long
+
 AXES = ["ride.speed_kmh=[30.0, 50.0]", "monte_carlo.track_draws=2", "monte_carlo.sensor_draws=3"]
 
 

@@ -17,7 +17,7 @@ from simrail.ride import cache as ride_cache
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = [pytest.mark.usefixtures("own_cache"), pytest.mark.long]
 
 SETTINGS = [
     "ride.reverse=[false, true]",

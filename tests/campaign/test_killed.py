@@ -23,6 +23,8 @@ from simrail.campaign.executors import _begin_worker
 from simrail.cli.main import DONE, INTERRUPTED, call
 from simrail.scenario.scenario import load_scenario
 
+pytestmark = pytest.mark.long
+
 WORKERS, BATCH_CELLS = 2, 2
 
 PROGRAM = """

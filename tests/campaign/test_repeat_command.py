@@ -17,6 +17,8 @@ from simrail.cli.main import DONE, call
 from simrail.report.pages import frame
 from simrail.scenario.scenario import Scenario, load_scenario
 
+pytestmark = pytest.mark.long
+
 SCENARIO = """
 title = "t"
 seed = 3

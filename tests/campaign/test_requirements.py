@@ -75,6 +75,7 @@ def scenario(here: Path) -> Scenario:
     return load_scenario("own.toml")
 
 
+@pytest.mark.long
 def test_what_is_settled_is_drawn_no_more(scenario: Scenario) -> None:
     found = run_campaign(scenario, workers=1)
     verdicts = found.verdicts.set_index("imu")
@@ -111,6 +112,7 @@ def test_a_cluster_settles_it_alike(scenario: Scenario) -> None:
     pd.testing.assert_frame_equal(run_campaign(scenario, workers=1).scores, found.scores, check_exact=True)
 
 
+@pytest.mark.long
 def test_interrupted_within_a_round_it_goes_on_to_the_same(
     scenario: Scenario, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -199,6 +199,7 @@ def rows_of(found: CampaignResult, draws: int) -> pd.DataFrame:
     return found.scores[found.scores["sensor_draw"] < draws].reset_index(drop=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("workers", "batch_cells"),
     [(1, 5), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, 1), (2, 3), (2, None)))],
@@ -312,6 +313,7 @@ def test_one_cell_alone_asks_no_rule(module_rides: None, short: Short) -> None:
     assert found.stopped is None and list(found.cells["cell"]) == [8]
 
 
+@pytest.mark.long
 def test_results_tell_of_it_and_failed_cells_are_tried_again(
     noting_file: Path,
     here: Path,

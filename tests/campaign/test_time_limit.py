@@ -17,6 +17,8 @@ from simrail.campaign.time_limit import LimitedEstimator, OverTimeError
 from simrail.cli.main import BAD_INPUT, call
 from simrail.scenario.scenario import Scenario, load_scenario
 
+pytestmark = pytest.mark.long
+
 OWN = """
 import os
 import signal

@@ -70,6 +70,7 @@ def grade(*words: str) -> int:
     return call(["grade", *words, "--scenario", "own.toml", "--workers", "1"])
 
 
+@pytest.mark.long
 def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A bias of up to 4 mg leans by up to 0.23 degrees, and 44 % of a uniform one by less than 0.1."""
     assert grade("./coarse.toml,./fine.toml", "--for", "roll<0.1deg", "--mount", "axle") == 0
@@ -88,6 +89,7 @@ def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.Ca
     assert stop["reached"] and sorted(stop["settled"].values()) == [20, 60]
 
 
+@pytest.mark.long
 def test_one_grade_is_told_what_its_error_is_made_of(
     ladder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,6 +22,8 @@ from simrail.vehicle.engines.exudyn_engine import ExudynEngine
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
+pytestmark = pytest.mark.long
+
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
 BRISK = {"rest_s": 0.3, "final_rest_s": 0.5, "acceleration_mps2": 2.0, "jerk_mps3": 4.0}
 FIELDS = ("time_s", "position", "rotation", "acceleration", "angular_acceleration", "spin_rad", "states")

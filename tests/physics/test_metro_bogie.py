@@ -24,6 +24,8 @@ from simrail.vehicle.engines.exudyn_engine import ExudynEngine
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
+pytestmark = pytest.mark.long
+
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 20.0)
 MOUNTS = [

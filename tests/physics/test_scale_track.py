@@ -35,7 +35,7 @@ from simrail.scoring.table import OK, UNOBSERVABLE
 from simrail.track.bands import TOO_COARSE, TOO_SHORT, Band
 from simrail.track.laid_track import LaidTrack
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = [pytest.mark.usefixtures("own_cache"), pytest.mark.long]
 
 PAPER_MM = {"cross_level": 0.12, "vertical_profile": 0.38, "alignment": 0.66}
 """The goal; the paper's own best are 0.111, 0.356 and 0.659 mm."""

@@ -20,6 +20,8 @@ from simrail.vehicle.file import RotationEntry, VehicleFile
 from simrail.vehicle.model import LinearContact
 from simrail.vehicle.speed_profile import SpeedProfile
 
+pytestmark = pytest.mark.long
+
 SMOOTH = Irregularity("none", (1.5, 100.0), 0.0)
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 20.0)
 VEHICLES = sorted(shipped("vehicle"))

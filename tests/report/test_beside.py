@@ -14,7 +14,7 @@ from short_line import SHORT_LINE
 from simrail.campaign.stored_results import read_results
 from simrail.cli.main import BAD_INPUT, DONE, call
 
-pytestmark = pytest.mark.usefixtures("no_pictures_of_rides")
+pytestmark = [pytest.mark.usefixtures("no_pictures_of_rides"), pytest.mark.long]
 
 TEXT = (
     SHORT_LINE

@@ -26,6 +26,8 @@ from simrail.scoring.statistics import compare
 from simrail.scoring.table import INTEGER_COLUMNS, SCORE_COLUMNS, as_score_table
 from simrail.track.bands import BANDS
 
+pytestmark = pytest.mark.long
+
 Scores = tuple[pd.DataFrame, pd.DataFrame]
 """Score table and table of cells."""
 

@@ -118,6 +118,7 @@ def rms(scores: pd.DataFrame, **labels: str) -> float:
     return float(rows["value"].iloc[0])
 
 
+@pytest.mark.long
 def test_a_scenario_of_runs_is_estimated_and_scored(turned: tuple[pd.DataFrame, pd.DataFrame]) -> None:
     scores, cells = turned
     assert set(cells["direction"]) == {"both ways"}

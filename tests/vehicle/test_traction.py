@@ -260,6 +260,7 @@ def test_wheels_without_traction_are_refused():
         run(model, START, duration_s=1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rails", "spins"), [("left", 0), ("right", 1)])
 def test_leaves_on_one_rail_spin_that_rails_wheel(rails, spins):
     """The wheel on leaves gains metres over the way, the other one centimetres."""

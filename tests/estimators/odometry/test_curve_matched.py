@@ -151,6 +151,7 @@ def judge_rides(rides: list[tuple[float, float, float]], draws: int) -> None:
         assert low < np.mean(inside) <= high, (smoothed, inside)
 
 
+@pytest.mark.long
 def test_below_one_metre_and_the_smoother_below_half_of_one():
     """At 70 km/h, both directions, a wheel wrong by 1 % and 0.05 deg/s of gyro bias."""
     judge_rides(FAST, 2)
@@ -483,6 +484,7 @@ def test_a_wrong_map_is_paid_for_by_its_own_sd():
     assert inside[1] < inside[0] - 0.2, inside
 
 
+@pytest.mark.long
 def test_a_body_that_stands_askew_is_no_acceleration():
     """A mount 9.5 m ahead of the middle of a body's chord, on an arc: its X axis is askew of the track there,
     by 9.5 k, and feels that share of V^2 k. Without the drawing the speed is wrong by it."""

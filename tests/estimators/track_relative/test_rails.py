@@ -103,6 +103,7 @@ def test_draws_are_as_large_as_the_error(
     assert (geometry[list(IRREGULARITY_SD[:3])] > 0.0).all().all()
 
 
+@pytest.mark.long
 def test_noise_that_the_sheet_does_not_have_shows(rough: Callable, rails: Callable) -> None:
     """Gyro x four times as noisy: the cross-level errs by more than the draws say."""
     recording = drawn(rough(0, 1))
@@ -138,6 +139,7 @@ def test_the_noise_is_that_of_the_sheet(rough: Callable) -> None:
         assert (one.waves.shaking == 0.0).all()
 
 
+@pytest.mark.long
 def test_draws_are_displaced_as_the_place_is_uncertain(rough: Callable, kept: dict) -> None:
     """By 5 cm against not at all: the slope of the rails times that, a normal number for each of 24 draws."""
     recording, estimate, _ = of(kept, rough, 1)

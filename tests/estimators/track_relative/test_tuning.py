@@ -68,6 +68,7 @@ def off_by_sds(goal: MotionLikelihood) -> tuple[np.ndarray, float]:
     return off / sd, float(sd.max())
 
 
+@pytest.mark.long
 def test_the_likelihood_finds_what_is_planted(rough: Callable) -> None:
     """Each within 99.9 % of its Cramer-Rao sd, all from the class's own sizes, which are far off."""
     off, sd = off_by_sds(world(rough))

@@ -233,6 +233,7 @@ def searched() -> Callable[[Recording, str], Tuning]:
     return search
 
 
+@pytest.mark.long
 def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording, searched: Callable) -> None:
     """On y only, the likelihood pins z; on both, neither; held, the position is what was said."""
     found = {name: searched(ride, name) for name in SPACES}
@@ -337,6 +338,7 @@ def test_kom_counts_the_places_that_the_reference_knows(ride: Recording) -> None
     assert min(kinds) < values["whole"] < max(kinds)
 
 
+@pytest.mark.long
 def test_straights_and_curves_by_themselves(ride: Recording) -> None:
     """Each set is that of a search on its own kind, and the smoother uses it there."""
     settings = {"box": (1e-8, 1e4), "constrained": (), "position_m2": 3e-3, "by_kind": True}

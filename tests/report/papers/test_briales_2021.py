@@ -33,6 +33,8 @@ from simrail.scenario.cells import cells, methods
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.ablations import ABLATIONS, MAP, VIBRATION, Ablation, without_ablations
 
+pytestmark = pytest.mark.long
+
 MEAN_KMH = {"go20A": 21.0, "go20B": 18.0, "back20A": -21.0, "back20B": -21.0, "go70": 42.0, "back70": -31.5}
 """Table 2 of the paper."""
 

@@ -546,6 +546,7 @@ def view_of(data: PageData) -> SimpleNamespace:
     return SimpleNamespace(**made.data)
 
 
+@pytest.mark.long
 def test_the_page_shows_rails_and_the_section(ran: Ran) -> None:
     page = ran[2].read_text(encoding="utf-8")
     for words in (

@@ -29,6 +29,7 @@ def test_amplitudes_fall_with_the_order_as_told():
     assert np.abs(sd / 0.4 - 1.0).max() < 4.0 / np.sqrt(800)
 
 
+@pytest.mark.long
 def test_each_wheel_by_itself():
     shape = OutOfRound()
     _, left = drawn_orders(shape, "f1.left", seed=3)
