@@ -1,6 +1,7 @@
 """Wheels out of round: each order has the amplitude that was drawn for it."""
 
 import numpy as np
+import pytest
 
 from simrail.vehicle.vibration.wheels import OutOfRound, drawn_orders, wheel_surface
 
