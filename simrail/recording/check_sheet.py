@@ -284,8 +284,8 @@ def _check_stuck(
     none.
     """
     span = float(time[-1] - time[0]) if len(time) else 0.0
-    if span <= 0.0:
-        return  # stamps that go back are refused elsewhere
+    if not 0.0 < span < np.inf:
+        return  # stamps that go back, or are none, are refused elsewhere
     rate = (len(time) - 1) / span
     noise = bounds.noise * np.sqrt(rate)
     shortest = max(STUCK_SAMPLES, int(np.ceil(STUCK_S * rate)))

@@ -153,6 +153,7 @@ def mutate(data: dict[str, Any], random: np.random.Generator, case: Case) -> dic
     chosen: Any = None
     if deed == "drop":
         del holder[last]
+        case.must_refuse = False  # what was wrong before may be what is dropped
     elif deed == "type":
         chosen = [{"a": 1}, "12 km/h", True, 3][int(random.integers(4))] if not is_number else "12 km/h"
         case.must_refuse |= is_number

@@ -97,6 +97,7 @@ class SignalPart(DataPart):
                     raise InputError(
                         "unknown key",
                         field=f"{field}.{key}",
+                        value=key,
                         limit="one of " + ", ".join(keys),
                         remedy=near(key, keys) or "remove it",
                     )

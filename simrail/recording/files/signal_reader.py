@@ -264,8 +264,9 @@ def _si(
     divide *= part.lsb_per_unit.get(quantity.key, 1.0)
     # In place: a long ride is held once.
     if multiply != divide:
-        np.multiply(values, multiply, out=values)
-        np.divide(values, divide, out=values)
+        with np.errstate(over="ignore"):  # what is beyond all numbers is judged where samples are
+            np.multiply(values, multiply, out=values)
+            np.divide(values, divide, out=values)
     return np.negative(values, out=values) if unit.startswith("-") else values
 
 

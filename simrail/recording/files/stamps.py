@@ -199,7 +199,7 @@ def _shared(time: FloatArray, first: int, count: int, file: str, field: str) -> 
     first_whole = begins[1] if len(begins) > 2 else begins[0]
     seconds = time[-1] - time[first_whole]
     rate = (begins[-1] - first_whole) / seconds if seconds > 0.0 else np.nan
-    rate = round(rate) if abs(rate / max(round(rate), 1) - 1.0) < 2e-3 else rate
+    rate = round(rate) if np.isfinite(rate) and abs(rate / max(round(rate), 1) - 1.0) < 2e-3 else rate
     return InputError(
         f"has duplicate time stamps at sample {first + 1} ({count} such samples), though the samples differ",
         file=file,
@@ -207,7 +207,7 @@ def _shared(time: FloatArray, first: int, count: int, file: str, field: str) -> 
         value=[float(time[first]), float(time[first + 1])],
         limit="strictly increasing",
         remedy="these are stamps of packets, or too coarse; if no samples are lost leave time out and give "
-        f"rate_hz = {rate:.6g}",
+        + (f"rate_hz = {rate:.6g}" if np.isfinite(rate) else "rate_hz"),
     )
 
 

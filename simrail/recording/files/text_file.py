@@ -139,7 +139,15 @@ def split(line: str, separator: str) -> list[str]:
     """Fields of a line, without the blanks around them."""
     if separator == " ":
         return [field.strip('"') for field in line.split()]
-    return [field.strip() for field in next(csv.reader([line], delimiter=separator))]
+    try:
+        return [field.strip() for field in next(csv.reader([line], delimiter=separator))]
+    except csv.Error as error:
+        raise InputError(
+            f"has a line that cannot be parted into fields ({error})",
+            value=line[:60],
+            limit=f"fields of at most {csv.field_size_limit()} characters",
+            remedy="mend that line, or pass over it by skip_lines",
+        ) from None
 
 
 def read_text(
