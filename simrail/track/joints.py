@@ -211,6 +211,7 @@ def _check_said(elements: Sequence[Element], ends: Sequence[tuple[EndValue, EndV
             raise InputError(
                 "two transitions meet, and nothing says at what curvature",
                 field=f"{here}.end_radius_m",
+                value=element.end_radius_m,
                 limit="a curvature where they meet",
                 remedy="say end_radius_m of the first, inf where they meet straight; only between opposite "
                 "curves that is taken",

@@ -355,7 +355,7 @@ def judge(answer: Answer) -> str:
             if part not in line:
                 return f"lacks{part.rstrip(': ').removeprefix(';')}"
         if "; found " not in line and not re.search(
-            "is required|missing|is empty|has no|there is no|needs its|joins two", line
+            "is required|missing|is empty|has no|there is no|needs its|joins two|nothing says", line
         ):
             return "lacks what was found"
     return ""

@@ -82,7 +82,9 @@ class SignalReader:
             another than that of the first signal read; if a sample is none of its device
             (`simrail.recording.check_sheet`).
         """
-        return self._framed(self._read(part, table, bounds), part, part.signal, table)
+        # What is beyond all numbers is judged where samples and stamps are, without a warning beside it.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._framed(self._read(part, table, bounds), part, part.signal, table)
 
     def apart(
         self, part: SignalPart, table: str, signals: tuple[Signal, ...], bounds: Mapping[str, Bounds]
@@ -100,16 +102,17 @@ class SignalReader:
         bounds : mapping of str to Bounds
             What the sheet of the device says, by quantity.
         """
-        rows = self._read(part, table, bounds)
-        blank = [
-            np.isnan(np.vstack([c for q in one.quantities for c in rows.columns[q.key]])).all(axis=0)
-            if _has_nan(rows.columns, one)
-            else np.zeros(rows.size, dtype=bool)
-            for one in signals
-        ]
-        if all(np.array_equal(blank[0], other) for other in blank[1:]):
-            return [self._framed(rows, part, part.signal, table)]
-        return [self._framed(rows, part, one, f"{table}.{one.quantities[0].key}") for one in signals]
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows = self._read(part, table, bounds)
+            blank = [
+                np.isnan(np.vstack([c for q in one.quantities for c in rows.columns[q.key]])).all(axis=0)
+                if _has_nan(rows.columns, one)
+                else np.zeros(rows.size, dtype=bool)
+                for one in signals
+            ]
+            if all(np.array_equal(blank[0], other) for other in blank[1:]):
+                return [self._framed(rows, part, part.signal, table)]
+            return [self._framed(rows, part, one, f"{table}.{one.quantities[0].key}") for one in signals]
 
     def _read(self, part: SignalPart, table: str, bounds: Mapping[str, Bounds] | None) -> _Rows:
         """The columns that a signal needs, and no others."""
@@ -264,9 +267,8 @@ def _si(
     divide *= part.lsb_per_unit.get(quantity.key, 1.0)
     # In place: a long ride is held once.
     if multiply != divide:
-        with np.errstate(over="ignore"):  # what is beyond all numbers is judged where samples are
-            np.multiply(values, multiply, out=values)
-            np.divide(values, divide, out=values)
+        np.multiply(values, multiply, out=values)
+        np.divide(values, divide, out=values)
     return np.negative(values, out=values) if unit.startswith("-") else values
 
 

@@ -83,7 +83,7 @@ def open_parquet(path: Path) -> Table:
     """Open a Parquet file."""
     try:
         names = tuple(pq.read_schema(path).names)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, pa.ArrowException) as error:
         raise unreadable(f"is not readable Parquet ({joined(error)})", path, "a whole Parquet file") from None
 
     def read(wanted: Sequence[str], texts: Sequence[str]) -> dict[str, FloatArray | pd.Series]:
@@ -139,7 +139,7 @@ def open_mat(path: Path) -> Table:
 def _parquet_column(path: Path, name: str, *, is_text: bool) -> FloatArray | pd.Series:
     try:
         column = pq.read_table(path, columns=[name]).column(name)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, pa.ArrowException) as error:
         raise unreadable(f"is not readable Parquet ({joined(error)})", path, "a whole Parquet file") from None
     if is_text:
         series: pd.Series = column.to_pandas()
