@@ -26,6 +26,8 @@ from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scenario.stop_rule import StopRule, StopState
 from simrail.scoring.bootstrap import interval
 
+pytestmark = pytest.mark.long
+
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
 

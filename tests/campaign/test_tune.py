@@ -15,7 +15,7 @@ from simrail.estimation.tunable import TunedValues
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import load_scenario
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = [pytest.mark.usefixtures("own_cache"), pytest.mark.long]
 
 QUICK = shipped("scenario")["quick_kinematic"].read_text(encoding="utf-8")
 SMOOTHER = """

@@ -44,6 +44,8 @@ from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.track.bands import BANDS, Band, margin_m
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
 
+pytestmark = pytest.mark.long
+
 Rides = Callable[..., CellResult]
 Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
 

@@ -26,6 +26,8 @@ from simrail.recording.sheets.allan import (
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.imu import sample_imu
 
+pytestmark = pytest.mark.long
+
 RATES = (10.0, 100.0, 1000.0)
 COLUMNS = {"gyro": list(GYRO), "accel": list(ACCEL)}
 UNITS = {"gyro": ("radps", "radpsqrts"), "accel": ("mps2", "mpsqrts")}

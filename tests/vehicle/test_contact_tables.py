@@ -23,6 +23,8 @@ from simrail.vehicle.engines.engine import Setup
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
+pytestmark = pytest.mark.long
+
 LEVEL = TrackDesign("level", 0.0, (Straight(60.0),))
 
 
