@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from shortest_ride import SHORTEST_RIDE
 
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.fence import EstimatorExit, digest, fenced, handed
@@ -22,31 +23,9 @@ from simrail.recording.recording import Recording
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import read_scenario
 
-TEXT = """
-title = "fence"
-seed = 3
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-truth_rate_hz = 250.0
-[[ride]]
-name = "line"
-start_m = 40.0
-end_m = 60.0
-speed_kmh = 20.0
-acceleration_mps2 = 1.5
-jerk_mps3 = 1.5
-rest_s = 1.0
-final_rest_s = 1.0
-[encoder]
-wheel = "trailing.left"
-pulses_per_revolution = 1024
-rate_hz = 250.0
-[[imu]]
-name = "axle"
-grade = "consumer"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
+TEXT = (
+    SHORTEST_RIDE
+    + """
 [[estimator]]
 name = "stranger"
 method = "DesignAngles"
@@ -54,6 +33,7 @@ method = "DesignAngles"
 name = "ekf"
 method = "AttitudeEkf"
 """
+)
 
 
 @dataclass(frozen=True)

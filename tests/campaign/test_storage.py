@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from shortest_ride import DESIGN, SHORTEST_RIDE
 
 from simrail import results
 from simrail.campaign import time_limit
@@ -18,35 +19,7 @@ from simrail.ride import cache as ride_cache
 from simrail.ride import ride as ride_module
 from simrail.ride import truth_files
 
-TEXT = """
-title = "t"
-seed = 3
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-truth_rate_hz = 250.0
-[[ride]]
-name = "line"
-start_m = 40.0
-end_m = 60.0
-speed_kmh = 20.0
-acceleration_mps2 = 1.5
-jerk_mps3 = 1.5
-rest_s = 1.0
-final_rest_s = 1.0
-[encoder]
-wheel = "trailing.left"
-pulses_per_revolution = 1024
-rate_hz = 250.0
-[[imu]]
-name = "axle"
-grade = "consumer"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
-[[estimator]]
-name = "design"
-method = "DesignAngles"
-"""
+TEXT = SHORTEST_RIDE + DESIGN
 ERRORS = [errno.EROFS, errno.EACCES, errno.ENOENT, errno.EIO, errno.EMFILE, errno.ENOSPC]
 
 

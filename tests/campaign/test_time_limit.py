@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from shortest_ride import DESIGN, SHORTEST_RIDE
 
 from simrail.campaign import time_limit
 from simrail.campaign.campaign import run_campaign
@@ -67,39 +68,15 @@ class Own:
     def is_second(self, recording):
         return recording.imu["gyro_x_radps"].iloc[0] > 0.0
 """
-TEXT = """
-title = "t"
-seed = 3
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-truth_rate_hz = 250.0
-monte_carlo = { sensor_draws = 4 }
-[[ride]]
-name = "line"
-start_m = 40.0
-end_m = 60.0
-speed_kmh = 10.0
-acceleration_mps2 = 1.5
-jerk_mps3 = 1.5
-rest_s = 1.0
-final_rest_s = 1.0
-[encoder]
-wheel = "trailing.left"
-pulses_per_revolution = 1024
-rate_hz = 250.0
-[[imu]]
-name = "axle"
-grade = "consumer"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
+TEXT = (
+    SHORTEST_RIDE.replace("seed = 3", "seed = 3\nmonte_carlo = { sensor_draws = 4 }")
+    + """
 [[estimator]]
 name = "own"
 method = "own.py:Own"
-[[estimator]]
-name = "design"
-method = "DesignAngles"
 """
+    + DESIGN
+)
 
 
 @pytest.fixture
