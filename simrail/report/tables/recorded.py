@@ -280,7 +280,9 @@ def reference_table(scores: pd.DataFrame) -> TextTable:
     rows = []
     chosen = scores[(scores["window"].astype(str) == "whole") & (scores["status"].astype(str) == "ok")]
     for key, group in chosen.groupby(["estimator", "quantity", "band", "unit"], observed=True, sort=False):
-        figure_of = {str(metric): value for metric, value in zip(group["metric"], group["value"], strict=True)}
+        figure_of = {
+            str(metric): value for metric, value in zip(group["metric"], group["value"], strict=True)
+        }
         method, quantity, band, _ = map(str, key)
         if "rms" not in figure_of:
             continue
