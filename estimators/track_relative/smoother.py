@@ -103,7 +103,7 @@ class TrackRelativeSmoother:
     gnss: bool = False
     aiding: tuple[Aiding, ...] = ()
 
-    cites = ("Briales et al. 2021", "Gonzalez-Carbajal et al. 2023", "Hartikainen and Sarkka 2010")
+    cites = ("briales_2021", "gonzalez_2023", "hartikainen_2010")
 
     def __post_init__(self) -> None:
         for name in self.without.split():

@@ -31,7 +31,7 @@ Progress = Callable[[str, int, float], None]
 
 
 Forecast = Callable[[str, float, int], None]
-"""Is told before a search: which set, seconds of one evaluation with all cores at work, and about how many."""
+"""Is told before a search: which set, seconds of one evaluation with all cores at work, about how many."""
 
 
 def objective_of(

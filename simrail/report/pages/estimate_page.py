@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from simrail.core.resample import GAPS
+from simrail.estimation.bibliography import citations, entries
 from simrail.estimation.estimate import Estimate
 from simrail.recording.files.asked import RideReference
 from simrail.recording.recording import Recording, odometry_of
@@ -111,6 +112,8 @@ def write_estimate_page(path: Path, found: RideEstimates) -> None:
         reference=None if found.scores is None else reference_table(found.scores),
         sources=_sources(found.reference),
         gaps=_gaps(found.recording),
+        citations=citations((result.name, result.cites) for result in found.results),
+        bibtex=entries(result.cites for result in found.results),
     )
     path.write_text(text, encoding="utf-8")
 
