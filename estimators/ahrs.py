@@ -42,7 +42,7 @@ class Vqf:
     causal = True
     role = property(role_of)
     label = "VQF"
-    cites = ("Laidig and Seel 2023",)
+    cites = ("laidig_2023",)
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ class Imufusion:
     needs = property(needs_of)
     role = property(role_of)
     label = "imufusion"
-    cites = ("Madgwick, Wilson, Turk, Burridge, Kapatos and Vaidyanathan 2020",)
+    cites = ("madgwick_2020",)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gain < np.inf:

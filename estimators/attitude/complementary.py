@@ -55,7 +55,7 @@ class ComplementaryFilter:
     causal = True
     needs = property(needs_of)
     label = "complementary filter"
-    cites = ("Veillard, Mailly and Fraisse 2016",)
+    cites = ("veillard_2016",)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.time_constant_s < math.inf:

@@ -98,7 +98,7 @@ class AttitudeEkf:
     causal = True
     role = property(role_of)
     label = "EKF"
-    cites = ("Briales, Urda and Escalona 2021",)
+    cites = ("briales_2021",)
 
     @property
     def needs(self) -> tuple[str, ...]:

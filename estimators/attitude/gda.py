@@ -58,7 +58,7 @@ class AttitudeGda:
     needs = property(needs_of)
     role = property(role_of)
     label = "GDA"
-    cites = ("Briales, Urda and Escalona 2021", "Madgwick 2010")
+    cites = ("briales_2021", "madgwick_2010")
 
     def __post_init__(self) -> None:
         if self.tuning not in GYRO_ERROR_RADPS:

@@ -125,7 +125,7 @@ class VeillardEkf:
     calibration_file: SpectralCalibration | None = None
 
     label = "EKF of 11 states"
-    cites = ("Veillard, Mailly and Fraisse 2016",)
+    cites = ("veillard_2016",)
 
     def __post_init__(self) -> None:
         one_of(self.dated, DATES, "no such date", field="dated")

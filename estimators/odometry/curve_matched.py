@@ -168,7 +168,7 @@ class CurveMatchedOdometry:
     wheel: bool = True
 
     needs = ()
-    cites = ("Escalona, Urda and Munoz, Sensors 21(3) 683, 2021",)
+    cites = ("escalona_2021",)
 
     @property
     def causal(self) -> bool:

@@ -281,7 +281,7 @@ class SpectralOdometry:
     calibration_file: SpectralCalibration | None = None
 
     label = "spectral odometry"
-    cites = ("Veillard, Mailly and Fraisse 2016",)
+    cites = ("veillard_2016",)
 
     def __post_init__(self) -> None:
         one_of(self.calibration, CALIBRATIONS, "no such calibration", field="calibration")

@@ -155,7 +155,7 @@ class ZeroVelocityOdometry:
     surely: float = 0.99
     start_sd_m: float = 0.05
 
-    cites = ("Skog, Handel, Nilsson and Rantakokko, IEEE Trans. Biomed. Eng. 57(11) 2657, 2010",)
+    cites = ("skog_2010",)
 
     @property
     def causal(self) -> bool:

@@ -94,7 +94,7 @@ class ProfileFilter:
     causal = True
     needs = ("odometry",)
     label = "profile filter"
-    cites = ("Hidalgo, Ros, Escalona and Garcia-Vallejo",)
+    cites = ("hidalgo",)
 
     def __post_init__(self) -> None:
         for name, least, limit in (

@@ -18,7 +18,7 @@ Gonzalez-Carbajal et al. 2023 the state of a body in the track frame, and to Har
 processes over space as states.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,7 +35,7 @@ from simrail.estimators.track_relative.kernel import (
 )
 from simrail.estimators.track_relative.model import Course, Steps, about, course_of, linearised, steps_of
 from simrail.estimators.track_relative.monitor import faults_and_widening
-from simrail.estimators.track_relative.noise import Motion, motion_of, tuned_motions
+from simrail.estimators.track_relative.noise import CLASSES, Motion, class_of, motion_of, tuned_motions
 from simrail.estimators.track_relative.output import Trace, innovations_of, states_of, with_bounds
 from simrail.estimators.track_relative.prior import PARTS
 from simrail.estimators.track_relative.rails import rails_of
@@ -103,7 +103,7 @@ class TrackRelativeSmoother:
     gnss: bool = False
     aiding: tuple[Aiding, ...] = ()
 
-    cites = ("Briales et al. 2021", "Gonzalez-Carbajal et al. 2023", "Hartikainen and Sarkka 2010")
+    cites = ("briales_2021", "gonzalez_2023", "hartikainen_2010")
 
     def __post_init__(self) -> None:
         for name in self.without.split():
@@ -174,6 +174,20 @@ class TrackRelativeSmoother:
         from simrail.estimators.track_relative.tuning import tunables_of_motion
 
         return tunables_of_motion(self, settings)
+
+    def usual_search(self, recordings: Sequence[Recording]) -> Mapping[str, Any]:
+        """What a search on recorded rides is for, where nobody has said it: how far their mounts turn."""
+        sizes = ("roll_sd", "pitch_sd", "yaw_sd")
+        kinds = [word for word, motion in CLASSES.items() if motion in map(class_of, recordings)]
+        motions = self.motions()
+        return {
+            "parameters": tuple(
+                f"{word}_{size}"
+                for word in kinds
+                for size in sizes
+                if getattr(motions[CLASSES[word]], size) > 0.0
+            )
+        }
 
     def course(self, recording: Recording, steps: Steps | None = None) -> Course:
         """What the first pass linearises about; ``steps`` are those of the recording, if they are at hand."""

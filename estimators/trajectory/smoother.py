@@ -200,7 +200,7 @@ class TrajectorySmoother:
 
     needs = ("odometry",)
     label = "trajectory smoother"
-    cites = ("Gonzalez-Carbajal et al. 2023",)
+    cites = ("gonzalez_2023",)
 
     @property
     def causal(self) -> bool:

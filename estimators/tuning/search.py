@@ -54,6 +54,18 @@ WORST = 1e12
 """Stands for a value that is not finite: a filter that broke down."""
 
 
+USUAL_STEPS = 10
+"""Of a descent, each of which asks for a gradient and some points along it."""
+
+USUAL_ROUNDS = 2
+
+
+def usual_evaluations(parameters: int, evaluations: int = EVALUATIONS) -> int:
+    """About how often a search of so many parameters evaluates its objective, to tell how long it takes."""
+    descent = USUAL_STEPS * (2 * parameters + 2)
+    return evaluations + USUAL_ROUNDS * (descent + ALONG * parameters)
+
+
 @dataclass(frozen=True)
 class Least:
     """Where a search ended.

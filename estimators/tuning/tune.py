@@ -7,6 +7,7 @@ the file of a result (`simrail.estimators.tuning.file`).
 
 import hashlib
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import asdict, fields, is_dataclass, replace
@@ -16,7 +17,7 @@ import numpy as np
 import pandas as pd
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
-from simrail.estimators.tuning.search import EVALUATIONS, Batch, Record, least
+from simrail.estimators.tuning.search import EVALUATIONS, Batch, Record, least, usual_evaluations
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
@@ -27,6 +28,10 @@ from simrail.recording.recording import Recording
 
 Progress = Callable[[str, int, float], None]
 """Is told how a search goes: which set, evaluations so far, least value so far."""
+
+
+Forecast = Callable[[str, float, int], None]
+"""Is told before a search: which set, seconds of one evaluation with all cores at work, about how many."""
 
 
 def objective_of(
@@ -66,6 +71,7 @@ def tune(
     seed: int = 1,
     threads: int | None = None,
     unfinished: Path | None = None,
+    forecast: Forecast | None = None,
     progress: Progress | None = None,
     fitted_on: Sequence[str] = (),
     command: str = "",
@@ -92,6 +98,8 @@ def tune(
         Where the best so far stands: a file ``<unfinished>`` with the best tuning so far after each
         improvement, and one ``<unfinished>.<set>.npz`` per set with which a search with the same arguments
         goes on where it was. They are removed when the search is over.
+    forecast : Forecast, optional
+        Is told how long each set will take about, for which it is evaluated a few times more.
     progress : Progress, optional
         Is told how it goes.
     fitted_on : sequence of str
@@ -141,6 +149,10 @@ def tune(
                 if progress is not None:
                     progress(name, count, value)
 
+            if forecast is not None:
+                each_s = _seconds_each(objectives[name], cube, pool, threads or os.cpu_count() or 1)
+                most = usual_evaluations(len(cube.searched), evaluations)
+                forecast(name, each_s, most if at_most is None else min(most, at_most))
             end = least(
                 _side_by_side(objectives[name], cube, pool),
                 start=cube.start(),
@@ -154,6 +166,16 @@ def tune(
     for file in files:
         file.unlink(missing_ok=True)
     return replace(result, finished=True)
+
+
+def _seconds_each(objective: Objective, cube: Cube, pool: Executor, threads: int) -> float:
+    """Time of one evaluation while all threads evaluate; what is compiled at the first is not counted."""
+    start = cube.start()[None, :]
+    evaluate = _side_by_side(objective, cube, pool)
+    evaluate(start)
+    begun = time.perf_counter()
+    evaluate(np.repeat(start, threads, axis=0))
+    return (time.perf_counter() - begun) / threads
 
 
 def _side_by_side(objective: Objective, cube: Cube, pool: Executor) -> Batch:

@@ -16,8 +16,9 @@ from simrail.core.atomic_files import draft_of
 from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
+from simrail.recording.files.frame_file import Format, write_frame
 from simrail.recording.files.ned import Frame, in_ned
-from simrail.recording.files.ride_writer import Format, refuse_existing, write_frame, write_parts
+from simrail.recording.files.ride_writer import refuse_existing, write_parts
 from simrail.ride.truth import Truth
 from simrail.scenario.cells import Cell, cell_record, first_cells
 from simrail.scenario.check import judge_scenario
@@ -103,7 +104,9 @@ def export(
                 if truth:
                     true = truth_at_imu(motion, recording)
                     true = true if axes == "flu" else in_ned(true)
-                    write_frame(true, draft / name / f"{TRUTH_STEM}.{format}", format=format)
+                    about, file = f"true motion of {recording.mount!r}, part of no recording", TRUTH_STEM
+                    path = draft / name / f"{file}.{format}"
+                    write_frame(true, path, format=format, about=about, axes=axes)
                 if contact:
                     _write_contact(motion, draft / name / CONTACT_FOLDER, format=format)
                 labels = cell_record(cell).items()
@@ -119,7 +122,8 @@ def _write_contact(truth: Truth, folder: Path, *, format: Format) -> None:
     """Write the forces of every wheel, a file each."""
     folder.mkdir()
     for wheel in truth.contacts or truth.wheel_names:
-        write_frame(truth.contact(wheel), folder / f"{wheel}.{format}", format=format)
+        about = f"forces between the wheel {wheel} and its rail"
+        write_frame(truth.contact(wheel), folder / f"{wheel}.{format}", format=format, about=about)
 
 
 def _names(chosen: list[Cell]) -> dict[int, str]:

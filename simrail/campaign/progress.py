@@ -42,8 +42,14 @@ class Watcher:
     def recording_written(self, number: int, count: int, name: str) -> None:
         """Recording `number` (from 1) of `count` has been written, by an export."""
 
+    def search_begins(self, name: str, each_s: float, evaluations: int) -> None:
+        """A tuning will evaluate its objective about so often for a set of parameters, each in so many s."""
+
     def search_goes(self, name: str, evaluations: int, value: float) -> None:
         """A tuning has evaluated its objective so often for a set of parameters; its least value so far."""
+
+    def works(self, what: str, share: float | None = None) -> None:
+        """Something that may take long is done up to a share, or begins, where no share is known."""
 
 
 class ProgressWatcher(Watcher):
@@ -68,6 +74,8 @@ class ProgressWatcher(Watcher):
         self._before = self._done = 0
         self._by_worker: dict[str, int] = {}
         self._searches: dict[str, TaskID] = {}
+        self._expected: dict[str, tuple[float, int]] = {}
+        self._work: tuple[str, float, TaskID | None] | None = None
 
     def __enter__(self) -> Self:
         self._progress.__enter__()
@@ -158,11 +166,53 @@ class ProgressWatcher(Watcher):
         if not self._console.is_terminal:
             self._console.print(f"wrote {name} ({number} of {count})", highlight=False)
 
+    def search_begins(self, name: str, each_s: float, evaluations: int) -> None:
+        """See `Watcher`."""
+        self._expected[name] = time.perf_counter(), evaluations
+        whole = timedelta(seconds=round(each_s * evaluations))
+        self.told(
+            f"search, {name}: some {evaluations} evaluations of {each_s:.3g} s each: about {whole}; "
+            "interrupted, the same command goes on"
+        )
+
     def search_goes(self, name: str, evaluations: int, value: float) -> None:
         """See `Watcher`."""
+        begun, expected = self._expected.get(name, (time.perf_counter(), 0))
         if self._searches.get(name) is None:
-            self._searches[name] = self._progress.add_task(f"search, {name}", total=None, note="")
-            if not self._console.is_terminal:
+            self._searches[name] = self._progress.add_task(f"search, {name}", total=expected or None, note="")
+            self._said = time.perf_counter()
+            if not expected and not self._console.is_terminal:
                 self._console.print(f"search, {name}", highlight=False)
         note = f"{evaluations} evaluations, {value:.6f}"
-        self._progress.update(self._searches[name], note=note)
+        now = time.perf_counter()
+        if expected:
+            left = max(expected - evaluations, 0) * (now - begun) / max(evaluations, 1)
+            note += f", some {timedelta(seconds=round(left))} left"
+        self._progress.update(self._searches[name], completed=min(evaluations, expected or 0), note=note)
+        if not self._console.is_terminal and now > self._said + _EVERY_S:
+            self._said = now
+            self._console.print(f"search, {name}: {note}", highlight=False, soft_wrap=True)
+
+    def works(self, what: str, share: float | None = None) -> None:
+        """See `Watcher`."""
+        now = time.perf_counter()
+        if self._work is None or self._work[0] != what:
+            self._end_work()
+            self._work, self._said = (what, now, None), now - _EVERY_S
+        what, begun, task = self._work
+        if share is None or now < begun + SILENT_S:
+            return
+        note = f"{100.0 * share:.0f} %"
+        if task is None:
+            task = self._progress.add_task(what, total=1.0, note="")
+            self._work = what, begun, task
+        self._progress.update(task, completed=share, note=note)
+        if not self._console.is_terminal and now > self._said + _EVERY_S:
+            self._said = now
+            self._console.print(f"{what}: {note}", highlight=False, markup=False)
+
+    def _end_work(self) -> None:
+        """What was worked at is done: its line goes."""
+        if self._work is not None and self._work[2] is not None:
+            self._progress.remove_task(self._work[2])
+        self._work = None

@@ -21,7 +21,7 @@ from simrail.core.errors import InputError, one_of
 from simrail.core.interrupts import interruptible
 from simrail.core.toml_files import blame
 from simrail.estimation.estimate import Estimator, registered
-from simrail.estimation.tunable import tunables_of
+from simrail.estimation.tunable import Tunable, tunables_of
 from simrail.estimators.tuning.cube import Cube
 from simrail.estimators.tuning.file import TuningResult
 from simrail.estimators.tuning.identify import identify
@@ -35,11 +35,10 @@ from simrail.scenario.tables import EstimatorPart
 from simrail.track.bands import SAMPLES_PER_WAVE, Band
 
 STEP_M = 0.25
+"""Distance of the places of a reference, unless another is given."""
 
 MOST_PLACES = 10_000_000
 """Of a reference of the rails."""
-
-"""Distance of the places of a reference, unless another is given."""
 
 
 def tune_scenario(
@@ -124,13 +123,7 @@ def tune_scenario(
     if within_m is not None and not within_m[0] < within_m[1]:
         given, limit = list(within_m), "two places, m, the smaller first"
         raise InputError("is no range", field="--within", value=given, limit=limit, remedy="swap them")
-    for field, number, least in (
-        ("--evaluations", evaluations, 0),
-        ("--at-most", at_most, 1),
-        ("--draws", draws, 1),
-    ):
-        if number is not None and number < least:
-            raise InputError("is out of range", field=field, value=number, limit=f">= {least}")
+    _judge_numbers(evaluations, at_most, draws)
     _judge_file(out)
     watcher = watcher or Watcher()
     scenario = alone(scenario, estimator)
@@ -141,18 +134,109 @@ def tune_scenario(
         chosen_settings["band"] = _band(parts.resolve(chosen[0]).bands, band, step_m=step_m)
     tunables = tunables_of(tuned_estimator, chosen_settings, method=method)
     recordings, references = _rides(chosen, parts, watcher, within_m=within_m, step_m=step_m)
-    rails = references if method == "kom" else None
-    with interruptible(), blame(scenario.file, "tuning"):
+    with blame(scenario.file, "tuning"):
+        return _searched(
+            tunables,
+            recordings,
+            references if method == "kom" else None,
+            out,
+            evaluations=evaluations,
+            at_most=at_most,
+            seed=scenario.spec.seed,
+            fitted_on=[_words(scenario, *pair) for pair in zip(chosen, recordings, strict=True)],
+            command=command,
+            watcher=watcher,
+        )
+
+
+def tune_recordings(
+    recordings: Sequence[Recording],
+    out: Path,
+    *,
+    estimator: Estimator,
+    settings: Mapping[str, Any] | None = None,
+    evaluations: int = 480,
+    at_most: int | None = None,
+    seed: int = 1,
+    command: str = "",
+    watcher: Watcher | None = None,
+) -> tuple[TuningResult, dict[str, pd.DataFrame]]:
+    """Tune an estimator on recorded rides by their likelihood, which needs no known rails.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Rides to fit on, together.
+    out : Path
+        File of the tuning; see `tune_scenario`.
+    estimator : Estimator
+        What is tuned. What it searches where `settings` say nothing is its own matter: a verb
+        ``usual_search(recordings)``, if it has one, returns its settings.
+    settings : mapping, optional
+        Settings of the search that are the estimator's own.
+    evaluations, at_most, seed, command, watcher
+        See `tune_scenario`.
+
+    Returns
+    -------
+    result, identified
+        See `tune_scenario`.
+
+    Raises
+    ------
+    InputError
+        If the estimator has nothing to tune by likelihood, or the file is no tuning.
+    KeyboardInterrupt
+        If interrupted; the search can be gone on with.
+    """
+    _judge_numbers(evaluations, at_most, 1)
+    _judge_file(out)
+    usual = getattr(estimator, "usual_search", None)
+    chosen = ({} if usual is None else dict(usual(recordings))) | dict(settings or {})
+    return _searched(
+        tunables_of(estimator, chosen, method="cml"),
+        recordings,
+        None,
+        out,
+        evaluations=evaluations,
+        at_most=at_most,
+        seed=seed,
+        fitted_on=[
+            f"recorded ride {one.name}: {one.mount} on {one.mount_body}, odometry "
+            f"{one.odometry_source or 'none'}, {len(one.imu)} samples"
+            for one in recordings
+        ],
+        command=command,
+        watcher=watcher or Watcher(),
+    )
+
+
+def _searched(
+    tunables: Mapping[str, Tunable],
+    recordings: Sequence[Recording],
+    rails: Sequence[pd.DataFrame] | None,
+    out: Path,
+    *,
+    evaluations: int,
+    at_most: int | None,
+    seed: int,
+    fitted_on: Sequence[str],
+    command: str,
+    watcher: Watcher,
+) -> tuple[TuningResult, dict[str, pd.DataFrame]]:
+    """Search, judge what was found, and write it."""
+    with interruptible():
         result = tune(
             tunables,
             recordings,
             references=rails,
             evaluations=evaluations,
             at_most=at_most,
-            seed=scenario.spec.seed,
+            seed=seed,
             unfinished=unfinished(out),
+            forecast=watcher.search_begins,
             progress=watcher.search_goes,
-            fitted_on=[_words(scenario, *pair) for pair in zip(chosen, recordings, strict=True)],
+            fitted_on=fitted_on,
             command=command,
         )
         identified = {
@@ -310,6 +394,17 @@ def _words(scenario: Scenario, cell: Cell, recording: Recording) -> str:
         f"{Path(cell.imu.grade).stem}, odometry {recording.odometry_source}, {len(recording.imu)} samples"
         + ("" if first else f", draw {cell.sensor_draw} on track {cell.track_draw}")
     )
+
+
+def _judge_numbers(evaluations: int, at_most: int | None, draws: int) -> None:
+    """Refuse numbers of a search that are none."""
+    for field, number, least in (
+        ("--evaluations", evaluations, 0),
+        ("--at-most", at_most, 1),
+        ("--draws", draws, 1),
+    ):
+        if number is not None and number < least:
+            raise InputError("is out of range", field=field, value=number, limit=f">= {least}")
 
 
 def _judge_file(out: Path) -> None:

@@ -30,6 +30,9 @@ def list_parts(
     kind: Annotated[
         str, typer.Argument(metavar="[KIND]", help=f"One of {', '.join((*FOLDERS, 'estimators'))}.")
     ] = "",
+    bibtex: Annotated[
+        bool, typer.Option("--bibtex", help="Of estimators: BibTeX of what they rest on, to copy.")
+    ] = False,
 ) -> int:
     """Show the scenarios, tracks, vehicles, IMUs, published spectra and estimators that are there."""
     from rich.console import Console
@@ -39,6 +42,16 @@ def list_parts(
     wanted = kind if kind in ("", *FOLDERS) or kind.endswith("s") else f"{kind}s"
     if wanted:
         one_of(wanted, (*FOLDERS, "estimators"), "there is no such kind", field="KIND")
+    if bibtex:
+        if wanted not in ("", "estimators"):
+            raise InputError(
+                "belongs to estimators",
+                field="--bibtex",
+                limit="simrail list estimators --bibtex",
+                remedy="leave it out, or list estimators",
+            )
+        print(_bibtex())
+        return DONE
     console = Console(highlight=False)
     shown = {name: entries for name, entries in catalogue().items() if wanted in ("", name)}
     for kind, entries in shown.items():
@@ -48,6 +61,22 @@ def list_parts(
             console.print(f"  [cyan]{name:{width}}[/cyan]  ", end="")
             console.print(title, markup=False, overflow="ignore", crop=False, no_wrap=True)
     return DONE
+
+
+def _bibtex() -> str:
+    """What all registered estimators rest on: who cites what as comments, then the entries."""
+    from simrail.estimation.bibliography import citations, entries
+    from simrail.estimation.estimate import estimator_class, registered
+
+    cites: dict[str, tuple[str, ...]] = {}
+    for name in registered():
+        try:
+            told = getattr(estimator_class(name), "cites", ())
+        except ImportError:  # of a package that lacks what it needs
+            continue
+        cites[name] = told if isinstance(told, tuple) else ()
+    lines = [f"% {one.method}: {one.words}" for one in citations(cites.items())]
+    return "\n".join([*lines, "", entries(cites.values())])
 
 
 def open_page(

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
+from simrail.cli.estimate import estimate
 from simrail.cli.examples import below
 from simrail.cli.figure import figure
 from simrail.cli.film import film
@@ -21,7 +22,7 @@ from simrail.cli.grade import grade
 from simrail.cli.lesson import lesson
 from simrail.cli.library import cache, imu, list_parts, new, open_page, vehicle
 from simrail.cli.options import BAD_INPUT, CELL_FAILED, DONE, INTERRUPTED, say
-from simrail.cli.rides import estimate, export
+from simrail.cli.rides import export
 from simrail.cli.run import check, run
 from simrail.cli.schema import schema
 from simrail.cli.sensitivity import sensitivity

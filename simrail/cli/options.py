@@ -4,12 +4,15 @@ import math
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from simrail.core.atomic_files import can_be_made
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, one_of
+
+if TYPE_CHECKING:
+    from simrail.recording.files.frame_file import Format
 
 DONE, CELL_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -37,6 +40,18 @@ def finite(param: typer.CallbackParam, value: float | None) -> float | None:
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"{value} is no finite number", param_hint=f"'{param.opts[0]}'")
     return value
+
+
+def form_of(word: str) -> "Format":
+    """The form of data files that a word stands for.
+
+    Raises
+    ------
+    InputError
+        If it stands for none.
+    """
+    one_of(word, ("csv", "parquet"), "no such format", field="--format")
+    return cast("Format", word)
 
 
 def say(message: str) -> None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from simrail.cli.options import DONE, Scenario, Seed, Settings, finite
+from simrail.cli.options import DONE, Seed, Settings, finite
+from simrail.cli.tune_ride import refuse_of_scenarios, tune_rides
 from simrail.core.errors import InputError, one_of
 
 if TYPE_CHECKING:
@@ -25,19 +26,29 @@ CONSTRAINED = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
 
 def tune(
     context: typer.Context,
-    scenario: Scenario,
-    estimator: Annotated[
+    scenario: Annotated[
         str,
+        typer.Argument(
+            metavar="NAME|FILE", help="A shipped scenario, the path of one, or that of a recorded ride."
+        ),
+    ],
+    estimator: Annotated[
+        str | None,
         typer.Option(
             "--estimator",
             metavar="NAME",
-            help="An estimator of the scenario, a registered one, or FILE.py:CLASS.",
+            help="An estimator of the scenario or ride file, a registered one, or FILE.py:CLASS. Of a "
+            "recorded ride TrackRelativeSmoother, if not given.",
         ),
-    ],
+    ] = None,
     method: Annotated[
-        str,
-        typer.Option("--method", metavar="cml|kom", help="By likelihood, or against the rails as they lie."),
-    ],
+        str | None,
+        typer.Option(
+            "--method",
+            metavar="cml|kom",
+            help="By likelihood, or against the rails as they lie, which nobody knows of a recorded ride.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -110,7 +121,11 @@ def tune(
     seed: Seed = None,
     rides: Annotated[
         list[str] | None,
-        typer.Option("--ride", metavar="NAME", help="Ride to fit on; all if none is named. Repeatable."),
+        typer.Option(
+            "--ride",
+            metavar="NAME",
+            help="Ride to fit on; all if none is named. Beside a recorded ride another one. Repeatable.",
+        ),
     ] = None,
     settings: Settings = None,
     by_kind: Annotated[
@@ -118,17 +133,28 @@ def tune(
         typer.Option("--by-kind", help="Smoother: one set for straights, one for transitions and curves."),
     ] = False,
 ) -> int:
-    """Search an estimator's parameters on rides of a scenario; interrupted, the same command goes on."""
+    """Search an estimator's parameters, on a scenario's or recorded rides; the same command goes on."""
     from rich.console import Console
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.tune import tune_scenario, unfinished
+    from simrail.cli.check_ride import is_ride
     from simrail.scenario.scenario import load_scenario
 
-    read = load_scenario(scenario, overrides=settings or [], seed=seed)
     if constrain is not None:
         one_of(constrain, CONSTRAINED, "no such constraint", field="--constrain")
-    file = out or Path(f"{read.name}_{method}.toml")
+    recorded = is_ride(scenario)
+    if not recorded:
+        estimator, method = _required("--estimator", estimator), _required("--method", method)
+        read = load_scenario(scenario, overrides=settings or [], seed=seed)
+        file = out or Path(f"{read.name}_{method}.toml")
+    else:
+        method = "cml" if method is None else method
+        of_scenarios = {"--imu": imu, "--band": band, "--within": within, "--step": step}
+        of_scenarios["--draws"] = None if draws == 1 else draws
+        refuse_of_scenarios(of_scenarios, method)
+        stem = Path(scenario).stem if Path(scenario).suffix else Path(scenario).absolute().name
+        file = out or Path(f"{stem}_{method}.toml")
     # Settings of an estimator's own search: the option of each, and its value if it was given.
     own: dict[str | None, tuple[str, Any]] = {
         "box": ("--box", box),
@@ -143,22 +169,37 @@ def tune(
     if best.is_file():
         print(f"going on from {best}")
     try:
+        given = {str(name): value for name, (_, value) in own.items() if value is not None}
         with ProgressWatcher(Console(stderr=True)) as watcher:
-            result, identified = tune_scenario(
-                read,
-                file,
-                estimator=estimator,
-                method=method,
-                rides=rides or [],
-                draws=draws,
-                imu=imu,
-                within_m=within,
-                settings={str(name): value for name, (_, value) in own.items() if value is not None},
-                evaluations=evaluations,
-                at_most=at_most,
-                command=_command(context),
-                watcher=watcher,
-            )
+            if recorded:
+                result, identified, use = tune_rides(
+                    [Path(scenario), *map(Path, rides or [])],
+                    file,
+                    estimator=estimator,
+                    options=settings or [],
+                    settings=given,
+                    evaluations=evaluations,
+                    at_most=at_most,
+                    seed=1 if seed is None else seed,
+                    command=_command(context),
+                    watcher=watcher,
+                )
+            else:
+                result, identified = tune_scenario(
+                    read,
+                    file,
+                    estimator=str(estimator),
+                    method=str(method),
+                    rides=rides or [],
+                    draws=draws,
+                    imu=imu,
+                    within_m=within,
+                    settings=given,
+                    evaluations=evaluations,
+                    at_most=at_most,
+                    command=_command(context),
+                    watcher=watcher,
+                )
     except InputError as error:
         error.field = own.get(error.field, (error.field,))[0]
         raise
@@ -168,7 +209,21 @@ def tune(
         raise
     _show(Console(), result, identified)
     print(f"{result.evaluations} evaluations; wrote {file}")
+    if recorded:
+        print(f"use it: {use}")
     return DONE
+
+
+def _required(option: str, value: str | None) -> str:
+    """An option that a scenario needs."""
+    if value is None:
+        raise InputError(
+            "is required for a scenario",
+            field=option,
+            limit="--estimator NAME and --method cml or kom",
+            remedy="e.g. --estimator TrackRelativeSmoother --method cml --parameter axle_yaw_sd",
+        )
+    return value
 
 
 def _command(context: typer.Context) -> str:

@@ -1,6 +1,7 @@
 """A recorded ride, ready for estimators: its signals, an odometry, and whether all that can be true."""
 
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 from simrail.core.toml_files import blame, label
@@ -9,7 +10,9 @@ from simrail.recording.check_field import check_hard_iron
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.check_sheet import check_ranges
 from simrail.recording.evidence.judge import Evidence, warnings_of
-from simrail.recording.files.ride_reader import read_signals, ride_file
+from simrail.recording.files.asked import RideReference
+from simrail.recording.files.ride_file import RideFile
+from simrail.recording.files.ride_reader import read_whole, ride_file
 from simrail.recording.recording import Recording
 
 
@@ -43,7 +46,41 @@ def read_ride(path: Path) -> Recording:
 
 def judged_ride(path: Path) -> tuple[Recording, Evidence]:
     """As `read_ride`, with what the ride says of itself, and without a warning."""
-    recording = read_signals(path)
+    ride = whole_ride(path)
+    return ride.recording, ride.evidence
+
+
+@dataclass(frozen=True)
+class RecordedRide:
+    """All that a ride file brings.
+
+    Attributes
+    ----------
+    recording : Recording
+        What methods may see.
+    evidence : Evidence
+        What the ride says of itself.
+    spec : RideFile
+        The file: methods and limits that it names.
+    reference : RideReference, optional
+        What estimates are compared with; no method sees it.
+    """
+
+    recording: Recording
+    evidence: Evidence
+    spec: RideFile
+    reference: RideReference | None = None
+
+
+def whole_ride(path: Path) -> RecordedRide:
+    """As `judged_ride`, with what its file asks for.
+
+    Raises
+    ------
+    InputError
+        As `read_ride`.
+    """
+    recording, spec, reference = read_whole(path)
     if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
         source = "encoder" if recording.odometer is None else "odometer"
         recording = with_odometry(recording, "encoder", source=source)
@@ -51,4 +88,4 @@ def judged_ride(path: Path) -> tuple[Recording, Evidence]:
         evidence = check_plausible(recording)
         check_ranges(recording)
         check_hard_iron(recording)
-    return recording, evidence
+    return RecordedRide(recording, evidence, spec, reference)

@@ -9,10 +9,12 @@ from math import pi
 
 from simrail.core.columns import (
     ACCEL,
+    ATTITUDE,
     EDGE_TIME,
     ENCODER,
     GNSS,
     GYRO,
+    IRREGULARITY,
     MAGNETIC,
     ODOMETRY,
     ODOMETRY_SD,
@@ -146,6 +148,26 @@ ODOMETER_SIGNAL = Signal(
 )
 """What a train's odometer gives in place of an encoder's pulses; a recording holds the speed alone, since a
 distance in steps is an encoder's."""
+
+REFERENCE_SIGNAL = Signal(
+    "reference",
+    (
+        *(Quantity(name.removesuffix("_rad"), (name,), ANGLES, required=False) for name in ATTITUDE),
+        Quantity("position", ODOMETRY[:1], LENGTHS, required=False),
+        Quantity("speed", ODOMETRY[1:2], SPEEDS, required=False),
+    ),
+)
+"""What a recorded ride is compared with; part of no recording."""
+
+RAIL_REFERENCE_SIGNAL = Signal(
+    "rail_reference",
+    (
+        Quantity("position", ODOMETRY[:1], LENGTHS),
+        *(Quantity(name.removesuffix("_m"), (name,), LENGTHS, required=False) for name in IRREGULARITY),
+    ),
+    timed=False,
+)
+"""Rails that a recorded ride is compared with."""
 
 GAPS_SIGNAL = Signal(
     "gaps",

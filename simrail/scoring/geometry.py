@@ -23,11 +23,8 @@ from simrail.recording.recording import Recording
 from simrail.scoring.metrics import Row, Series, figures
 from simrail.scoring.table import NO_TWIST, UNOBSERVABLE, table_of
 from simrail.scoring.windows import chosen_metrics, chosen_windows, windows_of
-from simrail.track.bands import BANDS, Band, band_pass, sd_of_draws, twist, why_not
+from simrail.track.bands import BANDS, TWIST_BASE_M, Band, band_pass, sd_of_draws, twist, why_not
 from simrail.track.laid_track import LaidTrack
-
-TWIST_BASE_M = 3.0
-"""Base of the twist, unless a scenario says otherwise."""
 
 _NO_PLACE_METRICS = ("final", "nis", "us_per_sample")
 

@@ -8,41 +8,13 @@ import re
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from simrail.core.amounts import amount_in
 from simrail.core.errors import InputError, one_of
 from simrail.scoring.table import CURVE_PREFIX, FULL, QUANTITY_UNITS, WINDOWS
 from simrail.track.bands import BANDS
 
 METRICS = ("rms", "sd", "p95", "p9985", "max")
 """Figures of an error that are the better the smaller."""
-
-_PI = 3.141592653589793
-_SI = {
-    "deg": ("angle", _PI / 180.0),
-    "\u00b0": ("angle", _PI / 180.0),
-    "arcmin": ("angle", _PI / 10800.0),
-    "mrad": ("angle", 1e-3),
-    "rad": ("angle", 1.0),
-    "mm": ("length", 1e-3),
-    "cm": ("length", 1e-2),
-    "m": ("length", 1.0),
-    "m/s": ("speed", 1.0),
-    "mm/s": ("speed", 1e-3),
-    "km/h": ("speed", 1.0 / 3.6),
-    "m/s2": ("acceleration", 1.0),
-    "m/s\u00b2": ("acceleration", 1.0),
-    "mg": ("acceleration", 9.80665e-3),
-    "ug": ("acceleration", 9.80665e-6),
-    "g": ("acceleration", 9.80665),
-    "deg/s": ("rate", _PI / 180.0),
-    "deg/h": ("rate", _PI / 648000.0),
-    "rad/s": ("rate", 1.0),
-    "1": ("ratio", 1.0),
-    "%": ("ratio", 1e-2),
-    "kN": ("force", 1e3),
-    "N": ("force", 1.0),
-    "1/s": ("growth", 1.0),
-}
-"""Kind of quantity that a unit is of, and its size in SI."""
 
 QUANTITY_ALIASES = {
     "level": "cross_level",
@@ -65,7 +37,6 @@ WINDOW_ALIASES = {
     "rest": "standstill",
 }
 
-_LIMIT = re.compile(r"^\s*([-+.\deE]+)\s*(\S.*?)?\s*$")
 _FOR = re.compile(
     r"^\s*(?P<what>[A-Za-z_ -]+?)(?:\s+(?P<metric>rms|sd|p95|p9985|max))?(?:\s+(?P<band>D[0-3]))?"
     r"\s*<=?\s*(?P<limit>[.\d]+(?:[eE][-+]?\d+)?\s*[^\s,]*)"
@@ -151,32 +122,7 @@ def limit_of(value: float | str, quantity: str) -> float:
     InputError
         If it is no number above 0, or its unit is none, or one of another kind.
     """
-    unit = QUANTITY_UNITS[quantity]
-    kind, size = _SI[unit]
-    alike = ", ".join(name for name, (of, _) in _SI.items() if of == kind)
-    found = _LIMIT.match(str(value))
-    try:
-        number = float(found[1]) if found else float("nan")
-    except ValueError:
-        number = float("nan")
-    if not 0.0 < number < float("inf"):
-        raise InputError(
-            "is no limit", field="limit", value=value, limit=f"a number above 0 with a unit: {alike}"
-        )
-    written = (found[2] or unit) if found else unit
-    if written not in _SI:
-        raise InputError(
-            "has a unit that is not known", field="limit", value=value, limit=f"{quantity}: {alike}"
-        )
-    if _SI[written][0] != kind:
-        raise InputError(
-            f"has a unit of {_SI[written][0]}; {quantity} is measured in {unit}",
-            field="limit",
-            value=value,
-            limit=alike,
-            remedy=f"give it in {unit}",
-        )
-    return number * _SI[written][1] / size
+    return amount_in(value, QUANTITY_UNITS[quantity], what=quantity)
 
 
 def read_requirement(text: str) -> Wanted:

@@ -234,7 +234,7 @@ def score_odometry(
     return table_of(rows)
 
 
-def _wrap(angle: FloatArray) -> FloatArray:
+def wrap(angle: FloatArray) -> FloatArray:
     """Angle in [-pi, pi)."""
     with np.errstate(invalid="ignore"):  # what is not finite stays so, and is counted later
         wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
@@ -253,14 +253,14 @@ def _attitude_series(states: pd.DataFrame, against: Reference) -> Iterator[Serie
             ("truth", against.motion[name].to_numpy()),
             ("design", against.design[:, column]),
         ):
-            error = _wrap(angle - values)
+            error = wrap(angle - values)
             true = reference == "truth"
             bounds = _bounds(states, against.motion, f"{quantity}_bound_rad", 180.0 / np.pi) if true else None
             yield Series(quantity, reference, np.rad2deg(error), sd if true else None, bounds=bounds)
             if quantity == "yaw":
                 # The initial heading is given to the methods, not found by them.
                 reason = "" if np.isfinite(error[0]) else "estimate not finite at the first sample"
-                yield Series("yaw_debiased", reference, np.rad2deg(_wrap(error - error[0])), None, reason)
+                yield Series("yaw_debiased", reference, np.rad2deg(wrap(error - error[0])), None, reason)
 
 
 def _bounds(states: pd.DataFrame, motion: pd.DataFrame, name: str, scale: float) -> Bounds | None:

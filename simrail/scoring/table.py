@@ -94,7 +94,7 @@ METRIC_UNITS = {
 FULL = "full"
 """The band of what no filter has cut."""
 BANDS = (FULL, *_STANDARD_BANDS)
-REFERENCES = ("truth", "design")
+REFERENCES = ("truth", "design", "reference")
 WINDOWS = ("whole", "cropped", "straight", "transition", "curve", "standstill", "moving")
 METRICS = ("rms", "mean", "sd", "p95", "p9985", "max", "final", "nees", "nis", "coverage95", "us_per_sample")
 ON_REQUEST = ("coverage50", "coverage90", "coverage99", "coverage999", "bound", "outside", "fault")

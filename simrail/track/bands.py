@@ -21,6 +21,9 @@ ORDER = 4
 SAMPLES_PER_WAVE = 2.5
 """Samples that the shortest wave of a band needs."""
 
+TWIST_BASE_M = 3.0
+"""Base of the twist, unless another is given."""
+
 TOO_SHORT, TOO_COARSE = "line too short for the band", "step too coarse for the band"
 
 

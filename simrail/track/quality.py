@@ -95,25 +95,33 @@ def section_indicators(
             raise InputError(
                 "no such quantity", field="limits", value=name, limit=", ".join((*values, "twist"))
             )
-    sections = np.floor(position / section_m + 1e-9).astype(np.int64)
     rows = [
         row
         for name, line in lines.items()
-        for row in _rows(name, line, position, sections, section_m, step, (limits or {}).get(name, Limits()))
+        for row in section_rows(name, line, position, section_m, (limits or {}).get(name, Limits()))
     ]
     return pd.DataFrame(rows, columns=list(INDICATORS))
 
 
-def _rows(
-    name: str,
-    line: FloatArray,
-    position: FloatArray,
-    sections: np.ndarray,
-    section_m: float,
-    step_m: float,
-    limits: Limits,
-) -> list[tuple[object, ...]]:
-    rows: list[tuple[object, ...]] = []
+def section_rows(
+    name: str, line: FloatArray, position: FloatArray, section_m: float, limits: Limits
+) -> list[tuple[str, float, float, float, float, float, int, bool]]:
+    """Rows of one quantity, in the order of `INDICATORS`.
+
+    Parameters
+    ----------
+    name : str
+        The quantity.
+    line, position : ndarray (n,)
+        Its values over uniform places, m; NaN where nothing is known.
+    section_m : float
+        Length of a section.
+    limits : Limits
+        Of the quantity.
+    """
+    step_m = float(position[1] - position[0])
+    sections = np.floor(position / section_m + 1e-9).astype(np.int64)
+    rows: list[tuple[str, float, float, float, float, float, int, bool]] = []
     for number in np.unique(sections):
         inside = np.flatnonzero((sections == number) & np.isfinite(line))
         if len(inside) * step_m < LEAST_FILLED * section_m:
@@ -124,6 +132,6 @@ def _rows(
         defects = int(np.count_nonzero(np.diff(beyond.astype(np.int8), prepend=0) == 1))
         peak, place = float(away[worst]), float(position[inside[worst]])
         start = float(number * section_m)
-        exceeded = limits.sd_m is not None and sd > limits.sd_m
+        exceeded = bool(limits.sd_m is not None and sd > limits.sd_m)
         rows.append((name, start, start + section_m, sd, peak, place, defects, exceeded))
     return rows

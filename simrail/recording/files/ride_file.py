@@ -13,6 +13,7 @@ from pydantic import Field, field_validator, model_validator
 from simrail.core.errors import InputError
 from simrail.core.resample import LONGEST_GAP_S
 from simrail.core.toml_files import Part, blame, judge
+from simrail.recording.files.asked import LimitsPart, MethodPart, RailReferencePart, ReferencePart
 from simrail.recording.files.signal_part import TICKS, SignalPart, VectorPart
 from simrail.recording.recording import (
     EncoderSheet,
@@ -406,6 +407,14 @@ class RideFile(Part):
     imu, second_imu, encoder, magnetometer, rail_displacement, odometer, odometry, gnss, gaps
         Its signals. Without an odometry it is made from encoder or odometer
         (`simrail.estimation.recorded_ride.read_ride`); without those as well, nobody knows where it is.
+    estimator : tuple of MethodPart
+        Methods that ``simrail estimate`` runs, where its command names none.
+    limits : LimitsPart
+        What the rails that are found are held against; examples where nothing is said.
+    reference : ReferencePart, optional
+        Angles, place or speed to compare with, better known than what is judged.
+    rail_reference : RailReferencePart, optional
+        Rails to compare with.
     """
 
     name: str = Field(min_length=1, max_length=200)
@@ -425,6 +434,10 @@ class RideFile(Part):
     odometry: OdometrySignalPart | None = None
     gnss: GnssSignalPart | None = None
     gaps: GapsPart | None = None
+    estimator: tuple[MethodPart, ...] = ()
+    limits: LimitsPart = LimitsPart()
+    reference: ReferencePart | None = None
+    rail_reference: RailReferencePart | None = None
 
     @field_validator("map")
     @classmethod
@@ -478,6 +491,20 @@ class RideFile(Part):
                 limit=f"{body.ends_m[0]:g} to {body.ends_m[1]:g} m, the ends of {body.name!r}",
                 remedy="give it in metres from the body's own reference point",
             )
+        return self
+
+    @model_validator(mode="after")
+    def _methods_told_apart(self) -> Self:
+        names = [part.called for part in self.estimator]
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                raise InputError(
+                    "is the name of two methods",
+                    field=f"estimator[{number}].name",
+                    value=name,
+                    limit="a name for each",
+                    remedy="give one of them another name",
+                )
         return self
 
     @model_validator(mode="after")

@@ -33,8 +33,10 @@ from simrail.core.resample import (
 from simrail.core.toml_files import blame, judge, label, load, read_toml
 from simrail.recording.check_form import SHEETS, check_recording
 from simrail.recording.check_sheet import check_counts, field_bounds, imu_bounds
+from simrail.recording.files.asked import RideReference
 from simrail.recording.files.common_time import STILL_MPS, begun_later, common_time, refuse_little, spanned
 from simrail.recording.files.counters import unwrap
+from simrail.recording.files.reference_reader import read_reference
 from simrail.recording.files.ride_file import (
     AccelPart,
     EncoderSignalPart,
@@ -86,12 +88,29 @@ def read_signals(path: Path) -> Recording:
         If a file is missing or unreadable, or says something impossible, or the recording does not pass
         `check_recording`.
     """
+    return read_whole(path)[0]
+
+
+def read_whole(path: Path) -> tuple[Recording, RideFile, RideReference | None]:
+    """As `read_signals`, with what the ride file says and what the ride is to be compared with.
+
+    Returns
+    -------
+    recording : Recording
+        What a method may see.
+    spec : RideFile
+        The ride file.
+    reference : RideReference or None
+        What none may see.
+    """
     path = ride_file(path)
     spec = judge(RideFile, read_toml(path), file=label(path))
     with blame(label(path)):
-        recording = _recording(spec, path.parent)
+        reader = SignalReader(path.parent)
+        recording = _recording(spec, reader)
         check_recording(recording)
-    return recording
+        reference = read_reference(spec, reader, recording.imu)
+    return replace(recording, notes=tuple(reader.notes)), spec, reference
 
 
 def ride_file(path: Path) -> Path:
@@ -99,12 +118,11 @@ def ride_file(path: Path) -> Path:
     return path / RIDE_FILE if path.is_dir() else path
 
 
-def _recording(spec: RideFile, folder: Path) -> Recording:
-    track = NO_MAP
+def _recording(spec: RideFile, reader: SignalReader) -> Recording:
+    track, folder = NO_MAP, reader.folder
     if spec.track is not None:
         with blame(None, "track"):
             track = load(TrackFile, "track", spec.track, folder=folder).design(Path(spec.track).stem)
-    reader = SignalReader(folder)
     imu, rate_hz, gaps = _imu(spec, reader, _sheet(spec.imu, folder))
     if spec.gaps is not None:
         noted = reader.frame(spec.gaps, "gaps")
@@ -141,8 +159,7 @@ def _recording(spec: RideFile, folder: Path) -> Recording:
     if spec.gnss is not None:
         received = reader.frame(spec.gnss, "gnss")
         recording = replace(recording, gnss=received, gnss_sheet=spec.gnss.sheet)
-    recording = begun_later(_with_way(recording, spec, reader), began_s, reader.notes)
-    return replace(recording, notes=tuple(reader.notes))
+    return begun_later(_with_way(recording, spec, reader), began_s, reader.notes)
 
 
 def _aside(spec: RideFile, reader: SignalReader) -> dict[str, pd.DataFrame]:

@@ -6,15 +6,14 @@ columns or units. Numbers survive the round trip bit by bit, in CSV as in Parque
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pandas as pd
-import pyarrow as pa
-import pyarrow.csv as pa_csv
 
 from simrail.core.atomic_files import draft_of
 from simrail.core.errors import InputError
 from simrail.core.toml_files import toml_text
+from simrail.recording.files.frame_file import Format, write_frame
 from simrail.recording.files.ned import Frame, in_ned, ned_table
 from simrail.recording.files.ride_reader import RIDE_FILE
 from simrail.recording.recording import Recording
@@ -22,8 +21,6 @@ from simrail.recording.sheets.vehicle_sheet_file import vehicle_sheet_table
 from simrail.recording.signals import SIGNALS
 from simrail.track.file import track_text
 from simrail.track.map_file import map_table
-
-Format = Literal["csv", "parquet"]
 
 TRACK_FILE = "track.toml"
 
@@ -77,7 +74,9 @@ def write_parts(recording: Recording, folder: Path, *, format: Format, axes: Fra
                 remedy="drop them",
             )
         file = f"{signal.name}.{format}"
-        write_frame(frame if axes == "flu" else in_ned(frame), folder / file, format=format)
+        about = f"{signal.name} of the recording {recording.name!r}"
+        turned = frame if axes == "flu" else in_ned(frame)
+        write_frame(turned, folder / file, format=format, about=about, axes=axes)
         tables[signal.name] = {"file": file}
         if axes == "ned":
             tables[signal.name] |= ned_table(signal, [*frame.columns])
@@ -125,15 +124,3 @@ def write_parts(recording: Recording, folder: Path, *, format: Format, axes: Fra
     if recording.track.is_map:
         (folder / TRACK_FILE).write_text(track_text(recording.track), encoding="utf-8")
     (folder / RIDE_FILE).write_text(toml_text({**head, **tables}), encoding="utf-8")
-
-
-def write_frame(frame: pd.DataFrame, path: Path, *, format: Format) -> None:
-    """Write a frame, its index as the first column if it has a name; floats with all their digits."""
-    plain = frame.reset_index() if frame.index.name else frame
-    if format == "parquet":
-        plain.to_parquet(path, index=False)
-    else:
-        table = pa.Table.from_pandas(plain, preserve_index=False)
-        with path.open("wb") as file:
-            file.write((",".join(map(str, plain.columns)) + "\n").encode())
-            pa_csv.write_csv(table, file, pa_csv.WriteOptions(include_header=False))

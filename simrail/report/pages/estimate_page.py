@@ -1,65 +1,141 @@
-"""The page of one estimate on one ride, without scores."""
+"""The page of estimates on one recorded ride, which has no truth."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from simrail.core.resample import GAPS
+from simrail.estimation.bibliography import citations, entries
 from simrail.estimation.estimate import Estimate
+from simrail.recording.files.asked import RideReference
 from simrail.recording.recording import Recording, odometry_of
-from simrail.report.figures.estimate import estimate_looks, estimate_view, place_of, shown_bands
+from simrail.report.figures.estimate import estimate_looks, estimate_view, place_of
+from simrail.report.figures.views import ATTITUDES, RAILS
 from simrail.report.pages.explorer import explorer_data
 from simrail.report.pages.frame import page_text
-from simrail.report.tables.geometry import BAND, indicator_table
-from simrail.report.tables.tables import Table
+from simrail.report.tables.geometry import BAND
+from simrail.report.tables.recorded import (
+    BAND_WORDS,
+    LIKELY,
+    MethodResult,
+    TextTable,
+    beside_each_other,
+    difference_table,
+    differences,
+    exceedance_table,
+    exceedance_words,
+    rails_table,
+    reference_table,
+    sections_table,
+)
 from simrail.report.words.sentences import recording_facts
-from simrail.track.bands import BANDS
+from simrail.scoring.score import wrap
+from simrail.track.rail_limits import RailLimits, exceedances, rail_sections, rail_summary
 
 MOST_GAPS = 20
 
+MOST_PLACES = 25
+"""Places beyond a limit that the page lists; the file has all."""
 
-def write_estimate_page(
-    path: Path, recording: Recording, estimate: Estimate, *, label: str, method: str, us_per_sample: float
-) -> None:
+
+@dataclass(frozen=True)
+class RideEstimates:
+    """What was concluded from one recorded ride.
+
+    Attributes
+    ----------
+    recording : Recording
+        The ride.
+    results : tuple of MethodResult
+        Its methods; the first is what others are compared with.
+    limits : RailLimits
+        What rails are held against.
+    reference : RideReference, optional
+        What estimates are compared with, if there is something.
+    scores : pandas.DataFrame, optional
+        Scores against it, with a column ``estimator``.
+    """
+
+    recording: Recording
+    results: tuple[MethodResult, ...]
+    limits: RailLimits
+    reference: RideReference | None = None
+    scores: pd.DataFrame | None = None
+
+
+@dataclass(frozen=True)
+class _Rails:
+    """Rails of one method, as the page has them."""
+
+    name: str
+    words: str
+    summary: TextTable
+    places: TextTable
+    more: int
+    sections: TextTable
+
+
+def write_estimate_page(path: Path, found: RideEstimates) -> None:
     """Write the page.
 
     Parameters
     ----------
     path : Path
         The HTML file.
-    recording : Recording
-        The ride.
-    estimate : Estimate
-        What the method concluded from it.
-    label, method : str
-        Name of the method, and its options in full.
-    us_per_sample : float
-        Time that it took.
+    found : RideEstimates
+        What it shows.
     """
-    view = estimate_view(recording, estimate)
-    shown = explorer_data([view], estimate_looks(label))
+    view = estimate_view(found.results, found.limits, found.reference)
+    groups = {panel.group for panel in view.panels}
+    first = [group for group in (f"{RAILS} in {BAND}", ATTITUDES) if group in groups] or [ATTITUDES]
+    shown = explorer_data([view], estimate_looks(found.results), first=first)
+    several = len(found.results) > 1
     text = page_text(
         "pages/estimate.html.j2",
-        recording=recording,
-        label=label,
-        method=method,
+        recording=found.recording,
+        label=" beside ".join(result.name for result in found.results) if several else found.results[0].label,
+        results=found.results,
+        several=several,
         version=version("simrail"),
-        tiles=_tiles(recording, estimate, us_per_sample),
-        facts=ride_facts(recording),
+        tiles=_tiles(found),
+        facts=ride_facts(found.results[0].recording),
         data=shown["data"],
-        quality=_quality(estimate),
-        gaps=_gaps(recording),
+        rails=[_rails(result, found.limits) for result in found.results if result.lines],
+        limits=found.limits,
+        bands=BAND_WORDS,
+        beside=beside_each_other(found.results) if several else None,
+        differences=difference_table(differences(found.results)) if several else None,
+        reference=None if found.scores is None else reference_table(found.scores),
+        sources=_sources(found.reference),
+        gaps=_gaps(found.recording),
+        citations=citations((result.name, result.cites) for result in found.results),
+        bibtex=entries(result.cites for result in found.results),
     )
     path.write_text(text, encoding="utf-8")
 
 
-def _quality(estimate: Estimate) -> Table | None:
-    """Track quality of the rails by sections; None where there are none, or the ride is too short."""
-    geometry = estimate.geometry
-    if geometry is None or len(geometry) < 2 or BANDS[BAND] not in shown_bands(geometry.index.to_numpy()):
-        return None
-    return indicator_table(None, geometry, limits={}, band=BANDS[BAND])
+def _rails(result: MethodResult, limits: RailLimits) -> _Rails:
+    places = exceedances(result.lines, limits)
+    return _Rails(
+        result.name,
+        exceedance_words(places, limits),
+        rails_table(rail_summary(result.lines, limits)),
+        exceedance_table(places, most=MOST_PLACES),
+        max(len(places) - MOST_PLACES, 0),
+        sections_table(rail_sections(result.lines, limits)),
+    )
+
+
+def _sources(reference: RideReference | None) -> str:
+    if reference is None:
+        return ""
+    named = [reference.source, reference.rail_source]
+    band = f" (in {reference.rail_band})" if reference.rail_band else ""
+    return " and ".join(name for name in named if name) + (band if reference.rail_source else "")
 
 
 def ride_facts(recording: Recording) -> list[str]:
@@ -87,29 +163,50 @@ def ride_facts(recording: Recording) -> list[str]:
 def design_difference_deg(recording: Recording, estimate: Estimate, angle: str) -> float:
     """RMS difference of an estimated angle to the design's at the odometry's place, deg; it is no error."""
     frame = recording.track.frame_extended(odometry_of(recording)["position_m"].to_numpy())
-    difference = estimate.states[angle].to_numpy(dtype=np.float64) - getattr(frame, angle)
-    wrapped = (difference + np.pi) % (2.0 * np.pi) - np.pi
-    return float(np.rad2deg(np.sqrt(np.mean(wrapped**2))))
+    difference = wrap(estimate.states[angle].to_numpy(dtype=np.float64) - getattr(frame, angle))
+    return float(np.rad2deg(np.sqrt(np.mean(difference**2))))
 
 
-def _tiles(recording: Recording, estimate: Estimate, us_per_sample: float) -> list[tuple[str, str, str]]:
+def design_differences(result: MethodResult) -> dict[str, float]:
+    """Root mean squares of roll and pitch less the design, deg, of what a method has on a line with a map."""
+    if result.recording.odometry is None or not result.recording.track.is_map:
+        return {}
+    return {
+        angle.removesuffix("_rad"): design_difference_deg(result.recording, result.estimate, angle)
+        for angle in ("roll_rad", "pitch_rad")
+        if angle in result.estimate.states
+    }
+
+
+def _tiles(found: RideEstimates) -> list[tuple[str, str, str]]:
+    result = found.results[0]
+    recording = result.recording
     duration = f"{recording.imu.index[-1] - recording.imu.index[0]:.0f} s"
     position = place_of(recording)
     tiles = [("way", f"{abs(position[-1] - position[0]):.0f} m", f"in {duration}")]
     if recording.odometry is None:
         tiles = [("duration", duration, "no odometry tells the way")]
-    for angle in ("roll_rad", "pitch_rad"):
-        if angle in estimate.states and recording.odometry is not None and recording.track.is_map:
-            word = angle.removesuffix("_rad")
-            difference = design_difference_deg(recording, estimate, angle)
-            tiles.append(
-                (f"{word} less design", f"{difference:.3f}\u00b0", "rms; not an error: there is no truth")
-            )
-    tiles.append(("time", f"{us_per_sample:.2f} \u00b5s", "per sample"))
-    return tiles
+    if result.lines:
+        tiles.append(_rails_tile(result, found.limits))
+    for word, difference in design_differences(result).items():
+        note = "rms; not an error: there is no truth"
+        tiles.append((f"{word} less design", f"{difference:.3f}\u00b0", note))
+    tiles.append(("time", f"{result.us_per_sample:.2f} \u00b5s", "per sample"))
+    if len(found.results) == 1:
+        return tiles
+    return [tiles[0], *((f"{title}, {result.name}", value, note) for title, value, note in tiles[1:])]
 
 
-def _gaps(recording: Recording) -> list[str]:
+def _rails_tile(result: MethodResult, limits: RailLimits) -> tuple[str, str, str]:
+    places = exceedances(result.lines, limits)
+    whose = "example limits" if limits.is_example else "limits of the ride file"
+    if places["chance"].notna().any():
+        sure = int((places["chance"] >= LIKELY).sum())
+        return "places beyond a limit", str(len(places)), f"{sure} of them surely; {whose}"
+    return "places beyond a limit", str(len(places)), whose
+
+
+def _gaps(recording: Recording) -> Sequence[str]:
     if recording.gaps is None:
         return []
     lines = [

@@ -144,7 +144,7 @@
     }
     pen.inside(LEFT, TOP, right - LEFT, bottom - TOP, () => {
       // The truth comes last, a thin line above all others.
-      const last = one => one.key === "truth" ? 2 : looks[one.key].kind === "test" ? 1 : 0;
+      const last = one => looks[one.key].kind === "truth" ? 2 : looks[one.key].kind === "test" ? 1 : 0;
       for (const one of [...panel.series].sort((a, b) => last(a) - last(b))) {
         if (!shown(one.key)) continue;
         const look = looks[one.key], colour = hue(look);
@@ -172,7 +172,7 @@
         if (!y) continue;
         const values = numbers(y), at = one.y ? numbers(view.axes[panel.axis].x2) : x;
         pen.strokeStyle = colour;
-        pen.lineWidth = one.key === "truth" ? 0.8 : 1.3;
+        pen.lineWidth = look.kind === "truth" ? 0.8 : 1.3;
         pen.setLineDash(look.dash || []);
         pen.beginPath();
         let lifted = true;
@@ -384,6 +384,21 @@
       download(`${figure.dataset.name}.svg`, text);
     });
     (figure.querySelector("figcaption") || figure).append(one);
+  }
+  // ---- text that is there to be copied ------------------------------------------------------------------------
+  for (const text of document.querySelectorAll("pre[data-copy]")) {
+    const one = make("button", {type: "button", className: "save", textContent: "copy"});
+    one.addEventListener("click", async () => {
+      try {
+        await navigator.clipboard.writeText(text.textContent);
+        one.textContent = "copied";
+      } catch {
+        // A page from a file may not write to the clipboard: what is to be copied is selected.
+        getSelection().selectAllChildren(text);
+        one.textContent = document.execCommand("copy") ? "copied" : "selected: press Ctrl+C";
+      }
+    });
+    text.before(one);
   }
   // A link into a folded part opens it.
   const open = () => {

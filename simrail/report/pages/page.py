@@ -15,6 +15,8 @@ from markupsafe import Markup
 from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
 from simrail.core.columns import IRREGULARITY
+from simrail.estimation.bibliography import citations, entries
+from simrail.estimation.estimate import description_of
 from simrail.report.campaign.axes import is_campaign
 from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.passes import passes_section
@@ -46,7 +48,9 @@ from simrail.report.words.ablations import WORDS, state_words
 from simrail.report.words.findings import findings
 from simrail.report.words.geometry_findings import geometry_findings
 from simrail.report.words.sentences import Finding, axis_words
-from simrail.scenario.build import goals_mm, limits_of
+from simrail.scenario.axes import each
+from simrail.scenario.build import Parts, goals_mm, limits_of
+from simrail.scenario.build_estimator import odometry_estimator
 from simrail.scenario.requirements import requirements_of
 from simrail.scenario.scenario import Scenario
 from simrail.scoring.ablations import ABLATIONS
@@ -300,6 +304,17 @@ def _parts(data: PageData) -> list[Section]:
     return [_section("parts", "Parts and sources", folded=True, parts=rows)]
 
 
+def _cite(data: PageData) -> list[Section]:
+    """What the methods rest on, with BibTeX to copy."""
+    told = {name: description_of(one).cites for name, one in Parts(data.scenario).estimators(0).items()}
+    for name in each(data.scenario.spec.odometry):
+        odometry = odometry_estimator(data.scenario, name)
+        if odometry is not None:
+            told[f"odometry {name}"] = description_of(odometry).cites
+    shown = {"citations": citations(told.items()), "bibtex": entries(told.values())}
+    return [_section("cite", "Cite the methods", folded=True, **shown)]
+
+
 def _again(data: PageData) -> list[Section]:
     lines = facts(data.manifest)
     return [_section("again", "Make it again", scenario=data.scenario, manifest=data.manifest, facts=lines)]
@@ -323,6 +338,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     _odometry,
     _words,
     _parts,
+    _cite,
     _again,
 )
 """What the page holds after its answer, in its order; what has nothing to show makes no section."""
