@@ -173,7 +173,14 @@ def citations(here: Path, about: Description) -> str:
         raise ValueError(f"references.bib lacks what a method cites: {missing}")
     if not about.cites:
         return "Nothing but simrail itself: see `CITATION.cff`."
-    return "\n\n".join(f"```bibtex\n{known[one]}\n```" for one in dict.fromkeys(about.cites))
+    return "\n\n".join(map(_citation, (known[one] for one in dict.fromkeys(about.cites))))
+
+
+def _citation(entry: str) -> str:
+    """A BibTeX entry, with a link to the paper where it has one."""
+    doi = re.search(r"doi\s*=\s*\{(.*?)\}", entry)
+    link = f"[doi:{doi.group(1)}](https://doi.org/{doi.group(1)})\n\n" if doi else ""
+    return f"{link}```bibtex\n{entry}\n```"
 
 
 def method_page(here: Path, name: str, title: str, page: Mapping[str, Any]) -> str:
