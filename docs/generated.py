@@ -8,11 +8,10 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
+from method_pages import cell, pages
 from sphinx.application import Sphinx
 
 import simrail
-from simrail.cli.library import catalogue
-from simrail.estimation.estimate import registered
 from simrail.scenario.file_keys import FILES, Key, keys_of
 
 WHAT = {
@@ -36,9 +35,11 @@ def write(path: Path, text: str) -> None:
         path.write_text(text)
 
 
-def cell(text: str) -> str:
-    """Text that can stand in a table of Markdown."""
-    return text.replace("|", "\\|").replace("\n", " ").replace("<", "&lt;").replace("*", "\\*")
+def drop_others(folder: Path, kept: Iterable[str]) -> None:
+    """Remove pages of a folder that are made no more: a build would read them, too."""
+    for page in folder.glob("*.*"):
+        if page.name not in kept:
+            page.unlink()
 
 
 def table(keys: Iterable[Key]) -> str:
@@ -59,25 +60,6 @@ def keys_page(kind: str) -> str:
     for shown, keys in groupby(keys_of(kind), key=lambda key: key.table):
         parts += [f"## `{shown}`" if shown else "## Above all tables", table(keys)]
     return "\n\n".join(parts) + "\n"
-
-
-def method_page(name: str, title: str) -> str:
-    """One estimator, from its docstring and its module's."""
-    module, _, attribute = registered()[name].value.partition(":")
-    line = "=" * len(name)
-    return f"""{line}
-{name}
-{line}
-
-{title}
-
-.. automodule:: {module}
-   :no-members:
-   :no-index:
-
-.. autoclass:: {module}.{attribute}
-   :no-index:
-"""
 
 
 def validation_page(here: Path) -> str:
@@ -114,17 +96,9 @@ def build(app: Sphinx) -> None:
     write(here / "validation.md", validation_page(here))
     toc = "\n".join(FILES)
     write(here / "keys" / "index.md", f"# Every key of every file\n\n```{{toctree}}\n{toc}\n```\n")
-    methods = catalogue()["estimators"]
-    for name, title in methods.items():
-        if registered()[name].value.startswith("simrail."):
-            write(here / "methods" / f"{name}.rst", method_page(name, title))
-    names = [name for name in methods if registered()[name].value.startswith("simrail.")]
-    rows = "\n".join(f"| [{name}]({name}.rst) | {cell(methods[name])} |" for name in names)
-    hidden = "\n".join(names)
-    write(
-        here / "methods" / "index.md",
-        f"# The methods\n\n| method | is |\n|---|---|\n{rows}\n\n```{{toctree}}\n:hidden:\n{hidden}\n```\n",
-    )
+    drop_others(here / "methods", made := pages(here))
+    for name, text in made.items():
+        write(here / "methods" / name, text)
     public = "\n".join(f".. autoclass:: simrail.{name}\n   :no-index:\n" for name in classes())
     verbs = "\n".join(f".. autofunction:: simrail.{name}\n   :no-index:\n" for name in functions())
     head = "===\nAPI\n===\n\n.. automodule:: simrail\n   :no-members:\n"

@@ -9,11 +9,13 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 
 import simrail
 from simrail.cli.main import app
+from simrail.estimation.estimate import description_of, estimator_class, registered
 from simrail.scenario.file_keys import keys_of
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -75,9 +77,79 @@ def test_keys_of_toml_blocks_are_known() -> None:
 
 
 def test_every_page_is_in_the_table_of_contents() -> None:
-    listed = (DOCS / "index.md").read_text().rpartition("```{toctree}")[2].split()
+    listed = re.findall(
+        r"<(\S+)>$", (DOCS / "index.md").read_text().rpartition("```{toctree}")[2], re.MULTILINE
+    )
     made = {"validation"}  # by docs/generated.py
     assert {page.stem for page in PAGES} | made <= {*listed, "index"}
+
+
+@pytest.fixture
+def docs_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `docs/conf.py` puts on the path."""
+    pytest.importorskip("numpydoc", reason='pip install -e ".[docs]"')
+    monkeypatch.syspath_prepend(str(DOCS))
+
+
+CASES = tomllib.loads((DOCS / "methods.toml").read_text())
+SHIPPED = sorted(name for name, entry in registered().items() if entry.value.startswith("simrail."))
+
+
+def test_every_method_has_figures_equations_and_something_that_it_is_bad_at() -> None:
+    assert sorted(CASES) == SHIPPED
+    for name, case in CASES.items():
+        text = (DOCS / "method_equations" / f"{name}.md").read_text()
+        assert "$$" in text or "\\begin{align" in text, name
+        assert case["bad"], name
+        for one in [*case.get("good", []), *case["bad"]]:
+            # Its numbers are those of the run: but for units of wavelength it holds none.
+            assert not re.search(r"\d", re.sub(r"\bD[0-3]\b|95 %", "", one["says"])), one["says"]
+            assert ("than" in one) != ("limit" in one), one["says"]
+
+
+def test_every_option_is_described_and_everything_cited_can_be_copied(docs_modules: None) -> None:
+    import method_pages
+
+    known = method_pages.references(DOCS)
+    for name in SHIPPED:
+        case = CASES[name]
+        assert method_pages.options(name)  # a KeyError names an option that no docstring has
+        about = description_of(estimator_class(name)(**case.get("options", {})))
+        assert set(about.cites) <= set(known), name
+    assert all(entry.startswith("@") and "simrail" not in entry for entry in known.values())
+
+
+def test_a_sentence_that_the_ride_does_not_bear_out_ends_the_build(docs_modules: None) -> None:
+    import method_runs
+
+    class Told(method_runs.Method):
+        def figure(self, quantity: str, *args: str, **more: str) -> float:
+            return {"it": 0.02, "the other": 0.05}[self.label]
+
+    own, other = (Told(label, "Vqf", (), "curve") for label in ("it", "the other"))
+    words = {"says": "{own} and not {other}", "quantity": "roll", "than": "the other"}
+    assert method_runs.said(words, own, {"the other": other}, good=True) == "0.02° and not 0.05°"
+    with pytest.raises(ValueError, match="not borne out"):
+        method_runs.said(words, own, {"the other": other}, good=False)
+    with pytest.raises(ValueError, match="not borne out"):
+        method_runs.said({**words, "limit": 0.01}, own, {"the other": own}, good=True)
+
+
+@pytest.mark.long
+def test_a_figure_is_of_the_run_and_needs_no_network(docs_modules: None) -> None:
+    """Its error is that of the score, drawn for a desk and for a phone."""
+    import method_runs
+
+    page = method_runs.made("DesignAngles", CASES["DesignAngles"])
+    own = method_runs.Method("it", "DesignAngles", (), "curve")
+    run = method_runs.run_of("curve")
+    true = run.reference.motion["roll_rad"].to_numpy()
+    rms = np.rad2deg(np.sqrt(np.mean((own.estimate().states["roll_rad"].to_numpy() - true) ** 2)))
+    assert f"| roll, ° | {method_runs.number(rms)} |" in page["scores"]
+    assert page["shape"].count("<svg") == page["beside"].count("<svg") == 2
+    assert "estimated" in page["shape"]
+    assert not page["has_interval"]
+    assert "http" not in page["shape"].replace("http://www.w3.org", "")
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.canvas import INK, MUTED, look, panels, to_svg
+from simrail.report.figures.canvas import INK, MUTED, legend_above, look, panels, to_svg
 
 COLOURS = {
     "true": "#0b7a55",
@@ -99,7 +99,7 @@ def draw(
             if panel.limits is not None:
                 axis.set_ylim(*panel.limits)
             axis.set_ylabel(panel.label)
-            if axis.get_legend_handles_labels()[1]:
-                axis.legend(loc="upper left", ncols=4)
         axes[-1].set_xlabel(x_label)
+        if any(axis.get_legend_handles_labels()[1] for axis in axes):
+            legend_above(*axes)
         return str(to_svg(figure, description=description))

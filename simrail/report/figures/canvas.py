@@ -118,7 +118,7 @@ def width_in() -> float:
 
 def is_narrow() -> bool:
     """Whether it is made for a phone."""
-    return width_in() < WIDE_IN
+    return width_in() < 0.5 * WIDE_IN
 
 
 class Drawing(Markup):
@@ -151,7 +151,9 @@ def only(wanted: str, path: Path) -> Iterator[Order]:
         _ORDER.reset(token)
 
 
-def drawn(name: str, make: Callable[[], str]) -> Drawing:
+def drawn(
+    name: str, make: Callable[[], str], *, widths_in: tuple[float, float] = (WIDE_IN, NARROW_IN)
+) -> Drawing:
     """A figure of the page, for a desk and for a phone; "" if there is nothing to draw.
 
     Parameters
@@ -160,21 +162,24 @@ def drawn(name: str, make: Callable[[], str]) -> Drawing:
         By which it is asked for; once on a page.
     make : callable
         Makes it: what `to_svg` returned, or "".
+    widths_in : tuple of float
+        Of both.
     """
     order = _ORDER.get()
     if order is not None:
         order.names.append(name)
         order.written |= name == order.wanted and bool(make())
         return Drawing()
-    wide = make()
-    if not wide:
-        return Drawing()
-    token = _WIDTH.set(NARROW_IN)
-    try:
-        narrow = make()
-    finally:
-        _WIDTH.reset(token)
-    drawing = Drawing(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
+    sizes = []
+    for width in widths_in:
+        token = _WIDTH.set(width)
+        try:
+            sizes.append(make())
+        finally:
+            _WIDTH.reset(token)
+        if not sizes[0]:
+            return Drawing()
+    drawing = Drawing(f'<div class="wide">{sizes[0]}</div><div class="narrow">{sizes[1]}</div>')
     drawing.name = name
     return drawing
 
