@@ -15,6 +15,7 @@ from method_runs import shown
 from numpydoc.docscrape import NumpyDocString
 
 from simrail.cli.library import catalogue
+from simrail.estimation.bibliography import SOURCES, Source
 from simrail.estimation.estimate import Description, description_of, estimator_class, registered
 
 NOT_AN_AVERAGE = """One device, one map, one short ride without the short waves that shake a train:
@@ -51,19 +52,6 @@ ROLES = {
 def names() -> list[str]:
     """The shipped methods, as `simrail list estimators` has them."""
     return [name for name in catalogue()["estimators"] if registered()[name].value.startswith("simrail.")]
-
-
-def references(here: Path) -> dict[str, str]:
-    """BibTeX entries by how a method cites them."""
-    entries = {}
-    for entry in re.findall(
-        r"^@\w+\{.*?^\}", (here / "references.bib").read_text(), re.DOTALL | re.MULTILINE
-    ):
-        cited = re.search(r",\s*simrail\s*=\s*\{(.*?)\}\s*\}", entry, re.DOTALL)
-        assert cited, f"references.bib: no field simrail in {entry[:40]}"
-        plain = entry[: cited.start()] + "\n}"
-        entries |= {one.strip(): plain for one in cited.group(1).split(";")}
-    return entries
 
 
 def cell(text: str) -> str:
@@ -159,28 +147,27 @@ def example(name: str, page_options: Mapping[str, object]) -> str:
     return "\n".join([*lines, "```"])
 
 
-def citations(here: Path, about: Description) -> str:
-    """BibTeX of what it rests on.
+def citations(about: Description) -> str:
+    """BibTeX of what it rests on, with a link to each publication that has one.
 
     Raises
     ------
     ValueError
-        If it cites what ``references.bib`` does not hold.
+        If it cites what ``simrail.estimation.bibliography`` does not hold.
     """
-    known = references(here)
-    missing = [one for one in about.cites if one not in known]
+    missing = [key for key in about.cites if key not in SOURCES]
     if missing:
-        raise ValueError(f"references.bib lacks what a method cites: {missing}")
+        raise ValueError(f"simrail.estimation.bibliography lacks what a method cites: {missing}")
     if not about.cites:
         return "Nothing but simrail itself: see `CITATION.cff`."
-    return "\n\n".join(map(_citation, (known[one] for one in dict.fromkeys(about.cites))))
+    return "\n\n".join(_citation(SOURCES[key]) for key in dict.fromkeys(about.cites))
 
 
-def _citation(entry: str) -> str:
+def _citation(source: Source) -> str:
     """A BibTeX entry, with a link to the paper where it has one."""
-    doi = re.search(r"doi\s*=\s*\{(.*?)\}", entry)
-    link = f"[doi:{doi.group(1)}](https://doi.org/{doi.group(1)})\n\n" if doi else ""
-    return f"{link}```bibtex\n{entry}\n```"
+    doi = source.fields.get("doi")
+    link = f"[doi:{doi}](https://doi.org/{doi})\n\n" if doi else ""
+    return f"{link}```bibtex\n{source.bibtex}\n```"
 
 
 def method_page(here: Path, name: str, title: str, page: Mapping[str, Any]) -> str:
@@ -219,7 +206,7 @@ def method_page(here: Path, name: str, title: str, page: Mapping[str, Any]) -> s
         example(name, chosen),
         options(name),
         "## To cite",
-        citations(here, about),
+        citations(about),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 

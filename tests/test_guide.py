@@ -110,13 +110,12 @@ def test_every_method_has_figures_equations_and_something_that_it_is_bad_at() ->
 def test_every_option_is_described_and_everything_cited_can_be_copied(docs_modules: None) -> None:
     import method_pages
 
-    known = method_pages.references(DOCS)
     for name in SHIPPED:
         case = CASES[name]
         assert method_pages.options(name)  # a KeyError names an option that no docstring has
         about = description_of(estimator_class(name)(**case.get("options", {})))
-        assert set(about.cites) <= set(known), name
-    assert all(entry.startswith("@") and "simrail" not in entry for entry in known.values())
+        copied = method_pages.citations(about)  # a ValueError names what the bibliography lacks
+        assert copied.count("@") >= len(set(about.cites)), name
 
 
 def test_a_sentence_that_the_ride_does_not_bear_out_ends_the_build(docs_modules: None) -> None:
