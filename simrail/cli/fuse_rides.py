@@ -5,6 +5,7 @@ from pathlib import Path
 
 from simrail.cli.estimate_ride import estimator_named, ride_for
 from simrail.core.atomic_files import draft_of
+from simrail.core.csv_files import write_csv
 from simrail.core.toml_files import blame, label
 from simrail.estimation.estimate import Estimate
 from simrail.estimators.rails.fuse import Fused, fuse, rails_and_place_of
@@ -47,5 +48,5 @@ def fuse_rides(
         write_frame(fused.geometry, draft / f"geometry.{format}", format=format)
         write_frame(fused.shifts, draft / f"shifts.{format}", format=format)
         table = fused.passes.assign(ride=[label(ride) for ride in rides])
-        table.to_csv(draft / "passes.csv")
+        write_csv(table.reset_index(), draft / "passes.csv", float_format=None)
     return fused
