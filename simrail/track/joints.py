@@ -190,7 +190,7 @@ def _check_radius(radius: float, field: str) -> None:
     require_number(radius, field, zero=False)
     if abs(radius) < LEAST_RADIUS_M:
         limit = f">= {LEAST_RADIUS_M:g} m to either side"
-        raise InputError("is out of range", field=field, value=radius, limit=limit, remedy="give it in metres")
+        raise InputError("is out of range", field=field, value=radius, limit=limit, remedy="say it in m")
 
 
 def _check_said(elements: Sequence[Element], ends: Sequence[tuple[EndValue, EndValue]], i: int) -> None:
