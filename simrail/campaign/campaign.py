@@ -110,6 +110,8 @@ def run_campaign(
         with interruptible():
             try:
                 with executor_of(workers, cluster if loop.left else None, cells=loop.left) as executor:
+                    for note in executor.notes:
+                        loop.tell(note)
                     stopped = loop.run(executor)
                 return gather(plan, packed, checkpoint, only=only, stopped=stopped)
             finally:
@@ -164,9 +166,9 @@ class _Loop:
         self.ready: deque[_Batch] = deque()
         self.suspects: deque[_Batch] = deque()
         if checkpoint.damaged:
-            self._tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
+            self.tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
         if self.done:
-            self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
+            self.tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
     def run(self, executor: Executor) -> StopState | VerdictState | None:
         """Run what is left, or as much as the stop rule asks for; its last state."""
@@ -183,7 +185,7 @@ class _Loop:
             self._run()
             tables = (result.scores for result in self.checkpoint.results())
             state = rule.state(chosen_cells(self.plan), tables, draws, state)
-            self._tell(state.words)
+            self.tell(state.words)
             if state.reached:
                 break
         return state
@@ -273,7 +275,7 @@ class _Loop:
         for note in result.notes:
             if note not in self.told:
                 self.told.add(note)
-                self._tell(note)
+                self.tell(note)
         if result.cells:
             self._keep(result)
         else:
@@ -285,7 +287,7 @@ class _Loop:
         batch = batch._replace(lost=batch.lost + 1)
         single = batch.ride_only or len(batch.cells) == 1
         if not given_up and batch.lost < (_MOST_TRIES if single else _MOST_TRIES - 1):
-            self._tell(f"a worker died: {batch.words} run again")
+            self.tell(f"a worker died: {batch.words} run again")
             self.suspects.append(batch)
         elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it.
@@ -311,6 +313,7 @@ class _Loop:
         self.checkpoint.log(f"{done} of {self.total} cells done; the last by {result.worker}")
         self.watcher.cells_done(done, self.total, self.failed, result.worker)
 
-    def _tell(self, line: str) -> None:
+    def tell(self, line: str) -> None:
+        """Tell the user a line, and keep it in the log."""
         self.checkpoint.log(line)
         self.watcher.told(line)

@@ -555,8 +555,8 @@ class EstimatorPart(Part):
 
     ``stands_for`` says which row of the paper's table it is set beside, by the words of the page of that
     paper (`simrail.report.papers`). ``time_limit_s`` is how long it may take for a recording; it is then
-    ended, and its row says so. Without one, nothing ends it. ``memory_limit_mb`` is how much memory it may take
-    beside that of the process that it is a copy of; what it compiles counts.
+    ended, and its row says so. Without one, nothing ends it. ``memory_limit_mb`` is how much memory it may
+    take beside that of the process that it is a copy of; what it compiles counts.
     """
 
     name: Name

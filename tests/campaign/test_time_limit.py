@@ -243,7 +243,7 @@ EATEN = "OverMemoryError: took more memory than memory_limit_mb = 400"
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit of Linux")
 @pytest.mark.parametrize("deed", ["eat", "nibble"])
 def test_one_that_eats_memory_is_ended_and_the_others_go_on(deed: str, scenario: Path) -> None:
-    """All at once by numpy, and by Python bit by bit; without a time limit, and the next recording is whole."""
+    """All at once by numpy, and by Python bit by bit; the next recording is whole again."""
     free = run_campaign(read(scenario, "estimator.own.options.deed='print'"), workers=1).scores
     settings = [f"estimator.own.options.deed='{deed}'", "estimator.own.memory_limit_mb=400.0"]
     limited = run_campaign(read(scenario, *settings), workers=1).scores
