@@ -18,6 +18,7 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
@@ -104,8 +105,7 @@ def run_campaign(
     plan = scenario if isinstance(scenario, Plan) else judge_scenario(scenario)
     packed = pack(plan.parts)
     ride_cache.make_writable()  # now, so that workers share the folder that stands in for it
-    with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
-        checkpoint = Checkpoint(Path(spare)) if checkpoint is None else checkpoint
+    with _kept_for_now() if checkpoint is None else nullcontext(checkpoint) as checkpoint:
         loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only, batch_cells)
         with interruptible():
             try:
@@ -116,6 +116,13 @@ def run_campaign(
                 return gather(plan, packed, checkpoint, only=only, stopped=stopped)
             finally:
                 forget()
+
+
+@contextmanager
+def _kept_for_now() -> Iterator[Checkpoint]:
+    """A folder for batches, which goes with the campaign."""
+    with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
+        yield Checkpoint(Path(spare))
 
 
 class _Batch(NamedTuple):
