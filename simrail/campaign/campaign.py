@@ -18,6 +18,7 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
@@ -104,16 +105,24 @@ def run_campaign(
     plan = scenario if isinstance(scenario, Plan) else judge_scenario(scenario)
     packed = pack(plan.parts)
     ride_cache.make_writable()  # now, so that workers share the folder that stands in for it
-    with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
-        checkpoint = Checkpoint(Path(spare)) if checkpoint is None else checkpoint
+    with _kept_for_now() if checkpoint is None else nullcontext(checkpoint) as checkpoint:
         loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only, batch_cells)
         with interruptible():
             try:
                 with executor_of(workers, cluster if loop.left else None, cells=loop.left) as executor:
+                    for note in executor.notes:
+                        loop.tell(note)
                     stopped = loop.run(executor)
                 return gather(plan, packed, checkpoint, only=only, stopped=stopped)
             finally:
                 forget()
+
+
+@contextmanager
+def _kept_for_now() -> Iterator[Checkpoint]:
+    """A folder for batches, which goes with the campaign."""
+    with tempfile.TemporaryDirectory(prefix="simrail-", ignore_cleanup_errors=True) as spare:
+        yield Checkpoint(Path(spare))
 
 
 class _Batch(NamedTuple):
@@ -164,9 +173,9 @@ class _Loop:
         self.ready: deque[_Batch] = deque()
         self.suspects: deque[_Batch] = deque()
         if checkpoint.damaged:
-            self._tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
+            self.tell(f"{checkpoint.damaged} damaged file(s) of finished batches dropped: run again")
         if self.done:
-            self._tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
+            self.tell(f"going on with an unfinished run: {len(self.done)} of {self.total} cells are done")
 
     def run(self, executor: Executor) -> StopState | VerdictState | None:
         """Run what is left, or as much as the stop rule asks for; its last state."""
@@ -183,7 +192,7 @@ class _Loop:
             self._run()
             tables = (result.scores for result in self.checkpoint.results())
             state = rule.state(chosen_cells(self.plan), tables, draws, state)
-            self._tell(state.words)
+            self.tell(state.words)
             if state.reached:
                 break
         return state
@@ -273,7 +282,7 @@ class _Loop:
         for note in result.notes:
             if note not in self.told:
                 self.told.add(note)
-                self._tell(note)
+                self.tell(note)
         if result.cells:
             self._keep(result)
         else:
@@ -285,7 +294,7 @@ class _Loop:
         batch = batch._replace(lost=batch.lost + 1)
         single = batch.ride_only or len(batch.cells) == 1
         if not given_up and batch.lost < (_MOST_TRIES if single else _MOST_TRIES - 1):
-            self._tell(f"a worker died: {batch.words} run again")
+            self.tell(f"a worker died: {batch.words} run again")
             self.suspects.append(batch)
         elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it.
@@ -311,6 +320,7 @@ class _Loop:
         self.checkpoint.log(f"{done} of {self.total} cells done; the last by {result.worker}")
         self.watcher.cells_done(done, self.total, self.failed, result.worker)
 
-    def _tell(self, line: str) -> None:
+    def tell(self, line: str) -> None:
+        """Tell the user a line, and keep it in the log."""
         self.checkpoint.log(line)
         self.watcher.told(line)

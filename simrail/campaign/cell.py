@@ -116,6 +116,8 @@ class BatchTally:
         Estimators whose kernels have been compiled in this process.
     limits_s : mapping of str to float
         How long an estimator may take for a recording, by the names of those that have such a limit.
+    limits_mb : mapping of str to float
+        How much memory an estimator may take, by the names of those that have such a limit.
     figures : list of (pandas.DataFrame, dict)
         Figures of one estimate, and their labels.
     failures : list of Failure
@@ -131,6 +133,7 @@ class BatchTally:
     tunings: Mapping[str, str]
     warm: set[str] = field(default_factory=set)
     limits_s: Mapping[str, float] = field(default_factory=dict)
+    limits_mb: Mapping[str, float] = field(default_factory=dict)
     figures: list[tuple[pd.DataFrame, dict[str, object]]] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     printed: dict[str, str] = field(default_factory=dict)
@@ -336,13 +339,13 @@ def estimates_of(
     """Each estimate and the microseconds per sample that it took, or what went wrong with it.
 
     A method that takes many recordings at once takes them all; if one of them upsets it, it takes them
-    one by one, so that only that one fails. One with a time limit runs in a process of its own.
+    one by one, so that only that one fails. One with a limit runs in a process of its own.
     """
-    limit_s = tally.limits_s.get(name)
-    if limit_s is None:
+    limit_s, limit_mb = tally.limits_s.get(name), tally.limits_mb.get(name)
+    if limit_s is None and limit_mb is None:
         yield from _outcomes(name, estimator, recordings, partial(estimate_here, estimator), tally, check)
         return
-    limited = LimitedEstimator(estimator, limit_s)
+    limited = LimitedEstimator(estimator, limit_s, limit_mb)
     try:
         # Every process of its own loads its kernels, or compiles them.
         with tally.timed("estimate"), suppress(Exception):
@@ -373,7 +376,7 @@ def _outcomes(
         try:
             with tally.timed("estimate"):
                 outcome = run(group)
-            if name in tally.limits_s:
+            if name in tally.limits_s or name in tally.limits_mb:
                 tally.cpu_s["estimate"] += outcome.cpu_s  # of another process
             tally.note_print(name, outcome.printed)
             estimates = outcome.estimates

@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
 from simrail.core.errors import InputError
+from simrail.core.machine import differences, machine
 from simrail.core.source_hash import score_code_hash
 from simrail.ride import cache as ride_cache
 
@@ -33,6 +34,9 @@ class Executor(Protocol):
 
     here: bool = False
     """Whether it is this process: then `submit` returns when the work is done."""
+
+    notes: tuple[str, ...] = ()
+    """What is worth a line to the user, before anything is run."""
 
     def workers(self) -> int:
         """How many batches may be under way at once. A worker gets the next one when the last is kept."""
@@ -205,7 +209,7 @@ class _Cluster(Executor):
         self._busy: set[str] = set()
 
     def _judge_workers(self) -> None:
-        """Refuse a cluster without workers, or one whose workers run another simrail."""
+        """Refuse a cluster without workers, or of another simrail; note in what its machines differ."""
 
         def refusal(problem: str, value: str, remedy: str) -> InputError:
             return InputError(
@@ -230,6 +234,9 @@ class _Cluster(Executor):
         others = sorted(worker for worker, code in codes.items() if code != score_code_hash())
         if others:
             raise refusal("a worker runs another simrail, and would give other bits", others[0], remedy)
+        unlike = differences(machine(), self._client.run(machine))
+        if unlike:
+            self.notes = (f"warning: scores agree to 1e-9, not to the bit: workers differ in {unlike}",)
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.

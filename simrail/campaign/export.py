@@ -54,7 +54,7 @@ def export(
     format : str
         ``"csv"`` or ``"parquet"``.
     draw : int
-        Draw of the sensors; the track is that of its first draw.
+        Draw of the sensors, one of the scenario's; the track is that of its first draw.
     truth : bool
         Writes the true motion of the mount at the IMU's times beside each recording, too.
     contact : bool
@@ -74,10 +74,20 @@ def export(
     Raises
     ------
     InputError
-        If the folder exists, or the scenario cannot be run; nothing is written then.
+        If the folder exists, there is no such draw, or the scenario cannot be run; nothing is written then.
     """
     watcher = watcher or Watcher()
     refuse_existing(folder)
+    draws = scenario.spec.monte_carlo.sensor_draws
+    if draw >= draws:
+        raise InputError(
+            "the scenario has no such draw",
+            file=scenario.file,
+            field="--draw",
+            value=draw,
+            limit=f"0 to {draws - 1}",
+            remedy=f"take one of these, or add --set monte_carlo.sensor_draws={draw + 1}",
+        )
     parts = judge_scenario(scenario).parts
     if contact and not scenario.spec.contact_rate_hz:
         raise InputError(

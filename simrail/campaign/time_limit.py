@@ -1,9 +1,12 @@
-"""An estimator with a time limit: run in a process of its own, which is killed when the time is over.
+"""An estimator with a limit of time or memory: run in a process of its own, which is ended beyond it.
 
 A signal ends no compiled loop and a thread none at all: only a process can be ended for sure. It is a copy of
 this one (a fork, where the system has it), so that what is compiled is there, and takes one batch after the
 other; estimators without a limit have no such process. Where the one that waits is killed itself, a timer of
 the system ends the other one.
+
+Memory is limited by the system (``RLIMIT_DATA`` of Linux: what a process has for itself, with what it has
+from its parent as the start). What asks for more gets a `MemoryError`, and its process is ended.
 """
 
 import contextlib
@@ -13,6 +16,7 @@ import pickle
 import signal
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from simrail.campaign.fence import MOST_PRINTED, fenced, handed
@@ -28,6 +32,10 @@ _GRACE_S = 2.0
 
 class OverTimeError(RuntimeError):
     """An estimator took longer than it may."""
+
+
+class OverMemoryError(RuntimeError):
+    """An estimator asked for more memory than it may have."""
 
 
 class EstimatorDiedError(RuntimeError):
@@ -60,12 +68,16 @@ class LimitedEstimator:
     ----------
     estimator : Estimator
         What is run.
-    limit_s : float
+    limit_s : float, optional
         How long it may take for each recording, s.
+    memory_mb : float, optional
+        How much memory its process may take beside that of this one, MB.
     """
 
-    def __init__(self, estimator: Estimator, limit_s: float) -> None:
-        self._estimator, self._limit_s = estimator, limit_s
+    def __init__(
+        self, estimator: Estimator, limit_s: float | None = None, memory_mb: float | None = None
+    ) -> None:
+        self._estimator, self._limit_s, self._memory_mb = estimator, limit_s, memory_mb
         self._process: Any = None
         self._pipe: Any = None
 
@@ -81,18 +93,19 @@ class LimitedEstimator:
 
         Raises
         ------
-        OverTimeError, EstimatorDiedError
+        OverTimeError, OverMemoryError, EstimatorDiedError
             If it was ended, or ended its process.
         Exception
             What the estimator raised.
         """
-        allowed_s = max(self._limit_s * len(recordings), at_least_s)
+        limit_s = self._limit_s
+        allowed_s = None if limit_s is None else max(limit_s * len(recordings), at_least_s)
         try:
             if self._process is None:
                 self._begin()
             self._pipe.send((recordings, allowed_s))
             if not self._pipe.poll(allowed_s):
-                raise OverTimeError(f"took longer than time_limit_s = {self._limit_s:g}, and was ended")
+                raise self._over_time()
             done, content = self._pipe.recv()
         except (EOFError, ConnectionError):
             raise self._death() from None
@@ -100,6 +113,9 @@ class LimitedEstimator:
             self.close()
             raise
         if not done:
+            if isinstance(content, MemoryError) and self._memory_mb is not None:
+                self.close()  # what it holds would be in the way of the next one
+                raise OverMemoryError(f"took more memory than memory_limit_mb = {self._memory_mb:g}")
             raise content
         outcome: Outcome = content
         return outcome
@@ -116,7 +132,9 @@ class LimitedEstimator:
         ways = multiprocessing.get_all_start_methods()
         context: Any = multiprocessing.get_context("fork" if "fork" in ways else "spawn")
         self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_run, args=(other, self._pipe, self._estimator), daemon=True)
+        self._process = context.Process(
+            target=_run, args=(other, self._pipe, self._estimator, self._memory_mb), daemon=True
+        )
         with _allowed_children():
             self._process.start()
         other.close()
@@ -127,9 +145,13 @@ class LimitedEstimator:
         code = self._process.exitcode
         self.close()
         if code == -getattr(signal, "SIGALRM", 0):
-            return OverTimeError(f"took longer than time_limit_s = {self._limit_s:g}, and was ended")
+            return self._over_time()
         by = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-        return EstimatorDiedError(f"it ended the process that ran it ({by})")
+        had = "" if self._memory_mb is None else f"; it had memory_limit_mb = {self._memory_mb:g}"
+        return EstimatorDiedError(f"it ended the process that ran it ({by}{had})")
+
+    def _over_time(self) -> OverTimeError:
+        return OverTimeError(f"took longer than time_limit_s = {self._limit_s:g}, and was ended")
 
 
 @contextlib.contextmanager
@@ -144,16 +166,32 @@ def _allowed_children() -> Any:
         config["daemon"] = before
 
 
-def _run(pipe: Any, parents: Any, estimator: Estimator) -> None:
+def _limit_memory(more_mb: float) -> None:
+    """Let this process have so much more memory, and no more; nothing where the system cannot.
+
+    What is held already counts: the sum of the private writable mappings, ``VmData`` (proc_pid_status(5)).
+    """
+    with contextlib.suppress(ImportError, OSError, StopIteration):
+        import resource
+
+        lines = Path("/proc/self/status").read_text().splitlines()
+        held_kb = next(int(line.split()[1]) for line in lines if line.startswith("VmData:"))
+        most = 1024 * held_kb + int(1e6 * more_mb)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+def _run(pipe: Any, parents: Any, estimator: Estimator, memory_mb: float | None) -> None:
     """Run what is asked for, until nobody asks any more: the child's part."""
     parents.close()
+    if memory_mb is not None:
+        _limit_memory(memory_mb)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    has_timer = hasattr(signal, "setitimer")
-    if has_timer:
+    if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
     with contextlib.suppress(EOFError, ConnectionError):
         while True:
             recordings, allowed_s = pipe.recv()
+            has_timer = allowed_s is not None and hasattr(signal, "setitimer")
             if has_timer:
                 signal.setitimer(signal.ITIMER_REAL, allowed_s + _GRACE_S)
             try:
@@ -168,6 +206,8 @@ def _run(pipe: Any, parents: Any, estimator: Estimator) -> None:
 
 def _portable(error: Exception) -> Exception:
     """An error that another process can read, with its own words."""
+    if isinstance(error, MemoryError):  # numpy's own cannot be read back without its arguments
+        return MemoryError(str(error))
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

@@ -81,7 +81,8 @@ class _Worker:
         """What gathers one batch; with the estimators of a sample."""
         parts = self.parts
         estimators, tunings = parts.estimators(sample), parts.tunings(sample)
-        return BatchTally(parts.scenario.name, estimators, tunings, self.warm, parts.time_limits_s)
+        limits = parts.time_limits_s, parts.memory_limits_mb
+        return BatchTally(parts.scenario.name, estimators, tunings, self.warm, *limits)
 
     def take_sample(self, tally: BatchTally, sample: int) -> None:
         """Give a batch the estimators of another sample; their names are the same in every one."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from simrail.cli.estimate_ride import Method, estimator_named, judge_needs, ride_with_warnings
 from simrail.core.atomic_files import draft_of
+from simrail.core.csv_files import write_csv
 from simrail.core.toml_files import blame, label
 from simrail.estimation.estimate import Estimate
 from simrail.estimators.rails.fuse import Fused, fuse, rails_and_place_of
@@ -59,5 +60,5 @@ def fuse_rides(
         about = "by pass, how much further on the same rails lie in it, m"
         write_frame(fused.shifts, draft / f"shifts.{format}", format=format, about=about)
         table = fused.passes.assign(ride=[label(ride) for ride in rides])
-        table.to_csv(draft / "passes.csv")
+        write_csv(table.reset_index(), draft / "passes.csv", float_format=None)
     return fused

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from simrail.cli.options import CELL_FAILED, DONE, Scenario, Seed, Settings, number, say
+from simrail.core.csv_files import write_csv
 from simrail.core.errors import one_of
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def sensitivity(
     print(f"Of {draws}, the same in every sample; each index with the half of its 95 % interval (bootstrap).")
     name = f"sensitivity_{quantity}_{metric}_{window}"
     with whole_file(folder / f"{name}.csv") as stream:
-        stream.write(sensitivity_table(found).to_csv(index=False, float_format="%.6g").encode())
+        write_csv(sensitivity_table(found), stream, float_format="%.6g")
     drawn = dimensions(spec)
     for i, one in enumerate(found):
         case = f"_{i}" if one.case else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simrail.cli.options import DONE, Scenario, Seed, Settings
+from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def spectra(
         print(f"{MOUNTS[kind]}: {verdict}")
     if out is not None:
         with whole_file(out) as stream:
-            stream.write(table.to_csv(index=False, float_format="%.6g").encode("utf-8"))
+            write_csv(table, stream, float_format="%.6g")
         print(f"wrote {out}")
     return DONE
 

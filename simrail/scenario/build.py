@@ -373,6 +373,13 @@ class Parts:
         return {name: limit for name, limit in limits.items() if limit is not None}
 
     @property
+    def memory_limits_mb(self) -> dict[str, float]:
+        """How much memory an estimator may take, by name in the tables; of those with a limit."""
+        usual = self.scenario.spec.memory_limit_mb
+        limits = {method.name: method.part.memory_limit_mb or usual for method in methods(self.scenario)}
+        return {name: limit for name, limit in limits.items() if limit is not None}
+
+    @property
     def draws_estimators(self) -> bool:
         """Whether an option of an estimator is a distribution."""
         return any(distributions_of(part) for part in self.scenario.spec.estimator)

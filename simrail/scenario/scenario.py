@@ -47,7 +47,7 @@ class ScenarioFile(Part):
     rate at which forces between wheels and rails are kept, ``truth_rate_hz`` over a whole number; 0 keeps
     none. ``passes`` is over how many of the rides the rails are fused
     (`simrail.estimators.rails.fuse`); a cell is then so many rides, and its scores are of the rails alone.
-    ``time_limit_s`` is that of every estimator which names none of its own.
+    ``time_limit_s`` and ``memory_limit_mb`` are those of every estimator which names none of its own.
     """
 
     title: str
@@ -78,6 +78,8 @@ class ScenarioFile(Part):
     curve_matched if left out, else none."""
     time_limit_s: tables.TimeLimit | None = None
     """Longest time of a method for a recording, s; one that takes longer is ended, and its row says so."""
+    memory_limit_mb: tables.MemoryLimit | None = None
+    """Most memory of a method, MB, on Linux; one that asks for more is ended, and its row says so."""
     irregularity: tables.IrregularityPart | None = None
     """How the rails deviate from the design; without it they do not."""
     vibration: VibrationPart | None = None

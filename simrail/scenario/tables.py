@@ -547,6 +547,7 @@ class TemperaturePart(Part):
 
 
 TimeLimit = Annotated[float, Field(ge=0.01, le=86400.0)]
+MemoryLimit = Annotated[float, Field(ge=64.0, le=1e6)]
 
 
 class EstimatorPart(Part):
@@ -554,7 +555,8 @@ class EstimatorPart(Part):
 
     ``stands_for`` says which row of the paper's table it is set beside, by the words of the page of that
     paper (`simrail.report.papers`). ``time_limit_s`` is how long it may take for a recording; it is then
-    ended, and its row says so. Without one, nothing ends it.
+    ended, and its row says so. Without one, nothing ends it. ``memory_limit_mb`` is how much memory it may
+    take beside that of the process that it is a copy of; what it compiles counts.
     """
 
     name: Name
@@ -563,6 +565,8 @@ class EstimatorPart(Part):
     """Its class by name, or FILE.py:CLASS for one of your own."""
     time_limit_s: TimeLimit | None = None
     """Longest time for a recording, s, in place of the scenario's."""
+    memory_limit_mb: MemoryLimit | None = None
+    """Most memory that it may take, MB, in place of the scenario's; on Linux."""
     stands_for: Name | None = None
     """The row of the paper's table that it is set beside."""
     options: dict[str, Any] = Field(default_factory=dict)

@@ -28,6 +28,9 @@ SMOOTH_STEP = np.array([6.0, -15.0, 10.0, 0.0, 0.0, 0.0])
 """The quintic from 0 to 1 with zero slope and bend at both ends, highest power first."""
 
 
+LEAST_RADIUS_M = 0.5
+"""Narrower no vehicle goes round, also not a model."""
+
 LEAST_LENGTH_M = 1e-6
 """Of one element: of shorter ones places cannot be told apart along a track."""
 

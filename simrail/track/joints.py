@@ -7,12 +7,14 @@ track says over what length it is smoothed (`simrail.track.alignment`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from simrail.core.errors import InputError
 from simrail.track.elements import (
     LEAST_LENGTH_M,
+    LEAST_RADIUS_M,
     MAX_CANT_PER_BASE,
     MOST_LENGTH_M,
     RAIL_BASE_M,
@@ -155,7 +157,7 @@ def _check_numbers(element: Element, here: str, *, rail_base_m: float, has_stati
     """Refuse numbers of an element that are none, or that belong elsewhere."""
     require_number(element.length_m, f"{here}.length_m", above=LEAST_LENGTH_M, within=MOST_LENGTH_M)
     if isinstance(element, Curve):
-        require_number(element.radius_m, f"{here}.radius_m", zero=False)
+        _check_radius(element.radius_m, f"{here}.radius_m")
     if isinstance(element, Transition):
         cants = {"start_cant_m": element.start_cant_m, "end_cant_m": element.end_cant_m}
         for end in ("start", "end"):
@@ -167,8 +169,8 @@ def _check_numbers(element: Element, here: str, *, rail_base_m: float, has_stati
                     limit=f"only beside {end}_radius_m",
                     remedy=f"add {end}_radius_m, inf where it is straight, or remove it",
                 )
-            if radius is not None and not abs(radius) > 0.0:
-                require_number(radius, f"{here}.{end}_radius_m", zero=False)
+            if radius is not None and not math.isinf(radius):
+                _check_radius(radius, f"{here}.{end}_radius_m")
     else:
         cants = {"cant_m": element.cant_m}
     for field, cant in cants.items():
@@ -181,6 +183,14 @@ def _check_numbers(element: Element, here: str, *, rail_base_m: float, has_stati
                 limit="cant in one of the two",
                 remedy="remove it, or all of [[cant]]",
             )
+
+
+def _check_radius(radius: float, field: str) -> None:
+    """Refuse a radius that is none, or that no vehicle of any scale goes round."""
+    require_number(radius, field, zero=False)
+    if abs(radius) < LEAST_RADIUS_M:
+        limit = f">= {LEAST_RADIUS_M:g} m to either side"
+        raise InputError("is out of range", field=field, value=radius, limit=limit, remedy="say it in m")
 
 
 def _check_said(elements: Sequence[Element], ends: Sequence[tuple[EndValue, EndValue]], i: int) -> None:

@@ -451,11 +451,13 @@ class VehicleModel(Shown):
             short[held + 1] = 0.0
         if np.max(np.abs(short)) > 1e-6 * np.sum(weight):
             # What lacks support, not what stands under it and is pressed in its stead.
-            name = self.body_names[int(np.argmax(short)) // 3]
+            where = int(np.argmax(short))
+            unit = "N" if where % 3 == 0 else "N m"
             raise InputError(
                 "cannot rest: its weight is not balanced by vertical springs and wheels",
                 file=f"vehicle {self.name}",
-                field=name,
+                field=self.body_names[where // 3],
+                value=f"{short[where]:.3g} {unit} without support",
                 remedy="give it a suspension with vertical stiffness on both sides",
                 limit="vertical forces in balance",
             )
@@ -490,6 +492,7 @@ class VehicleModel(Shown):
                 "cannot rest: rods that carry its weight push it aside",
                 file=f"vehicle {self.name}",
                 field=self.bodies[i].name,
+                value=f"a thrust of {np.max(np.abs(thrust[i])):.3g} N or N m",
                 remedy="lay rods level, or in pairs whose level thrusts balance",
                 limit="level forces in balance",
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from concurrent.futures import BrokenExecutor, Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.campaign import worker
+from simrail.campaign import executors, worker
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.progress import Watcher
 from simrail.campaign.result import CampaignResult
@@ -230,6 +231,39 @@ def test_a_ride_that_fails_fails_its_cells_only(monkeypatch: pytest.MonkeyPatch)
     assert OK in statuses[1]
     assert len(found.failures) == 3
     assert found.examples[0].cell["speed_kmh"] == 30.0
+
+
+@pytest.mark.parametrize("by_one", [True, False])
+def test_no_cell_of_a_lost_worker_is_dropped(by_one: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers that die over cells 1 and 4, as on a cluster or in a pool: the rest have their scores."""
+    killers, tried = {1, 4}, []
+
+    class KilledWorker(Exception):
+        """By the name of dask's."""
+
+    class Mortal(executors._Here):
+        def submit(self, function, packed, cells, *more):  # type: ignore[no-untyped-def]
+            numbers = {cell.number for cell in cells}
+            if function is not worker.run_batch or not numbers & killers:
+                return super().submit(function, packed, cells, *more)
+            tried.append(numbers)
+            future: Future[object] = Future()
+            future.set_exception(KilledWorker() if by_one else BrokenExecutor())
+            return future
+
+    settings = ["monte_carlo.sensor_draws=6", "ride.end_m=70.0", "score.windows=['whole']"]
+    whole = run_campaign(short(*settings))
+    monkeypatch.setattr(executors, "_Here", Mortal)
+    found = run_campaign(short(*settings), workers=1, batch_cells=3)
+    assert {failure.cell for failure in found.failures} == killers
+    assert set(found.scores["cell"]) == set(range(6)) == set(found.cells["cell"])
+    is_lost = found.scores["cell"].isin(killers)
+    assert found.scores["value"][is_lost].isna().all() and (found.scores["status"][is_lost] != OK).all()
+    good = whole.scores[~whole.scores["cell"].isin(killers)]
+    pd.testing.assert_frame_equal(without_time(found.scores[~is_lost]), without_time(good), check_exact=True)
+    counts = aggregate(found.scores, found.cells).query("estimator == 'ekf_compensated' and metric == 'rms'")
+    assert set(counts["draws"]) == {4}
+    assert tried[0] == {0, 1, 2} and {1} in tried and {4} in tried
 
 
 def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(

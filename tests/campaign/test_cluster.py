@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shutil
@@ -13,18 +14,22 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import pandas as pd
 import pytest
+from threadpoolctl import threadpool_info
 
 import simrail
 from simrail import results
+from simrail.campaign import executors
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.executors import _Cluster
+from simrail.campaign.progress import Watcher
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.core.errors import InputError
+from simrail.core.machine import machine
 from simrail.scenario.scenario import load_scenario
 
 pytest.importorskip("distributed")
@@ -131,6 +136,77 @@ def test_a_worker_gets_no_batch_before_its_last_result_is_here() -> None:
             asked[done][1].set_result(None)
         executor.submit(print)
     assert [workers for workers, _ in asked] == ["one", "two", "two", None, "two", "one"]
+
+
+HERE = {
+    "kernels": "znver4",
+    "instructions": "avx2 avx512f fma",
+    "linear algebra": "SkylakeX",
+    "Python": "3.11",
+}
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        ({}, ""),
+        (
+            {"kernels": "haswell", "instructions": "avx2 fma", "linear algebra": "Haswell"},
+            "kernels: znver4 here, haswell on two; linear algebra: SkylakeX here, Haswell on two",
+        ),
+        ({"instructions": "avx2 fma"}, "instructions: also avx512f here, no others on two"),
+        ({"Python": "3.13"}, "Python: 3.11 here, 3.13 on two"),
+    ],
+)
+def test_workers_of_other_instructions_are_told_in_one_line(
+    other: dict[str, str], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers that are not there: what they answer is made up."""
+
+    class Client:
+        def nthreads(self) -> dict[str, int]:
+            return {"one": 1, "two": 1}
+
+        def run(self, function: Callable[[], object]) -> dict[str, object]:
+            return {"one": function(), "two": HERE | other if function is executors.machine else function()}
+
+    monkeypatch.setattr(executors, "machine", lambda: dict(HERE))
+    executor = object.__new__(_Cluster)
+    executor._client = Client()
+    executor._judge_workers()
+    line = f"warning: scores agree to 1e-9, not to the bit: workers differ in {words}"
+    assert executor.notes == ((line,) if words else ())
+
+
+def test_a_campaign_tells_what_its_executor_notes(
+    noting_file: Path, notes: Notes, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    class Listener(Watcher):
+        lines: ClassVar[list[str]] = []
+
+        def told(self, line: str) -> None:
+            self.lines.append(line)
+
+    monkeypatch.setattr(executors._Here, "notes", ("warning: workers differ",))
+    scenario = load_scenario(noting_file, overrides=["estimator.noting.options.sleep_s=0.0"])
+    run_campaign(scenario, only=0, workers=1, watcher=Listener())
+    assert Listener.lines == ["warning: workers differ"]
+
+
+@pytest.mark.long
+def test_this_machine_is_what_the_kernels_are_compiled_for() -> None:
+    """In a process of its own, as numba and OpenBLAS read these once."""
+    code = "from simrail.core.machine import machine; print(machine())"
+    asked = {"NUMBA_CPU_NAME": "generic", "OPENBLAS_CORETYPE": "Prescott"}
+    said = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | asked, capture_output=True, text=True, check=True
+    )
+    found = ast.literal_eval(said.stdout)
+    assert found["kernels"] == "generic" and found["instructions"] == ""
+    mine = machine()
+    assert found["Python"] == mine["Python"]
+    if "openblas" in str(threadpool_info()):  # it calls the set of Prescott by the first that has it
+        assert found["linear algebra"] and found["linear algebra"] != mine["linear algebra"]
 
 
 @pytest.mark.slow

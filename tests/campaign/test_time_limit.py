@@ -59,6 +59,12 @@ class Own:
             time.sleep(60.0)
         if second and self.deed == "die":
             os.kill(os.getpid(), signal.SIGSEGV)
+        if second and self.deed == "eat":
+            np.ones(500_000_000)
+        if second and self.deed == "nibble":
+            held = []
+            while len(held) < 4000:
+                held.append(bytearray(1_000_000))
         if second and self.deed == "raise":
             raise KeyError("no such thing")
         if self.deed == "print":
@@ -206,6 +212,35 @@ def test_ctrl_c_while_it_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(KeyboardInterrupt):
         limited.estimate([None])  # type: ignore[list-item]
     assert not process.is_alive()
+
+
+EATEN = "OverMemoryError: took more memory than memory_limit_mb = 400"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit of Linux")
+@pytest.mark.parametrize("deed", ["eat", "nibble"])
+def test_one_that_eats_memory_is_ended_and_the_others_go_on(deed: str, scenario: Path) -> None:
+    """All at once by numpy, and by Python bit by bit; the next recording is whole again."""
+    free = run_campaign(read(scenario, "estimator.own.options.deed='print'"), workers=1).scores
+    settings = [f"estimator.own.options.deed='{deed}'", "estimator.own.memory_limit_mb=400.0"]
+    limited = run_campaign(read(scenario, *settings), workers=1).scores
+    pd.testing.assert_frame_equal(values(limited, "design"), values(free, "design"), check_exact=True)
+    reasons = failed(limited)
+    assert 0 < len(reasons) < 4 and set(reasons.values()) == {EATEN}
+    good = [cell for cell in range(4) if cell not in reasons]
+    pd.testing.assert_frame_equal(
+        values(limited[limited["cell"].isin(good)], "own"),
+        values(free[free["cell"].isin(good)], "own"),
+        check_exact=True,
+    )
+
+
+@pytest.mark.parametrize("value", ["0.0", "63.0", "1e9", "'little'"])
+def test_a_memory_limit_that_is_none(value: str, scenario: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for key in ("memory_limit_mb", "estimator.own.memory_limit_mb"):
+        assert call(["check", "mine.toml", "--set", f"{key}={value}"]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert "memory_limit_mb" in said and "limit:" in said and "remedy:" in said
 
 
 @pytest.mark.parametrize("value", ["0.0", "-1.0", "1e9", "'soon'"])

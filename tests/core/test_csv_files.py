@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import simrail
 from simrail.core.csv_files import write_csv
 
 
@@ -22,3 +23,13 @@ def test_texts_are_harmless_and_numbers_are_numbers(kind: str, tmp_path: Path) -
     assert [row[0] for row in rows] == shown
     assert {row[1] for row in rows} == {"-1.5"}
     assert frame["text"].iloc[0] == "=1+1", "the table itself is as it was"
+    with (tmp_path / "b.csv").open("wb") as binary:
+        write_csv(frame, binary)
+    assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+
+
+def test_no_table_is_written_past_the_guard() -> None:
+    """`to_csv` is called where the guard is, and for a template, which is made of our own numbers."""
+    package = Path(simrail.__file__).parent
+    callers = {path.name for path in package.rglob("*.py") if ".to_csv(" in path.read_text()}
+    assert callers == {"csv_files.py", "templates.py"}

@@ -58,6 +58,10 @@ def test_what_no_disk_holds_is_refused(
         ([*TUNE, "kom", "--step", "inf"], ["--step", "no finite number"]),
         ([*TUNE, "cml", "--out", "nowhere/x.toml"], ["nowhere", "make the folder"]),
         (["export", "quick_kinematic", "--out", "x", "--draw", "1000000"], ["--draw", "999999"]),
+        (
+            ["export", "quick_kinematic", "--out", "x", "--draw", "2"],
+            ["--draw", "found 2", "0 to 1", "monte_carlo.sensor_draws=3"],
+        ),
         (["vehicle", "two_axle_wagon", "--out", "file"], ["--out", "cannot be written"]),
         (["vehicle", "two_axle_wagon", "--out", LONG], ["--out", "255 bytes"]),
         (["vehicle", "two_axle_wagon", "--speed", "nan"], ["--speed"]),

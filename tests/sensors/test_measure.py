@@ -23,7 +23,7 @@ from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec
 from simrail.sensors.measure import measure
 from simrail.track.design import Straight, TrackDesign
-from simrail.vehicle.speed_profile import SpeedProfile
+from simrail.vehicle.speed_profile import Run, SpeedProfile
 
 REST_S = 6.0
 MOUNT = Mount("axle", "body", (0.5, 0.0, 0.6))
@@ -97,6 +97,22 @@ def test_a_slide_and_quadrature_reach_the_odometry(truth):
         assert lost == pytest.approx(0.15 * 10.0 * (1.5 - 0.25), abs=0.003)
         assert plain.odometry["position_m"].iloc[-1] == pytest.approx(210.5, abs=0.005)
         assert plain.encoder_sheet.pulses_per_revolution == (4096 if quadrature else 1024)
+
+
+@pytest.mark.parametrize("runs", [(), (Run(30.0, 8.0),)])
+def test_a_calibrated_radius_is_the_way_over_the_turns(truth, runs):
+    """To rounding, on a wheel that rolls on another radius than its own; also over a run there and one back.
+
+    On a straight, so that the mount's way is the body's. A thousandth of it is a metre in a kilometre.
+    """
+    profile = SpeedProfile(start_m=10.0, end_m=210.0, speed_mps=10.0, rest_s=REST_S, runs=runs)
+    ridden = kinematic_truth(truth.track, profile, height_m=0.3)
+    own, place = ridden.wheel_radius_m["wheel"], ridden.reference_position_m
+    ridden = replace(ridden, wheel_angles={"wheel": (place - place[0]) / (1.003 * own)})
+    spec = EncoderSpec("wheel", radius="calibrated", radius_error=0.0)
+    assert record(ridden, encoder=spec).encoder_sheet.wheel_radius_m == pytest.approx(1.003 * own, rel=1e-9)
+    drawing = replace(spec, radius="drawing")
+    assert record(ridden, encoder=drawing).encoder_sheet.wheel_radius_m == own
 
 
 def test_true_odometry_is_exact_and_labelled(truth):

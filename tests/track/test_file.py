@@ -118,6 +118,7 @@ def test_condequinto_olivar_is_the_line_of_the_station_coordinates() -> None:
     ("old", "new", "words"),
     [
         ("radius_m = 200.0", "", ("segment[2].radius_m", "a curve needs its radius")),
+        ("radius_m = 200.0", "radius_m = 5e-324", ("segment[2].radius_m", "5e-324", ">= 0.5 m", "in m")),
         ("radius_m = 200.0", "radius_m = 0.0", ("segment[2].radius_m", "found 0.0", "not 0")),
         ("cant_mm = 60.0", "cant_mm = 6000.0", ("segment[2].cant_m",)),
         ("cant_mm = 60.0", "cant_mm = nan", ("segment[2].cant_mm", "not a finite number")),

@@ -23,6 +23,9 @@ from simrail.core.toml_files import label
 MOST_COLUMNS = 64
 """A matrix with more rows and columns than this holds no columns of signals."""
 
+_HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError)
+"""What h5py says of a damaged file: its insides have no error of their own."""
+
 Read = Callable[[Sequence[str], Sequence[str]], dict[str, "FloatArray | pd.Series"]]
 
 
@@ -104,14 +107,18 @@ def open_hdf5(path: Path) -> Table:
     try:
         with h5py.File(path, "r") as file:
             file.visititems(visit)
-    except OSError:
-        raise unreadable("is not readable HDF5", path, "a whole HDF5 file") from None
+    except _HDF5_ERRORS as error:
+        raise unreadable(f"is not readable HDF5 ({joined(error)})", path, "a whole HDF5 file") from None
     places = _places(shapes)
 
     def read(wanted: Sequence[str], texts: Sequence[str]) -> dict[str, FloatArray | pd.Series]:
         refuse_texts(path, texts)
-        with h5py.File(path, "r") as file:
-            return _alike({name: _part(file[places[name][0]], *places[name][1:]) for name in wanted}, path)
+        try:
+            with h5py.File(path, "r") as file:
+                columns = {name: _part(file[places[name][0]], *places[name][1:]) for name in wanted}
+        except _HDF5_ERRORS as error:
+            raise unreadable(f"is not readable HDF5 ({joined(error)})", path, "a whole HDF5 file") from None
+        return _alike(columns, path)
 
     return Table(tuple(places), read)
 

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
+from simrail.core.csv_files import write_csv
 from simrail.report.campaign.axes import CampaignAxis, along, beside_ablations, draws_of
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.question import UNLIKE
@@ -247,6 +248,6 @@ def write_tables(folder: Path, tables: Mapping[str, pd.DataFrame]) -> None:
         if frame.empty:
             continue
         file = folder / TABLES / name
-        frame.to_csv(file.with_suffix(".csv"), index=False, float_format="%.6g")
+        write_csv(frame, file.with_suffix(".csv"), float_format="%.6g")
         text = frame.to_latex(index=False, escape=True, float_format="%.4g", na_rep="--")
         file.with_suffix(".tex").write_text(text.replace("\u00b0", r"$^\circ$"), encoding="utf-8")

@@ -75,6 +75,29 @@ def test_hdf5(base: Recording, tmp_path: Path, turned: bool) -> None:
         read_signals(said(tmp_path, "ride.h5", (paths[0], ["log/gyr.1", *paths[1][1:]], *paths[2:])))
 
 
+def test_a_damaged_hdf5_file_is_told_in_one_line(base: Recording, tmp_path: Path) -> None:
+    """Bytes of the file overwritten, in its head and in its compressed data; and half of it."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "ride.h5", "w") as file:
+        for name, values in logged().items():
+            file.create_dataset(f"log/{name}", data=values, compression="gzip", chunks=values.shape)
+    paths = tuple(f"log/{c}" if isinstance(c, str) else [f"log/{one}" for one in c] for c in OF_ARRAYS)
+    folder, file = said(tmp_path, "ride.h5", paths), tmp_path / "ride.h5"
+    whole = file.read_bytes()
+    refused = 0
+    for begin in range(0, len(whole), max(64, len(whole) // 24)):
+        file.write_bytes(whole[:begin] + b"\xa5" * 64 + whole[begin + 64 :])
+        try:
+            read_signals(folder)
+        except InputError as error:
+            assert "\n" not in str(error) and error.limit and error.remedy and error.value
+            refused += 1
+    assert refused > 6
+    file.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="not readable HDF5"):
+        read_signals(folder)
+
+
 def test_matlab(base: Recording, tmp_path: Path) -> None:
     scipy_io = pytest.importorskip("scipy.io")
     scipy_io.savemat(tmp_path / "ride.mat", {"log": logged(), "note": "words"})

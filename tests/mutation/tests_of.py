@@ -1,0 +1,159 @@
+"""Which tests run a line: found by coverage, one file of tests after the other.
+
+Rooms without kernels are tested with kernels compiled, which are in the cache; those with kernels without,
+as coverage does not see compiled lines, and each fault would be compiled anew.
+
+What a fixture of a file runs counts for all tests of that file, as it is run before the first of them and
+judged by others. What runs at import only (constants, fields) counts for whatever uses the module. Tests that
+fail or take too long are left out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from cosmic_ray.work_item import MutationSpec
+from coverage import CoverageData
+from mutants import ROOMS
+
+TESTS = {
+    "tests/scoring": True,
+    "tests/campaign": True,
+    "tests/sensors": False,
+    "tests/estimation": False,
+    "tests/estimators/odometry": False,
+    "tests/estimators/test_kalman.py": False,
+    "tests/recording/test_standstill.py": False,
+}
+"""Tests, and whether kernels are compiled for them."""
+
+COMPILED = ("simrail/scoring/", "simrail/campaign/")
+"""Rooms that are tested so."""
+LEFT_OUT = ("test_killed.py", "test_cluster.py")
+"""These run others as processes of their own."""
+
+MOST_TEST_S, MOST_FILE_S = 20.0, 600.0
+"""On the processor."""
+
+BUDGET_S = 60.0
+"""Of tests for one fault, the shortest first; all have to pass for it to survive."""
+
+_PYTEST = "-m pytest -p mutation_limit --no-header -q -o addopts=--import-mode=importlib -m 'not slow'"
+
+
+def command(tests: dict[str, float]) -> str:
+    """The command that runs tests until one fails, or they take several times their time on the processor."""
+    named = " ".join(f"'{test}'" for test in tests)
+    most_s = 90 + int(4.0 * sum(tests.values()))
+    return f'bash -c "ulimit -t {most_s}; exec {sys.executable} {_PYTEST} -x --tb=line {named}"'
+
+
+def is_compiled(mutation: MutationSpec) -> bool:
+    """Whether the tests for a fault have their kernels compiled."""
+    return mutation.module_path.as_posix().startswith(COMPILED)
+
+
+class TestMap:
+    """Tests by what they run, kept in a file; asked again only where a file of tests has changed.
+
+    Parameters
+    ----------
+    file : Path
+        Where it is kept.
+    root : Path
+        The sources and tests: the working folder of the runs.
+    """
+
+    __test__ = False
+
+    def __init__(self, file: Path, root: Path) -> None:
+        self._file, self._root = file, root
+        self._map: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+
+    def refresh(self, environment: dict[str, str]) -> None:
+        """Run the files of tests that are new or have changed."""
+        files = [path for name in TESTS for path in self._files_of(name) if path.name not in LEFT_OUT]
+        self._map = {name: one for name, one in self._map.items() if self._root / name in files}
+        for path in files:
+            name, code = (
+                path.relative_to(self._root).as_posix(),
+                hashlib.sha256(path.read_bytes()).hexdigest(),
+            )
+            if self._map.get(name, {}).get("code") != code:
+                compiled = next(mode for place, mode in TESTS.items() if name.startswith(place))
+                switch = {"NUMBA_DISABLE_JIT": "0" if compiled else "1"}
+                self._map[name] = {"code": code, "compiled": compiled} | self._run(name, environment | switch)
+                self._file.write_text(json.dumps(self._map))
+                took = sum(self._map[name]["tests"].values())
+                print(f"{name}: {len(self._map[name]['tests'])} tests, {took:.0f} s", flush=True)
+
+    def tests(self, mutation: MutationSpec) -> dict[str, float]:
+        """The tests for a fault, with the time that each takes: the shortest first."""
+        module = mutation.module_path.as_posix()
+        lines = set(range(mutation.start_pos[0], mutation.end_pos[0] + 1))
+        exact: dict[str, float] = {}
+        whole: dict[str, float] = {}
+        for one in self._map.values():
+            if one["compiled"] != is_compiled(mutation):
+                continue
+            runs = one["runs"].get(module, {})
+            shared = lines & set(runs.get("", ()))
+            for test, seconds in one["tests"].items():
+                if shared or lines & set(runs.get(test, ())):
+                    exact[test] = seconds
+                if runs.get(test) or runs.get(""):
+                    whole[test] = seconds
+        chosen, total = {}, 0.0
+        for test, seconds in sorted((exact or whole).items(), key=lambda item: (item[1], item[0])):
+            total += seconds
+            if total > BUDGET_S:
+                break
+            chosen[test] = seconds
+        return chosen
+
+    def _files_of(self, name: str) -> list[Path]:
+        place = self._root / name
+        return [place] if place.is_file() else sorted(place.rglob("test_*.py"))
+
+    def _run(self, name: str, environment: dict[str, str]) -> dict[str, Any]:
+        data = self._root / ".mutation-coverage"
+        data.unlink(missing_ok=True)
+        settings = self._root / ".mutation-coveragerc"
+        rooms = ",".join(room if room.endswith(".py") else f"{room}/*" for room in ROOMS)
+        settings.write_text(f"[run]\ndata_file = {data}\ninclude = {rooms}\n")
+        words = f"{_PYTEST} -vv --tb=no --durations=0 --durations-min=0 {name}"
+        run = f"{sys.executable} -m coverage run --rcfile={settings} {words}"
+        limits = environment | {"MUTATION_TEST_S": str(MOST_TEST_S)}
+        words = ["bash", "-c", f"ulimit -t {MOST_FILE_S:.0f}; exec {run}"]
+        said = subprocess.run(
+            words, cwd=self._root, env=limits, capture_output=True, text=True, check=False
+        ).stdout
+        passed = set(re.findall(r"^(tests/\S+::.+?) PASSED", said, re.MULTILINE))
+        seconds: dict[str, float] = {}
+        for took, test in re.findall(r"^([\d.]+)s (?:call|setup|teardown) +(tests/.+?)$", said, re.MULTILINE):
+            seconds[test] = seconds.get(test, 0.0) + float(took)
+        return {"tests": {test: seconds.get(test, 0.0) for test in sorted(passed)}, "runs": self._runs(data)}
+
+    def _runs(self, data: Path) -> dict[str, dict[str, list[int]]]:
+        """Lines by module and test; under "" those of fixtures, for all tests of the file."""
+        runs: dict[str, dict[str, list[int]]] = {}
+        if not data.exists():
+            return runs
+        measured = CoverageData(str(data))
+        measured.read()
+        for file in measured.measured_files():
+            by_test: dict[str, set[int]] = {}
+            for line, contexts in measured.contexts_by_lineno(file).items():
+                for context in contexts:
+                    test, _, phase = context.rpartition("|")
+                    if test:
+                        by_test.setdefault(test if phase == "call" else "", set()).add(line)
+            module = Path(file).resolve().relative_to(self._root.resolve()).as_posix()
+            runs[module] = {test: sorted(lines) for test, lines in by_test.items()}
+        return runs
