@@ -96,6 +96,35 @@ class Echo(NamedTuple):
     shared: float
 
 
+class Pair(NamedTuple):
+    """The two IMUs by the way that the train runs.
+
+    Attributes
+    ----------
+    behind, ahead : ndarray (n,), (m,)
+        Signals of the one behind and of the one ahead.
+    behind_s, ahead_s : ndarray (n,), (m,)
+        Their stamps.
+    later_behind, later_ahead : float
+        How much later than what it speaks of a sample is stamped, by the first clock.
+    """
+
+    behind: FloatArray
+    ahead: FloatArray
+    behind_s: FloatArray
+    ahead_s: FloatArray
+    later_behind: float
+    later_ahead: float
+
+
+class Span(NamedTuple):
+    """Samples begin..last of the one behind, below 0 if there are too few; the last seen of the one ahead."""
+
+    begin: int
+    last: int
+    seen: int
+
+
 class Heard(NamedTuple):
     """Room for a search, and what came of each.
 
@@ -156,21 +185,12 @@ def search_delay(
     c, variance : float
         Variance 0 where nothing was found.
     """
-    forward = speed > 0.0
-    second_behind = forward == (echo.spacing_m > 0.0)
-    now = echo.end_s[k]
-    behind, ahead, behind_s, ahead_s = echo.first, echo.second, echo.first_s, echo.second_s
-    later_behind, later_ahead = echo.lag_s, echo.lag_s + offset_s
-    if second_behind:
-        behind, ahead, behind_s, ahead_s = echo.second, echo.first, echo.second_s, echo.first_s
-        later_behind, later_ahead = echo.lag_s + offset_s, echo.lag_s
-    # Nothing that is stamped later than this step has been seen, nor lies in the future of the filter.
-    last = _index_at(behind_s, min(now, now + later_behind), echo.rate_hz)
-    begin = last - echo.window + 1
-    if begin < 0:
+    pair = _pair(echo, speed, offset_s)
+    span = _span(echo, pair, echo.end_s[k])
+    if span.begin < 0:
         return 0.0, 0.0
-    seen = _index_at(ahead_s, min(now, now + later_ahead), echo.rate_hz)
-    nodes = _way_back(echo, heard, k, speed, acceleration, step_s, behind_s[begin] - later_behind, length)
+    begin_s = pair.behind_s[span.begin] - pair.later_behind
+    nodes = _way_back(echo, heard, k, speed, acceleration, step_s, begin_s, length)
     if nodes == 0:
         return 0.0, 0.0
     size = abs(speed)
@@ -178,32 +198,13 @@ def search_delay(
     sides = min(math.ceil(max(echo.width_sds * sd, echo.width_mps) / step), (heard.rho.shape[0] - 1) // 2)
     best = 0
     for i in range(2 * sides + 1):
-        heard.rho[i] = _correlation(
-            echo,
-            heard,
-            nodes,
-            (i - sides) * step,
-            length,
-            behind,
-            ahead,
-            behind_s,
-            ahead_s,
-            later_behind,
-            later_ahead,
-            begin,
-            last,
-            seen,
-        )
+        heard.rho[i] = _correlation(heard, pair, span, nodes, (i - sides) * step, length, echo.stride)
         if heard.rho[i] > heard.rho[best]:
             best = i
     most = heard.rho[best]
     heard.searches[k, 0], heard.searches[k, 2] = 0.0, most
-    if most < echo.least_correlation or best == 0 or best == 2 * sides:
+    if most < echo.least_correlation or not _is_alone(heard.rho, best, sides):
         return 0.0, 0.0
-    for i in range(1, 2 * sides):
-        is_peak = heard.rho[i] >= max(heard.rho[i - 1], heard.rho[i + 1])
-        if is_peak and abs(i - best) > BESIDE and heard.rho[i] > ALONE * most:
-            return 0.0, 0.0
     left, right = heard.rho[best - 1], heard.rho[best + 1]
     bend = left - 2.0 * most + right
     c = (best - sides + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)) * step
@@ -211,6 +212,37 @@ def search_delay(
     variance = echo.shared * (by_noise + (echo.floor_mps + echo.floor_share * size) ** 2)
     heard.searches[k, 1], heard.searches[k, 3] = c, math.sqrt(variance)
     return c, variance
+
+
+@njit_borrowed
+def _pair(echo: Echo, speed: float, offset_s: float) -> Pair:
+    """Which of both runs ahead, and how much later than what it speaks of each is stamped."""
+    first, second = echo.lag_s, echo.lag_s + offset_s
+    if (speed > 0.0) == (echo.spacing_m > 0.0):
+        return Pair(echo.second, echo.first, echo.second_s, echo.first_s, second, first)
+    return Pair(echo.first, echo.second, echo.first_s, echo.second_s, first, second)
+
+
+@njit_borrowed
+def _span(echo: Echo, pair: Pair, now: float) -> Span:
+    """Samples of the window: nothing that is stamped later than now, nor what lies in the filter's future."""
+    last = _index_at(pair.behind_s, min(now, now + pair.later_behind), echo.rate_hz)
+    begin = last - echo.window + 1
+    if begin < 0:
+        return Span(-1, last, -1)
+    return Span(begin, last, _index_at(pair.ahead_s, min(now, now + pair.later_ahead), echo.rate_hz))
+
+
+@njit_borrowed
+def _is_alone(rho: FloatArray, best: int, sides: int) -> bool:
+    """Whether the largest rho lies inside the search, and no other peak is nearly as high."""
+    if best == 0 or best == 2 * sides:
+        return False
+    for i in range(1, 2 * sides):
+        is_peak = rho[i] >= max(rho[i - 1], rho[i + 1])
+        if is_peak and abs(i - best) > BESIDE and rho[i] > ALONE * rho[best]:
+            return False
+    return True
 
 
 @njit_borrowed
@@ -259,28 +291,15 @@ def _way_back(
 
 @njit_borrowed
 def _correlation(
-    echo: Echo,
-    heard: Heard,
-    nodes: int,
-    c: float,
-    length: float,
-    behind: FloatArray,
-    ahead: FloatArray,
-    behind_s: FloatArray,
-    ahead_s: FloatArray,
-    later_behind: float,
-    later_ahead: float,
-    begin: int,
-    last: int,
-    seen: int,
+    heard: Heard, pair: Pair, span: Span, nodes: int, c: float, length: float, stride: int
 ) -> float:
-    """rho(c) of the window begin..last; -1 where it reaches beyond what is known."""
+    """rho(c) over the window; -1 where it reaches beyond what is known."""
     now = heard.node_s[0]
     both = squares = others = 0.0
     here = there = 0
-    j = seen
-    for i in range(last, begin - 1, -echo.stride):
-        t = behind_s[i] - later_behind
+    j = span.seen
+    for i in range(span.last, span.begin - 1, -stride):
+        t = pair.behind_s[i] - pair.later_behind
         while here < nodes - 2 and heard.node_s[here + 1] > t:
             here += 1
         share = (heard.node_s[here] - t) / (heard.node_s[here] - heard.node_s[here + 1])
@@ -294,14 +313,15 @@ def _correlation(
         if high < way or high <= low:
             return -1.0
         share = (way - low) / (high - low)
-        place = heard.node_s[there] + share * (heard.node_s[there + 1] - heard.node_s[there]) + later_ahead
-        while j >= 0 and ahead_s[j] > place:
+        place = heard.node_s[there] + share * (heard.node_s[there + 1] - heard.node_s[there])
+        place += pair.later_ahead
+        while j >= 0 and pair.ahead_s[j] > place:
             j -= 1
-        if j < 0 or j + 1 > seen:
+        if j < 0 or j + 1 > span.seen:
             return -1.0
-        share = (place - ahead_s[j]) / (ahead_s[j + 1] - ahead_s[j])
-        value = ahead[j] + share * (ahead[j + 1] - ahead[j])
-        both += behind[i] * value
-        squares += behind[i] * behind[i]
+        share = (place - pair.ahead_s[j]) / (pair.ahead_s[j + 1] - pair.ahead_s[j])
+        value = pair.ahead[j] + share * (pair.ahead[j + 1] - pair.ahead[j])
+        both += pair.behind[i] * value
+        squares += pair.behind[i] * pair.behind[i]
         others += value * value
     return both / math.sqrt(squares * others) if squares > 0.0 and others > 0.0 else -1.0

@@ -82,6 +82,32 @@ def sample_second_imu(
     InputError
         If its body is unknown, or its rate does not divide the truth's.
     """
+    imu, delay_s = _felt(truth, spec, seed=seed, draw=draw, earth_rate=earth_rate, temperature=temperature)
+    ahead, behind = (
+        float(truth.motion(one, range(1), ("position_m",)).to_numpy()[0, 0]) for one in (first, spec.mount)
+    )
+    sheet = SecondImuSheet(
+        mount=spec.mount.name,
+        mount_body=spec.mount.body,
+        mount_position_m=spec.mount.position_m,
+        spacing_m=ahead - behind,
+        imu=imu_sheet(spec.grade, delay_s=delay_s),
+        spacing_sd_m=spec.spacing_sd_m,
+        clock_offset_sd_s=spec.clock_offset_sd_s,
+    )
+    return imu, sheet
+
+
+def _felt(
+    truth: Truth,
+    spec: SecondImuSpec,
+    *,
+    seed: int,
+    draw: int,
+    earth_rate: EarthRate | None,
+    temperature: Temperature | None,
+) -> tuple[pd.DataFrame, float]:
+    """What it recorded, by its own clock, and by how much that is late."""
     mount, grade = spec.mount, spec.grade
     imu, delay_s = sample_imu(
         truth.motion(mount, columns=IMU if earth_rate is None else (*IMU, *ATTITUDE, *VELOCITY)),
@@ -100,16 +126,4 @@ def sample_second_imu(
         drawn = stream(seed, "sensor", draw, "imu", mount.name, "clock_offset").standard_normal()
         offset_s = spec.clock_offset_sd_s * drawn
     imu.index = pd.Index(imu.index.to_numpy() + offset_s, name="time_s")
-    ahead, behind = (
-        float(truth.motion(one, range(1), ("position_m",)).to_numpy()[0, 0]) for one in (first, mount)
-    )
-    sheet = SecondImuSheet(
-        mount=mount.name,
-        mount_body=mount.body,
-        mount_position_m=mount.position_m,
-        spacing_m=ahead - behind,
-        imu=imu_sheet(grade, delay_s=delay_s),
-        spacing_sd_m=spec.spacing_sd_m,
-        clock_offset_sd_s=spec.clock_offset_sd_s,
-    )
-    return imu, sheet
+    return imu, delay_s
