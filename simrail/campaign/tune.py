@@ -31,7 +31,7 @@ from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.tables import EstimatorPart
+from simrail.scenario.study_tables import EstimatorPart
 from simrail.track.bands import SAMPLES_PER_WAVE, Band
 
 STEP_M = 0.25

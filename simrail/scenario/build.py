@@ -28,9 +28,11 @@ from simrail.scenario.axes import each
 from simrail.scenario.build_estimator import estimator_of, odometry_estimator, option_files
 from simrail.scenario.cells import Cell, methods
 from simrail.scenario.distributions import distributions_of
+from simrail.scenario.imu_tables import ImuPart
+from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.measured_file import read_measured
+from simrail.scenario.ride_tables import RidePart
 from simrail.scenario.scenario import Scenario, ScenarioFile
-from simrail.scenario.tables import ImuPart, IrregularityPart, RidePart
 from simrail.scenario.vibration_tables import VibrationPart
 from simrail.sensors.drawing import drawing
 from simrail.sensors.encoder import EncoderSpec

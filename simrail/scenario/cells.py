@@ -30,8 +30,10 @@ from simrail.core.seeds import stream
 from simrail.scenario.axes import axes_of, drawn, each, expand
 from simrail.scenario.designs import DESIGNS
 from simrail.scenario.distributions import Value, distributions_of, sample_count, samples_of
+from simrail.scenario.imu_tables import ImuPart
+from simrail.scenario.ride_tables import RidePart
 from simrail.scenario.scenario import Scenario, ScenarioFile, ride_count
-from simrail.scenario.tables import EstimatorPart, ImuPart, RidePart
+from simrail.scenario.study_tables import EstimatorPart
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
 
 WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity", "vibration")

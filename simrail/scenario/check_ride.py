@@ -16,7 +16,7 @@ from simrail.ride.ride import Ride, rails_of
 from simrail.ride.vibration.sources import Vibration
 from simrail.scenario.build import ResolvedCell
 from simrail.scenario.check_vibration import judge_vibration
-from simrail.scenario.tables import RidePart
+from simrail.scenario.ride_tables import RidePart
 from simrail.scoring.ride_comfort import LEAST_RATE_HZ as COMFORT_HZ
 from simrail.scoring.running_safety import LEAST_RATE_HZ as SAFETY_HZ
 from simrail.track.design import TrackDesign

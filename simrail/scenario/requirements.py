@@ -25,7 +25,7 @@ from simrail.scenario.stop_rule import (
     judge_least_draws,
     judge_stop_rule,
 )
-from simrail.scenario.tables import RequirePart
+from simrail.scenario.study_tables import RequirePart
 from simrail.scoring.requirement import Requirement, judge_band
 from simrail.scoring.share import UNDECIDED
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, QUANTITY_UNITS, WINDOWS, concat_scores

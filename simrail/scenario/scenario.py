@@ -19,10 +19,13 @@ from pydantic import Field, field_validator, model_validator
 from simrail.core.errors import InputError
 from simrail.core.shown import Facts, Shown, names
 from simrail.core.toml_files import Part, blame, find, judge, label, parse_toml, read_text, shipped_folder
-from simrail.scenario import tables
 from simrail.scenario.axes import Axis, Listed, axes_of, each
 from simrail.scenario.distributions import Distribution, is_distribution, read_distribution
+from simrail.scenario.imu_tables import EarthPart, ImuPart, TemperaturePart
+from simrail.scenario.line_tables import IrregularityPart, MapPart
 from simrail.scenario.overrides import override
+from simrail.scenario.ride_tables import RailConditionPart, RidePart
+from simrail.scenario.scoring_tables import GeometryPart, RideComfortPart, RunningSafetyPart, ScorePart
 from simrail.scenario.sensor_tables import (
     EncoderPart,
     GnssPart,
@@ -30,10 +33,18 @@ from simrail.scenario.sensor_tables import (
     RailSensorPart,
     SecondImuPart,
 )
+from simrail.scenario.study_tables import (
+    EstimatorPart,
+    MemoryLimit,
+    MonteCarloPart,
+    RequirePart,
+    StopRulePart,
+    TimeLimit,
+)
 from simrail.scenario.vibration_tables import VibrationPart
 
 
-def ride_count(rides: Sequence[tables.RidePart]) -> int:
+def ride_count(rides: Sequence[RidePart]) -> int:
     """Number of rides over a track: those of the tables, each for every combination of its lists."""
     return sum(prod(len(axis) for axis in axes_of(part).values()) for part in rides)
 
@@ -69,28 +80,28 @@ class ScenarioFile(Part):
     """Rate at which the true motion is kept, Hz: 1000 over a whole number, 2000 or 4000."""
     contact_rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
     """Rate at which forces between wheels and rails are kept, Hz; 0 keeps none."""
-    monte_carlo: tables.MonteCarloPart = tables.MonteCarloPart()
+    monte_carlo: MonteCarloPart = MonteCarloPart()
     """How often chance is asked."""
     passes: Listed[Annotated[int, Field(ge=1, le=1000)]] | None = None
     """Over how many of the rides the rails are fused; scores are then of the rails alone."""
     odometry: Listed[str] = ""
     """The odometry that the methods work with, by its short name, class or file; with an [encoder]
     curve_matched if left out, else none."""
-    time_limit_s: tables.TimeLimit | None = None
+    time_limit_s: TimeLimit | None = None
     """Longest time of a method for a recording, s; one that takes longer is ended, and its row says so."""
-    memory_limit_mb: tables.MemoryLimit | None = None
+    memory_limit_mb: MemoryLimit | None = None
     """Most memory of a method, MB, on Linux; one that asks for more is ended, and its row says so."""
-    irregularity: tables.IrregularityPart | None = None
+    irregularity: IrregularityPart | None = None
     """How the rails deviate from the design; without it they do not."""
     vibration: VibrationPart | None = None
     """What shakes the vehicle beyond its multibody ride; without it, nothing."""
-    map: tables.MapPart | None = None
+    map: MapPart | None = None
     """How the map that the train carries differs from what was laid; without it, not at all."""
-    rail_condition: tuple[tables.RailConditionPart, ...] = ()
+    rail_condition: tuple[RailConditionPart, ...] = ()
     """What lies on the rails, stretch by stretch; dry without it."""
-    ride: Annotated[list[tables.RidePart], Field(min_length=1)]
+    ride: Annotated[list[RidePart], Field(min_length=1)]
     """The rides; at least one."""
-    imu: Annotated[list[tables.ImuPart], Field(min_length=1)]
+    imu: Annotated[list[ImuPart], Field(min_length=1)]
     """The IMUs; at least one."""
     encoder: EncoderPart | None = None
     """A wheel encoder; without it the train has none."""
@@ -102,23 +113,23 @@ class ScenarioFile(Part):
     """An IMU on another bogie, recorded beside each of the others; without it there is none."""
     gnss: GnssPart | None = None
     """A satellite receiver; without it there is none."""
-    earth: tables.EarthPart | None = None
+    earth: EarthPart | None = None
     """The Earth turns; without it, it is at rest."""
-    temperature: tables.TemperaturePart | None = None
+    temperature: TemperaturePart | None = None
     """Temperature of the IMUs; without it, that of their calibration."""
-    estimator: Annotated[list[tables.EstimatorPart], Field(min_length=1)]
+    estimator: Annotated[list[EstimatorPart], Field(min_length=1)]
     """The methods under test and their baselines; at least one."""
-    score: tables.ScorePart = tables.ScorePart()
+    score: ScorePart = ScorePart()
     """What of the score table is kept; everything without it."""
-    require: tuple[tables.RequirePart, ...] = ()
+    require: tuple[RequirePart, ...] = ()
     """What is asked of an IMU: each has a verdict on the page."""
-    stop: tables.StopRulePart | None = None
+    stop: StopRulePart | None = None
     """When to draw no more; without it every draw is made."""
-    geometry: tables.GeometryPart = tables.GeometryPart()
+    geometry: GeometryPart = GeometryPart()
     """Wavelength bands and base of twist in which rails are scored."""
-    running_safety: tables.RunningSafetyPart | None = None
+    running_safety: RunningSafetyPart | None = None
     """Score the forces between wheels and rails after EN 14363."""
-    ride_comfort: tables.RideComfortPart | None = None
+    ride_comfort: RideComfortPart | None = None
     """Score N_MV (EN 12299) and Sperling's Wz where each IMU sits."""
 
     @field_validator("step_s")
@@ -340,7 +351,7 @@ def read_scenario(
     return Scenario(name=name, file=file, folder=folder, text=text, overrides=tuple(overrides), spec=spec)
 
 
-def _options_as_axes(part: tables.EstimatorPart, field: str, file: str) -> tables.EstimatorPart:
+def _options_as_axes(part: EstimatorPart, field: str, file: str) -> EstimatorPart:
     """Read lists among an estimator's options as axes, and tables such as ``{ uniform = ... }`` as draws.
 
     A list of lists is a list-valued option. What the options may be is judged when the estimator is made.

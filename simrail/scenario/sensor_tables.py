@@ -17,7 +17,7 @@ from simrail.recording.recording import SecondImuSheet
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.ride.truth import Mount
 from simrail.scenario.axes import Listed
-from simrail.scenario.tables import Name, OnBoard
+from simrail.scenario.fields import Name, OnBoard
 from simrail.sensors.encoder import EncoderSpec, Slip
 from simrail.sensors.gnss import GnssSpec, Outage
 from simrail.sensors.magnetic_surroundings import Steel, Traction

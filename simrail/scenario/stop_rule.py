@@ -27,7 +27,7 @@ from simrail.core.jit import FloatArray
 from simrail.scenario.cells import Cell, sensor_draws
 from simrail.scenario.distributions import sample_count
 from simrail.scenario.scenario import ScenarioFile
-from simrail.scenario.tables import StopRulePart
+from simrail.scenario.study_tables import StopRulePart
 from simrail.scoring.bootstrap import clustered, mean_interval
 from simrail.scoring.table import BANDS, CURVE_PREFIX, EVERY_CURVE, METRICS, QUANTITY_UNITS, WINDOWS, unit_of
 

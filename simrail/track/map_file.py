@@ -1,7 +1,7 @@
 """The accuracy of a map as a person writes it: ``[map]`` of a ride file, in mm, percent and permil.
 
-What a scenario says of its maps has the same keys (`simrail.scenario.tables.MapPart`), where each may be a
-list or a distribution.
+What a scenario says of its maps has the same keys (`simrail.scenario.line_tables.MapPart`), where each may
+be a list or a distribution.
 """
 
 from typing import Annotated

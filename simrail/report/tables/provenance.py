@@ -10,8 +10,8 @@ from simrail.campaign.cell import CellResult
 from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.recording.sheets.imu_file import ImuFile
+from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.scenario import Scenario
-from simrail.scenario.tables import IrregularityPart
 from simrail.track.rail_condition import FRICTION
 from simrail.vehicle.file import VehicleFile
 

@@ -21,7 +21,7 @@ from simrail.report.tables.pivot import (
 )
 from simrail.report.words.ablations import state_words
 from simrail.scenario.cells import Method, methods
-from simrail.scenario.tables import NOISE
+from simrail.scenario.imu_tables import NOISE
 from simrail.scoring.ablations import COLUMNS as TAKEN_AWAY
 from simrail.scoring.ablations import Ablation
 
