@@ -59,8 +59,17 @@ def unreadable(problem: str, path: Path, limit: str) -> InputError:
     )
 
 
-def library(name: str, path: Path) -> Any:
-    """A library that reads a kind of file.
+def library(name: str, path: Path, *, instead: str = "export the logger's file as CSV") -> Any:
+    """A library that reads or writes a kind of file.
+
+    Parameters
+    ----------
+    name : str
+        Its module.
+    path : Path
+        The file.
+    instead : str
+        What else can be done without it.
 
     Raises
     ------
@@ -75,7 +84,7 @@ def library(name: str, path: Path) -> Any:
             file=label(path),
             value=path.suffix,
             limit="a kind of file whose library is installed",
-            remedy="pip install 'simrail[loggers]', or export the logger's file as CSV",
+            remedy=f"pip install 'simrail[loggers]', or {instead}",
         ) from None
 
 
