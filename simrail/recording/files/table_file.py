@@ -16,7 +16,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, joined
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import label
 
@@ -40,11 +40,6 @@ class Table:
 
     names: tuple[str, ...]
     read: Read
-
-
-def joined(error: object) -> str:
-    """What a library says of its error, in one line."""
-    return " ".join(str(error).split())
 
 
 def unreadable(problem: str, path: Path, limit: str) -> InputError:
