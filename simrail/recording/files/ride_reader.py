@@ -2,8 +2,8 @@
 
 Signals come in SI and in the body's axes (`simrail.recording.files.signal_reader`), IMUs at uniform times
 (`simrail.recording.files.imu_reader`), the way beside them (`simrail.recording.files.way_reader`). What is at
-its best already (SI, the body's own axes, uniform times) passes bit by bit. Nothing else is repaired: what has
-a fault is refused by name.
+its best already (SI, the body's own axes, uniform times) passes bit by bit. Nothing else is repaired: what
+has a fault is refused by name.
 
 Not here: an odometry, where the file has none, and whether the ride can be true, which are the matter of
 `simrail.estimation.recorded_ride.read_ride`.
