@@ -8,7 +8,7 @@ import numpy as np
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
 from simrail.recording.check_samples import SLACK, STUCK_COUNTS, imu_bounds
-from simrail.recording.recording import Recording
+from simrail.recording.recording import Recording, imus
 from simrail.recording.standstill import at_rest_initially
 
 _TRIADS = (("gyro", GYRO, "rad/s"), ("accel", ACCEL, "m/s2"))
@@ -19,13 +19,18 @@ _TURNED = float(np.sqrt(3.0))
 def check_ranges(recording: Recording) -> None:
     """Refuse an IMU that measures beyond the range of its sheet throughout: it is the sheet of another.
 
-    Meant for signals whose units have been judged already.
+    Meant for signals whose units have been judged already; of both IMUs, where there are two.
 
     Raises
     ------
     InputError
         With the largest value and its time.
     """
+    for table, alone in imus(recording):
+        _check_ranges(alone, table)
+
+
+def _check_ranges(recording: Recording, table: str) -> None:
     bounds = imu_bounds(recording.imu_sheet)
     for kind, columns, unit in _TRIADS:
         limit = bounds[kind].range
@@ -36,7 +41,7 @@ def check_ranges(recording: Recording) -> None:
                 raise InputError(
                     f"is beyond the range of its sheet at time_s = {float(recording.imu.index[worst]):.6g} "
                     f"({int((values > SLACK * _TURNED * limit).sum())} such samples)",
-                    field=f"imu.{column}",
+                    field=f"{table}.{column}",
                     value=float(f"{recording.imu[column].iloc[worst]:.6g}"),
                     limit=f"{limit:.6g} {unit}, the range of {bounds[kind].sheet}",
                     remedy="mend the range in its sheet: a device measures no further",
@@ -56,6 +61,10 @@ def noise_warnings(recording: Recording) -> tuple[str, ...]:
     The noise of a sample is taken from second differences of the initial rest, x[k-1] - 2 x[k] + x[k+1] over
     sqrt(6): bias and its wandering do not show in them.
     """
+    return tuple(line for table, alone in imus(recording) for line in _noise_warnings(alone, table))
+
+
+def _noise_warnings(recording: Recording, table: str) -> tuple[str, ...]:
     resting, sheet = at_rest_initially(recording), recording.imu_sheet
     if resting < REST_SAMPLES:
         return ()
@@ -75,7 +84,7 @@ def noise_warnings(recording: Recording) -> tuple[str, ...]:
                 else "the samples were smoothed, or the device is another"
             )
             told.append(
-                f"imu.{kind}: noise of {found:.2g} {unit} a sample at rest is {found / stated:.2g} times "
+                f"{table}.{kind}: noise of {found:.2g} {unit} a sample at rest is {found / stated:.2g} times "
                 f"that of {sheet.grade} ({stated:.2g} {unit} at {sheet.rate_hz:g} Hz): {why}"
             )
     return tuple(told)
