@@ -20,7 +20,7 @@ import pandas as pd
 
 from simrail.campaign.fence import MOST_PRINTED, digest, fenced, handed
 from simrail.campaign.time_limit import FIRST_CALL_S, LimitedEstimator, Outcome, estimate_here
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, joined
 from simrail.core.interrupts import Check, interruptible
 from simrail.core.jit import FloatArray
 from simrail.estimation.choose_odometry import TRUTH, with_odometry
@@ -152,7 +152,7 @@ class BatchTally:
 
     def note_print(self, estimator: str, text: str) -> None:
         """Keep what an estimator printed, once, for the log."""
-        words = " ".join(text.split())[:MOST_PRINTED]
+        words = joined(text)[:MOST_PRINTED]
         if words and estimator not in self.printed:
             self.printed[estimator] = words
 
@@ -316,7 +316,7 @@ def look_at(cell: Cell, truth: Truth, parts: Parts, tally: BatchTally) -> CellRe
 
 def _reason_of(error: Exception) -> str:
     """One line that says why."""
-    text = " ".join(str(error).split())
+    text = joined(error)
     named = text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
     return named[:300]
 

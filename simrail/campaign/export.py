@@ -16,9 +16,10 @@ from simrail.core.atomic_files import draft_of
 from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 from simrail.core.interrupts import interruptible
-from simrail.recording.files.frame_file import Format, write_frame
+from simrail.recording.files.frame_file import write_frame
+from simrail.recording.files.mcap_file import Topic, needs_mcap, write_mcap
 from simrail.recording.files.ned import Frame, in_ned
-from simrail.recording.files.ride_writer import refuse_existing, write_parts
+from simrail.recording.files.ride_writer import MCAP_FILE, RideFormat, refuse_existing, write_parts
 from simrail.ride.truth import Truth
 from simrail.scenario.cells import Cell, cell_record, first_cells
 from simrail.scenario.check import judge_scenario
@@ -36,7 +37,7 @@ def export(
     scenario: Scenario,
     folder: Path,
     *,
-    format: Format = "csv",
+    format: RideFormat = "csv",
     draw: int = 0,
     truth: bool = False,
     contact: bool = False,
@@ -52,7 +53,7 @@ def export(
     folder : Path
         Must not exist yet; it appears whole or not at all.
     format : str
-        ``"csv"`` or ``"parquet"``.
+        ``"csv"``, ``"parquet"`` or ``"mcap"`` (one file a recording, as `simrail.recording.files.mcap_file`).
     draw : int
         Draw of the sensors, one of the scenario's; the track is that of its first draw.
     truth : bool
@@ -74,10 +75,13 @@ def export(
     Raises
     ------
     InputError
-        If the folder exists, there is no such draw, or the scenario cannot be run; nothing is written then.
+        If the folder exists, there is no such draw, the scenario cannot be run, or what writes MCAP is not
+        installed; nothing is written then.
     """
     watcher = watcher or Watcher()
     refuse_existing(folder)
+    if format == "mcap":
+        needs_mcap(folder / MCAP_FILE)
     draws = scenario.spec.monte_carlo.sensor_draws
     if draw >= draws:
         raise InputError(
@@ -113,10 +117,7 @@ def export(
                 write_parts(recording, draft / name, format=format, axes=axes)
                 if truth:
                     true = truth_at_imu(motion, recording)
-                    true = true if axes == "flu" else in_ned(true)
-                    about, file = f"true motion of {recording.mount!r}, part of no recording", TRUTH_STEM
-                    path = draft / name / f"{file}.{format}"
-                    write_frame(true, path, format=format, about=about, axes=axes)
+                    _write_truth(true, draft / name / f"{TRUTH_STEM}.{format}", format, recording.mount, axes)
                 if contact:
                     _write_contact(motion, draft / name / CONTACT_FOLDER, format=format)
                 labels = cell_record(cell).items()
@@ -128,12 +129,25 @@ def export(
     return list(names.values())
 
 
-def _write_contact(truth: Truth, folder: Path, *, format: Format) -> None:
+def _write_truth(truth: pd.DataFrame, path: Path, format: RideFormat, mount: str, axes: Frame) -> None:
+    """Write the true motion of a mount."""
+    if format == "mcap":
+        write_mcap(path, [Topic("truth", truth, mount)], axes=axes)
+    else:
+        about = f"true motion of {mount!r}, part of no recording"
+        turned = truth if axes == "flu" else in_ned(truth)
+        write_frame(turned, path, format=format, about=about, axes=axes)
+
+
+def _write_contact(truth: Truth, folder: Path, *, format: RideFormat) -> None:
     """Write the forces of every wheel, a file each."""
     folder.mkdir()
     for wheel in truth.contacts or truth.wheel_names:
-        about = f"forces between the wheel {wheel} and its rail"
-        write_frame(truth.contact(wheel), folder / f"{wheel}.{format}", format=format, about=about)
+        forces, path = truth.contact(wheel), folder / f"{wheel}.{format}"
+        if format == "mcap":
+            write_mcap(path, [Topic(wheel, forces)])
+        else:
+            write_frame(forces, path, format=format, about=f"forces between the wheel {wheel} and its rail")
 
 
 def _names(chosen: list[Cell]) -> dict[int, str]:

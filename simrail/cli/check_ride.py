@@ -10,7 +10,8 @@ from simrail.cli.options import DONE, number
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label, read_toml
 from simrail.estimation.recorded_ride import judged_ride
-from simrail.recording.evidence.judge import Evidence, weigh
+from simrail.recording.evidence.devices import weigh_all
+from simrail.recording.evidence.judge import Evidence
 from simrail.recording.files.mend import write_mended
 from simrail.recording.files.ride_reader import RIDE_FILE, read_signals, ride_file
 
@@ -44,7 +45,7 @@ def check_ride(path: Path, write: Path | None) -> int:
     """
     console = Console(width=WIDEST)
     recording = read_signals(path)
-    evidence = weigh(recording)
+    evidence = weigh_all(recording)
     print_evidence(console, evidence, title=f"{label(ride_file(path))}: {recording.name}")
     for note in recording.notes:
         console.print(f"note: {note}", markup=False, soft_wrap=True)

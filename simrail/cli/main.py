@@ -28,7 +28,7 @@ from simrail.cli.schema import schema
 from simrail.cli.sensitivity import sensitivity
 from simrail.cli.spectra import spectra
 from simrail.cli.tune import tune
-from simrail.core.errors import MOST_SHOWN, InputError, one_line
+from simrail.core.errors import MOST_SHOWN, InputError, joined, one_line
 
 app = typer.Typer(
     name="simrail",
@@ -82,7 +82,7 @@ def _say_usage(error: Any) -> None:
     if context is None or type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         return
-    text = one_line(" ".join(error.format_message().split()).rstrip("."), 2 * MOST_SHOWN)
+    text = one_line(joined(error.format_message()).rstrip("."), 2 * MOST_SHOWN)
     command = "simrail" if context.parent is None else f"simrail {context.info_name}"
     say(f"simrail: {text}; limit: what the help lists; remedy: see '{command} --help'")
 

@@ -5,17 +5,20 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from simrail.cli.options import DONE, Form, Scenario, Seed, Settings, form_of, number
+from simrail.cli.options import DONE, Scenario, Seed, Settings, number
 from simrail.core.errors import one_of
 
 if TYPE_CHECKING:
     from simrail.recording.files.ned import Frame
+    from simrail.recording.files.ride_writer import RideFormat
 
 
 def export(
     scenario: Scenario,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new folder for the recordings.")],
-    form: Form = "csv",
+    form: Annotated[
+        str, typer.Option("--format", metavar="csv|parquet|mcap", help="Form of the data files.")
+    ] = "csv",
     draw: Annotated[int, typer.Option("--draw", min=0, max=999_999, help="Draw of the sensors.")] = 0,
     truth: Annotated[
         bool, typer.Option("--truth", help="Write the true motion beside each recording, too.")
@@ -41,8 +44,9 @@ def export(
     from simrail.scenario.scenario import load_scenario
 
     one_of(frame, ("flu", "ned"), "no such axes", field="--frame")
-    axes = cast("Frame", frame)
-    chosen, read = form_of(form), load_scenario(scenario, overrides=settings or [], seed=seed)
+    one_of(form, ("csv", "parquet", "mcap"), "no such format", field="--format")
+    axes, chosen = cast("Frame", frame), cast("RideFormat", form)
+    read = load_scenario(scenario, overrides=settings or [], seed=seed)
     with ProgressWatcher(Console(stderr=True)) as watcher:
         names = export_scenario(
             read, out, format=chosen, draw=draw, truth=truth, contact=contact, axes=axes, watcher=watcher

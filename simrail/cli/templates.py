@@ -19,7 +19,7 @@ from string import Template
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from simrail.core.errors import InputError, did_you_mean, one_of
+from simrail.core.errors import InputError, did_you_mean, joined, one_of
 from simrail.core.toml_files import label, read_toml, shipped
 
 if TYPE_CHECKING:
@@ -224,7 +224,7 @@ def _usual(key: str) -> float:
 
 def _entry(key: str, value: object, *, commented: bool) -> str:
     """One line of a TOML file."""
-    text = " ".join(value.split()) if isinstance(value, str) else value
+    text = joined(value) if isinstance(value, str) else value
     # Text, numbers, truth and lists of numbers are written alike in JSON and TOML.
     return f"{'# ' if commented else ''}{key} = {json.dumps(text, ensure_ascii=False)}"
 

@@ -85,6 +85,11 @@ def one_line(text: str, most: int) -> str:
     return "".join(letter if letter.isprintable() else _code(letter) for letter in text)
 
 
+def joined(words: object) -> str:
+    """What is told, as one line: any white space between its words is one blank."""
+    return " ".join(str(words).split())
+
+
 def _code(letter: str) -> str:
     """A character that does not print, as Python writes it; spaces of other kinds are spaces."""
     return " " if letter in "\xa0\u202f\u2009" else repr(letter)[1:-1]

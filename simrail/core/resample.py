@@ -17,6 +17,9 @@ import pandas as pd
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 
+SLOW_INTERVALS = 3.0
+"""A signal that is slower than the longest gap may be silent for this many of its own intervals."""
+
 GAP_INTERVALS = 1.5
 """Two stamps further apart than this many intervals have a gap between them: nearer to two than to one."""
 

@@ -2,6 +2,8 @@
 
 from html import escape
 
+from simrail.core.errors import joined
+
 Facts = tuple[str, dict[str, str]]
 """What an object is called, and at most `MOST_FACTS` things about it, each with its words."""
 
@@ -51,5 +53,5 @@ def names(values: object, *, most: int = 6) -> str:
 
 
 def _shortened(text: str) -> str:
-    flat = " ".join(text.split())
+    flat = joined(text)
     return flat if len(flat) <= WIDEST else flat[: WIDEST - 4].rstrip() + " ..."

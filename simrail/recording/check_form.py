@@ -26,7 +26,7 @@ from simrail.core.columns import (
 from simrail.core.errors import InputError
 from simrail.core.resample import check_stamps
 from simrail.recording.check_field import check_field
-from simrail.recording.check_sheet import markers
+from simrail.recording.check_samples import markers
 from simrail.recording.recording import AT_IMU_TIMES, Recording
 
 

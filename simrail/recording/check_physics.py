@@ -12,8 +12,9 @@ import pandas as pd
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.recording.evidence.judge import Evidence, refuse_wrong, weigh
-from simrail.recording.recording import Recording
+from simrail.recording.evidence.devices import weigh_all
+from simrail.recording.evidence.judge import Evidence, refuse_wrong
+from simrail.recording.recording import Recording, imus
 from simrail.recording.signals import FORCES
 from simrail.recording.standstill import at_rest_initially
 
@@ -44,12 +45,12 @@ BEYOND_TRACK_M = 20.0
 def check_plausible(recording: Recording) -> Evidence:
     """Refuse a recording whose units, axes, factors, place or clocks cannot be those that are claimed.
 
-    The specific force is judged at rest, where the ride begins with a second of it, else by its median.
-    Then the ride's curves, its setting off and braking, and gravity are weighed together
-    (`simrail.recording.evidence.judge`). What that cannot explain is held against wide limits: the gyro's Z
-    against the track's yaw rate, the accelerometer's X and Y against the odometry's acceleration. A ride on
-    the straight at constant speed says nothing of either, nor does one without odometry or
-    without a map.
+    The specific force is judged at rest, where the ride begins with a second of it, else by its median; of
+    both IMUs, where there are two. Then the ride's curves, its setting off and braking, and gravity are
+    weighed together (`simrail.recording.evidence.devices`). What that cannot explain is held against wide
+    limits: the gyro's Z against the track's yaw rate, the accelerometer's X and Y against the odometry's
+    acceleration. A ride on the straight at constant speed says nothing of either, nor does one without
+    odometry or without a map.
 
     Returns
     -------
@@ -64,9 +65,10 @@ def check_plausible(recording: Recording) -> Evidence:
         the other way, or many times as much; if the accelerometer does not push when the train gains speed,
         or sideways, or backwards.
     """
-    _check_gravity(recording)
-    _check_turning(recording)
-    evidence = weigh(recording)
+    for table, alone in imus(recording):
+        _check_gravity(alone, table)
+        _check_turning(alone, table)
+    evidence = weigh_all(recording)
     refuse_wrong(evidence)
     if not recording.track.is_map:
         return evidence
@@ -77,7 +79,7 @@ def check_plausible(recording: Recording) -> Evidence:
     return evidence
 
 
-def _check_gravity(recording: Recording) -> None:
+def _check_gravity(recording: Recording, table: str) -> None:
     resting = at_rest_initially(recording)
     force = recording.imu[list(ACCEL)].to_numpy()
     if resting >= recording.imu_sheet.rate_hz:
@@ -96,7 +98,7 @@ def _check_gravity(recording: Recording) -> None:
                     remedy = f'the values look like {unit}, given as {claimed}: set units.accel = "{unit}"'
         raise InputError(
             "is not as large as gravity",
-            field="imu.accel",
+            field=f"{table}.accel",
             value=shown,
             limit=f"{gravity:g} m/s2 to {slack:.2g} m/s2",
             remedy=remedy,
@@ -104,7 +106,7 @@ def _check_gravity(recording: Recording) -> None:
     if found[2] < -UPRIGHT * size:
         raise InputError(
             "points down: at rest an accelerometer shows +g on Z, which points up",
-            field="imu.accel",
+            field=f"{table}.accel",
             value=f"{found[2]:.4g} m/s2 on Z {when}",
             limit=f"> {UPRIGHT * gravity:.3g} m/s2",
             remedy='for a device upside down set axes = ["x", "-y", "-z"]; for a logger that writes gravity '
@@ -114,14 +116,14 @@ def _check_gravity(recording: Recording) -> None:
         axis = int(np.argmax(np.abs(found)))
         raise InputError(
             f"gravity lies along {'-' if found[axis] < 0 else ''}{'XYZ'[axis]} of the body, not Z",
-            field="imu.axes",
+            field=f"{table}.axes",
             value=[round(float(part), 3) for part in found],
             limit=f"> {UPRIGHT * gravity:.3g} m/s2 on Z {when}",
             remedy="name the axes of the device that point forward, left and up, or its mounting angles",
         )
 
 
-def _check_turning(recording: Recording) -> None:
+def _check_turning(recording: Recording, table: str) -> None:
     rate = recording.imu_sheet.rate_hz
     window = max(1, min(round(MEAN_OVER_S * rate), len(recording.imu) - 1))
     for name in GYRO:
@@ -132,7 +134,7 @@ def _check_turning(recording: Recording) -> None:
             raise InputError(
                 f"turns faster than a train does, in the mean over {window / rate:.3g} s "
                 f"from time_s = {float(recording.imu.index[worst]):.6g}",
-                field=f"imu.{name}",
+                field=f"{table}.{name}",
                 value=float(f"{mean[worst]:.4g}"),
                 limit=f"{MEAN_RATE_RADPS:g} rad/s",
                 remedy='the values look like degrees: set units.gyro = "deg/s"',

@@ -1,343 +1,36 @@
-"""Are these measurements of that device? Samples held against the sheet of the device that took them.
+"""Is this the device of that sheet? A whole signal held against the sheet: its range, its noise at rest.
 
-Loggers mark what they do not have by a number: the least count (-32768), the end of the range, -9999,
-zeros. One such sample is as large as a thousand sound ones, and an estimator believes it. It is told from
-a unit that is wrong by the rest of the signal: markers stand apart from all other samples, while a wrong
-unit makes the whole signal large. So samples that stand apart are refused here, by the line of the file,
-and a signal that is large as a whole is left to those who judge units (`simrail.recording.check_form`,
-`simrail.recording.check_physics`).
+Single samples that are no measurements were refused before (`simrail.recording.check_samples`).
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import numpy as np
-import numpy.typing as npt
-import pandas as pd
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
-from simrail.core.jit import FloatArray
-from simrail.recording.recording import EncoderSheet, ImuSheet, MagnetometerSheet, Recording
+from simrail.recording.check_samples import SLACK, STUCK_COUNTS, imu_bounds
+from simrail.recording.recording import Recording, imus
 from simrail.recording.standstill import at_rest_initially
-
-APART = 10.0
-"""Samples stand apart if each is this many times as far from the median as every other sample is."""
-
-APART_BEYOND = 3.0
-"""The same of samples that no such device gives, or of numbers that loggers use as markers."""
-
-MOST_MARKERS = 0.2
-"""Share of a signal that may be markers; what is more than that is the signal."""
-
-SLACK = 1.01
-"""Share of a range that is still within it: scale factors and decimals of a logger."""
-
-MARKERS = (999.0, 999.9, 9999.0, 9999.9, 99999.0, 32767.0, 32768.0, 65535.0, 8388607.0, 8388608.0)
-"""Numbers that loggers write where they have none, either sign, in the unit of the file."""
-
-STUCK_S, STUCK_SAMPLES = 2.0, 60
-"""A signal whose noise is `STUCK_COUNTS` counts does not repeat one number for so long: the chance that one
-sample equals the last is 0.65 even where the noise is a fifth of its sheet's, so 6e-12 of sixty."""
-
-STUCK_COUNTS = 2.0
-
-LIVING = 0.5
-"""Standard deviation of second differences, over the noise of the sheet, of a device that measures: sqrt(6)
-where it has the noise of its sheet."""
-
-SHORT_ZEROS = 3
-"""Zeros in a row of a gyro that may be markers; a specific force is never zero, however long."""
-
-_STILL = {"gyro": 0.01, "accel": 0.2, "field": 1e-6}
-"""What counts as nothing beside a marker, in SI: a perfect sensor at rest moves by nothing at all."""
-
-
-class Bounds(NamedTuple):
-    """What a sheet says of the samples of one triad.
-
-    Attributes
-    ----------
-    range : float, optional
-        Largest magnitude that is measured, SI; None where the sheet is silent.
-    noise : float
-        Density N of its white noise, SI; 0 where the sheet is silent.
-    sheet : str
-        Name of the sheet, for messages.
-    """
-
-    range: float | None
-    noise: float
-    sheet: str
-
-
-class Channel(NamedTuple):
-    """One column of a device, as it was logged.
-
-    Attributes
-    ----------
-    name : str
-        How messages call it.
-    values : ndarray (n,)
-        Its samples in SI, on the device's own axis.
-    unit, si : str, float
-        Unit of the file, and one of it in SI.
-    """
-
-    name: str
-    values: FloatArray
-    unit: str
-    si: float
-
-
-def imu_bounds(sheet: ImuSheet) -> dict[str, Bounds]:
-    """What the sheet of an IMU says of its samples, by quantity."""
-    return {
-        "gyro": Bounds(sheet.gyro_range_radps, sheet.gyro_noise_radpsqrts, sheet.grade),
-        "accel": Bounds(sheet.accel_range_mps2, sheet.accel_noise_mpsqrts, sheet.grade),
-    }
-
-
-def field_bounds(sheet: MagnetometerSheet) -> dict[str, Bounds]:
-    """What the sheet of a magnetometer says of its samples, by quantity."""
-    return {"field": Bounds(None, sheet.noise_tpsqrthz, "magnetometer.sheet")}
-
-
-def check_samples(
-    channels: tuple[Channel, ...],
-    kind: str,
-    bounds: Bounds,
-    *,
-    time: FloatArray,
-    where: Callable[[int], str],
-    file: str | None = None,
-) -> None:
-    """Refuse samples of a triad that are none of its device.
-
-    Parameters
-    ----------
-    channels : tuple of Channel
-        The three columns.
-    kind : {"gyro", "accel", "field"}
-        What they measure.
-    bounds : Bounds
-        What the sheet says.
-    time : ndarray (n,)
-        Time stamps, s.
-    where : callable
-        Place of a sample in its file, in words.
-    file : str, optional
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        At the first of: zeros on all axes at once amid a signal; samples beyond the range that stand apart
-        from the rest; numbers that mark missing samples; one number for seconds, where the sheet has noise.
-    """
-
-    def place(sample: int) -> str:
-        return f"{where(sample)} (time_s = {time[sample]:.6g})"
-
-    _check_zeros(channels, kind, place, file)
-    for channel in channels:
-        apart = markers(channel.values, still=_STILL[kind], limit=bounds.range, unit_si=channel.si)
-        if apart.any():
-            raise _no_measurement(channel, apart, bounds, place, file)
-    _check_stuck(channels, bounds, time, place, file)
-
-
-def markers(
-    values: FloatArray, *, still: float, limit: float | None = None, unit_si: float = 1.0
-) -> npt.NDArray[np.bool_]:
-    """Which samples of a signal stand apart from all others, so that they are no measurements.
-
-    In the order of their distances from the median, the samples before the widest step are apart from those
-    behind it, if the step is wide: `APART` times as far; or `APART_BEYOND` times for samples beyond the
-    range, at its very end, or equal to one of `MARKERS`. Those within the range must also be alone: a blow
-    rings, so its neighbours are large too.
-
-    Parameters
-    ----------
-    values : ndarray (n,)
-        Samples.
-    still : float
-        Distance that counts as nothing.
-    limit : float, optional
-        Range of the device.
-    unit_si : float
-        The unit in which a logger wrote them.
-
-    Returns
-    -------
-    ndarray (n,) of bool
-    """
-    none = np.zeros(len(values), dtype=np.bool_)
-    off = np.abs(values - np.median(values))
-    most = max(1, int(MOST_MARKERS * len(values)))
-    if len(values) < 3 or off.max() <= APART_BEYOND * still:
-        return none
-    top = np.sort(np.partition(off, len(off) - most - 1)[len(off) - most - 1 :])[::-1]
-    steps = top[:-1] / np.maximum(top[1:], still)
-    widest = int(np.argmax(steps))
-    if steps[widest] < APART_BEYOND:
-        return none
-    apart: npt.NDArray[np.bool_] = np.greater_equal(off, top[widest])
-    found = values[apart]
-    if limit is not None and bool(np.all(np.abs(found) > SLACK * limit)):
-        return apart
-    marked = np.isin(np.round(np.abs(found / unit_si), 6), MARKERS)
-    if limit is not None:
-        marked |= np.abs(np.abs(found) / limit - 1.0) < 1e-3
-    if steps[widest] < APART and not marked.all():
-        return none
-    return apart if marked.all() or _alone(off, apart, top[widest]) else none
-
-
-def _alone(off: FloatArray, apart: npt.NDArray[np.bool_], size: float) -> bool:
-    """Whether the samples beside those that stand apart are as small as any."""
-    beside = np.zeros_like(apart)
-    beside[1:] |= apart[:-1]
-    beside[:-1] |= apart[1:]
-    beside &= ~apart
-    runs = np.flatnonzero(np.diff(apart.astype(np.int8)) == 1).size + int(apart[0])
-    # One sample each: what lasts for longer is a motion that begins and ends.
-    return int(apart.sum()) == runs and bool(np.all(off[beside] < size / APART))
-
-
-def _no_measurement(
-    channel: Channel,
-    apart: npt.NDArray[np.bool_],
-    bounds: Bounds,
-    place: Callable[[int], str],
-    file: str | None,
-) -> InputError:
-    first, count = int(np.argmax(apart)), int(apart.sum())
-    found = float(channel.values[first])
-    more = f" (and {count - 1} more such samples)" if count > 1 else ""
-    remedy = _drop(count)
-    if bounds.range is not None and abs(found) > SLACK * bounds.range:
-        problem = f"is beyond the range of its device in {place(first)}{more}; the sample is no measurement"
-        limit = f"{bounds.range / channel.si:.6g} {channel.unit}, the range of {bounds.sheet}"
-        remedy += "; if it does measure so far, mend the range in its sheet"
-    else:
-        rest = np.abs(channel.values[~apart]).max() / channel.si
-        problem = f"stands alone in {place(first)}{more}; it marks a missing sample, and is no measurement"
-        limit = f"{rest:.6g} {channel.unit}, the largest of all others"
-    return InputError(
-        problem,
-        file=file,
-        field=channel.name,
-        value=f"{found / channel.si:.6g} {channel.unit}",
-        limit=limit,
-        remedy=remedy,
-    )
-
-
-def _drop(count: int) -> str:
-    return "drop those lines, so that they are gaps" if count > 1 else "drop that line, so that it is a gap"
-
-
-def _check_zeros(
-    channels: tuple[Channel, ...], kind: str, place: Callable[[int], str], file: str | None
-) -> None:
-    """Refuse zeros on all axes at once, where the samples before and after are far from zero."""
-    values = np.column_stack([channel.values for channel in channels])
-    empty: npt.NDArray[np.bool_] = np.all(values == 0.0, axis=1)
-    if len(values) < 3 or not empty.any() or empty.all():
-        return
-    # What one sample adds to the mean of its neighbours, beside the markers themselves.
-    rough = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
-    usual = 1.4826 * float(np.median(np.linalg.norm(rough[~empty[1:-1]], axis=1))) if rough.size else 0.0
-    full = np.flatnonzero(~empty)
-    around = np.searchsorted(full, np.flatnonzero(empty))
-    before, after = full[np.maximum(around - 1, 0)], full[np.minimum(around, len(full) - 1)]
-    expected = np.linalg.norm(0.5 * (values[before] + values[after]), axis=1)
-    wrong = expected > APART * max(usual, _STILL[kind])
-    if kind == "gyro":
-        # A perfect gyro is at zero between two curves; it does not get there and back in a moment.
-        wrong &= (around > 0) & (around < len(full)) & (after - before <= SHORT_ZEROS + 1)
-    if wrong.any():
-        first, count = int(np.flatnonzero(empty)[int(np.argmax(wrong))]), int(wrong.sum())
-        more = f" (and {count - 1} more such samples)" if count > 1 else ""
-        size = float(expected[int(np.argmax(wrong))])
-        raise InputError(
-            f"is zero on all axes in {place(first)}{more}; it marks a missing sample, and is no measurement",
-            file=file,
-            field=", ".join(channel.name for channel in channels),
-            value=f"0 {channels[0].unit}",
-            limit=f"{size / channels[0].si:.4g} {channels[0].unit} just before and after",
-            remedy=_drop(count),
-        )
-
-
-def _check_stuck(
-    channels: tuple[Channel, ...],
-    bounds: Bounds,
-    time: FloatArray,
-    place: Callable[[int], str],
-    file: str | None,
-) -> None:
-    """Refuse a signal that repeats one number for seconds, although its sheet's noise is several counts.
-
-    The device must show noise otherwise, on another axis meanwhile or on both sides: a computed ride has
-    none.
-    """
-    span = float(time[-1] - time[0]) if len(time) else 0.0
-    if not 0.0 < span < np.inf:
-        return  # stamps that go back, or are none, are refused elsewhere
-    rate = (len(time) - 1) / span
-    noise = bounds.noise * np.sqrt(rate)
-    shortest = max(STUCK_SAMPLES, int(np.ceil(STUCK_S * rate)))
-    if noise == 0.0 or len(time) <= shortest:
-        return
-    steps = [np.abs(np.diff(channel.values)) for channel in channels]
-    counts = [float(step[step > 1e-9 * noise].min(initial=np.inf)) for step in steps]
-
-    def lives(axis: int, begin: int, end: int) -> bool:
-        """Whether an axis shows noise, by the median of its second differences."""
-        part = channels[axis].values[max(begin, 0) : end]
-        return len(part) >= STUCK_SAMPLES // 2 and float(np.diff(part, n=2).std()) > LIVING * noise
-
-    for axis, (channel, step) in enumerate(zip(channels, steps, strict=True)):
-        # A column that never changes is held against the decimals of its neighbours.
-        count = counts[axis] if np.isfinite(counts[axis]) else min(counts)
-        moves = np.concatenate([[-1], np.flatnonzero(step > 1e-9 * noise), [len(step)]])
-        longest = int(np.argmax(np.diff(moves)))
-        first, end = int(moves[longest]) + 1, min(int(moves[longest + 1]) + 1, len(time))
-        if end - first < shortest or noise < STUCK_COUNTS * count:
-            continue
-        others = any(lives(other, first, end) for other in range(len(channels)) if other != axis)
-        if others or (lives(axis, first - STUCK_SAMPLES, first) and lives(axis, end, end + STUCK_SAMPLES)):
-            raise InputError(
-                f"repeats one number from {place(first)} to time_s = {time[end - 1]:.6g}; "
-                "the device is stuck",
-                file=file,
-                field=channel.name,
-                value=f"{channel.values[first] / channel.si:.6g} {channel.unit}",
-                limit=f"noise of {noise / channel.si:.2g} {channel.unit}, as {bounds.sheet} says",
-                remedy="cut the recording there, or mend the logger",
-            )
-
 
 _TRIADS = (("gyro", GYRO, "rad/s"), ("accel", ACCEL, "m/s2"))
 _TURNED = float(np.sqrt(3.0))
 """A device turned in its body may show the range of each of its axes at once along one of the body."""
 
-_JUMP_MPS = 150.0
-"""Speed of no train (540 km/h): a count that goes there and back within one reading."""
-
 
 def check_ranges(recording: Recording) -> None:
     """Refuse an IMU that measures beyond the range of its sheet throughout: it is the sheet of another.
 
-    Meant for signals whose units have been judged already.
+    Meant for signals whose units have been judged already; of both IMUs, where there are two.
 
     Raises
     ------
     InputError
         With the largest value and its time.
     """
+    for table, alone in imus(recording):
+        _check_ranges(alone, table)
+
+
+def _check_ranges(recording: Recording, table: str) -> None:
     bounds = imu_bounds(recording.imu_sheet)
     for kind, columns, unit in _TRIADS:
         limit = bounds[kind].range
@@ -348,57 +41,11 @@ def check_ranges(recording: Recording) -> None:
                 raise InputError(
                     f"is beyond the range of its sheet at time_s = {float(recording.imu.index[worst]):.6g} "
                     f"({int((values > SLACK * _TURNED * limit).sum())} such samples)",
-                    field=f"imu.{column}",
+                    field=f"{table}.{column}",
                     value=float(f"{recording.imu[column].iloc[worst]:.6g}"),
                     limit=f"{limit:.6g} {unit}, the range of {bounds[kind].sheet}",
                     remedy="mend the range in its sheet: a device measures no further",
                 )
-
-
-def check_counts(counts: pd.Series, sheet: EncoderSheet, *, where: Callable[[int], str], file: str) -> None:
-    """Refuse single readings of a counter that jump there and back, or at an end: no wheel does.
-
-    Parameters
-    ----------
-    counts : pandas.Series
-        Counts, indexed by ``time_s``; wraps and resets mended.
-    sheet : EncoderSheet
-        Pulses per revolution and radius.
-    where, file
-        As of `check_samples`.
-
-    Raises
-    ------
-    InputError
-        Naming the first such reading.
-    """
-    count, time = counts.to_numpy(dtype=np.float64), counts.index.to_numpy(dtype=np.float64)
-    if len(count) < 3:
-        return
-    before, after = np.diff(count)[:-1], np.diff(count)[1:]
-    # Beyond two counts a reading, and beyond what a train does in the longer of both intervals.
-    most = 2.0 + _JUMP_MPS / sheet.pulse_m * np.maximum(np.diff(time)[:-1], np.diff(time)[1:])
-    back = (before * after < 0.0) & (np.minimum(np.abs(before), np.abs(after)) > most)
-    if abs(before[0]) > most[0] >= abs(after[0]):
-        i, back = 0, np.ones(1, dtype=np.bool_)
-    elif abs(after[-1]) > most[-1] >= abs(before[-1]):
-        i, back = len(count) - 1, np.ones(1, dtype=np.bool_)
-    else:
-        i = int(np.argmax(back)) + 1
-    if back.any():
-        more = f" (and {int(back.sum()) - 1} more such readings)" if back.sum() > 1 else ""
-        raise InputError(
-            f"jumps in {where(i)} (time_s = {time[i]:.6g}){more}; the reading is no count",
-            file=file,
-            field="pulse_count",
-            value=int(count[i]),
-            limit=" and ".join(
-                f"{int(count[k])} {side}"
-                for k, side in ((i - 1, "before"), (i + 1, "after"))
-                if 0 <= k < len(count)
-            ),
-            remedy="drop that line, so that it is a gap; or mend the width of the counter",
-        )
 
 
 LOUD, SILENT = {"gyro": 10.0, "accel": 30.0}, 0.1
@@ -414,6 +61,10 @@ def noise_warnings(recording: Recording) -> tuple[str, ...]:
     The noise of a sample is taken from second differences of the initial rest, x[k-1] - 2 x[k] + x[k+1] over
     sqrt(6): bias and its wandering do not show in them.
     """
+    return tuple(line for table, alone in imus(recording) for line in _noise_warnings(alone, table))
+
+
+def _noise_warnings(recording: Recording, table: str) -> tuple[str, ...]:
     resting, sheet = at_rest_initially(recording), recording.imu_sheet
     if resting < REST_SAMPLES:
         return ()
@@ -433,7 +84,7 @@ def noise_warnings(recording: Recording) -> tuple[str, ...]:
                 else "the samples were smoothed, or the device is another"
             )
             told.append(
-                f"imu.{kind}: noise of {found:.2g} {unit} a sample at rest is {found / stated:.2g} times "
+                f"{table}.{kind}: noise of {found:.2g} {unit} a sample at rest is {found / stated:.2g} times "
                 f"that of {sheet.grade} ({stated:.2g} {unit} at {sheet.rate_hz:g} Hz): {why}"
             )
     return tuple(told)

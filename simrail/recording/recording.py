@@ -397,3 +397,50 @@ def beginning(recording: Recording, *, samples: int) -> Recording:
         if frame is not None
     }
     return replace(recording, **cut)
+
+
+def second_alone(recording: Recording) -> Recording | None:
+    """The ride as the second IMU alone would have recorded it; None where there is none.
+
+    Parameters
+    ----------
+    recording : Recording
+        A ride with two IMUs.
+    """
+    imu, sheet = recording.second_imu, recording.second_imu_sheet
+    if imu is None or sheet is None:
+        return None
+    place = recording.start_position_m - sheet.spacing_m
+    odometry = recording.odometry
+    if odometry is not None:
+        odometry = odometry.assign(position_m=odometry["position_m"] - sheet.spacing_m)
+    return replace(
+        recording,
+        imu=imu,
+        imu_sheet=sheet.imu,
+        mount=sheet.mount,
+        mount_body=sheet.mount_body,
+        mount_position_m=sheet.mount_position_m,
+        start_position_m=place,
+        odometry=odometry,
+        gaps=None,
+        magnetometer=None,
+        magnetometer_sheet=None,
+        rail_displacement=None,
+        rail_sensor_sheet=None,
+        second_imu=None,
+        second_imu_sheet=None,
+    )
+
+
+def imus(recording: Recording) -> tuple[tuple[str, Recording], ...]:
+    """Each IMU of a ride by its table in a ride file, with the ride as it alone would have recorded it.
+
+    Parameters
+    ----------
+    recording : Recording
+        A ride with one IMU or two.
+    """
+    second = second_alone(recording)
+    first = ("imu", recording)
+    return (first,) if second is None else (first, ("second_imu", second))

@@ -13,6 +13,7 @@ from itertools import pairwise
 from textwrap import dedent
 from typing import Any, get_args, get_type_hints
 
+from simrail.core.errors import joined
 from simrail.core.toml_files import Part
 
 _ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : .*)?\n((?:    .*\n|\n)+)", re.MULTILINE)
@@ -39,7 +40,7 @@ def _below_fields(model: type) -> dict[str, str]:
     for field, below in pairwise(getattr(definition, "body", [])):
         is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and is_text:
-            words[field.target.id] = " ".join(str(below.value.value).split())
+            words[field.target.id] = joined(below.value.value)
     return words
 
 
@@ -48,7 +49,7 @@ def _of_section(docstring: str) -> dict[str, str]:
     words = {}
     for names, text in _ENTRY.findall(section + "\n"):
         for name in names.split(", "):
-            words[name] = " ".join(text.split())
+            words[name] = joined(text)
     return words
 
 

@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, joined
 from simrail.core.toml_files import label
 from simrail.recording.files.data_file import TABLES, DataPart, open_data
 
@@ -132,7 +132,7 @@ def _meaning(name: str) -> tuple[str | None, str | None, str | None]:
         return "position", unit, None
     told = _BAND.search(words)
     band = f"D{told[1]}" if told else None
-    words = " ".join(_BAND.sub(" ", words).split())
+    words = joined(_BAND.sub(" ", words))
     for key, pattern in _RAILS:
         for side, letters in _SIDES:
             if re.fullmatch(rf"({pattern}) ({letters})( rail)?|({letters})( rail)? ({pattern})", words):

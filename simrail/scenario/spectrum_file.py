@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from simrail.core.columns import IRREGULARITY
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, joined
 from simrail.core.toml_files import label
 from simrail.track.spectra import OwnSpectrum, Spectrum, TabledPsd
 
@@ -95,7 +95,7 @@ def _rows(path: Path) -> tuple[list[str], list[list[str]]]:
 
 
 def _plain(name: str) -> str:
-    return " ".join(name.casefold().replace("_", " ").split())
+    return joined(name.casefold().replace("_", " "))
 
 
 def _density(name: str, path: Path) -> tuple[str, float]:

@@ -128,6 +128,19 @@ def test_the_truth_in_ned_is_the_same_motion(here: Path) -> None:
     assert call([*order, "--frame", "enu", "--out", "x"]) == BAD_INPUT and not (here / "x").exists()
 
 
+@pytest.mark.long
+def test_a_recording_its_truth_and_its_forces_as_mcap(here: Path) -> None:
+    """One file each, and the recording is the one of the other forms."""
+    pytest.importorskip("mcap.writer")
+    order = ["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal"]
+    assert call([*order, "--format", "mcap", "--truth", "--frame", "ned", "--out", "x"]) == DONE
+    assert call([*order, "--out", "plain"]) == DONE
+    folder = here / "x" / "out_axle_ideal"
+    assert names_in(folder) == {"ride.toml", "track.toml", "ride.mcap", f"{TRUTH_STEM}.mcap"}
+    pd.testing.assert_frame_equal(read_ride(folder).imu, read_ride(here / "plain" / "out_axle_ideal").imu)
+    assert call([*order, "--format", "bag", "--out", "y"]) == BAD_INPUT and not (here / "y").exists()
+
+
 def test_columns_of_the_files_are_those_of_the_vocabulary(here: Path) -> None:
     assert call(["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal", "--out", "x"]) == DONE
     folder = here / "x" / "out_axle_ideal"

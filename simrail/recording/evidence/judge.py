@@ -46,7 +46,7 @@ LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
 
 
-class _Kind(NamedTuple):
+class Kind(NamedTuple):
     """How a parameter is told: name, unit, unit in SI, the sd from which on it is not judged, its source."""
 
     name: str
@@ -59,14 +59,14 @@ class _Kind(NamedTuple):
 _DEG = math.pi / 180.0
 
 KINDS = {
-    "gyro": _Kind("factor of the gyro", "1", 1.0, 0.1, ("turn",)),
-    "wheel": _Kind("factor of the wheel", "1", 1.0, 0.1, ("turn", "push")),
-    "shift": _Kind("shift along the track", "m", 1.0, 15.0, ("turn",)),
-    "yaw": _Kind("yaw of the mounting", "deg", _DEG, 3.0, ("push",)),
-    "pitch": _Kind("pitch of the mounting", "deg", _DEG, 3.0, ()),
-    "roll": _Kind("roll of the mounting", "deg", _DEG, 3.0, ()),
-    "offset": _Kind("offset of the clock", "s", 1.0, 0.3, ("push",)),
-    "drift": _Kind("drift of the clock", "ppm", 1e-6, 500.0, ("push",)),
+    "gyro": Kind("factor of the gyro", "1", 1.0, 0.1, ("turn",)),
+    "wheel": Kind("factor of the wheel", "1", 1.0, 0.1, ("turn", "push")),
+    "shift": Kind("shift along the track", "m", 1.0, 15.0, ("turn",)),
+    "yaw": Kind("yaw of the mounting", "deg", _DEG, 3.0, ("push",)),
+    "pitch": Kind("pitch of the mounting", "deg", _DEG, 3.0, ()),
+    "roll": Kind("roll of the mounting", "deg", _DEG, 3.0, ()),
+    "offset": Kind("offset of the clock", "s", 1.0, 0.3, ("push",)),
+    "drift": Kind("drift of the clock", "ppm", 1e-6, 500.0, ("push",)),
 }
 """What is judged, in the order in which it is told; ``by`` is what it needs, one of them at least."""
 

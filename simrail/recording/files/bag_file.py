@@ -69,15 +69,18 @@ def _mcap_messages(path: Path, topic: str | None, *, first: bool) -> Iterator[Me
     seen: set[str] = set()
     try:
         with path.open("rb") as file:
-            for schema, channel, message in reader.make_reader(file).iter_messages(
-                topics=None if topic is None else [topic]
-            ):
+            opened = reader.make_reader(file)
+            told = opened.get_summary() if first else None
+            topics = {channel.topic for channel in told.channels.values()} if told else set()
+            for schema, channel, message in opened.iter_messages(topics=None if topic is None else [topic]):
                 if first and channel.topic in seen:
                     continue
                 seen.add(channel.topic)
                 if channel.id not in decoders:
                     decoders[channel.id] = _decoder(schema, channel, path)
                 yield channel.topic, int(message.log_time), decoders[channel.id](message.data)
+                if first and seen == topics:
+                    return  # the rest of a long ride holds no new topic
     except InputError:
         raise
     except Exception as error:  # the library has errors of many kinds

@@ -83,20 +83,31 @@ def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
     """Set right what is wrong in the tables of a ride file, in place; returns what was changed."""
     wrong = {finding.key: finding for finding in evidence.wrong if finding.setting}
     changes: list[str] = []
-    if "gyro" in wrong:
-        _multiply(data, "imu.scale.gyro", 1.0 / wrong["gyro"].value, changes)
+    for mark, table in (("", "imu"), ("second_", "second_imu")):
+        if f"{mark}gyro" in wrong:
+            _multiply(data, f"{table}.scale.gyro", 1.0 / wrong[f"{mark}gyro"].value, changes)
+        found = {key: wrong[f"{mark}{key}"].value for key in ANGLES if f"{mark}{key}" in wrong}
+        if found:
+            _turn(data, table, found, changes)
     if "wheel" in wrong:
         _mend_wheel(data, wrong["wheel"], changes)
     if "shift" in wrong:
         _add(data, "start_position_m", wrong["shift"].value, changes)
-    if any(key in wrong for key in ANGLES):
-        _turn(data, wrong, changes)
-    offset = wrong["offset"].value if "offset" in wrong else 0.0
-    if "drift" in wrong:
-        _add(data, wrong["drift"].setting, wrong["drift"].value, changes)
-        offset = evidence.of("offset").value - 1e-6 * wrong["drift"].value * evidence.middle_s
-    if offset:
-        _add(data, evidence.of("offset").setting, offset, changes)
+    if "spacing" in wrong:
+        _set(
+            data, "second_imu.spacing_m", round(wrong["spacing"].value, 2), wrong["spacing"].nominal, changes
+        )
+    for mark in ("", "second_"):
+        offset = wrong[f"{mark}offset"].value if f"{mark}offset" in wrong else 0.0
+        if f"{mark}drift" in wrong:
+            slow = wrong[f"{mark}drift"]
+            _add(data, slow.setting, slow.value, changes)
+            offset = evidence.of(f"{mark}offset").value - 1e-6 * slow.value * evidence.middle_s
+        if offset:
+            _add(data, evidence.of(f"{mark}offset").setting, offset, changes)
+    if "magnetometer_offset" in wrong:
+        found_offset = wrong["magnetometer_offset"]
+        _add(data, found_offset.setting, found_offset.value, changes)
     return changes
 
 
@@ -112,16 +123,16 @@ def _mend_wheel(data: dict[str, Any], wheel: Finding, changes: list[str]) -> Non
         _multiply(data, wheel.setting, wheel.value, changes)
 
 
-def _turn(data: dict[str, Any], wrong: Mapping[str, Finding], changes: list[str]) -> None:
-    """Mounting angles: those that are given, turned on by those that were found."""
-    imu = data["imu"]
+def _turn(data: dict[str, Any], table: str, wrong: Mapping[str, float], changes: list[str]) -> None:
+    """Mounting angles: those that are given, turned on by those that were found, degrees."""
+    imu = data[table]
     given = np.radians([[float(imu.get(f"{key}_deg", 0.0)) for key in ANGLES]])
-    found = np.radians([[wrong[key].value if key in wrong else 0.0 for key in ANGLES]])
+    found = np.radians([[wrong.get(key, 0.0) for key in ANGLES]])
     angles = np.degrees(euler_angles(rotation_matrix(found) @ rotation_matrix(given)))[0]
     for key, angle in zip(ANGLES, angles, strict=True):
         before = float(imu.get(f"{key}_deg", 0.0))
         if abs(angle - before) > 1e-6:
-            _set(data, f"imu.{key}_deg", float(f"{angle:.5g}"), before, changes)
+            _set(data, f"{table}.{key}_deg", float(f"{angle:.5g}"), before, changes)
 
 
 def _table(data: dict[str, Any], setting: str) -> dict[str, Any]:

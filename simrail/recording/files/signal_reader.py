@@ -17,7 +17,7 @@ from simrail.core.jit import FloatArray
 from simrail.core.resample import rate_of
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import label
-from simrail.recording.check_sheet import Bounds, Channel, check_samples
+from simrail.recording.check_samples import Bounds, Channel, check_samples
 from simrail.recording.files.as_mended import as_mended
 from simrail.recording.files.data_file import DataFile, open_data, read_columns
 from simrail.recording.files.signal_part import TEXT_TIMES, SignalPart, VectorPart
@@ -80,7 +80,7 @@ class SignalReader:
         InputError
             If its file, a column or a value is missing or bad, its times do not rise, or its clock is
             another than that of the first signal read; if a sample is none of its device
-            (`simrail.recording.check_sheet`).
+            (`simrail.recording.check_samples`).
         """
         # What is beyond all numbers is judged where samples and stamps are, without a warning beside it.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -16,7 +16,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, joined
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import label
 
@@ -45,11 +45,6 @@ class Table:
     read: Read
 
 
-def joined(error: object) -> str:
-    """What a library says of its error, in one line."""
-    return " ".join(str(error).split())
-
-
 def unreadable(problem: str, path: Path, limit: str) -> InputError:
     """The refusal of a file that its library cannot read, with its size: it is often cut."""
     size = f"{path.stat().st_size} bytes" if path.exists() else "no file"
@@ -62,8 +57,17 @@ def unreadable(problem: str, path: Path, limit: str) -> InputError:
     )
 
 
-def library(name: str, path: Path) -> Any:
-    """A library that reads a kind of file.
+def library(name: str, path: Path, *, instead: str = "export the logger's file as CSV") -> Any:
+    """A library that reads or writes a kind of file.
+
+    Parameters
+    ----------
+    name : str
+        Its module.
+    path : Path
+        The file.
+    instead : str
+        What else can be done without it.
 
     Raises
     ------
@@ -78,7 +82,7 @@ def library(name: str, path: Path) -> Any:
             file=label(path),
             value=path.suffix,
             limit="a kind of file whose library is installed",
-            remedy="pip install 'simrail[loggers]', or export the logger's file as CSV",
+            remedy=f"pip install 'simrail[loggers]', or {instead}",
         ) from None
 
 

@@ -18,10 +18,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, joined
 from simrail.core.jit import FloatArray
 from simrail.core.toml_files import label
-from simrail.recording.files.table_file import joined
 
 COMMENTS = ("#", "%", "//")
 """A line that begins so holds no data; it may hold the names, right above the data."""

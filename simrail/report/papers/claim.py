@@ -24,6 +24,7 @@ from typing import Any, Literal
 
 from jinja2 import Environment, StrictUndefined
 
+from simrail.core.errors import joined
 from simrail.core.toml_files import Part
 from simrail.report.words.ablations import WORDS as ABLATION_WORDS
 from simrail.report.words.sentences import FILTERS
@@ -110,7 +111,7 @@ class Paper(Part):
         """Words of the paper, filled with its own data and with some values."""
         own = {"limit": self.limits, "printed": self.printed, "figures": self.figures, "words": self.words}
         label = {part: role.label for part, role in self.parts.items()}
-        return " ".join(_ENVIRONMENT.from_string(text).render(own, label=label, **values).split())
+        return joined(_ENVIRONMENT.from_string(text).render(own, label=label, **values))
 
 
 def read_paper(name: str) -> Paper:

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from simrail.core.errors import joined
 from simrail.recording.sheets.figures import FIGURES
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.recording.sheets.imu_file import ImuHead
@@ -103,4 +104,4 @@ def print_imu(console: Console, file: ImuHead, grade: ImuGrade) -> None:
     for warning in sheet_warnings(grade):
         console.print(f"warning: {warning}", highlight=False, markup=False, soft_wrap=True)
     for sentence in grade.assumed:
-        console.print(f"assumed: {' '.join(sentence.split())}", highlight=False, markup=False)
+        console.print(f"assumed: {joined(sentence)}", highlight=False, markup=False)

@@ -1,0 +1,177 @@
+"""A second IMU and the clock of a magnetometer: planted faults are found with their size, and alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from simrail.core.columns import MAGNETIC
+from simrail.core.errors import InputError
+from simrail.estimation.choose_odometry import with_odometry
+from simrail.recording.check_physics import check_plausible
+from simrail.recording.check_sheet import check_ranges, noise_warnings
+from simrail.recording.evidence.devices import weigh_all
+from simrail.recording.evidence.judge import weigh
+from simrail.recording.files.mend import mended
+from simrail.recording.recording import Recording, second_alone
+from simrail.recording.sheets.imu_file import load_grade
+from simrail.ride.kinematic import kinematic_truth
+from simrail.ride.truth import Mount
+from simrail.sensors.encoder import EncoderSpec
+from simrail.sensors.magnetometer import MagnetometerSpec, VehicleIron
+from simrail.sensors.measure import measure
+from simrail.sensors.second_imu import SecondImuSpec
+from simrail.track.design import Curve, Straight, TrackDesign, Transition
+from simrail.vehicle.speed_profile import SpeedProfile
+from tests.shared.planted_faults import PLANTS
+
+SPACING = 15.0
+TRACK = TrackDesign(
+    "curves",
+    -50.0,
+    (
+        Straight(100.0),
+        Transition(40.0),
+        Curve(80.0, 1.0 / 3.0e-3, 0.07),
+        Transition(40.0),
+        Straight(60.0),
+        Transition(30.0),
+        Curve(60.0, -1.0 / 2.5e-3, 0.05),
+        Transition(30.0),
+        Straight(120.0),
+    ),
+)
+
+
+def ridden(start_m: float, second: SecondImuSpec | None = None) -> Recording:
+    truth = kinematic_truth(
+        TRACK, SpeedProfile(start_m=start_m, end_m=start_m + 400.0, speed_mps=12.0, rest_s=5.0)
+    )
+    return measure(
+        truth,
+        name="two",
+        mount=Mount("front", "body", (0.0, 0.0, 0.6)),
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("wheel", radius_error_sd=1e-3),
+        magnetometer=MagnetometerSpec(iron=VehicleIron()),
+        second_imu=second,
+        seed=3,
+        draw=0,
+    )
+
+
+@pytest.fixture(scope="module")
+def sound() -> Recording:
+    """Two IMUs of one train on bodies of their own: the second one meets each place of the track later."""
+    spec = SecondImuSpec(
+        Mount("rear", "body", (-SPACING, 0.0, 0.6)), load_grade("lord_3dm_gx4_25"), clock_offset_s=0.01
+    )
+    first, behind = ridden(20.0, spec), ridden(20.0 - SPACING)
+    assert first.second_imu_sheet is not None
+    late = behind.imu.copy()
+    late.index = pd.Index(late.index.to_numpy() + 0.01, name="time_s")
+    sheet = replace(
+        first.second_imu_sheet, mount_body="other", mount_position_m=(0.0, 0.0, 0.6), spacing_m=SPACING
+    )
+    return replace(first, second_imu=late, second_imu_sheet=sheet)
+
+
+def planted(sound: Recording, key: str, size: float) -> Recording:
+    """The fault in the second IMU alone."""
+    second = second_alone(sound)
+    assert second is not None and sound.second_imu_sheet is not None
+    if key == "spacing":
+        return replace(sound, second_imu_sheet=replace(sound.second_imu_sheet, spacing_m=SPACING - size))
+    if key in ("offset", "drift"):
+        time = second.imu.index.to_numpy()
+        time = time - size if key == "offset" else time * (1.0 - 1e-6 * size)
+        return replace(sound, second_imu=second.imu.set_axis(pd.Index(time, name="time_s")))
+    return replace(sound, second_imu=PLANTS[key](second, size).imu)
+
+
+def test_a_sound_ride_is_left_alone_and_what_was_told_before_stays(sound: Recording) -> None:
+    """To the bit: a ride with one IMU is judged as it was, and that of two says the same of the first."""
+    both = weigh_all(sound)
+    assert not both.wrong and [finding.verdict for finding in both.findings[8:]] == ["sound"] * 8
+    assert both.findings[:8] == weigh(sound).findings
+    alone = replace(sound, second_imu=None, second_imu_sheet=None, magnetometer=None, magnetometer_sheet=None)
+    assert weigh_all(alone) == weigh(alone)
+
+
+@pytest.mark.parametrize(
+    ("key", "size", "slack"),
+    [
+        ("pitch", 2.0, 0.3),
+        ("offset", 0.3, 0.05),
+        ("spacing", -30.0, 5.0),
+        pytest.param("gyro", 0.5, 0.02, marks=pytest.mark.long),
+        pytest.param("gyro", 2.0, 0.05, marks=pytest.mark.long),
+        pytest.param("yaw", 5.0, 1.0, marks=pytest.mark.long),
+        pytest.param("roll", -2.0, 0.3, marks=pytest.mark.long),
+        pytest.param("offset", -2.0, 0.1, marks=pytest.mark.long),
+    ],
+)
+def test_a_fault_of_the_second_imu_is_found_with_its_size_and_alone(
+    key: str, size: float, slack: float, sound: Recording
+) -> None:
+    """Tolerances as of the first IMU's tests; and the setting that is named mends it."""
+    evidence = weigh_all(planted(sound, key, size))
+    (found,) = evidence.wrong
+    assert found.key == (key if key == "spacing" else f"second_{key}")
+    assert abs(found.value - (SPACING if key == "spacing" else size)) < slack
+    assert found.setting.startswith("second_imu.")
+    data = {"second_imu": {}, "imu": {}}
+    (line,) = mended(data, evidence)
+    assert line.startswith(found.setting if key != "gyro" else "second_imu.scale.gyro")
+
+
+@pytest.mark.long
+def test_faults_of_the_first_and_of_the_wheel_are_not_put_on_the_second(sound: Recording) -> None:
+    for key, size in (("gyro", 2.0), ("offset", -1.0), ("wheel", 1.05)):
+        evidence = weigh_all(PLANTS[key](sound, size))
+        assert [finding.key for finding in evidence.wrong] == [key]
+
+
+def test_the_form_of_the_second_imu_is_judged_as_the_first_ones(sound: Recording) -> None:
+    assert sound.second_imu is not None and sound.second_imu_sheet is not None
+    ride = with_odometry(sound, "encoder")
+    check_plausible(ride)
+    grams = sound.second_imu.copy()
+    grams.iloc[:, 3:] /= 9.80665
+    with pytest.raises(InputError, match=r"second_imu.accel: is not as large as gravity.*look like g"):
+        check_plausible(replace(ride, second_imu=grams))
+    down = sound.second_imu * [1.0, -1.0, -1.0, 1.0, -1.0, -1.0]
+    with pytest.raises(InputError, match=r"second_imu.accel: points down"):
+        check_plausible(replace(ride, second_imu=down))
+    narrow = replace(sound.second_imu_sheet.imu, gyro_range_radps=1e-3)
+    with pytest.raises(InputError, match=r"second_imu.gyro_.*beyond the range of its sheet"):
+        check_ranges(replace(sound, second_imu_sheet=replace(sound.second_imu_sheet, imu=narrow)))
+    own = sound.second_imu_sheet.imu
+    loud = replace(own, gyro_noise_radpsqrts=20.0 * own.gyro_noise_radpsqrts)
+    told = noise_warnings(replace(sound, second_imu_sheet=replace(sound.second_imu_sheet, imu=loud)))
+    assert len(told) == 1 and told[0].startswith("second_imu.gyro: noise")
+
+
+@pytest.mark.parametrize("size", [0.3, -2.0])
+def test_a_magnetometer_whose_clock_is_off_is_told_by_the_gyro(size: float, sound: Recording) -> None:
+    """Without map and way as well, and beside iron of the vehicle; the tolerance is three sds."""
+    assert sound.magnetometer is not None
+    time = sound.imu.index.to_numpy()
+    late = {name: np.interp(time + size, time, sound.magnetometer[name]) for name in MAGNETIC}
+    ride = replace(sound, magnetometer=pd.DataFrame(late, index=sound.imu.index))
+    for one in (ride, replace(ride, encoder=None, encoder_sheet=None)):
+        evidence = weigh_all(one)
+        (found,) = evidence.wrong
+        assert found.key == "magnetometer_offset" and found.value == pytest.approx(size, abs=0.04)
+        assert found.sd < 0.02 and found.setting == "magnetometer.time_offset_s"
+
+
+def test_on_the_straight_a_magnetometer_tells_nothing_of_its_clock(sound: Recording) -> None:
+    quiet = sound.imu * [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+    assert sound.magnetometer is not None
+    still = sound.magnetometer - sound.magnetometer + sound.magnetometer.iloc[0]
+    found = weigh_all(replace(sound, imu=quiet, magnetometer=still)).of("magnetometer_offset")
+    assert found.verdict == "could not be judged" and not found.wrong
