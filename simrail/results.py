@@ -13,7 +13,7 @@ import shlex
 import shutil
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -168,7 +168,10 @@ def run(
             manifest["beside"] = {name: other.manifest.get(name) for name in names}
             manifest["command"] += f" --beside {shlex.quote(label(other.folder))}"
         with draft_of(folder) as draft:
-            _write(draft, scenario, campaign, manifest, begun=begun, beside=other, budgets=budgets)
+            told = None if watcher is None else watcher.works
+            _write(
+                draft, scenario, campaign, manifest, begun=begun, beside=other, budgets=budgets, progress=told
+            )
             shutil.copyfile(checkpoint.folder / LOG, draft / LOG)
         checkpoint.remove()
     return Results(folder, scenario, campaign, manifest, budgets)
@@ -215,7 +218,8 @@ def run_cell(
         manifest["started_utc"] = started.isoformat(timespec="seconds")
         manifest["command"] += f" --cell {cell}"
         with draft_of(Path(out)) as draft:
-            _write(draft, read, campaign, manifest, begun=begun)
+            told = None if watcher is None else watcher.works
+            _write(draft, read, campaign, manifest, begun=begun, progress=told)
     return campaign
 
 
@@ -249,6 +253,7 @@ def _write(
     begun: float,
     beside: StoredResults | None = None,
     budgets: pd.DataFrame | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> None:
     """Write the results of a campaign into a folder."""
     campaign.scores.to_parquet(draft / "scores.parquet", index=False)
@@ -269,6 +274,7 @@ def _write(
         manifest=manifest,
         beside=beside,
         budgets=budgets,
+        progress=progress,
     )
     ended = time.perf_counter()
     manifest["wall_s"] |= {"report": ended - drawing, "total": ended - begun}

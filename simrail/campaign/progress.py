@@ -75,7 +75,7 @@ class ProgressWatcher(Watcher):
         self._by_worker: dict[str, int] = {}
         self._searches: dict[str, TaskID] = {}
         self._expected: dict[str, tuple[float, int]] = {}
-        self._work: tuple[str, float, TaskID | None] | None = None
+        self._work: tuple[str, float, TaskID] | None = None
 
     def __enter__(self) -> Self:
         self._progress.__enter__()
@@ -84,6 +84,7 @@ class ProgressWatcher(Watcher):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._end_work()
         self._progress.__exit__(kind, error, trace)
 
     def judging(self, done: int, count: int) -> None:
@@ -198,21 +199,20 @@ class ProgressWatcher(Watcher):
         now = time.perf_counter()
         if self._work is None or self._work[0] != what:
             self._end_work()
-            self._work, self._said = (what, now, None), now - _EVERY_S
-        what, begun, task = self._work
-        if share is None or now < begun + SILENT_S:
+            # On a terminal it is seen at once, and goes when it is done; on a plain stream after a while.
+            self._work = what, now, self._progress.add_task(what, total=None, note="")
+        _, begun, task = self._work
+        if share is None:
             return
         note = f"{100.0 * share:.0f} %"
-        if task is None:
-            task = self._progress.add_task(what, total=1.0, note="")
-            self._work = what, begun, task
-        self._progress.update(task, completed=share, note=note)
-        if not self._console.is_terminal and now > self._said + _EVERY_S:
+        self._progress.update(task, total=1.0, completed=share, note=note)
+        is_due = now > begun + SILENT_S and now > self._said + _EVERY_S
+        if not self._console.is_terminal and is_due:
             self._said = now
             self._console.print(f"{what}: {note}", highlight=False, markup=False)
 
     def _end_work(self) -> None:
         """What was worked at is done: its line goes."""
-        if self._work is not None and self._work[2] is not None:
+        if self._work is not None:
             self._progress.remove_task(self._work[2])
         self._work = None

@@ -62,6 +62,7 @@ def estimate(
     """Run estimators on a recorded ride, of a real train or exported: states, rails, a page."""
     from rich.console import Console
 
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.estimate_ride import DEFAULT, chosen_methods, estimate_ride, ride_with_warnings
     from simrail.core.toml_files import blame, label
     from simrail.recording.check_field import field_warnings
@@ -95,7 +96,10 @@ def estimate(
         methods = chosen_methods(whole.spec.estimator, named, settings or [], file.parent)
     name = "_".join(method.name for method in methods[:3]) + "_and_more" * (len(methods) > 3)
     folder = out or Path("results") / f"{_stem(ride)}_{name}"
-    found, files = estimate_ride(whole, methods, folder, file=label(file), format=chosen, units=wanted)
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        found, files = estimate_ride(
+            whole, methods, folder, file=label(file), format=chosen, units=wanted, watcher=watcher
+        )
     for warning in (*noise_warnings(whole.recording), *field_warnings(whole.recording)):
         print(f"warning: {warning}", file=sys.stderr)
     console = Console(highlight=False)

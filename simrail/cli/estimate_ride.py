@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from simrail.campaign.progress import Watcher
 from simrail.cli.options import say
 from simrail.core.atomic_files import draft_of
 from simrail.core.columns import ODOMETRY
@@ -195,6 +196,7 @@ def estimate_ride(
     file: str,
     format: Format = "csv",
     units: Collection[str] = (),
+    watcher: Watcher | None = None,
 ) -> tuple[RideEstimates, list[Path]]:
     """Run methods on a ride, and write what they found.
 
@@ -213,6 +215,8 @@ def estimate_ride(
         ``"csv"`` or ``"parquet"``.
     units : collection of str
         ``"deg"``, ``"mm"``: units of the tables beside SI.
+    watcher : Watcher, optional
+        Is told of the progress.
 
     Returns
     -------
@@ -236,7 +240,11 @@ def estimate_ride(
         )
     for method in methods:
         judge_needs(method, whole.recording, file)
-    results = [_run(method, whole) for method in methods]
+    results, watcher = [], watcher or Watcher()
+    for done, method in enumerate(methods):
+        watcher.works("estimate", done / (len(methods) + 1))
+        results.append(_run(method, whole))
+    watcher.works("estimate", len(methods) / (len(methods) + 1))
     limits = whole.spec.limits.limits()
     scores = None
     if whole.reference is not None:
@@ -271,7 +279,7 @@ def _run(method: Method, whole: RecordedRide) -> MethodResult:
     """One method on the ride."""
     recording, begun = whole.recording, time.perf_counter()
     estimate = method.estimator.estimate(recording)
-    us_per_sample = 1e6 * (time.perf_counter() - begun) / len(recording.imu)
+    seconds = time.perf_counter() - begun
     if not len(estimate.states.columns):
         raise InputError(
             "concludes nothing",
@@ -290,7 +298,7 @@ def _run(method: Method, whole: RecordedRide) -> MethodResult:
     told = description_of(method.estimator)
     shown = repr(method.estimator)
     return MethodResult(
-        method.name, told.label, shown, recording, estimate, tuple(lines), us_per_sample, told.cites
+        method.name, told.label, shown, recording, estimate, tuple(lines), seconds, told.cites
     )
 
 

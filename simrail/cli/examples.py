@@ -5,8 +5,15 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "check": ("simrail check go20a", "simrail check my_ride.toml"),
     "grade": ("simrail grade consumer --for 'roll<0.5deg'", "simrail grade all --for 'alignment D1<0.5mm'"),
     "export": ("simrail export quick_kinematic --out recordings",),
-    "estimate": ("simrail estimate my_ride.toml", "simrail estimate my_ride.toml --estimator AttitudeEkf"),
-    "tune": ("simrail tune scale_track --estimator TrajectorySmoother --method cml",),
+    "estimate": (
+        "simrail estimate my_ride.toml",
+        "simrail estimate my_ride.toml --estimator TrackRelativeSmoother --estimator AttitudeEkf",
+        "simrail estimate my_ride.toml --units deg,mm",
+    ),
+    "tune": (
+        "simrail tune my_ride.toml",
+        "simrail tune scale_track --estimator TrajectorySmoother --method cml",
+    ),
     "sensitivity": ("simrail sensitivity sensitivity",),
     "spectra": ("simrail spectra shaking",),
     "vehicle": ("simrail vehicle metro_irw_bogie", "simrail vehicle my_vehicle.toml --out page"),
@@ -14,10 +21,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "figure": ("simrail figure results/go20a", "simrail figure results/go20a answer --out answer.pdf"),
     "film": ("simrail film go20a --from 380 --to 600", "simrail film go20a --gif ride.gif"),
     "lesson": ("simrail lesson", "simrail lesson drift"),
-    "new": ("simrail new scenario --out my_scenario.toml", "simrail new imu --out my_imu.toml"),
+    "new": ("simrail new scenario my_scenario", "simrail new imu my_imu", "simrail new ride my_ride"),
     "schema": ("simrail schema scenario", "simrail schema vehicle --out vehicle.schema.json"),
     "cache": ("simrail cache", "simrail cache --clear"),
-    "list": ("simrail list", "simrail list vehicles"),
+    "list": ("simrail list", "simrail list vehicles", "simrail list estimators --bibtex"),
     "open": ("simrail open", "simrail open results/go20a"),
 }
 """By the name of the command."""

@@ -164,6 +164,7 @@ def vehicle(
     """Show a vehicle: masses, wheel loads, natural frequencies, conicity and critical speed."""
     from rich.console import Console
 
+    from simrail.campaign.progress import ProgressWatcher
     from simrail.core.toml_files import blame, find, judge, label, read_toml
     from simrail.report.tables.vehicle_text import print_study
     from simrail.vehicle.file import VehicleFile
@@ -172,19 +173,18 @@ def vehicle(
     judge_out(out)
     path = find("vehicle", name)
     model = judge(VehicleFile, read_toml(path), file=label(path)).model(path.stem)
-    console = Console(stderr=True)
-    with console.status("") as status, blame(label(path), "vehicle"):
-        study = study_vehicle(
-            model,
-            running_mps=speed / 3.6,
-            top_mps=top / 3.6,
-            progress=lambda what, share: status.update(f"{what} {100 * share:.0f} %"),
-        )
-    print_study(Console(), study)
-    if out is not None:
-        from simrail.report.pages.vehicle_page import write_vehicle_page
+    page = None
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        with blame(label(path), "vehicle"):
+            study = study_vehicle(model, running_mps=speed / 3.6, top_mps=top / 3.6, progress=watcher.works)
+        if out is not None:
+            from simrail.report.pages.vehicle_page import write_vehicle_page
 
-        print(f"wrote {write_vehicle_page(out, study)}")
+            watcher.works("page")
+            page = write_vehicle_page(out, study)
+    print_study(Console(), study)
+    if page is not None:
+        print(f"wrote {page}")
     return DONE
 
 

@@ -110,7 +110,7 @@ def test_the_truth_in_ned_is_the_same_motion(here: Path) -> None:
     order = ["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal", "--truth"]
     assert call([*order, "--out", "flu"]) == DONE and call([*order, "--frame", "ned", "--out", "ned"]) == DONE
     own, ned = (
-        pd.read_csv(here / axes / "out_axle_ideal" / "truth_not_part_of_the_recording.csv")
+        pd.read_csv(here / axes / "out_axle_ideal" / "truth_not_part_of_the_recording.csv", comment="#")
         for axes in ("flu", "ned")
     )
     half_turn = np.diag([1.0, -1.0, -1.0])
@@ -145,7 +145,8 @@ def test_columns_of_the_files_are_those_of_the_vocabulary(here: Path) -> None:
     assert call(["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal", "--out", "x"]) == DONE
     folder = here / "x" / "out_axle_ideal"
     for name, columns in (("imu", IMU), ("encoder", ENCODER), ("odometry", ODOMETRY + ODOMETRY_SD)):
-        header = (folder / f"{name}.csv").read_text().split("\n", 1)[0]
+        *legend, header, _ = (folder / f"{name}.csv").read_text().split("\n", 4)
+        assert all(line.startswith("# ") for line in legend)
         assert header == ",".join(("time_s", *columns))
 
 
@@ -153,7 +154,7 @@ def test_truth_stands_beside_the_recording_and_is_no_part_of_it(here: Path) -> N
     settings = [*SETTINGS, "--set", "imu.grade=lord_3dm_gx4_25"]
     assert call(["export", "quick_kinematic", *settings, "--truth", "--out", "x"]) == DONE
     folder = here / "x" / "out_axle_lord_3dm_gx4_25"
-    truth = pd.read_csv(folder / f"{TRUTH_STEM}.csv", index_col="time_s")
+    truth = pd.read_csv(folder / f"{TRUTH_STEM}.csv", index_col="time_s", comment="#")
     assert list(truth.columns) == list(MOTION)
     recording = read_ride(folder)
     np.testing.assert_array_equal(truth.index, recording.imu.index)
@@ -207,7 +208,7 @@ def test_estimate_of_a_train_that_stands(here: Path) -> None:
     frame.to_csv("mine.csv", index=False)
     assert call(["estimate", "mine.toml", "--estimator", "Vqf"]) == DONE
     assert names_in(here / "results" / "mine_Vqf") == {"estimate.csv", "estimate.html"}
-    table = pd.read_csv(here / "results" / "mine_Vqf" / "estimate.csv")
+    table = pd.read_csv(here / "results" / "mine_Vqf" / "estimate.csv", comment="#")
     assert (table["speed_mps"] == 0.0).all()
 
 
@@ -281,7 +282,7 @@ def test_forces_are_written_for_each_wheel(here: Path, form: str, capsys: pytest
     assert names_in(folder) == {f"{wheel}.{form}" for wheel in truth.wheel_names}
     for wheel in truth.wheel_names:
         file = folder / f"{wheel}.{form}"
-        frame = pd.read_csv(file) if form == "csv" else pd.read_parquet(file)
+        frame = pd.read_csv(file, comment="#") if form == "csv" else pd.read_parquet(file)
         frame = frame.set_index("time_s") if "time_s" in frame.columns else frame
         assert list(frame.columns) == list(CONTACT)
         np.testing.assert_array_equal(frame.to_numpy(), truth.contact(wheel).to_numpy())

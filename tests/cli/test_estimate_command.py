@@ -1,4 +1,4 @@
-"""``simrail estimate`` on a recorded ride that has an IMU and nothing else."""
+"""``simrail estimate`` on recorded rides: an IMU and nothing else, several methods, limits, a reference."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from simrail.recording.recording import Recording
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.truth import Mount
+from simrail.sensors.encoder import EncoderSpec
 from simrail.sensors.measure import measure
 from simrail.track.file import track_by_name
 from simrail.vehicle.speed_profile import SpeedProfile
@@ -50,7 +51,7 @@ def estimate(folder: Path, recording: Recording, *settings: str) -> int:
 def test_an_imu_alone_gives_speed_and_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert estimate(tmp_path, imu_alone(), "smoothed=true") == DONE
     assert "position and speed from the odometry 'ZeroVelocityOdometry'" in capsys.readouterr().out
-    states = pd.read_csv(tmp_path / "out" / "estimate.csv", index_col="time_s")
+    states = pd.read_csv(tmp_path / "out" / "estimate.csv", index_col="time_s", comment="#")
     assert list(states) == [*ODOMETRY, *ODOMETRY_SD, STANDSTILL]
     last = states.iloc[-1]
     assert last["position_m"] == pytest.approx(END_M, abs=4.0 * last["position_sd_m"])
@@ -72,3 +73,87 @@ def test_a_recording_that_begins_on_the_way_is_refused(
     text = capsys.readouterr().err
     assert "does not begin at rest" in text and "begin the recording while the train stands" in text
     assert not (tmp_path / "out").exists()
+
+
+METHODS = """
+[[estimator]]
+name = "quick"
+method = "ComplementaryFilter"
+[[estimator]]
+method = "DesignAngles"
+[reference]
+file = "level.csv"
+source = "a spirit level"
+sd = { roll = "0.05 deg" }
+"""
+
+
+@pytest.fixture(scope="module")
+def with_reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ride with an encoder, two methods in its file, and a level that was read every second."""
+    folder = tmp_path_factory.mktemp("reference")
+    profile = SpeedProfile(
+        300.0, END_M, 12.0, acceleration_mps2=1.0, jerk_mps3=1.0, rest_s=4.0, final_rest_s=2.0
+    )
+    truth = kinematic_truth(track_by_name("condequinto_olivar"), profile)
+    recording = measure(
+        truth,
+        name="levelled",
+        mount=Mount("floor", "body", (0.0, 0.0, 1.1)),
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec(truth.wheel_names[0], radius="calibrated"),
+        seed=1,
+        draw=0,
+    )
+    write_ride(recording, folder / "ride")
+    moved = truth.motion(Mount("floor", "body", (0.0, 0.0, 1.1)))
+    every = slice(None, None, round(len(moved) / (moved.index[-1] - moved.index[0])))
+    moved[["roll_rad", "position_m"]].iloc[every].to_csv(folder / "ride" / "level.csv")
+    text = (folder / "ride" / "ride.toml").read_text()
+    head, brackets, rest = text.partition("[")
+    (folder / "ride" / "ride.toml").write_text(head + METHODS + brackets + rest)
+    return folder / "ride"
+
+
+def test_methods_of_the_file_stand_side_by_side_and_beside_the_reference(
+    with_reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["estimate", str(with_reference), "--out", str(out), "--units", "deg,mm"]
+    assert call(command) == DONE
+    said = capsys.readouterr().out
+    assert "less quick" in said and "beside the reference" in said and "DesignAngles: roll, deg" in said
+    written = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert {"quick/estimate.csv", "DesignAngles/estimate.csv", "differences.csv", "scores.csv"} <= written
+    assert all(name in said for name in written), "every file that was written is named"
+    scores = pd.read_csv(out / "scores.csv", comment="#")
+    assert set(scores["reference"]) == {"reference"} and set(scores["estimator"]) == {"quick", "DesignAngles"}
+    table = pd.read_csv(out / "DesignAngles" / "estimate.csv", comment="#")
+    assert "roll_deg" in table and "position_m" in table
+    # The level is the truth itself: rails as designed err by what the body sways, and by no more.
+    whole = scores[(scores["window"] == "whole") & (scores["metric"] == "rms")]
+    rms = whole.set_index(["estimator", "quantity"])["value"]
+    assert 0.0 < rms["DesignAngles", "roll"] < 1.0 and rms["DesignAngles", "roll"] != rms["quick", "roll"]
+    page = (out / "estimate.html").read_text(encoding="utf-8")
+    assert "Beside the reference" in page and "a spirit level" in page
+    for words in (said, page.partition("<script")[0]):
+        assert "truth" not in words.replace("no truth", "")
+
+
+def test_one_of_the_file_is_chosen_by_its_name_and_options_say_whose_they_are(
+    with_reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["estimate", str(with_reference), "--out", str(tmp_path / "out")]
+    assert call([*command, "--estimator", "quick", "--set", "time_constant_s=2.5"]) == DONE
+    assert "time_constant_s=2.5" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+    assert not (tmp_path / "out" / "differences.csv").exists()
+    capsys.readouterr()
+    for more, words in (
+        (["--set", "time_constant_s=2.5"], ["whose option", "quick.time_constant_s"]),
+        (["--estimator", "quick", "--estimator", "quick"], ["named twice"]),
+        (["--estimator", "quick", "--set", "no=1"], ["no such option"]),
+        (["--units", "inch"], ["--units", "deg, mm"]),
+    ):
+        assert call([*command, *more]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert all(word in said for word in words) and len(said.splitlines()) == 1, said

@@ -60,7 +60,7 @@ def test_rails_of_both_ways_are_fused(
     assert call(["estimate", *rides, "--fuse", "--out", str(out)]) == DONE
     text = capsys.readouterr().out
     assert "2 passes over" in text and text.count("moved by") == 2 and "cross level: sd" in text
-    geometry = pd.read_csv(out / "geometry.csv")
+    geometry = pd.read_csv(out / "geometry.csv", comment="#")
     assert list(geometry) == ["position_m", *IRREGULARITY, *IRREGULARITY_SD]
     assert len(geometry) > 600 and geometry["cross_level_sd_m"].gt(0.0).all()
     passes = pd.read_csv(out / "passes.csv")

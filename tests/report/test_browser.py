@@ -14,9 +14,11 @@ import pandas as pd
 import pytest
 
 from simrail.campaign.cell import CellResult
-from simrail.report.pages.estimate_page import write_estimate_page
+from simrail.report.pages.estimate_page import RideEstimates, write_estimate_page
 from simrail.report.pages.page import write_report
+from simrail.report.tables.recorded import MethodResult
 from simrail.scenario.scenario import Scenario, read_scenario
+from simrail.track.rail_limits import EXAMPLE_LIMITS
 
 Rides = Callable[..., CellResult]
 Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
@@ -150,12 +152,16 @@ def test_an_estimate_is_explored(opened: Callable[..., Any], tmp_path: Path, exa
     ride = example()
     path = tmp_path / "estimate.html"
     estimate = ride.estimates["ekf_compensated"]
-    write_estimate_page(
-        path, ride.recording, estimate, label="EKF", method="AttitudeEkf()", us_per_sample=0.2
-    )
+    result = MethodResult("EKF", "EKF", "AttitudeEkf()", ride.recording, estimate, (), 0.2, ("briales_2021",))
+    write_estimate_page(path, RideEstimates(ride.recording, (result,), EXAMPLE_LIMITS))
     page = opened(path)
     before = picture(page)
     page.locator('button[data-series="design"]').click()
     assert picture(page) != before
     drag(page, 0.2, 0.4)
     assert len(set(zooms(page))) == 1 and zooms(page)[0][1] < 300.0
+    page.locator("details.bibtex summary").first.click()
+    page.get_by_role("button", name="copy").first.click()
+    selected = page.evaluate("getSelection().toString()")
+    copied = page.locator("details.bibtex button").first.inner_text()
+    assert copied == "copied" or "@article{briales_2021," in selected

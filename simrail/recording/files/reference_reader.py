@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import IRREGULARITY
 from simrail.core.errors import InputError
 from simrail.core.toml_files import label
 from simrail.recording.files.asked import RailReferencePart, ReferencePart, RideReference
+from simrail.recording.files.data_file import open_data
 from simrail.recording.files.ride_file import RideFile
 from simrail.recording.files.signal_reader import SignalReader
 from simrail.track.bands import SAMPLES_PER_WAVE
@@ -55,8 +55,8 @@ def read_reference(spec: RideFile, reader: SignalReader, imu: pd.DataFrame) -> R
 
 
 def _motion(part: ReferencePart, reader: SignalReader, imu: pd.DataFrame) -> pd.DataFrame:
+    _refuse_empty(part, "reference", reader.folder)
     frame = reader.frame(part, "reference")
-    _refuse_empty(frame, part, "reference", reader.folder)
     within = frame[(frame.index >= imu.index[0]) & (frame.index <= imu.index[-1])]
     if not len(within):
         raise InputError(
@@ -70,8 +70,8 @@ def _motion(part: ReferencePart, reader: SignalReader, imu: pd.DataFrame) -> pd.
 
 
 def _rails(part: RailReferencePart, reader: SignalReader) -> pd.DataFrame:
+    _refuse_empty(part, "rail_reference", reader.folder)
     frame = reader.frame(part, "rail_reference").sort_values("position_m").set_index("position_m")
-    _refuse_empty(frame, part, "rail_reference", reader.folder)
     step = np.diff(frame.index.to_numpy())
     if len(step) == 0 or not (step > 0.0).all():
         place = float(frame.index[int(np.argmin(step))]) if len(step) else float(frame.index[0])
@@ -91,19 +91,17 @@ def _rails(part: RailReferencePart, reader: SignalReader) -> pd.DataFrame:
     return frame
 
 
-def _refuse_empty(
-    frame: pd.DataFrame, part: ReferencePart | RailReferencePart, table: str, folder: Path
-) -> None:
-    """Refuse a reference without any quantity that can be compared with."""
-    names = [quantity.key for quantity in part.signal.quantities]
-    if table == "rail_reference":
-        names = [name.removesuffix("_m") for name in IRREGULARITY]
-    if not len(frame.columns) or not np.isfinite(frame.to_numpy(dtype=np.float64)).any():
+def _refuse_empty(part: ReferencePart | RailReferencePart, table: str, folder: Path) -> None:
+    """Refuse a reference whose file has no column of any quantity that can be compared with."""
+    quantities = {q.key: q.columns[0] for q in part.signal.quantities if not q.required}
+    names = open_data(part, folder, table=table).names
+    if not any(key in part.columns or column in names for key, column in quantities.items()):
+        key = next(iter(quantities))
         raise InputError(
             "has nothing to compare with",
             file=label(folder / part.file),
             field=f"{table}.columns",
             value=list(part.columns) or None,
-            limit="a column for one of " + ", ".join(names),
-            remedy=f'name it, e.g. [{table}.columns] {names[0]} = "its name in the file"',
+            limit="a column for one of " + ", ".join(quantities),
+            remedy=f'name it, e.g. columns = {{ {key} = "its name in the file" }}',
         )

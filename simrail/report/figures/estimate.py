@@ -217,7 +217,8 @@ def _rails(
         limit = limits.peaks.get((quantity, band))
         if limit is not None:
             series += [line("limit", bins, np.full(len(place), sign * 1e3 * limit)) for sign in (1.0, -1.0)]
-        yield Panel(rail_group(quantity, band), QUANTITIES[quantity], "mm", RAILS, tuple(series))
+        words = QUANTITIES[quantity] if band == UNFILTERED else f"{QUANTITIES[quantity]} in {band}"
+        yield Panel(rail_group(quantity, band), words, "mm", RAILS, tuple(series))
 
 
 def rail_group(quantity: str, band: str) -> str:

@@ -191,7 +191,7 @@ def _tiles(found: RideEstimates) -> list[tuple[str, str, str]]:
     for word, difference in design_differences(result).items():
         note = "rms; not an error: there is no truth"
         tiles.append((f"{word} less design", f"{difference:.3f}\u00b0", note))
-    tiles.append(("time", f"{result.us_per_sample:.2f} \u00b5s", "per sample"))
+    tiles.append(("time", f"{result.seconds:.1f} s", "with what had to be compiled"))
     if len(found.results) == 1:
         return tiles
     return [tiles[0], *((f"{title}, {result.name}", value, note) for title, value, note in tiles[1:])]

@@ -84,6 +84,7 @@ def write_report(
     manifest: Mapping[str, Any],
     beside: StoredResults | None = None,
     budgets: pd.DataFrame | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> None:
     """Write the report of a campaign; where it has axes, its tables into a folder beside it as well.
 
@@ -93,9 +94,11 @@ def write_report(
         The HTML file.
     scenario, scores, cells, examples, manifest, beside, budgets
         The campaign, see `PageData`.
+    progress : callable, optional
+        Is told what is made, and which share of it is done.
     """
     data = PageData(scenario, scores, cells, examples, manifest, beside, budgets)
-    sections = sections_of(data)
+    sections = sections_of(data, progress)
     spec = scenario.spec.monte_carlo
     text = page_text(
         "pages/page.html.j2",
@@ -119,9 +122,14 @@ def write_report(
             section.write_beside(path.parent)
 
 
-def sections_of(data: PageData) -> list[Section]:
+def sections_of(data: PageData, progress: Callable[[str, float], None] | None = None) -> list[Section]:
     """All sections of a page, in its order."""
-    return [section for make in in_order(data) for section in make(data)]
+    sections, makers = [], in_order(data)
+    for done, make in enumerate(makers):
+        if progress is not None:
+            progress("page", done / len(makers))
+        sections += make(data)
+    return sections
 
 
 def _section(name: str, title: str, *, folded: bool = False, **data: Any) -> Section:

@@ -56,8 +56,8 @@ class MethodResult:
         What it concluded.
     lines : tuple of RailLine
         Its rails in bands.
-    us_per_sample : float
-        Time that it took.
+    seconds : float
+        Time that it took, with what had to be compiled.
     cites : tuple of str
         Where its equations come from.
     """
@@ -68,7 +68,7 @@ class MethodResult:
     recording: Recording
     estimate: Estimate
     lines: tuple[RailLine, ...]
-    us_per_sample: float
+    seconds: float
     cites: tuple[str, ...] = ()
 
 
@@ -329,9 +329,9 @@ def beside_each_other(results: Sequence[MethodResult]) -> TextTable:
             )
             cells.append(f"{value:.{decimals}f}" if math.isfinite(value) else "no sd" if known else "\u2013")
         has_rails = "yes" if result.lines else "\u2013"
-        rows.append((f"{result.name} ({result.label})", *cells, has_rails, f"{result.us_per_sample:.2f}"))
+        rows.append((f"{result.name} ({result.label})", *cells, has_rails, f"{result.seconds:.1f}"))
     heads = ("method, its own sd", "roll, \u00b0", "pitch, \u00b0", "yaw, \u00b0", "position, m", "rails")
-    return TextTable((*heads, "\u00b5s per sample"), tuple(rows))
+    return TextTable((*heads, "time, s"), tuple(rows))
 
 
 OPEN_WORDS = (

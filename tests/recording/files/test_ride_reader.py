@@ -175,7 +175,7 @@ def test_clocks_of_loggers(motion, truth, tmp_path, unit):
     start = float(motion["position_m"].iloc[0])
     sampled = motion.iloc[::10][list(IMU)]
     write_encoder(truth, tmp_path)
-    encoder = pd.read_csv(tmp_path / "encoder.csv")
+    encoder = pd.read_csv(tmp_path / "encoder.csv", comment="#")
     zero = pd.Timestamp("2024-05-31T12:00:00Z")
 
     def clock(seconds: pd.Series) -> pd.Series:

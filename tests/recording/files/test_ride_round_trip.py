@@ -102,12 +102,12 @@ def test_a_ride_in_frd_reads_as_it_was(recording, tmp_path, format):
     write_ride(recording, tmp_path / "ride", format=format, axes="ned")
     assert_same(recording, read_ride(tmp_path / "ride"))
     if format == "csv":
-        imu = pd.read_csv(tmp_path / "ride" / "imu.csv")
+        imu = pd.read_csv(tmp_path / "ride" / "imu.csv", comment="#")
         assert list(imu)[:4] == ["time_s", "gyro_x_frd_radps", "gyro_y_frd_radps", "gyro_z_frd_radps"]
         np.testing.assert_array_equal(imu["accel_z_frd_mps2"], -recording.imu["accel_z_mps2"])
         np.testing.assert_array_equal(imu["accel_x_frd_mps2"], recording.imu["accel_x_mps2"])
         assert imu["accel_z_frd_mps2"].iloc[0] == pytest.approx(-9.81, abs=0.1)  # at rest, up is minus
-        rails = pd.read_csv(tmp_path / "ride" / "rail_displacement.csv")
+        rails = pd.read_csv(tmp_path / "ride" / "rail_displacement.csv", comment="#")
         assert rails["rail_left_y_frd_m"].mean() < 0.0 < rails["rail_right_y_frd_m"].mean()
 
 

@@ -1,0 +1,120 @@
+"""``simrail tune my_ride.toml``: by the likelihood of recorded rides, into a file that estimate takes."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from simrail.cli.main import BAD_INPUT, DONE, call
+from simrail.cli.templates import ride_template
+from simrail.core.toml_files import read_toml
+
+OWN = '''
+from dataclasses import dataclass
+
+import pandas as pd
+
+from simrail.estimation.estimate import Estimate
+from simrail.estimation.tunable import Parameter, TunedValues
+
+
+@dataclass(frozen=True)
+class Bowl:
+    """Least where the logarithms of a and b are those of 0.02 and 0.3."""
+
+    rides: int
+    unit = "negative log-likelihood"
+
+    def value(self, values):
+        from math import log
+
+        return self.rides + log(values["a"] / 0.02) ** 2 + log(values["b"] / 0.3) ** 2
+
+
+@dataclass(frozen=True)
+class Mine:
+    tuning: TunedValues = TunedValues({"a": 1.0, "b": 1.0})
+    causal = True
+
+    def estimate(self, recording):
+        states = pd.DataFrame({"roll_rad": self.tuning.values["a"]}, index=recording.imu.index)
+        return Estimate(states=states, mount=recording.mount)
+
+    def parameters(self):
+        return [Parameter(name, "1", 1e-4, 1e4, 1.0) for name in "ab"]
+
+    def likelihood(self, recordings):
+        return Bowl(len(recordings))
+'''
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    text, data = ride_template("mine")
+    lines = [line for line in text.splitlines() if not line.startswith(("track", "start_position_m"))]
+    (tmp_path / "mine.toml").write_text("\n".join(lines), encoding="utf-8")
+    (tmp_path / "mine.csv").write_text(data, encoding="utf-8")
+    (tmp_path / "own.py").write_text(OWN)
+    return tmp_path
+
+
+def test_what_is_found_is_taken_by_estimate(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["tune", "mine.toml", "--estimator", "own.py:Mine", "--evaluations", "64", "--ride", "mine.toml"]
+    assert call(words) == DONE
+    said = capsys.readouterr()
+    # 64 of CMA-ES, and for two parameters twice ten steps of six and 17 along each axis.
+    assert "search, all: some 252 evaluations of" in said.err and "s each: about 0:00:0" in said.err
+    table = read_toml(here / "mine_cml.toml")
+    assert table["hyperparameters"] == pytest.approx({"a": 0.02, "b": 0.3}, rel=1e-3)
+    assert table["search"]["objective"][0] == pytest.approx(2.0, abs=1e-6), "both rides were fitted on"
+    assert table["search"]["command"] == "simrail " + " ".join(words) and table["search"]["finished"]
+    use = next(line for line in said.out.splitlines() if line.startswith("use it: "))
+    assert call(shlex.split(use.removeprefix("use it: simrail "))) == DONE
+    page = (here / "results" / "mine_Mine" / "estimate.html").read_text(encoding="utf-8")
+    assert "0.02" in page.partition('id="options"')[2]
+    # The search is over: nothing unfinished is left beside its file.
+    assert sorted(path.name for path in here.glob("*.toml")) == ["mine.toml", "mine_cml.toml"]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--method", "kom"], ["--method", "cml for a recorded ride", "needs no known rails"]),
+        (["--draws", "2"], ["--draws", "only for scenarios"]),
+        (["--imu", "axle"], ["--imu", "only for scenarios"]),
+        (["--estimator", "Vqf"], ["--estimator", "nothing to tune"]),
+        (["--estimator", "own.py:Mine", "--out", "mine.csv"], ["--out", ".toml"]),
+        (["--estimator", "own.py:Mine", "--out", "mine.toml"], ["--out", "no tuning, and would be replaced"]),
+    ],
+)
+def test_what_says_nothing_to_a_ride_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], more: list[str], words: list[str]
+) -> None:
+    assert call(["tune", "mine.toml", *more]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert all(word in said for word in words) and len(said.splitlines()) == 1, said
+    assert not (here / "mine_cml.toml").exists()
+
+
+def test_a_scenario_has_to_say_what_and_how(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["tune", "go20a"]) == BAD_INPUT
+    assert "--estimator: is required for a scenario" in capsys.readouterr().err
+    assert call(["tune", "go20a", "--estimator", "ekf_compensated"]) == BAD_INPUT
+    assert "--method: is required for a scenario" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_the_method_of_our_own_searches_how_its_mount_turns(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, _ = ride_template("mine")
+    (here / "mine.toml").write_text(text, encoding="utf-8")
+    assert call(["tune", "mine.toml", "--evaluations", "16", "--at-most", "24"]) == DONE
+    table = read_toml(here / "mine_cml.toml")
+    assert {name.partition("_")[2] for name in table["hyperparameters"]} >= {"roll_sd", "yaw_sd"}
+    assert table["search"]["evaluations"] == 24
+    assert call(["estimate", "mine.toml", "--set", "tuning=mine_cml.toml"]) == DONE
+    assert "rails by TrackRelativeSmoother" in capsys.readouterr().out
