@@ -63,7 +63,7 @@ def sensitivity(
     from rich.console import Console
 
     from simrail.campaign.sensitivity import FigureName, sensitivities, sensitivity_table
-    from simrail.core.atomic_files import whole_file
+    from simrail.core.atomic_files import write_whole
     from simrail.report.figures.responses import responses_figure
     from simrail.scenario.distributions import dimensions
 
@@ -79,19 +79,16 @@ def sensitivity(
     draws = number(spec.monte_carlo.sensor_draws, "device")
     print(f"Of {draws}, the same in every sample; each index with the half of its 95 % interval (bootstrap).")
     name = f"sensitivity_{quantity}_{metric}_{window}"
-    with whole_file(folder / f"{name}.csv") as stream:
-        stream.write(sensitivity_table(found).to_csv(index=False, float_format="%.6g").encode())
+    content = sensitivity_table(found).to_csv(index=False, float_format="%.6g").encode()
+    write_whole(folder / f"{name}.csv", content, what="table")
     drawn = dimensions(spec)
     for i, one in enumerate(found):
         case = f"_{i}" if one.case else ""
         file = folder / f"{name}_{re.sub(r'[^A-Za-z0-9_.-]+', '_', one.estimator)}{case}.svg"
         if one.indices.notna().any(axis=None):
-            with whole_file(file) as stream:
-                # By itself, without a page that chooses the font.
-                picture = str(responses_figure(one, drawn)).replace(
-                    "<svg ", '<svg font-family="sans-serif" ', 1
-                )
-                stream.write(picture.encode())
+            # By itself, without a page that chooses the font.
+            picture = str(responses_figure(one, drawn)).replace("<svg ", '<svg font-family="sans-serif" ', 1)
+            write_whole(file, picture.encode(), what="figure")
     print(f"wrote {folder / name}.csv, and the responses beside it as .svg")
     return CELL_FAILED if failures else DONE
 

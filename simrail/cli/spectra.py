@@ -36,7 +36,7 @@ def spectra(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.spectra import scenario_spectra
-    from simrail.core.atomic_files import whole_file
+    from simrail.core.atomic_files import write_whole
     from simrail.scenario.scenario import load_scenario
     from simrail.scoring.published_spectra import MOUNTS, read_spectrum, shipped_spectra
     from simrail.scoring.vibration_levels import verdicts
@@ -51,9 +51,8 @@ def spectra(
     for kind, verdict in verdicts(table).items():
         print(f"{MOUNTS[kind]}: {verdict}")
     if out is not None:
-        with whole_file(out) as stream:
-            stream.write(table.to_csv(index=False, float_format="%.6g").encode("utf-8"))
-        print(f"wrote {out}")
+        content = table.to_csv(index=False, float_format="%.6g").encode("utf-8")
+        print(f"wrote {write_whole(out, content, what='table')}")
     return DONE
 
 
