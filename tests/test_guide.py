@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import simrail
+from simrail.cli.main import call
 from simrail.estimation.estimate import description_of, estimator_class, registered
 from simrail.scenario.file_keys import keys_of
 
@@ -31,6 +32,8 @@ def test_python_blocks_run(
     short = partial(load, overrides=["ride.end_m=60.0", "ride.rest_s=4.0"])
     monkeypatch.setattr(simrail, "load_scenario", short, raising=False)
     monkeypatch.chdir(tmp_path)
+    assert call(["new", "estimator", "my_filter"]) == 0  # which a block goes on with
+    monkeypatch.syspath_prepend(str(tmp_path))
     for page in PAGES:
         for block in blocks(page, "python"):
             exec(compile(block, str(page), "exec"), {})

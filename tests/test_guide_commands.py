@@ -26,7 +26,9 @@ DONE = [line for line in RUN if line not in READ]
 REFUSED = {"simrail check my_ride.toml --write mended.toml": "nothing is wrong that a setting could mend"}
 """Of the example, in which nothing is wrong."""
 
-FIRST = ("simrail new scenario mine", "simrail new imu my_imu", "simrail new ride my_ride")
+FIRST = tuple(
+    f"simrail new {one}" for one in ("scenario mine", "imu my_imu", "ride my_ride", "estimator my_filter")
+)
 """What others go on with."""
 
 
@@ -76,7 +78,11 @@ def desk(tmp_path_factory: pytest.TempPathFactory, own_cache: None) -> Iterator[
     yield folder
 
 
-HEAVY = ("simrail vehicle manchester_1 --out results/vehicle", "simrail run validation --plan")
+HEAVY = (
+    "simrail vehicle manchester_1 --out results/vehicle",
+    "simrail run validation --plan",
+    "simrail film quick_kinematic --gif quick.gif",
+)
 
 
 @pytest.mark.parametrize(
