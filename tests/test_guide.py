@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import re
-import shlex
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 import simrail
-from simrail.cli.main import app
+from simrail.cli.main import call
 from simrail.estimation.estimate import description_of, estimator_class, registered
 from simrail.scenario.file_keys import keys_of
 
@@ -26,31 +24,6 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
 
 
-COMMANDS = [
-    (page.stem, line.removeprefix("$ "))
-    for page in PAGES
-    for block in blocks(page, "console")
-    for line in block.splitlines()
-    if line.startswith("$ simrail")
-]
-
-
-def test_there_are_commands_to_try() -> None:
-    assert len(COMMANDS) > 10
-
-
-@pytest.mark.parametrize(("page", "line"), COMMANDS)
-def test_every_command_is_one_that_there_is(page: str, line: str) -> None:
-    """Its name, its options and the number of its words; nothing is run."""
-    name, *rest = shlex.split(line)[1:]
-    group = typer.main.get_command(app)
-    command = group.commands[name]  # type: ignore[attr-defined]
-    context = command.make_context(name, list(rest), resilient_parsing=True)
-    assert not context.args, f"{page}: {context.args}"
-    known = {option for parameter in command.params for option in parameter.opts}
-    assert {word.partition("=")[0] for word in rest if word.startswith("--")} <= known
-
-
 def test_python_blocks_run(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str], own_cache: None
 ) -> None:
@@ -59,6 +32,8 @@ def test_python_blocks_run(
     short = partial(load, overrides=["ride.end_m=60.0", "ride.rest_s=4.0"])
     monkeypatch.setattr(simrail, "load_scenario", short, raising=False)
     monkeypatch.chdir(tmp_path)
+    assert call(["new", "estimator", "my_filter"]) == 0  # which a block goes on with
+    monkeypatch.syspath_prepend(str(tmp_path))
     for page in PAGES:
         for block in blocks(page, "python"):
             exec(compile(block, str(page), "exec"), {})
@@ -66,14 +41,35 @@ def test_python_blocks_run(
     assert (tmp_path / "attitude.svg").is_file()
 
 
+def toml_blocks(page: Path) -> list[str]:
+    """Fenced ones, and indented ones that begin with a table."""
+    text = page.read_text()
+    indented = re.findall(r"^((?:    .*\n|\n)+)", text, re.MULTILINE)
+    shown = [block for block in indented if re.match(r"\s+\[[\w\[.]+\]+", block)]
+    return [*blocks(page, "toml"), *(re.sub(r"^    ", "", block, flags=re.MULTILINE) for block in shown)]
+
+
+KNOWN = {(key.table, key.name) for kind in ("scenario", "ride") for key in keys_of(kind)}
+
+
+def keys_in(table: dict, path: str = "") -> Iterator[tuple[str, str]]:
+    """Tables, as `keys_of` shows them, and their keys."""
+    for name, value in table.items():
+        inside = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, dict)]
+        full = f"{path.strip('[]')}.{name}" if path else name
+        if inside and not (path and (path, name) in KNOWN):
+            for one in inside:
+                yield from keys_in(one, f"[[{full}]]" if isinstance(value, list) else f"[{full}]")
+        elif path:
+            yield path, name
+
+
 def test_keys_of_toml_blocks_are_known() -> None:
-    known = {(key.table, key.name) for key in keys_of("scenario")}
-    for block in blocks(DOCS / "choose_an_imu.md", "toml"):
-        for table, entries in tomllib.loads(block).items():
-            several = isinstance(entries, list)
-            shown = f"[[{table}]]" if several else f"[{table}]"
-            for entry in entries if several else [entries]:
-                assert {(shown, name) for name in entry} <= known
+    pages = [*PAGES, DOCS.parent / "README.md"]
+    shown = {page.name: list(keys_in(tomllib.loads(block))) for page in pages for block in toml_blocks(page)}
+    assert len(shown) >= 4
+    for page, keys in shown.items():
+        assert set(keys) <= KNOWN, page
 
 
 def test_every_page_is_in_the_table_of_contents() -> None:

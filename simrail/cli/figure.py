@@ -29,15 +29,7 @@ def figure(
         raise InputError("no such form of a figure", field="--out", value=str(out), limit=", ".join(FORMS))
     path = out or Path(f"{name}.svg")
     with canvas.only(name or "", path) as order:
-        try:
-            _offer(results)
-        except OSError as error:
-            raise InputError(
-                f"the figure cannot be written: {error.strerror or error}",
-                field="--out",
-                value=str(path),
-                limit="a file that can be written",
-            ) from error
+        _offer(results)
     if name is None:
         print("\n".join(order.names))
         return DONE

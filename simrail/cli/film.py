@@ -1,12 +1,17 @@
 """``simrail film``: a piece of a ride as a page that plays it, or as a moving picture for slides."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from simrail.cli.options import DONE, Seed, Settings
 from simrail.core.errors import InputError
+
+if TYPE_CHECKING:
+    from simrail.report.film.film import Film
 
 
 def film(
@@ -47,8 +52,34 @@ def film(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.report.film.film import film_of, scenario_of
+
+    _judge_places(out, gif)
+    scenario = scenario_of(name, overrides=settings or [], seed=seed)
+    with ProgressWatcher(Console(stderr=True)) as watcher:
+        made = film_of(
+            scenario, cell=cell, from_m=from_m, to_m=to_m, method=method, forces=forces, watcher=watcher
+        )
+    _write(made, gif or out or Path(f"{scenario.name}_film.html"), moving=gif is not None)
+    return DONE
+
+
+def _write(made: Film, path: Path, *, moving: bool) -> None:
+    """Write the page, or the moving picture, and say what it holds."""
+    from simrail.report.film.gif import pace, write_gif
     from simrail.report.film.page import write_film
 
+    times = pace(made) if moving else 1.0
+    (write_gif if moving else write_film)(path, made)
+    first, last = made.reference_m[0], made.reference_m[-1]
+    print(
+        f"wrote {path}: {made.duration_s:.0f} s of ride {made.ride}, "
+        f"{first:.0f} to {last:.0f} m, {path.stat().st_size / 1e6:.1f} MB"
+        + ("" if times == 1.0 else f", plays {times:.3g} times as fast")
+    )
+
+
+def _judge_places(out: Path | None, gif: Path | None) -> None:
+    """Refuse both at once, and files of another kind."""
     _check_ending("--out", out, ".html")
     _check_ending("--gif", gif, ".gif")
     if out is not None and gif is not None:
@@ -58,24 +89,6 @@ def film(
             limit="one of --out, --gif",
             remedy="choose one of them",
         )
-    scenario = scenario_of(name, overrides=settings or [], seed=seed)
-    with ProgressWatcher(Console(stderr=True)) as watcher:
-        made = film_of(
-            scenario, cell=cell, from_m=from_m, to_m=to_m, method=method, forces=forces, watcher=watcher
-        )
-    if gif is not None:
-        from simrail.report.film.gif import pace, write_gif
-
-        path, times = write_gif(gif, made), pace(made)
-        plays = "" if times == 1.0 else f", plays {times:.3g} times as fast"
-    else:
-        path, plays = write_film(out or Path(f"{scenario.name}_film.html"), made), ""
-    first, last = made.reference_m[0], made.reference_m[-1]
-    print(
-        f"wrote {path}: {made.duration_s:.0f} s of ride {made.ride}, "
-        f"{first:.0f} to {last:.0f} m, {path.stat().st_size / 1e6:.1f} MB{plays}"
-    )
-    return DONE
 
 
 def _check_ending(field: str, path: Path | None, ending: str) -> None:

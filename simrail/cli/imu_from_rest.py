@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 
 from simrail.cli.options import DONE
-from simrail.core.atomic_files import whole_file
+from simrail.core.atomic_files import write_whole
 from simrail.core.toml_files import blame, judge, label, parse_toml
 from simrail.recording.files.rest_file import read_rest
 from simrail.recording.sheets.imu_file import ImuFile
@@ -44,8 +44,6 @@ def imu_from_rest(path: Path, out: Path | None) -> int:
         print(line)
     if out is not None:
         page = write_imu_page(out, file, grade, rest=imu)
-        sheet = out / f"{name}.toml"
-        with whole_file(sheet) as stream:
-            stream.write(text.encode())
+        sheet = write_whole(out / f"{name}.toml", text.encode(), what="sheet")
         print(f"wrote {sheet} and {page}")
     return DONE

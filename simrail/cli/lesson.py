@@ -1,14 +1,17 @@
 """``simrail lesson``: serve a lesson on this machine, or tell which there are."""
 
 import os
+import secrets
 import subprocess
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from simrail.cli.options import DONE
+from simrail.core.atomic_files import write_whole
 from simrail.core.errors import InputError, did_you_mean, one_of
 from simrail.lessons import LESSONS, notebook, teacher_page
 
@@ -53,15 +56,7 @@ def lesson(
 
 def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
     """Serve a lesson until it is stopped; returns the exit code of the server."""
-    path = notebook(name)
-    if edit:
-        from pathlib import Path
-
-        # The lesson of the package stays as it is: what is changed is a copy.
-        own = Path(f"lesson_{name}.py")
-        if not own.exists():
-            own.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-        path = own
+    path = own_copy(name) if edit else notebook(name)
     command = [
         sys.executable,
         "-m",
@@ -72,7 +67,36 @@ def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
     ]
     command += ["--headless"] if headless else []
     command += ["--port", str(port)] if port is not None else []
+    key = ""
+    if edit and headless:
+        # Whoever may edit runs code on this machine: only who is told the key may.
+        password = secrets.token_urlsafe(12)
+        command += ["--token-password", password]
+        key = f"?access_token={password}"
     if headless and port is not None:
-        print(f"serving {name} at http://127.0.0.1:{port}", flush=True)
+        print(f"serving {name} at http://127.0.0.1:{port}{key}", flush=True)
     # No question whether there is a newer marimo leaves the machine.
     return subprocess.call(command, env={**os.environ, "MARIMO_SKIP_UPDATE_CHECK": "1"}) or DONE
+
+
+def own_copy(name: str) -> Path:
+    """A lesson's notebook as a file of this folder; the lesson of the package stays as it is.
+
+    What is there already is one's own work, and is kept.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written here.
+    """
+    own = Path(f"lesson_{name}.py")
+    if own.exists():
+        print(
+            f"opens {own}, which is there already; for the lesson as it ships, give it another name",
+            flush=True,
+        )
+        return own
+    content = notebook(name).read_bytes()
+    write_whole(own, content, what="copy of the lesson", field="NAME", remedy="go to another folder")
+    print(f"wrote {own}, a copy of the lesson: change it as you like", flush=True)
+    return own

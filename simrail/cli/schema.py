@@ -22,14 +22,12 @@ def schema(
     Shipped files name theirs in their first line, which editors with a TOML language server read.
     """
     one_of(kind, KINDS, "there is no such kind of file", field="KIND")
-    from simrail.core.atomic_files import whole_file
+    from simrail.core.atomic_files import write_whole
     from simrail.scenario.file_keys import schema_text
 
     text = schema_text(kind)
     if out is None:
         print(text, end="")
     else:
-        with whole_file(out) as file:
-            file.write(text.encode())
-        print(f"wrote {out}")
+        print(f"wrote {write_whole(out, text.encode(), what='schema')}")
     return DONE

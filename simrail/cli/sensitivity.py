@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from simrail.cli.options import CELL_FAILED, DONE, Scenario, Seed, Settings, number, say
-from simrail.core.csv_files import write_csv
+from simrail.core.csv_files import csv_bytes
 from simrail.core.errors import one_of
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def sensitivity(
     from rich.console import Console
 
     from simrail.campaign.sensitivity import FigureName, sensitivities, sensitivity_table
-    from simrail.core.atomic_files import whole_file
+    from simrail.core.atomic_files import write_whole
     from simrail.report.figures.responses import responses_figure
     from simrail.scenario.distributions import dimensions
 
@@ -80,19 +80,17 @@ def sensitivity(
     draws = number(spec.monte_carlo.sensor_draws, "device")
     print(f"Of {draws}, the same in every sample; each index with the half of its 95 % interval (bootstrap).")
     name = f"sensitivity_{quantity}_{metric}_{window}"
-    with whole_file(folder / f"{name}.csv") as stream:
-        write_csv(sensitivity_table(found), stream, float_format="%.6g")
+    write_whole(
+        folder / f"{name}.csv", csv_bytes(sensitivity_table(found), float_format="%.6g"), what="table"
+    )
     drawn = dimensions(spec)
     for i, one in enumerate(found):
         case = f"_{i}" if one.case else ""
         file = folder / f"{name}_{re.sub(r'[^A-Za-z0-9_.-]+', '_', one.estimator)}{case}.svg"
         if one.indices.notna().any(axis=None):
-            with whole_file(file) as stream:
-                # By itself, without a page that chooses the font.
-                picture = str(responses_figure(one, drawn)).replace(
-                    "<svg ", '<svg font-family="sans-serif" ', 1
-                )
-                stream.write(picture.encode())
+            # By itself, without a page that chooses the font.
+            picture = str(responses_figure(one, drawn)).replace("<svg ", '<svg font-family="sans-serif" ', 1)
+            write_whole(file, picture.encode(), what="figure")
     print(f"wrote {folder / name}.csv, and the responses beside it as .svg")
     return CELL_FAILED if failures else DONE
 

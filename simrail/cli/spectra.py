@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simrail.cli.options import DONE, Scenario, Seed, Settings
-from simrail.core.csv_files import write_csv
+from simrail.core.csv_files import csv_bytes
 from simrail.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def spectra(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.spectra import scenario_spectra
-    from simrail.core.atomic_files import whole_file
+    from simrail.core.atomic_files import write_whole
     from simrail.scenario.scenario import load_scenario
     from simrail.scoring.published_spectra import MOUNTS, read_spectrum, shipped_spectra
     from simrail.scoring.vibration_levels import verdicts
@@ -52,9 +52,8 @@ def spectra(
     for kind, verdict in verdicts(table).items():
         print(f"{MOUNTS[kind]}: {verdict}")
     if out is not None:
-        with whole_file(out) as stream:
-            write_csv(table, stream, float_format="%.6g")
-        print(f"wrote {out}")
+        content = csv_bytes(table, float_format="%.6g")
+        print(f"wrote {write_whole(out, content, what='table')}")
     return DONE
 
 

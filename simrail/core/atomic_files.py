@@ -10,6 +10,8 @@ from glob import escape
 from pathlib import Path
 from typing import BinaryIO
 
+from simrail.core.errors import InputError
+
 _IN_MOTION_S = 1.0
 """How long two renames of a living process may take."""
 
@@ -106,6 +108,47 @@ def whole_file(file: Path) -> Iterator[BinaryIO]:
         draft.replace(file)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def write_whole(
+    file: Path,
+    content: bytes,
+    *,
+    what: str,
+    field: str = "--out",
+    remedy: str = "choose another place with --out",
+) -> Path:
+    """Write what somebody asked for: a file, whole or not at all; its folder is made if it is not there.
+
+    Parameters
+    ----------
+    file : Path
+        Where; returned.
+    content : bytes
+        What stands in it.
+    what : str
+        What it is to whoever asked, as "page" or "film".
+    field, remedy : str
+        What the place was asked for by, and what to do where it cannot be used.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(file) as stream:
+            stream.write(content)
+    except (OSError, ValueError) as error:  # a place that is no name of a file at all
+        raise InputError(
+            f"the {what} cannot be written: {getattr(error, 'strerror', None) or error}",
+            field=field,
+            value=str(file),
+            limit="a file in a folder that can be written",
+            remedy=remedy,
+        ) from error
+    return file
 
 
 def _drop_leftovers(folder: Path) -> None:

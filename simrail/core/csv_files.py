@@ -1,7 +1,6 @@
 """Tables as CSV that no spreadsheet takes for more than it is."""
 
 from pathlib import Path
-from typing import BinaryIO
 
 import pandas as pd
 
@@ -13,21 +12,24 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _MOST = 2000
 
 
-def write_csv(frame: pd.DataFrame, file: Path | BinaryIO, *, float_format: str | None = "%.9g") -> None:
-    """Write a table; a text that looks like a formula gets an apostrophe before it, and is one line.
+def csv_bytes(frame: pd.DataFrame, *, float_format: str | None = "%.9g") -> bytes:
+    """A table as CSV; a text that looks like a formula gets an apostrophe before it, and is one line.
 
     Parameters
     ----------
     frame : pandas.DataFrame
         The table; its index is not written.
-    file : Path or binary stream
-        Where to.
     float_format : str, optional
         Of numbers; all their digits with None.
     """
     texts = [name for name in frame if not pd.api.types.is_numeric_dtype(frame[name])]
     shown = frame.assign(**{str(name): frame[name].astype(object).map(_cell) for name in texts})
-    shown.to_csv(file, index=False, float_format=float_format)
+    return shown.to_csv(index=False, float_format=float_format).encode()
+
+
+def write_csv(frame: pd.DataFrame, file: Path, *, float_format: str | None = "%.9g") -> None:
+    """Write `csv_bytes` of a table into a folder that is a draft."""
+    file.write_bytes(csv_bytes(frame, float_format=float_format))
 
 
 def _cell(value: object) -> object:

@@ -64,3 +64,18 @@ def insist(claims: Sequence[Claim]) -> None:
     broken = [claim.line for claim in claims if not claim.holds]
     if broken:
         raise ClaimError("; ".join(broken))
+
+
+def conclusion(claims: Sequence[Claim], *, script: bool) -> str:
+    """How every lesson ends: its claims as Markdown; run as a script it prints them, and fails if one falls.
+
+    (A notebook's last cell is this one call: marimo wants cells in the file of the notebook.)
+
+    Raises
+    ------
+    ClaimError
+        In a script, if a claim does not hold.
+    """
+    if script:
+        insist(claims)
+    return "## What this lesson claims\n\nAt fixed settings, each time that it is opened.\n\n" + table(claims)

@@ -13,18 +13,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from simrail.core.errors import InputError
-from simrail.track.design import (
+from simrail.track.design import TrackDesign
+from simrail.track.elements import (
+    RAIL_BASE_M,
     CantStation,
     ChainageBreak,
     Curve,
     Element,
     Gradient,
     Straight,
-    TrackDesign,
     Transition,
 )
-from simrail.track.elements import RAIL_BASE_M
-from simrail.track.file import TrackFile
 from simrail.track.joints import steps
 from simrail.track.vertical import build_vertical
 
@@ -40,7 +39,7 @@ SMOOTHING_M = 5.0
 _HEIGHT_M = 5e-4
 """How far the rise of a vertical curve's bend may lead off its parabola: ramp^2/(24 radius)."""
 
-_LONGEST_RAMP_M: float = TrackFile.model_fields["vertical_ramp_m"].default
+_LONGEST_RAMP_M = TrackDesign.vertical_ramp_m
 
 
 @dataclass(frozen=True)

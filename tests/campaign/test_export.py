@@ -191,9 +191,9 @@ def test_estimate_of_an_exported_ride_is_that_of_the_campaign(
     (view,), looks = stored_rides(page)
     assert {panel.group for panel in view.panels} == {"attitude", "ride", "IMU", "innovations"}
     roll = next(panel for panel in view.panels if panel.title == "roll")
-    drawn = next(one.y for one in roll.series if one.key == "method" and one.y is not None)
+    drawn = next(one.y for one in roll.series if one.key == "AttitudeEkf" and one.y is not None)
     assert drawn.max() == pytest.approx(np.rad2deg(direct.states["roll_rad"].max()), rel=1e-6)
-    assert looks["method"].label in page
+    assert looks["AttitudeEkf"].label in page
     truth = simulate(Parts(scenario).ride(cell))
     assert len(score(direct, truth, recording))  # only with the truth at hand is there a score
     assert call([*command, "--out", "est"]) == DONE  # an earlier estimate is replaced as a whole

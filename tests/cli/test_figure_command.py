@@ -46,7 +46,7 @@ def test_a_pdf_is_one_and_the_results_stay_as_they_are(results: Path) -> None:
     [
         (["answr", "--out", "a.svg"], "did you mean answer?"),
         (["answer", "--out", "a.gif"], "limit: .svg, .pdf, .png"),
-        (["answer", "--out", "no/such/folder/a.svg"], "the figure cannot be written"),
+        (["answer", "--out", "/dev/null/a.svg"], "the figure cannot be written"),
     ],
 )
 def test_what_is_wrong_is_told(

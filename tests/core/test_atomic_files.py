@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -10,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from simrail.core import atomic_files
-from simrail.core.atomic_files import draft_of, restore
+from simrail.core.atomic_files import draft_of, restore, write_whole
+from simrail.core.errors import InputError
 
 KILLED = """
 import os, signal, sys
@@ -78,3 +80,30 @@ def test_another_process_between_its_renames_is_waited_for(
     assert not restore(folder)
     assert folder.exists()
     assert list(folder.iterdir()) == []
+
+
+def test_what_was_asked_for_is_written_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "new" / "page.html"
+    assert write_whole(file, b"first", what="page") == file
+    assert file.read_bytes() == b"first"
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match="the page cannot be written: No space left") as refused:
+        write_whole(file, b"second, and longer", what="page")
+    assert refused.value.field == "--out"
+    assert file.read_bytes() == b"first"
+    assert [one.name for one in file.parent.iterdir()] == ["page.html"], "no draft is left"
+
+
+def test_a_place_below_a_file_is_refused_in_a_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError) as refused:
+        write_whole(tmp_path / "file" / "page.html", b"", what="page", field="--gif", remedy="elsewhere")
+    assert str(refused.value).count("\n") == 0
+    assert str(refused.value).startswith("--gif: the page cannot be written")
+    assert (tmp_path / "file").read_text() == "mine"

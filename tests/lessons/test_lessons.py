@@ -11,7 +11,7 @@ import pytest
 
 from simrail.cli.main import call
 from simrail.lessons import LESSONS, notebook, teacher_page
-from simrail.lessons.claims import Claim, ClaimError, about, insist, table
+from simrail.lessons.claims import Claim, ClaimError, about, conclusion, insist, table
 
 OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift"]
 
@@ -69,6 +69,10 @@ def test_a_claim_that_does_not_hold_ends_the_script(capsys):
         insist([good, bad])
     assert "DOES NOT HOLD: a third: 0.5 m" in capsys.readouterr().out
     assert table([good, bad]).count("\n") == 3
+    with pytest.raises(ClaimError):
+        conclusion([bad], script=True)
+    assert "BALLOT" not in conclusion([bad], script=False)
+    assert "a third" in conclusion([bad], script=False)
 
 
 @pytest.mark.slow
@@ -85,6 +89,55 @@ def test_command_lists_and_refuses(capsys):
     err = capsys.readouterr().err
     assert "did you mean drift?" in err
     assert err.count("\n") == 1
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Commands that would serve a lesson."""
+    calls: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "call", lambda command, **more: calls.append(command) or 0)
+    return calls
+
+
+def test_edit_opens_a_copy_and_keeps_what_is_there(here, served, capsys):
+    shipped = notebook("drift").read_bytes()
+    assert call(["lesson", "drift", "--edit"]) == 0
+    assert (here / "lesson_drift.py").read_bytes() == shipped
+    assert served[-1][-2:] == ["edit", "lesson_drift.py"]
+    assert "wrote lesson_drift.py" in capsys.readouterr().out
+    (here / "lesson_drift.py").write_text("# my own\n")
+    assert call(["lesson", "drift", "--edit"]) == 0
+    assert (here / "lesson_drift.py").read_text() == "# my own\n"
+    assert "is there already" in capsys.readouterr().out
+    assert notebook("drift").read_bytes() == shipped
+    assert call(["lesson", "drift"]) == 0
+    assert served[-1][-2:] == ["run", str(notebook("drift"))]
+
+
+def test_an_edited_lesson_without_a_browser_asks_for_the_key_that_is_told(here, served, capsys):
+    assert call(["lesson", "slip", "--edit", "--headless", "--port", "8000"]) == 0
+    key = served[-1][served[-1].index("--token-password") + 1]
+    assert f"http://127.0.0.1:8000?access_token={key}" in capsys.readouterr().out
+    assert len(key) > 10
+
+
+def test_edit_in_a_folder_that_cannot_be_written_is_one_line(here, served, capsys, monkeypatch):
+    monkeypatch.setattr(
+        "simrail.core.atomic_files.whole_file", lambda file: (_ for _ in ()).throw(PermissionError(13, "no"))
+    )
+    assert call(["lesson", "drift", "--edit"]) == 2
+    err = capsys.readouterr().err
+    assert "the copy of the lesson cannot be written" in err
+    assert err.count("\n") == 1
+    assert served == []
+    assert list(here.iterdir()) == []
+
+
+def test_every_lesson_ends_alike():
+    for name in LESSONS:
+        text = notebook(name).read_text(encoding="utf-8")
+        last = text.rpartition("@app.cell")[2]
+        assert 'mo.md(conclusion(claims, script=mo.app_meta().mode == "script"))' in last, name
 
 
 def test_every_lesson_has_its_notebook_and_a_place_on_the_teachers_page():

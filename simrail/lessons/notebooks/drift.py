@@ -9,7 +9,7 @@ with app.setup:
     import marimo as mo
     import numpy as np
 
-    from simrail.lessons.claims import Claim, about, insist, table
+    from simrail.lessons.claims import Claim, about, conclusion
     from simrail.lessons.figures import Line, Panel, draw
     from simrail.recording.sheets.allan import overlapping_allan
     from simrail.recording.sheets.grades import ImuGrade
@@ -316,14 +316,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(claims):
-    mo.md("## What this lesson claims\n\nAt fixed settings, each time that it is opened.\n\n" + table(claims))
-    return
-
-
-@app.cell(hide_code=True)
-def _(claims):
-    if mo.app_meta().mode == "script":
-        insist(claims)
+    mo.md(conclusion(claims, script=mo.app_meta().mode == "script"))
     return
 
 

@@ -13,7 +13,7 @@ with app.setup:
     from simrail.estimators.attitude.ekf import AttitudeEkf
 
     from simrail import measure, score
-    from simrail.lessons.claims import Claim, about, insist, table
+    from simrail.lessons.claims import Claim, about, conclusion
     from simrail.lessons.figures import Band, Line, Panel, draw
     from simrail.lessons.rides import ON_BODY, one_curve
     from simrail.lessons.scores import pick
@@ -229,14 +229,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(claims):
-    mo.md("## What this lesson claims\n\nAt fixed settings, each time that it is opened.\n\n" + table(claims))
-    return
-
-
-@app.cell(hide_code=True)
-def _(claims):
-    if mo.app_meta().mode == "script":
-        insist(claims)
+    mo.md(conclusion(claims, script=mo.app_meta().mode == "script"))
     return
 
 

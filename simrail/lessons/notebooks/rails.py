@@ -14,7 +14,7 @@ with app.setup:
     from simrail.estimators.trajectory.smoother import TrajectorySmoother
 
     from simrail import Mount, measure, score_geometry, with_odometry
-    from simrail.lessons.claims import Claim, insist, table
+    from simrail.lessons.claims import Claim, conclusion
     from simrail.lessons.figures import Line, Panel, draw
     from simrail.lessons.rides import HEIGHT_M, short_ride
     from simrail.lessons.scores import markdown, pick
@@ -264,14 +264,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(claims):
-    mo.md("## What this lesson claims\n\nAt fixed settings, each time that it is opened.\n\n" + table(claims))
-    return
-
-
-@app.cell(hide_code=True)
-def _(claims):
-    if mo.app_meta().mode == "script":
-        insist(claims)
+    mo.md(conclusion(claims, script=mo.app_meta().mode == "script"))
     return
 
 

@@ -10,7 +10,7 @@ with app.setup:
     import numpy as np
 
     from simrail import measure, with_odometry
-    from simrail.lessons.claims import Claim, about, insist, table
+    from simrail.lessons.claims import Claim, about, conclusion
     from simrail.lessons.figures import Band, Line, Panel, draw
     from simrail.lessons.rides import ON_BODY, one_curve
     from simrail.recording.sheets.imu_file import load_imu
@@ -234,14 +234,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(claims):
-    mo.md("## What this lesson claims\n\nAt fixed settings, each time that it is opened.\n\n" + table(claims))
-    return
-
-
-@app.cell(hide_code=True)
-def _(claims):
-    if mo.app_meta().mode == "script":
-        insist(claims)
+    mo.md(conclusion(claims, script=mo.app_meta().mode == "script"))
     return
 
 

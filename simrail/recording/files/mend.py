@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from simrail.core.atomic_files import whole_file
+from simrail.core.atomic_files import write_whole
 from simrail.core.errors import InputError
 from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.core.toml_files import judge, label, read_toml, toml_text
@@ -74,8 +74,7 @@ def write_mended(path: Path, evidence: Evidence, out: Path) -> list[str]:
     _move(data, path.parent, out.parent)
     text = toml_text(data)
     judge(RideFile, data, file=label(out))
-    with whole_file(out) as stream:
-        stream.write(text.encode())
+    write_whole(out, text.encode(), what="ride file", field="--write", remedy="choose another place")
     return changes
 
 

@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from html import escape
-from io import StringIO
+from io import BytesIO, StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from simrail.core.atomic_files import write_whole
 from simrail.core.jit import FloatArray
 from simrail.report.figures.decimate import Bins
 from simrail.report.tables.methods import MethodStyle
@@ -520,7 +521,9 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     """
     order = _ORDER.get()
     if order is not None:
-        figure.savefig(order.path, metadata={"Title": description} if order.path.suffix != ".png" else None)
+        form, picture = order.path.suffix.removeprefix("."), BytesIO()
+        figure.savefig(picture, format=form, metadata={"Title": description} if form != "png" else None)
+        write_whole(order.path, picture.getvalue(), what="figure")
         return Markup(description)
     out = StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})

@@ -15,10 +15,10 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from simrail.core.atomic_files import write_whole
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
 from simrail.report.film.film import FRAME_HZ, Film
-from simrail.report.film.page import write_whole
 from simrail.report.film.shapes import Box, Disc, boxes_of, discs_of, scale_of
 
 WIDTH, HEIGHT = 720, 405
@@ -75,7 +75,7 @@ def write_gif(path: Path, film: Film) -> Path:
         loop=0,
         optimize=False,
     )
-    return write_whole(path, stream.getvalue())
+    return write_whole(path, stream.getvalue(), what="film")
 
 
 def pace(film: Film) -> float:

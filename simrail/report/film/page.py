@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from simrail.core.atomic_files import whole_file
+from simrail.core.atomic_files import write_whole
 from simrail.core.columns import CONTACT
-from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.report.film.film import FRAME_HZ, Film, Signal
 from simrail.report.film.shapes import boxes_of, discs_of, profile_lines, scale_of
@@ -58,24 +57,7 @@ def write_film(path: Path, film: Film, *, dark: bool | None = None) -> Path:
         player=Markup((here / "film.js").read_text(encoding="utf-8")),
         looks=Markup((here / "film.css").read_text(encoding="utf-8")),
     )
-    return write_whole(path, text.encode())
-
-
-def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file whole or not at all; its folder is made if it is not there."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(path) as stream:
-            stream.write(content)
-    except OSError as error:
-        raise InputError(
-            f"the film cannot be written: {error.strerror or error}",
-            field="--out",
-            value=str(path),
-            limit="a file in a folder that can be written",
-            remedy="choose another place with --out",
-        ) from error
-    return path
+    return write_whole(path, text.encode(), what="film")
 
 
 def film_data(film: Film) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from simrail.core.errors import InputError
+from simrail.core.atomic_files import write_whole
 from simrail.report.words.sentences import FILTERS
 
 
@@ -44,16 +44,4 @@ def write_page(folder: Path, name: str, text: str) -> Path:
     InputError
         If the folder is a file, or cannot be written.
     """
-    path = folder / f"{name}.html"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"the page cannot be written: {error.strerror or error}",
-            field="--out",
-            value=str(folder),
-            limit="a folder that can be written",
-            remedy="choose another folder with --out",
-        ) from error
-    return path
+    return write_whole(folder / f"{name}.html", text.encode(), what="page")
