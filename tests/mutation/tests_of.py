@@ -1,7 +1,7 @@
 """Which tests run a line: found by coverage, one file of tests after the other.
 
-Kernels are not compiled: coverage does not see compiled lines, and each fault would be compiled anew. Only the
-tests of campaigns, which run whole rides and mutate no kernel, have theirs from the cache.
+Kernels are not compiled: coverage does not see compiled lines, and each fault would be compiled anew. Only
+the tests of campaigns, which run whole rides and mutate no kernel, have theirs from the cache.
 
 What a fixture of a file runs counts for all tests of that file, as it is run before the first of them and
 judged by others. What runs at import only (constants, fields) counts for whatever uses the module. Tests that
