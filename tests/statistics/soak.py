@@ -44,16 +44,17 @@ from simrail.estimators.baselines import DesignAngles
 @dataclass(frozen=True)
 class Rogue:
     "Raises, hangs or eats memory on some recordings, always the same ones."
+    often: float = 1.0
     causal = True
 
     def estimate(self, recording):
-        number = zlib.crc32(recording.imu.to_numpy().tobytes()) % 2000
+        share = zlib.crc32(recording.imu.to_numpy().tobytes()) / 2**32 / self.often
         if len(recording.imu) > 64:
-            if number < 10:
+            if share < 0.005:
                 raise ValueError("it does not like this one")
-            while 10 <= number < 12:
+            while share < 0.006:
                 pass
-            if 12 <= number < 16:
+            if share < 0.008:
                 np.ones(1_000_000_000)
         return DesignAngles().estimate(recording)
 """
@@ -95,12 +96,15 @@ name = "rogue"
 method = "rogue.py:Rogue"
 time_limit_s = {limit_s}
 memory_limit_mb = 500.0
+options = {{ often = {often} }}
 """
 
 PROGRAM = """
 import sys
 from simrail import results
+from simrail.campaign import campaign
 
+campaign._MOST_CELLS = 5  # more batches, so more moments
 # The figures of the page take longer than the campaign.
 results.write_report = lambda path, **keywords: path.write_text("<html></html>")
 if __name__ == "__main__":
@@ -246,7 +250,7 @@ class Soak:
 
     def gap(self) -> int:
         """Batches until the next event: all of them within the first nine tenths."""
-        batches = max(2, self.cells // 20)
+        batches = max(2, self.cells // 5)
         left = max(0.0, 0.9 * batches - self.kept())
         return self.chance.randint(1, max(1, int(2.0 * left / max(1, len(self.events)))))
 
@@ -386,6 +390,7 @@ def main() -> int:
     words.add_argument("--seed", type=int, default=1)
     words.add_argument("--events", default="worker=16,run=10,scheduler=2,disk=2")
     words.add_argument("--limit-s", type=float, default=10.0, help="time limit of the estimator that hangs")
+    words.add_argument("--often", type=float, default=1.0, help="how many times more often it misbehaves")
     given = words.parse_args()
     chance, begun = random.Random(given.seed), time.monotonic()
     with tempfile.TemporaryDirectory(prefix="simrail-soak-") as place:
@@ -393,7 +398,9 @@ def main() -> int:
         (folder / "tmp").mkdir()
         (folder / "rogue.py").write_text(ROGUE)
         (folder / "program.py").write_text(PROGRAM)
-        (folder / "mine.toml").write_text(SCENARIO.format(draws=given.cells // 2, limit_s=given.limit_s))
+        (folder / "mine.toml").write_text(
+            SCENARIO.format(draws=given.cells // 2, limit_s=given.limit_s, often=given.often)
+        )
         soak = Soak(folder, given.cells, events_of(given.events, chance), chance)
         with small_disk(soak.disk, 64 + given.cells // 20):
             run = soak.start(soak.disk / "whole", "--workers", str(WORKERS))
