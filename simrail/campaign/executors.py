@@ -236,7 +236,9 @@ class _Cluster(Executor):
             raise refusal("a worker runs another simrail, and would give other bits", others[0], remedy)
         unlike = differences(machine(), self._client.run(machine))
         if unlike:
-            self.notes = (f"warning: scores agree to 1e-9, not to the bit: workers differ in {unlike}",)
+            self.notes = (
+                f"warning: scores will agree to some 1e-9, not to the bit: workers differ in {unlike}",
+            )
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.

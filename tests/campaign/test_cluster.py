@@ -174,7 +174,7 @@ def test_workers_of_other_instructions_are_told_in_one_line(
     executor = object.__new__(_Cluster)
     executor._client = Client()
     executor._judge_workers()
-    line = f"warning: scores agree to 1e-9, not to the bit: workers differ in {words}"
+    line = f"warning: scores will agree to some 1e-9, not to the bit: workers differ in {words}"
     assert executor.notes == ((line,) if words else ())
 
 
