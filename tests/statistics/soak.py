@@ -118,12 +118,12 @@ DONE = (0, 1)
 
 
 def children(pid: int) -> list[int]:
-    """All processes below one."""
+    """Processes that one has begun."""
     found = []
     for task in Path(f"/proc/{pid}/task").glob("*/children"):
         with contextlib.suppress(OSError):
             for child in map(int, task.read_text().split()):
-                found += [child, *children(child)]
+                found.append(child)
     return found
 
 
@@ -211,6 +211,7 @@ class Soak:
         while not (found := re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())):
             time.sleep(0.1)
         dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--no-dashboard", found[0]]
+        dask += ["--local-directory", str(self.folder / "dask")]  # killed, dask leaves what it has there
         workers = [
             subprocess.Popen([*dask, "--nthreads", "1", "--no-nanny"], stderr=subprocess.DEVNULL, **where)
             for _ in range(WORKERS)
@@ -228,7 +229,8 @@ class Soak:
         while run.poll() is None:
             time.sleep(0.5)
             kept = self.kept()
-            workers = [pid for pid in children(run.pid) if "loky" in command_of(pid)]
+            # Neither the tracker of shared resources, nor the processes of estimators with a limit.
+            workers = [pid for pid in children(run.pid) if "popen_loky" in command_of(pid)]
             self.memory.append((run.pid, kept, rss_mb(run.pid), max(map(rss_mb, workers), default=0.0)))
             if not self.events or kept < due:
                 continue
@@ -301,7 +303,7 @@ class Soak:
     def judge_memory(self) -> None:
         """In the longest session neither the run nor a worker grows from the second third to the last."""
         frame = pd.DataFrame(self.memory, columns=["run", "kept", "run_mb", "worker_mb"])
-        frame = frame[(frame["worker_mb"] > 0.0)]
+        frame = frame[(frame["worker_mb"] > 0.0) & (frame["kept"] < frame["kept"].max())]  # not as it ends
         longest = frame[
             frame["run"] == frame.groupby("run")["kept"].agg(lambda kept: kept.max() - kept.min()).idxmax()
         ]
