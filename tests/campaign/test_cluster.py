@@ -180,7 +180,7 @@ def test_workers_of_other_instructions_are_told_in_one_line(
 
 
 def test_dask_says_nothing_by_any_of_its_loggers() -> None:
-    """Some have levels of their own, as `distributed.client`, which told of a dead scheduler with a traceback."""
+    """Some have a level of their own, as `distributed.client`, which told of a dead scheduler."""
     import distributed  # noqa: F401
 
     named = [logging.getLogger(name) for name in ("distributed", "distributed.client", "distributed.core")]

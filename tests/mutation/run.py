@@ -43,6 +43,7 @@ def main() -> None:
     words.add_argument("--work", type=Path, help="folder of the session")
     words.add_argument("--again", action="store_true", help="survivors once more, with the tests of today")
     words.add_argument("--report", action="store_true", help="only tell what is known")
+    words.add_argument("--near", action="store_true", help="only the tests that are called by the module")
     words.add_argument("--most-s", type=float, default=1e9, help="end after so many seconds")
     given = words.parse_args()
     work = (given.work or Path(tempfile.gettempdir()) / f"simrail-mutation-{given.seed}").resolve()
@@ -106,13 +107,16 @@ def run(session: WorkDB, items: list[WorkItem], work: Path, given: argparse.Name
     for number in range(given.processes):
         numbers.put(number)
     with context.Pool(given.processes, _begin, (work, numbers)) as pool:
-        for room in mutants.ROOMS:
-            own = [item for item in left if room_of(item.mutations[0]) == room]
-            if own:
-                tests.refresh(room, environment_of(first))
-            orders = [(item, tests.tests(item.mutations[0])) for item in own]
+        for room, near in ((room, near) for room in mutants.ROOMS for near in (True, False)):
+            own = [item for item in left if room_of(item.mutations[0]) == room and item.job_id not in known]
+            if given.near and not near:
+                continue
+            tests.refresh([item.mutations[0] for item in own], environment_of(first), near=near)
+            orders = [(item, tests.tests(item.mutations[0], near=near)) for item in own]
             for done, (name, result, took) in enumerate(pool.imap_unordered(_run_one, orders), 1):
-                session.set_result(name, result)
+                if result.is_killed or not near or given.near:
+                    session.set_result(name, result)
+                    known.add(name)
                 outcome = result.test_outcome.value if result.test_outcome else result.worker_outcome.value
                 print(f"{room} {done} of {len(own)}  {outcome:10} {took:5.0f} s  {name}", flush=True)
                 if time.monotonic() - begun > given.most_s:

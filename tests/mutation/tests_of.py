@@ -15,7 +15,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,9 +81,10 @@ class TestMap:
         self._file, self._root = file, root
         self._map: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
 
-    def refresh(self, room: str, environment: dict[str, str]) -> None:
-        """Run the files of tests of a room that are new or have changed."""
-        for path in (path for place in TESTS[room] for path in self._files_of(place)):
+    def refresh(self, mutations: Sequence[MutationSpec], environment: dict[str, str], *, near: bool) -> None:
+        """Run the files of tests of faults that are new or have changed."""
+        files = {file for mutation in mutations for file in self._files(mutation, near=near)}
+        for path in sorted(files):
             name = path.relative_to(self._root).as_posix()
             code = hashlib.sha256(path.read_bytes()).hexdigest()
             if self._map.get(name, {}).get("code") != code:
@@ -92,15 +93,18 @@ class TestMap:
                 took = sum(self._map[name]["tests"].values())
                 print(f"{name}: {len(self._map[name]['tests'])} tests, {took:.0f} s", flush=True)
 
-    def tests(self, mutation: MutationSpec) -> dict[str, float]:
-        """The tests for a fault, with the time that each takes: the shortest first."""
+    def tests(self, mutation: MutationSpec, *, near: bool) -> dict[str, float]:
+        """The tests for a fault, with the time of each, the shortest first: near ones, or all others."""
         module = mutation.module_path.as_posix()
         lines = set(range(mutation.start_pos[0], mutation.end_pos[0] + 1))
         exact: dict[str, float] = {}
         whole: dict[str, float] = {}
-        for name, one in self._map.items():
-            if not name.startswith(TESTS[room_of(mutation)]):
-                continue
+        nearest = self._files(mutation, near=True)
+        files = (
+            nearest if near else [file for file in self._files(mutation, near=False) if file not in nearest]
+        )
+        for name in (file.relative_to(self._root).as_posix() for file in files):
+            one = self._map[name]
             runs = one["runs"].get(module, {})
             shared = lines & set(runs.get("", ()))
             for test, seconds in one["tests"].items():
@@ -116,10 +120,17 @@ class TestMap:
             chosen[test] = seconds
         return chosen
 
-    def _files_of(self, name: str) -> list[Path]:
-        place = self._root / name
-        files = [place] if place.is_file() else sorted(place.rglob("test_*.py"))
-        return [file for file in files if file.name not in LEFT_OUT]
+    def _files(self, mutation: MutationSpec, *, near: bool) -> list[Path]:
+        """Files of tests of the room of a fault; near ones are called by its module, or its kernel's user."""
+        stem = f"test_{mutation.module_path.stem}"
+        places = [self._root / name for name in TESTS[room_of(mutation)]]
+        files = [
+            file for place in places for file in ([place] if place.is_file() else place.rglob("test_*.py"))
+        ]
+        files = [file for file in files if file.name not in LEFT_OUT]
+        return (
+            [file for file in files if file.stem in (stem, stem.removesuffix("_kernel"))] if near else files
+        )
 
     def _run(self, name: str, environment: dict[str, str]) -> dict[str, Any]:
         data = self._root / ".mutation-coverage"
