@@ -105,15 +105,16 @@ def run_campaign(
     plan = scenario if isinstance(scenario, Plan) else judge_scenario(scenario)
     packed = pack(plan.parts)
     ride_cache.make_writable()  # now, so that workers share the folder that stands in for it
-    with _kept_for_now() if checkpoint is None else nullcontext(checkpoint) as checkpoint:
-        loop = _Loop(plan, packed, checkpoint, watcher or Watcher(), only, batch_cells)
+    folder = _kept_for_now() if checkpoint is None else nullcontext(checkpoint)
+    with folder as kept:
+        loop = _Loop(plan, packed, kept, watcher or Watcher(), only, batch_cells)
         with interruptible():
             try:
                 with executor_of(workers, cluster if loop.left else None, cells=loop.left) as executor:
                     for note in executor.notes:
                         loop.tell(note)
                     stopped = loop.run(executor)
-                return gather(plan, packed, checkpoint, only=only, stopped=stopped)
+                return gather(plan, packed, kept, only=only, stopped=stopped)
             finally:
                 forget()
 

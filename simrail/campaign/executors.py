@@ -185,14 +185,12 @@ class _Cluster(Executor):
                 limit="a scheduler with workers of the same simrail",
             ) from None
         self._address = address
-        self._log = logging.getLogger("distributed")
-        self._log_level = self._log.level
-        self._log.setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
+        self._levels = _mute_dask()  # what goes wrong is told here, in one line
         try:
             client: Any = distributed.Client  # its methods have no types
             self._client = client(address, timeout=_WAIT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            self._log.setLevel(self._log_level)
+            _unmute(self._levels)
             raise InputError(
                 "no dask scheduler answers there",
                 field="--cluster",
@@ -236,7 +234,9 @@ class _Cluster(Executor):
             raise refusal("a worker runs another simrail, and would give other bits", others[0], remedy)
         unlike = differences(machine(), self._client.run(machine))
         if unlike:
-            self.notes = (f"warning: scores agree to 1e-9, not to the bit: workers differ in {unlike}",)
+            self.notes = (
+                f"warning: scores will agree to some 1e-9, not to the bit: workers differ in {unlike}",
+            )
 
     def workers(self) -> int:
         # Threads of one worker take turns: it works on one batch at a time.
@@ -260,9 +260,25 @@ class _Cluster(Executor):
         return future
 
     def close(self) -> None:
+        there = self._client.status == "running"
         with suppress(Exception):  # a scheduler that has gone cannot be told
             self._client.close(timeout=2)
-        self._log.setLevel(self._log_level)
+        if there:  # else dask goes on to say that it is gone, for as long as this process lives
+            _unmute(self._levels)
+
+
+def _mute_dask() -> dict[str, int]:
+    """Let dask's loggers say nothing: each of them, as dask gives some a level of their own. Their levels."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    return levels
+
+
+def _unmute(levels: dict[str, int]) -> None:
+    for name, level in levels.items():
+        logging.getLogger(name).setLevel(level)
 
 
 class ClusterGone(OSError):

@@ -1,7 +1,7 @@
 """What of a machine the last bits of a score depend on.
 
 Compiled kernels and linear algebra use the widest instructions that a processor has, and sum in another order
-where these differ: scores are then the same to 1e-9 relative, and not to the bit, which
+where these differ: scores are then nearly the same (1e-9 relative on a kinematic ride), not to the bit, which
 ``tests/statistics/test_across_machines.py`` measures.
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import logging
 import os
 import re
 import shutil
@@ -174,8 +175,20 @@ def test_workers_of_other_instructions_are_told_in_one_line(
     executor = object.__new__(_Cluster)
     executor._client = Client()
     executor._judge_workers()
-    line = f"warning: scores agree to 1e-9, not to the bit: workers differ in {words}"
+    line = f"warning: scores will agree to some 1e-9, not to the bit: workers differ in {words}"
     assert executor.notes == ((line,) if words else ())
+
+
+def test_dask_says_nothing_by_any_of_its_loggers() -> None:
+    """Some have a level of their own, as `distributed.client`, which told of a dead scheduler."""
+    import distributed  # noqa: F401
+
+    named = [logging.getLogger(name) for name in ("distributed", "distributed.client", "distributed.core")]
+    logging.getLogger("distributed.client").setLevel(logging.WARNING)
+    levels = executors._mute_dask()
+    assert not any(logger.isEnabledFor(logging.CRITICAL) for logger in named)
+    executors._unmute(levels)
+    assert logging.getLogger("distributed.client").level == logging.WARNING
 
 
 def test_a_campaign_tells_what_its_executor_notes(
@@ -234,7 +247,9 @@ def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_i
     thread.start()
     assert call([*words, "--cluster", cluster.address]) == CELL_FAILED
     assert done
-    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("simrail:")]
+    err = capsys.readouterr().err
+    assert "Traceback" not in err
+    said = [line for line in err.splitlines() if line.startswith("simrail:")]
     assert len(said) == 1 and "the dask scheduler has gone" in said[0] and "goes on" in said[0]
     assert call([*words, "--resume"]) == DONE
     assert "of 8 cells are done" in capsys.readouterr().err

@@ -8,6 +8,7 @@ Ended at any time, the same command goes on where it was. See README.md beside t
 from __future__ import annotations
 
 import argparse
+import compileall
 import multiprocessing
 import os
 import shutil
@@ -20,7 +21,7 @@ import mutants
 from cosmic_ray.mutating import mutate_and_test
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome, WorkItem, WorkResult
-from tests_of import TestMap, command, is_compiled
+from tests_of import TestMap, command, jit_switch, room_of
 
 from simrail.scoring.share import wilson
 
@@ -38,16 +39,19 @@ def main() -> None:
     words.add_argument("--count", type=int, default=400, help="faults of the sample")
     words.add_argument("--seed", type=int, default=1, help="of the sample")
     words.add_argument("--processes", type=int, default=2)
+    words.add_argument("--room", default="", help="only of modules whose path begins so")
     words.add_argument("--work", type=Path, help="folder of the session")
     words.add_argument("--again", action="store_true", help="survivors once more, with the tests of today")
     words.add_argument("--report", action="store_true", help="only tell what is known")
+    words.add_argument("--near", action="store_true", help="only the tests that are called by the module")
     words.add_argument("--most-s", type=float, default=1e9, help="end after so many seconds")
     given = words.parse_args()
     work = (given.work or Path(tempfile.gettempdir()) / f"simrail-mutation-{given.seed}").resolve()
     work.mkdir(parents=True, exist_ok=True)
-    first = lay_out(work, 0)
+    first = lay_out(work, "copy")
     os.chdir(first)
     items = mutants.sample(first, seed=given.seed, count=given.count)
+    items = [item for item in items if item.mutations[0].module_path.as_posix().startswith(given.room)]
     with use_db(str(work / "session.sqlite"), WorkDB.Mode.create) as session:
         there = {item.job_id for item in session.work_items}
         session.add_work_items([item for item in items if item.job_id not in there])
@@ -56,7 +60,7 @@ def main() -> None:
         report(session, items)
 
 
-def lay_out(work: Path, number: int) -> Path:
+def lay_out(work: Path, name: str) -> Path:
     """A copy to mutate, in the layout of a wheel: the session's sources, and the tests of today."""
     kept = work / "sources"
     if not kept.exists():
@@ -66,7 +70,7 @@ def lay_out(work: Path, number: int) -> Path:
         for part in ("estimators", "scenarios"):
             _copy(HOME / part, draft / "simrail" / part)
         draft.rename(kept)
-    copy = work / f"copy{number}"
+    copy = work / name
     shutil.rmtree(copy, ignore_errors=True)
     _copy(kept, copy)
     for part in ("estimators", "scenarios"):
@@ -76,6 +80,7 @@ def lay_out(work: Path, number: int) -> Path:
     for name in ("pyproject.toml", "README.md"):
         shutil.copy(HOME / name, copy / name)
     _copy(HOME / "results" / "reference", copy / "results" / "reference")
+    compileall.compile_dir(copy / "simrail", quiet=2)  # a run that mutates writes no bytecode
     return copy
 
 
@@ -93,35 +98,42 @@ def environment_of(copy: Path) -> dict[str, str]:
 def run(session: WorkDB, items: list[WorkItem], work: Path, given: argparse.Namespace) -> None:
     """Run what has no result yet; with ``--again`` also what has survived."""
     begun = time.monotonic()
-    first = work / "copy0"
+    first = work / "copy"
     tests = TestMap(work / "tests.json", first)
-    tests.refresh(environment_of(first))
     known = {name for name, result in session.results if not given.again or result.is_killed}
-    orders = [(item, tests.tests(item.mutations[0])) for item in items if item.job_id not in known]
+    left = [item for item in items if item.job_id not in known]
     context = multiprocessing.get_context("spawn")
     numbers = context.SimpleQueue()
     for number in range(given.processes):
         numbers.put(number)
     with context.Pool(given.processes, _begin, (work, numbers)) as pool:
-        for done, (name, result, took) in enumerate(pool.imap_unordered(_run_one, orders), 1):
-            session.set_result(name, result)
-            outcome = result.test_outcome.value if result.test_outcome else result.worker_outcome.value
-            print(f"{done} of {len(orders)}  {outcome:10} {took:5.0f} s  {name}", flush=True)
-            if time.monotonic() - begun > given.most_s:
-                pool.terminate()
-                return
+        for room, near in ((room, near) for room in mutants.ROOMS for near in (True, False)):
+            own = [item for item in left if room_of(item.mutations[0]) == room and item.job_id not in known]
+            if given.near and not near:
+                continue
+            tests.refresh([item.mutations[0] for item in own], environment_of(first), near=near)
+            orders = [(item, tests.tests(item.mutations[0], near=near)) for item in own]
+            for done, (name, result, took) in enumerate(pool.imap_unordered(_run_one, orders), 1):
+                if result.is_killed or not near or given.near:
+                    session.set_result(name, result)
+                    known.add(name)
+                outcome = result.test_outcome.value if result.test_outcome else result.worker_outcome.value
+                print(f"{room} {done} of {len(own)}  {outcome:10} {took:5.0f} s  {name}", flush=True)
+                if time.monotonic() - begun > given.most_s:
+                    pool.terminate()
+                    return
 
 
 def _begin(work: Path, numbers: multiprocessing.SimpleQueue[int]) -> None:
     """A process that mutates a copy of its own."""
-    copy = lay_out(work, numbers.get())
+    copy = lay_out(work, f"copy{numbers.get()}")
     os.chdir(copy)
     os.environ.update(environment_of(copy))
 
 
 def _run_one(order: tuple[WorkItem, dict[str, float]]) -> tuple[str, WorkResult, float]:
     item, tests = order
-    os.environ["NUMBA_DISABLE_JIT"] = "0" if is_compiled(item.mutations[0]) else "1"
+    os.environ.update(jit_switch(tests))
     begun = time.monotonic()
     if tests:
         result = mutate_and_test(item.mutations, command(tests), MOST_WAIT_S)

@@ -1,7 +1,7 @@
 """Which tests run a line: found by coverage, one file of tests after the other.
 
-Rooms without kernels are tested with kernels compiled, which are in the cache; those with kernels without,
-as coverage does not see compiled lines, and each fault would be compiled anew.
+Kernels are not compiled: coverage does not see compiled lines, and each fault would be compiled anew. Only
+the tests of campaigns, which run whole rides and mutate no kernel, have theirs from the cache.
 
 What a fixture of a file runs counts for all tests of that file, as it is run before the first of them and
 judged by others. What runs at import only (constants, fields) counts for whatever uses the module. Tests that
@@ -15,6 +15,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,18 +24,17 @@ from coverage import CoverageData
 from mutants import ROOMS
 
 TESTS = {
-    "tests/scoring": True,
-    "tests/campaign": True,
-    "tests/sensors": False,
-    "tests/estimation": False,
-    "tests/estimators/odometry": False,
-    "tests/estimators/test_kalman.py": False,
-    "tests/recording/test_standstill.py": False,
+    "simrail/scoring": ("tests/scoring",),
+    "simrail/sensors/measure.py": ("tests/sensors",),
+    "simrail/estimators/odometry": ("tests/estimators/odometry", "tests/estimation"),
+    "simrail/estimators/kalman.py": ("tests/estimators/test_kalman.py", "tests/estimators/odometry"),
+    "simrail/campaign": ("tests/campaign",),
 }
-"""Tests, and whether kernels are compiled for them."""
+"""The tests of each room: its mirror, and what else is near."""
 
-COMPILED = ("simrail/scoring/", "simrail/campaign/")
-"""Rooms that are tested so."""
+COMPILED = ("tests/campaign",)
+"""Tests whose kernels are compiled: they run whole rides, and mutate none."""
+
 LEFT_OUT = ("test_killed.py", "test_cluster.py")
 """These run others as processes of their own."""
 
@@ -54,9 +54,14 @@ def command(tests: dict[str, float]) -> str:
     return f'bash -c "ulimit -t {most_s}; exec {sys.executable} {_PYTEST} -x --tb=line {named}"'
 
 
-def is_compiled(mutation: MutationSpec) -> bool:
-    """Whether the tests for a fault have their kernels compiled."""
-    return mutation.module_path.as_posix().startswith(COMPILED)
+def room_of(mutation: MutationSpec) -> str:
+    """The room that a fault is in."""
+    return next(room for room in ROOMS if mutation.module_path.as_posix().startswith(room))
+
+
+def jit_switch(tests: Iterable[str]) -> dict[str, str]:
+    """The environment's switch for tests: kernels compiled or not."""
+    return {"NUMBA_DISABLE_JIT": "0" if any(test.startswith(COMPILED) for test in tests) else "1"}
 
 
 class TestMap:
@@ -76,32 +81,30 @@ class TestMap:
         self._file, self._root = file, root
         self._map: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
 
-    def refresh(self, environment: dict[str, str]) -> None:
-        """Run the files of tests that are new or have changed."""
-        files = [path for name in TESTS for path in self._files_of(name) if path.name not in LEFT_OUT]
-        self._map = {name: one for name, one in self._map.items() if self._root / name in files}
-        for path in files:
-            name, code = (
-                path.relative_to(self._root).as_posix(),
-                hashlib.sha256(path.read_bytes()).hexdigest(),
-            )
+    def refresh(self, mutations: Sequence[MutationSpec], environment: dict[str, str], *, near: bool) -> None:
+        """Run the files of tests of faults that are new or have changed."""
+        files = {file for mutation in mutations for file in self._files(mutation, near=near)}
+        for path in sorted(files):
+            name = path.relative_to(self._root).as_posix()
+            code = hashlib.sha256(path.read_bytes()).hexdigest()
             if self._map.get(name, {}).get("code") != code:
-                compiled = next(mode for place, mode in TESTS.items() if name.startswith(place))
-                switch = {"NUMBA_DISABLE_JIT": "0" if compiled else "1"}
-                self._map[name] = {"code": code, "compiled": compiled} | self._run(name, environment | switch)
+                self._map[name] = {"code": code} | self._run(name, environment | jit_switch([name]))
                 self._file.write_text(json.dumps(self._map))
                 took = sum(self._map[name]["tests"].values())
                 print(f"{name}: {len(self._map[name]['tests'])} tests, {took:.0f} s", flush=True)
 
-    def tests(self, mutation: MutationSpec) -> dict[str, float]:
-        """The tests for a fault, with the time that each takes: the shortest first."""
+    def tests(self, mutation: MutationSpec, *, near: bool) -> dict[str, float]:
+        """The tests for a fault, with the time of each, the shortest first: near ones, or all others."""
         module = mutation.module_path.as_posix()
         lines = set(range(mutation.start_pos[0], mutation.end_pos[0] + 1))
         exact: dict[str, float] = {}
         whole: dict[str, float] = {}
-        for one in self._map.values():
-            if one["compiled"] != is_compiled(mutation):
-                continue
+        nearest = self._files(mutation, near=True)
+        files = (
+            nearest if near else [file for file in self._files(mutation, near=False) if file not in nearest]
+        )
+        for name in (file.relative_to(self._root).as_posix() for file in files):
+            one = self._map[name]
             runs = one["runs"].get(module, {})
             shared = lines & set(runs.get("", ()))
             for test, seconds in one["tests"].items():
@@ -117,9 +120,17 @@ class TestMap:
             chosen[test] = seconds
         return chosen
 
-    def _files_of(self, name: str) -> list[Path]:
-        place = self._root / name
-        return [place] if place.is_file() else sorted(place.rglob("test_*.py"))
+    def _files(self, mutation: MutationSpec, *, near: bool) -> list[Path]:
+        """Files of tests of the room of a fault; near ones are called by its module, or its kernel's user."""
+        stem = f"test_{mutation.module_path.stem}"
+        places = [self._root / name for name in TESTS[room_of(mutation)]]
+        files = [
+            file for place in places for file in ([place] if place.is_file() else place.rglob("test_*.py"))
+        ]
+        files = [file for file in files if file.name not in LEFT_OUT]
+        return (
+            [file for file in files if file.stem in (stem, stem.removesuffix("_kernel"))] if near else files
+        )
 
     def _run(self, name: str, environment: dict[str, str]) -> dict[str, Any]:
         data = self._root / ".mutation-coverage"

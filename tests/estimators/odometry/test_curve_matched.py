@@ -48,6 +48,7 @@ from simrail.estimation.conformance import check_odometry
 from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.imu_file import load_grade
 from simrail.recording.sheets.vehicle_sheet import Chord
+from simrail.ride.kinematic import kinematic_truth
 from simrail.ride.ride import Ride, simulate
 from simrail.ride.truth import Mount, Truth
 from simrail.scenario.build import Parts
@@ -259,6 +260,29 @@ def test_wheels_that_spin_and_slide_on_leaves():
     wheel = np.interp(recording.imu.index, way.index, way) - run
     assert np.max(np.abs(wheel)) > 5.0
     assert 6.0 < 0.02 * np.sum(slipping.slipping) < 14.0
+
+
+def test_sees_no_sample_ahead():
+    """A short ride on a body without springs, cut as it starts, runs, brakes and has stopped."""
+    track = TrackDesign("line", -50.0, (Straight(60.0), Transition(30.0), Curve(200.0, 150.0, 0.1)))
+    profile = SpeedProfile(
+        10.0, 60.0, 8.0, acceleration_mps2=1.5, jerk_mps3=2.0, rest_s=2.0, final_rest_s=2.0
+    )
+    recording = measure(
+        kinematic_truth(track, profile, rate_hz=250.0, height_m=0.3),
+        name="short",
+        mount=Mount("axle", "body", (0.0, 0.0, 0.6)),
+        grade=load_grade("lord_3dm_gx4_25"),
+        encoder=EncoderSpec("wheel", radius_error=0.01, radius_error_sd=0.01),
+        seed=1,
+        draw=0,
+        map_errors=MapErrors(),
+    )
+    whole = CurveMatchedOdometry().estimate(recording).states
+    n = len(whole)
+    for cut in (2, 480, 560, n // 3, n // 2 + 1, n - 500, n - 1):
+        part = CurveMatchedOdometry().estimate(beginning(recording, samples=cut)).states
+        pd.testing.assert_frame_equal(part, whole.iloc[:cut], check_exact=True)
 
 
 def test_conformance():
