@@ -63,10 +63,10 @@ def contradiction(trace: Trace) -> FloatArray:
     off = np.abs(trace.states[:, known] - trace.course.start[known]) / sd[known]
     off = off.max(axis=1, initial=0.0) / MOST_SDS
     sums = np.abs(_sums(trace)) / np.array([*MOST_SUM, *[MOST_OTHER_SUM] * (trace.surprises.shape[1] - 6)])
-    return np.maximum(np.maximum(off, sums.max(axis=1, initial=0.0)), _bent(trace) / MOST_BENT)
+    return np.maximum(np.maximum(off, sums.max(axis=1, initial=0.0)), in_curves(trace) / MOST_BENT)
 
 
-def _bent(trace: Trace) -> FloatArray:
+def in_curves(trace: Trace) -> FloatArray:
     """Mean square (n,) of the sums of the Z gyro's innovations over each curve and transition passed so far.
 
     Each sum is over the root of its number. What a model of yaw lacks goes by the distance, so that it is

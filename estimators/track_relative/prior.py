@@ -33,7 +33,7 @@ STEEPEST = 1.5 * math.sqrt(3.0)
 near the zero of its gyros and accelerometers, where a nonlinearity is an error of scale."""
 
 TO_1_E = 2.146193220620583 / math.sqrt(3.0)
-"""Lengths of a Matern 3/2 process within which its correlation falls to 1/e, which is what a map's sheet says."""
+"""Lengths of a Matern 3/2 process over which its correlation falls to 1/e: what a map's sheet calls one."""
 
 START_HEADING_SD_RAD = 1e-3
 """Of the map's yaw at its origin."""
