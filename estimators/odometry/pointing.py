@@ -148,4 +148,4 @@ def pointing_of(recording: Recording, chord: Chord | None) -> Pointing:
         return ON_BOGIES
     if not supports:
         return AXLE
-    return FRAME if all(not rests_on[support.on] for support in supports) else OTHER_BODY
+    return FRAME if all(not rests_on.get(support.on) for support in supports) else OTHER_BODY

@@ -32,6 +32,9 @@ STEEPEST = 1.5 * math.sqrt(3.0)
 """Slope at zero of a cubic that leaves the line between its ends by 1 at most, over its range: a train moves
 near the zero of its gyros and accelerometers, where a nonlinearity is an error of scale."""
 
+TO_1_E = 2.146193220620583 / math.sqrt(3.0)
+"""Lengths of a Matern 3/2 process over which its correlation falls to 1/e: what a map's sheet calls one."""
+
 START_HEADING_SD_RAD = 1e-3
 """Of the map's yaw at its origin."""
 
@@ -65,7 +68,12 @@ def noise_of(recording: Recording, motion: Motion, without: Collection[str] = ()
     base = recording.track.rail_base_m
     along = 0.0 if "cant_along" in without else errors.cant_along_sd_m / base
     angles = [motion.roll_sd, motion.pitch_sd, motion.yaw_sd, along]
-    lengths = [motion.roll_length, motion.pitch_length, motion.yaw_length, errors.cant_along_length_m]
+    lengths = [
+        motion.roll_length,
+        motion.pitch_length,
+        motion.yaw_length,
+        errors.cant_along_length_m / TO_1_E,
+    ]
     forgotten = {
         "slope": errors.gradient_sd,
         "curve": errors.radius_relative_sd,

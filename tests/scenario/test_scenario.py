@@ -62,19 +62,23 @@ def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) 
         "odometry": "irw_car runs unstably above",
         "track_relative": "uncompensated lateral acceleration",
         "passes": "uncompensated lateral acceleration",
+        "bounds": "uncompensated lateral acceleration",
+        "bounds_multibody": "irw_car runs unstably above",
     }
     assert bool(plan.warnings) == (name in warned)
-    assert name in ("track_relative", "passes") or len(plan.warnings) <= 1
+    several = ("track_relative", "passes", "bounds", "bounds_multibody")
+    assert name in several or len(plan.warnings) <= 1
     assert all(warned[name] in warning for warning in plan.warnings)
     # Where rails are scored alone, the baseline is that of rails.
     rails_alone = ("passes", "vertical_profile")
     # An IMU without a map has no design angles to be held against; its page holds it against the paper.
     baseline = "zero_track" if name in rails_alone else "design_angles"
-    assert (baseline in plan.estimators) == (name != "imu_only")
+    bounds_alone = ("bounds", "bounds_multibody")
+    assert (baseline in plan.estimators) == (name not in ("imu_only", *bounds_alone))
     grades = {cell.imu.grade for cell in cells(load_scenario(name))}
     # The floor of every estimator is in every table; a table of odometries alone has none of an estimator,
     # ranges of a sheet are no grade, and a ladder is of what can be bought.
-    without = ("odometry", "track_relative_parts", "sensitivity", "imu_only", "which_imu")
+    without = ("odometry", "track_relative_parts", "sensitivity", "imu_only", "which_imu", *bounds_alone)
     assert ("ideal" in grades) == (name not in without)
 
 
@@ -103,7 +107,7 @@ def test_full_size_vehicles_shake_by_default_and_say_it(name: str) -> None:
     """
     scenario = load_scenario(name)
     part, first = scenario.spec.vibration, next(cells(scenario))
-    if name in ("scale_ride", "scale_track", "quick_kinematic", "standstill", "sensitivity"):
+    if name in ("scale_ride", "scale_track", "quick_kinematic", "standstill", "sensitivity", "bounds"):
         assert part is None and first.vibration_label == "off"
         assert "# Without [vibration]" in scenario.text or "Without\n# [vibration]" in scenario.text
         return

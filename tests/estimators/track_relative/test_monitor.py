@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.monitor import (
     ALLOWED,
     BOUND_SDS,
+    MOST_BENT,
+    PATIENCE,
     WINDOW_S,
     contradiction,
     faults_and_widening,
+    in_curves,
 )
+from simrail.estimators.track_relative.noise import AT_MPS
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
 from simrail.core.columns import ACCEL, BOUND, FAULT, GYRO
 from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.vehicle_sheet import SheetBody, VehicleSheet
+from simrail.track.design import STRAIGHT
+from simrail.track.file import track_by_name
 
 DRAWN = VehicleSheet((SheetBody("body"),))
 
@@ -49,6 +56,13 @@ def yawed(recording: Recording, degrees: float) -> Recording:
     return replace(recording, imu=imu)
 
 
+def upside_down(recording: Recording) -> Recording:
+    imu = recording.imu.copy()
+    for _, *across in (GYRO, ACCEL):
+        imu[across] = -recording.imu[across]
+    return replace(recording, imu=imu)
+
+
 FAULTS = {
     "a wheel wrong by 5 %": lambda r: with_wheel(r, 1.05),
     "a gyro's bias that leaves its sheet": lambda r: with_bias(r, GYRO[2], 0.02),
@@ -56,6 +70,12 @@ FAULTS = {
     "an IMU yawed by 3 degrees": lambda r: yawed(r, 3.0),
     "a start that is 20 m off": lambda r: replace(r, start_position_m=r.start_position_m + 20.0),
 }
+
+WRONG_USE = {
+    "an IMU upside down": lambda r: upside_down(r),
+    "another line's map": lambda r: replace(r, track=track_by_name("metro_line")),
+}
+"""It is told before the train has run ten metres, or at its first curve."""
 
 
 @pytest.mark.parametrize("direction", [1, -1])
@@ -77,6 +97,48 @@ def test_a_wrong_sheet_is_a_fault(rough: Callable, fault: str) -> None:
     assert states[FAULT].iloc[-1] == 1.0
     assert (np.diff(states[FAULT]) >= 0.0).all()
     assert not states[FAULT].iloc[:100].any()
+
+
+@pytest.mark.parametrize("use", WRONG_USE)
+def test_wrong_use_is_a_fault_and_no_calm_answer(rough: Callable, use: str) -> None:
+    recording = WRONG_USE[use](rough())
+    states = found(recording)
+    way = states["position_m"] - recording.start_position_m
+    assert states[FAULT][way.abs() > 200.0].all()
+
+
+def test_a_map_worse_than_its_sheet_shows_in_its_curves(rough: Callable) -> None:
+    """By the mean of squares over curves and transitions: planted sums, beside those without surprise.
+
+    Rails that err as their sheet says leave it far below 1, a sheet 100 times too good raises it.
+    """
+    trace = TrackRelativeSmoother(smoothed=False).trace(rough())
+    track, place = trace.course.recording.track, trace.course.around.states[:, at.S]
+    states = np.tile(trace.course.start, (len(place), 1))
+    none = trace._replace(states=states, surprises=0.0 * trace.surprises)
+    planted = none.surprises.copy()
+    planted[track.kind(np.clip(place, track.start_m, track.end_m)) != STRAIGHT, 2] = 0.3
+    found = contradiction(none._replace(surprises=planted))
+    speed = np.abs(trace.course.around.states[:, at.V])
+    number = track.segment(np.clip(place, track.start_m, track.end_m))
+    squares = [
+        0.3**2 * (number == i).sum() * speed[number == i].mean() / AT_MPS
+        for i, element in enumerate(track.elements)
+        if element.kind != STRAIGHT
+    ]
+    wanted = sum(squares) / (len(squares) + PATIENCE) / MOST_BENT
+    # At its end no window of some seconds holds a curve any more.
+    assert found[-1] == pytest.approx(wanted, rel=0.02)
+    honest, better = (contradiction_of_map(rough(), share) for share in (1.0, 0.01))
+    assert honest < 0.7 and better > 2.0 * honest
+
+
+def contradiction_of_map(recording: Recording, share: float) -> float:
+    """By curves alone, of a map that claims a share of its errors."""
+    sizes = {name: size for name, size in asdict(recording.map_errors).items() if "length" not in name}
+    claimed = {name: share * size for name, size in sizes.items()}
+    spoiled = replace(recording, map_errors=replace(recording.map_errors, **claimed), vehicle_sheet=DRAWN)
+    return float(in_curves(TrackRelativeSmoother(smoothed=False).trace(spoiled)).max())
 
 
 def test_what_is_later_does_not_enter(rough: Callable) -> None:

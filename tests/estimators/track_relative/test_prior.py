@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import twins.track_relative as twin
 from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.noise import AXLE, BODY, FRAME, Motion, motion_of
+from simrail.estimators.track_relative.noise import AXLE, BODY, FRAME, JOINTED, Motion, motion_of
 from simrail.estimators.track_relative.prior import PARTS, first_state, heading_sd, noise_of, start_of
 
 from simrail.core.errors import InputError
@@ -34,6 +34,32 @@ def test_the_class_of_a_mount_is_that_of_the_drawing(rough: Callable) -> None:
     for body, motion in classes.items():
         assert motion_of(replace(drawn, mount_body=body)) is motion
     assert motion_of(rough()) is BODY
+
+
+def test_a_body_on_one_bogie_or_between_others_is_jointed(rough: Callable) -> None:
+    """One on two bogies is not, nor one on axles."""
+    train = VehicleSheet(
+        (
+            *(SheetBody(f"axle {i}", x) for i, x in enumerate((6.0, 4.0, -14.0, -16.0))),
+            SheetBody("bogie", 5.0, (Support("axle 1", -1.0), Support("axle 0", 1.0))),
+            SheetBody("last bogie", -15.0, (Support("axle 3", -1.0), Support("axle 2", 1.0))),
+            SheetBody("end", 5.5, (Support("bogie", -0.5),)),
+            SheetBody("between", -5.0, (Support("other end", -4.0), Support("end", 4.0))),
+            SheetBody("other end", -15.0, (Support("last bogie", 0.0),)),
+            SheetBody("coach", -5.0, (Support("last bogie", -10.0), Support("bogie", 10.0))),
+        )
+    )
+    classes = {"end": JOINTED, "between": JOINTED, "coach": BODY, "bogie": FRAME, "axle 0": AXLE}
+    for body, motion in classes.items():
+        assert motion_of(replace(rough(), vehicle_sheet=train, mount_body=body)) is motion, body
+
+
+def test_cant_along_the_line_is_correlated_as_the_sheet_says(rough: Callable) -> None:
+    """By 1/e over its length: that of a Matern 3/2 process, by its own matrix exponential."""
+    recording = rough()
+    along = twin.processes(noise_of(recording, AXLE))[at.PAIRS.index(at.CANT_ALONG)]
+    f, _ = twin.moved(along.generator, along.p, recording.map_errors.cant_along_length_m)
+    assert (f @ along.p)[0, 0] / along.p[0, 0] == pytest.approx(math.exp(-1.0), rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["roll_sd", "gyro", "pitch_length", "damping", "y_length"])

@@ -120,7 +120,10 @@ def test_the_search_keeps_to_its_box_and_begins_at_what_is() -> None:
         ({"axle_yaw_length": 0.0}, ["tuning.axle_yaw_length: ", "0.0", "> 0"]),
         ({"body_damping": 1.0}, ["tuning.body_damping: ", "1.0", "< 1"]),
         ({"axle_yaw_sd": float("nan")}, ["tuning.axle_yaw_sd: ", "nan"]),
-        ({"axel_yaw_sd": 1.0}, ["tuning.axel_yaw_sd: ", "axle_, frame_, body_", "did you mean axle_yaw_sd?"]),
+        (
+            {"axel_yaw_sd": 1.0},
+            ["tuning.axel_yaw_sd: ", "axle_, frame_, body_, jointed_", "did you mean axle_yaw_sd?"],
+        ),
         ({"yaw_sd": 1.0}, ["tuning.yaw_sd: ", "yaw_length"]),
         ({"roll_rad2ps3": 1.0}, ["tuning.roll_rad2ps3: ", "remedy: "]),
     ],
