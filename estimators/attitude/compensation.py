@@ -68,7 +68,8 @@ def start_frame(recording: Recording) -> TrackFrame:
 
 
 def _frame(recording: Recording, position_m: FloatArray) -> TrackFrame:
-    return recording.track.frame(np.clip(position_m, recording.track.start_m, recording.track.end_m))
+    clipped = np.clip(position_m, recording.track.start_m, recording.track.end_m)
+    return recording.track.frame(clipped, places=False)
 
 
 class TrackMotion(NamedTuple):
