@@ -22,7 +22,7 @@ from typing import Any
 
 import pandas as pd
 
-from simrail.campaign.budget import budgets_of
+from simrail.campaign.budget import budgets_of, ride_budget
 from simrail.campaign.campaign import key_of, run_campaign
 from simrail.campaign.cell import STAGES
 from simrail.campaign.checkpoint import LOG, Checkpoint, Start, checkpoint_of
@@ -103,6 +103,7 @@ def run(
     beside: str | Path | None = None,
     watcher: Watcher | None = None,
     many: bool = False,
+    budget_draws: int = 0,
 ) -> Results:
     """Run a scenario: simulate, record, estimate, score, and write the results.
 
@@ -128,6 +129,9 @@ def run(
         Is told of the progress.
     many : bool
         Accept more cells than `simrail.scenario.check.MOST_CELLS`.
+    budget_draws : int
+        Over how many draws it is found out what the error of the first method is made of
+        (`simrail.campaign.budget.ride_budget`); 0 for not at all.
 
     Returns
     -------
@@ -161,8 +165,14 @@ def run(
             plan, workers=workers, cluster=cluster, checkpoint=checkpoint, watcher=watcher
         )
         budgets = budgets_of(plan, campaign.verdicts, watcher=watcher)
+        if budget_draws:
+            budgets = pd.concat(
+                [budgets, ride_budget(plan, budget_draws, watcher=watcher)], ignore_index=True
+            )
         manifest = describe(scenario, campaign)
         manifest |= {"started_utc": started.isoformat(timespec="seconds"), "key": key}
+        if budget_draws:
+            manifest["command"] += f" --budget {budget_draws}"
         if other is not None:
             names = ("scenario", "scenario_hash", "seed", "started_utc", "git_revision")
             manifest["beside"] = {name: other.manifest.get(name) for name in names}

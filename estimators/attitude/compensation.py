@@ -11,8 +11,14 @@ what is neglected is the body's own relative motion.
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from simrail.estimators.attitude.compensation_kernel import (
+    MOTION,
+    Course,
+    force_less_motion,
+    frame_motion,
+)
 
-from simrail.core.columns import ACCEL
+from simrail.core.columns import ACCEL, ODOMETRY
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import Recording, odometry_of
 from simrail.track.design import Straight, TrackDesign, TrackFrame
@@ -68,7 +74,8 @@ def start_frame(recording: Recording) -> TrackFrame:
 
 
 def _frame(recording: Recording, position_m: FloatArray) -> TrackFrame:
-    return recording.track.frame(np.clip(position_m, recording.track.start_m, recording.track.end_m))
+    clipped = np.clip(position_m, recording.track.start_m, recording.track.end_m)
+    return recording.track.frame(clipped, places=False)
 
 
 class TrackMotion(NamedTuple):
@@ -76,18 +83,31 @@ class TrackMotion(NamedTuple):
 
     Attributes
     ----------
-    origin : ndarray (n, 3)
-        Acceleration of the frame's origin, m/s2, components in the track frame.
-    of_y, of_z : ndarray (n, 3)
-        What is added per m of y and of z in the frame, 1/s2.
-    rate : ndarray (n, 3)
-        Angular rate of the frame, rad/s, its own components.
+    rows : ndarray (12, n)
+        The four, one row for each of their components.
     """
 
-    origin: FloatArray
-    of_y: FloatArray
-    of_z: FloatArray
-    rate: FloatArray
+    rows: FloatArray
+
+    @property
+    def origin(self) -> FloatArray:
+        """Acceleration of the frame's origin (n, 3), m/s2, components in the track frame."""
+        return self.rows[0:3].T
+
+    @property
+    def of_y(self) -> FloatArray:
+        """What is added per m of y in the frame (n, 3), 1/s2."""
+        return self.rows[3:6].T
+
+    @property
+    def of_z(self) -> FloatArray:
+        """What is added per m of z in the frame (n, 3), 1/s2."""
+        return self.rows[6:9].T
+
+    @property
+    def rate(self) -> FloatArray:
+        """Angular rate of the frame (n, 3), rad/s, its own components."""
+        return self.rows[9:12].T
 
 
 def track_motion(
@@ -115,31 +135,22 @@ def track_motion(
         Use paper 000, Eqs. 3-6 as they are printed, to show what it costs: k = (roll', pitch', yaw')
         without the coupling of cant and slope, k' = (0, 0, yaw''), no 1/cos th.
     """
+    course = _course(recording, frame, printed=printed)
+    rows = np.empty((MOTION, len(course.speed)))
+    frame_motion(course, rows)
+    return TrackMotion(rows)
+
+
+def _course(recording: Recording, frame: TrackFrame | None, *, printed: bool) -> Course:
+    """What the kernel takes of the frame, in one of two readings, and of the odometry."""
     frame = design_frame(recording) if frame is None else frame
-    speed = odometry_of(recording)["speed_mps"].to_numpy(dtype=np.float64)
-    speed_rate = odometry_of(recording)["acceleration_mps2"].to_numpy(dtype=np.float64)
-    square = speed * speed
+    speeds = (odometry_of(recording)[name].to_numpy(dtype=np.float64) for name in ODOMETRY[1:])
     if printed:
-        t, v, h = frame.rates.T
-        t1, v1, h1 = 0.0 * t, 0.0 * t, frame.second[:, 2]
-        origin = (speed_rate, square * h, -square * v)
+        flat = np.zeros(len(frame.pitch_rad))
+        track = frame.rates.T, np.array([flat, flat, frame.second[:, 2]]), flat, flat
     else:
-        t, v, h = frame.k.T
-        t1, v1, h1 = frame.dk.T
-        secant = 1.0 / np.cos(frame.pitch_rad)
-        stretch = np.tan(frame.pitch_rad) * frame.rates[:, 1]
-        origin = ((speed_rate + square * stretch) * secant, square * h * secant, -square * v * secant)
-    a_t, a_v, a_h = (
-        speed_rate * t + square * t1,
-        speed_rate * v + square * v1,
-        speed_rate * h + square * h1,
-    )
-    return TrackMotion(
-        origin=np.column_stack(origin),
-        of_y=np.column_stack([square * t * v - a_h, -square * (t * t + h * h), square * v * h + a_t]),
-        of_z=np.column_stack([square * t * h + a_v, square * v * h - a_t, -square * (t * t + v * v)]),
-        rate=np.column_stack([t, v, h]) * speed[:, None],
-    )
+        track = frame.k.T, frame.dk.T, frame.rates[:, 1], np.tan(frame.pitch_rad)
+    return Course(*(np.ascontiguousarray(values) for values in (*track, *speeds)))
 
 
 def track_acceleration(
@@ -178,7 +189,10 @@ def gravity_force(
     ndarray (n, 3)
         m/s2, body frame, C-contiguous.
     """
-    force = recording.imu[list(ACCEL)].to_numpy(dtype=np.float64)
-    if compensated:
-        force = force - track_acceleration(recording, frame, printed=printed)
-    return np.ascontiguousarray(force)
+    measured = np.ascontiguousarray(recording.imu[list(ACCEL)].to_numpy(dtype=np.float64))
+    if not compensated:
+        return measured
+    _, r_y, r_z = recording.mount_position_m
+    force = np.empty_like(measured)
+    force_less_motion(_course(recording, frame, printed=printed), measured, r_y, r_z, force)
+    return force

@@ -4,14 +4,27 @@ Three states: roll, pitch, yaw. The gyro predicts, gravity corrects (EQUATIONS 2
 assumes is chosen in `simrail.estimators.attitude.noise`.
 """
 
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from simrail.estimators.attitude.compensation import design_frame, gravity_force, role_of, start_frame
-from simrail.estimators.attitude.kernel import attitude_ekf
+from simrail.estimators.attitude.kernel import attitude_ekf, with_deviations
+from simrail.estimators.attitude.lanes import (
+    Board,
+    begin_ekf,
+    board,
+    by_lanes,
+    ekf_block,
+    side_by_side,
+    through,
+)
 from simrail.estimators.attitude.noise import (
     READINGS,
     SWING_PER_SPEED,
@@ -50,6 +63,23 @@ class _Arrays(NamedTuple):
     start_variance: FloatArray
     step_s: float
     gravity: float
+
+
+class _Room(NamedTuple):
+    """What the kernel finds: the covariance in rows of nine, else shapes as there."""
+
+    angles: FloatArray
+    innovations: FloatArray
+    covariance: FloatArray
+
+    @classmethod
+    def of(cls, n: int) -> _Room:
+        """Room for n samples."""
+        return cls(*(np.empty((n, columns)) for columns in (3, 4, 9)))
+
+
+def _block(lanes: Board, arrays: _Arrays, count: int, is_first: bool) -> None:
+    ekf_block(lanes, count, is_first, arrays.step_s, arrays.gravity)
 
 
 @dataclass(frozen=True)
@@ -119,18 +149,42 @@ class AttitudeEkf:
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw with covariance and innovations at every IMU sample."""
         arrays, considered = self._arrays(recording)
-        n = arrays.rate.shape[0]
-        states, covariance, innovations = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 4))
-        attitude_ekf(*arrays, states, covariance, innovations)
-        for axis in range(3):
-            covariance[:, axis, axis] += considered[:, axis]
-        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        room = _Room.of(len(arrays.rate))
+        square = room.covariance.reshape(-1, 3, 3)
+        attitude_ekf(*arrays, room.angles, square, room.innovations)
+        return self._estimate(recording, room, considered)
+
+    def estimate_many(self, recordings: Sequence[Recording]) -> list[Estimate]:
+        """The same of many recordings, bit by bit; those of equal length are lanes of one loop."""
+        shared, alone = by_lanes(recordings)
+        found = {i: self.estimate(recordings[i]) for i in alone}
+        for members in shared:
+            made = [self._arrays(recordings[i]) for i in members]
+            each = [arrays for arrays, _ in made]
+            rooms = [_Room.of(len(arrays.rate)) for arrays in each]
+            lanes = board(10, 16, 13)
+            begin_ekf(
+                side_by_side([np.append(arrays.start, arrays.start_variance) for arrays in each]), lanes.state
+            )
+            through(
+                partial(_block, lanes, each[0]),
+                lanes,
+                [(one.rate, one.force, one.noise, one.process[:, None]) for one in each],
+                rooms,
+            )
+            for i, room, (_, considered) in zip(members, rooms, made, strict=True):
+                found[i] = self._estimate(recordings[i], room, considered)
+        return [found[i] for i in range(len(recordings))]
+
+    def _estimate(self, recording: Recording, room: _Room, considered: FloatArray) -> Estimate:
+        states = np.empty((len(room.angles), 6))
+        with_deviations(room.angles, room.covariance, considered, states)
         index = recording.imu.index
         return Estimate(
-            states=pd.DataFrame(np.hstack([states, sd]), index=index, columns=[*ATTITUDE, *ATTITUDE_SD]),
+            states=pd.DataFrame(states, index=index, columns=[*ATTITUDE, *ATTITUDE_SD]),
             mount=recording.mount,
-            innovations=pd.DataFrame(innovations, index=index, columns=list(INNOVATION)),
-            covariance=covariance,
+            innovations=pd.DataFrame(room.innovations, index=index, columns=list(INNOVATION)),
+            covariance=room.covariance.reshape(-1, 3, 3),
             covariance_of=ATTITUDE,
         )
 
@@ -141,12 +195,15 @@ class AttitudeEkf:
         first = start_frame(recording)
         sd = np.array([self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad])
         force = gravity_force(recording, frame, compensated=self.compensated, printed=self.printed)
-        excess = np.linalg.norm(force, axis=1) - recording.gravity_mps2
+        doubted = noise.force
+        if self.doubt:
+            excess = np.linalg.norm(force, axis=1) - recording.gravity_mps2
+            doubted = doubted + self.doubt * excess[:, None] ** 2
         arrays = _Arrays(
             rate=step_rates(recording, rest.bias),
             force=force,
             process=noise.process,
-            noise=noise.force + self.doubt * excess[:, None] ** 2,
+            noise=doubted,
             start=np.array([first.roll_rad[0], first.pitch_rad[0], first.yaw_rad[0]]),
             start_variance=sd**2,
             step_s=1.0 / recording.imu_sheet.rate_hz,

@@ -7,16 +7,20 @@ no covariance.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from simrail.estimators.attitude.compensation import gravity_force, needs_of, role_of, start_frame
 from simrail.estimators.attitude.kernel import attitude_gda
+from simrail.estimators.attitude.lanes import Board, board, by_lanes, gda_block, side_by_side, through
 from simrail.estimators.attitude.quaternions import from_euler, level, to_euler
 from simrail.estimators.attitude.rest_bias import rest_bias, step_rates
 
 from simrail.core.columns import ATTITUDE
 from simrail.core.errors import InputError
+from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate, states_only
 from simrail.recording.recording import Recording
 
@@ -75,19 +79,43 @@ class AttitudeGda:
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate roll, pitch and yaw at every IMU sample."""
+        rates, force, start, start_yaw = self._arrays(recording)
+        quaternions = np.empty((force.shape[0], 4))
+        attitude_gda(rates, force, start, self._beta, 1.0 / recording.imu_sheet.rate_hz, quaternions)
+        return states_only(recording, to_euler(quaternions, start_yaw_rad=start_yaw), ATTITUDE)
+
+    def estimate_many(self, recordings: Sequence[Recording]) -> list[Estimate]:
+        """The same of many recordings, bit by bit; those of equal length are lanes of one loop."""
+        shared, alone = by_lanes(recordings)
+        found = {i: self.estimate(recordings[i]) for i in alone}
+        for members in shared:
+            made = [self._arrays(recordings[i]) for i in members]
+            rates, forces, starts, yaws = zip(*made, strict=True)
+            quaternions = [np.empty((len(rates[0]), 4)) for _ in made]
+            lanes, step_s = board(6, 4, 4), 1.0 / recordings[members[0]].imu_sheet.rate_hz
+            lanes.state[:] = side_by_side(starts).ravel()
+            through(
+                partial(_block, lanes, self._beta, step_s),
+                lanes,
+                list(zip(rates, forces, strict=True)),
+                [(own,) for own in quaternions],
+            )
+            for i, own, start_yaw in zip(members, quaternions, yaws, strict=True):
+                found[i] = states_only(recordings[i], to_euler(own, start_yaw_rad=start_yaw), ATTITUDE)
+        return [found[i] for i in range(len(recordings))]
+
+    def _arrays(self, recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Rates, forces and first quaternion, as the kernel takes them, and the first yaw, rad."""
         force = gravity_force(recording, compensated=self.compensated, printed=self.printed)
         rates = step_rates(recording, rest_bias(recording, enabled=self.rest_bias).bias)
         start_yaw = float(start_frame(recording).yaw_rad[0])
+        return rates, force, from_euler(*level(force[0]), start_yaw), start_yaw
+
+    @property
+    def _beta(self) -> float:
         given = self.gyro_error_radps
-        gyro_error = GYRO_ERROR_RADPS[self.tuning] if given is None else given
-        quaternions = np.empty((force.shape[0], 4))
-        attitude_gda(
-            rates,
-            force,
-            from_euler(*level(force[0]), start_yaw),
-            math.sqrt(0.75) * gyro_error,
-            1.0 / recording.imu_sheet.rate_hz,
-            quaternions,
-        )
-        angles = to_euler(quaternions, start_yaw_rad=start_yaw)
-        return states_only(recording, angles, ATTITUDE)
+        return math.sqrt(0.75) * (GYRO_ERROR_RADPS[self.tuning] if given is None else given)
+
+
+def _block(lanes: Board, beta: float, step_s: float, count: int, is_first: bool) -> None:
+    gda_block(lanes, count, is_first, beta, step_s)

@@ -7,7 +7,8 @@ The three-state extended Kalman filter and the gradient descent algorithm of Bri
 
 import math
 
-from simrail.core.jit import FloatArray, njit, njit_inline
+from simrail.core.jit import FloatArray, njit, njit_borrowed, njit_inline
+from simrail.core.sine import sine_cosine
 
 Covariance = tuple[float, float, float, float, float, float]
 """Upper triangle of a covariance of roll, pitch and yaw, row by row."""
@@ -50,6 +51,96 @@ def propagate(
         m10 * a20 + m11 * a21 + m12,
         m20 * a20 + m21 * a21 + m22 + q,
     )
+
+
+Three = tuple[float, float, float]
+"""A vector, or roll, pitch and yaw."""
+
+Turns = tuple[float, float, float, float]
+"""Sine and cosine of roll, then of pitch."""
+
+
+@njit_inline
+def predicted(
+    angles: Three, p: Covariance, turns: Turns, rate: Three, process: float, step_s: float
+) -> tuple[Three, Covariance, Turns]:
+    """One step of the EKF: Euler rates f(x, w) and A = I + step F (EQUATIONS 2.2)."""
+    roll, pitch, yaw = angles
+    sr, cr, sp, cp = turns
+    x, y, z = rate
+    secant = 1.0 / cp
+    tangent = sp * secant
+    u = y * cr - z * sr
+    w = y * sr + z * cr
+    roll += step_s * (x + w * tangent)
+    pitch += step_s * u
+    yaw += step_s * w * secant
+    a00 = 1.0 + step_s * u * tangent
+    a01 = step_s * w * secant * secant
+    a20 = step_s * u * secant
+    a21 = step_s * w * tangent * secant
+    p = propagate(p, a00, a01, -step_s * w, a20, a21, process)
+    sr, cr = sine_cosine(roll)
+    sp, cp = sine_cosine(pitch)
+    return (roll, pitch, yaw), p, (sr, cr, sp, cp)
+
+
+@njit_inline
+def updated(
+    angles: Three, p: Covariance, turns: Turns, force: Three, noise: Three, gravity: float
+) -> tuple[Three, Covariance, Turns, tuple[float, float, float, float]]:
+    """One update of the EKF; the last is the innovation, and its normalised square."""
+    roll, pitch, yaw = angles
+    sr, cr, sp, cp = turns
+    # Innovation, z less gravity in body axes, and the three rows of its Jacobian (EQUATIONS 2.2).
+    ex = force[0] + gravity * sp
+    ey = force[1] - gravity * sr * cp
+    ez = force[2] - gravity * cr * cp
+    p, d_roll, d_pitch, nis = correct(p, 0.0, 0.0, 0.0, -gravity * cp, ex, noise[0])
+    h0, h1 = gravity * cr * cp, -gravity * sr * sp
+    p, d_roll, d_pitch, square = correct(p, d_roll, d_pitch, h0, h1, ey, noise[1])
+    nis += square
+    h0, h1 = -gravity * sr * cp, -gravity * cr * sp
+    p, d_roll, d_pitch, square = correct(p, d_roll, d_pitch, h0, h1, ez, noise[2])
+    nis += square
+    roll += d_roll
+    pitch += d_pitch
+    sr, cr = sine_cosine(roll)
+    sp, cp = sine_cosine(pitch)
+    return (roll, pitch, yaw), p, (sr, cr, sp, cp), (ex, ey, ez, nis)
+
+
+Quaternion = tuple[float, float, float, float]
+"""Scalar first."""
+
+
+@njit_inline
+def descended(q: Quaternion, rate: Three, force: Three, beta: float, step_s: float) -> Quaternion:
+    """One step of the gradient descent algorithm; see `attitude_gda`."""
+    a, b, c, d = q
+    half = 0.5 * step_s
+    x, y, z = half * rate[0], half * rate[1], half * rate[2]
+    fx, fy, fz = force
+    length = math.sqrt(fx * fx + fy * fy + fz * fz)
+    scale = 1.0 / length if length > 0.0 else 0.0
+    f0 = 2.0 * (b * d - a * c) - fx * scale
+    f1 = 2.0 * (a * b + c * d) - fy * scale
+    f2 = 1.0 - 2.0 * (b * b + c * c) - fz * scale
+    g0 = b * f1 - c * f0
+    g1 = d * f0 + a * f1 - 2.0 * b * f2
+    g2 = d * f1 - a * f0 - 2.0 * c * f2
+    g3 = b * f0 + c * f1
+    size = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2 + g3 * g3)
+    # Without a direction of gravity (free fall) or at the exact minimum there is nothing to correct.
+    gain = beta * step_s / size if size > 0.0 and length > 0.0 else 0.0
+    a, b, c, d = (
+        a - b * x - c * y - d * z - gain * g0,
+        b + a * x + c * z - d * y - gain * g1,
+        c + a * y - b * z + d * x - gain * g2,
+        d + a * z + b * y - c * x - gain * g3,
+    )
+    inverse = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
+    return a * inverse, b * inverse, c * inverse, d * inverse
 
 
 @njit
@@ -97,51 +188,44 @@ def attitude_ekf(
     innovations : ndarray (n, 4), out
         Measured minus predicted force, m/s2, and the normalised innovation squared.
     """
-    roll, pitch, yaw = start[0], start[1], start[2]
+    angles = start[0], start[1], start[2]
     p = (start_variance[0], 0.0, 0.0, start_variance[1], 0.0, start_variance[2])
-    sr, cr = math.sin(roll), math.cos(roll)
-    sp, cp = math.sin(pitch), math.cos(pitch)
+    sr, cr = sine_cosine(start[0])
+    sp, cp = sine_cosine(start[1])
+    turns = sr, cr, sp, cp
     for k in range(rate.shape[0]):
         if k > 0:
-            # Euler rates f(x, w) and A = I + step F (EQUATIONS 2.2).
-            y, z = rate[k, 1], rate[k, 2]
-            secant = 1.0 / cp
-            tangent = sp * secant
-            u = y * cr - z * sr
-            w = y * sr + z * cr
-            roll += step_s * (rate[k, 0] + w * tangent)
-            pitch += step_s * u
-            yaw += step_s * w * secant
-            a00 = 1.0 + step_s * u * tangent
-            a01 = step_s * w * secant * secant
-            a20 = step_s * u * secant
-            a21 = step_s * w * tangent * secant
-            p = propagate(p, a00, a01, -step_s * w, a20, a21, process[k])
-            sr, cr = math.sin(roll), math.cos(roll)
-            sp, cp = math.sin(pitch), math.cos(pitch)
-
-        # Innovation, z less gravity in body axes, and the three rows of its Jacobian (EQUATIONS 2.2).
-        ex = force[k, 0] + gravity * sp
-        ey = force[k, 1] - gravity * sr * cp
-        ez = force[k, 2] - gravity * cr * cp
-        p, d_roll, d_pitch, nis = correct(p, 0.0, 0.0, 0.0, -gravity * cp, ex, noise[k, 0])
-        h0, h1 = gravity * cr * cp, -gravity * sr * sp
-        p, d_roll, d_pitch, square = correct(p, d_roll, d_pitch, h0, h1, ey, noise[k, 1])
-        nis += square
-        h0, h1 = -gravity * sr * cp, -gravity * cr * sp
-        p, d_roll, d_pitch, square = correct(p, d_roll, d_pitch, h0, h1, ez, noise[k, 2])
-        nis += square
-        roll += d_roll
-        pitch += d_pitch
-        sr, cr = math.sin(roll), math.cos(roll)
-        sp, cp = math.sin(pitch), math.cos(pitch)
-
-        states[k, 0], states[k, 1], states[k, 2] = roll, pitch, yaw
+            angles, p, turns = predicted(
+                angles, p, turns, (rate[k, 0], rate[k, 1], rate[k, 2]), process[k], step_s
+            )
+        measured = force[k, 0], force[k, 1], force[k, 2]
+        variance = noise[k, 0], noise[k, 1], noise[k, 2]
+        angles, p, turns, innovation = updated(angles, p, turns, measured, variance, gravity)
+        states[k, 0], states[k, 1], states[k, 2] = angles
         p00, p01, p02, p11, p12, p22 = p
         covariance[k, 0, 0], covariance[k, 0, 1], covariance[k, 0, 2] = p00, p01, p02
         covariance[k, 1, 0], covariance[k, 1, 1], covariance[k, 1, 2] = p01, p11, p12
         covariance[k, 2, 0], covariance[k, 2, 1], covariance[k, 2, 2] = p02, p12, p22
-        innovations[k, 0], innovations[k, 1], innovations[k, 2], innovations[k, 3] = ex, ey, ez, nis
+        innovations[k, 0], innovations[k, 1], innovations[k, 2], innovations[k, 3] = innovation
+
+
+@njit_borrowed
+def with_deviations(
+    angles: FloatArray, covariance: FloatArray, considered: FloatArray, states: FloatArray
+) -> None:
+    """Add variances that are not estimated to a covariance, and put its roots beside the angles.
+
+    Parameters
+    ----------
+    angles, considered : ndarray (n, 3)
+    covariance : ndarray (n, 9), in and out
+    states : ndarray (n, 6), out
+    """
+    for k in range(angles.shape[0]):
+        for axis in range(3):
+            covariance[k, 4 * axis] += considered[k, axis]
+            states[k, axis] = angles[k, axis]
+            states[k, 3 + axis] = math.sqrt(covariance[k, 4 * axis])
 
 
 @njit
@@ -174,30 +258,9 @@ def attitude_gda(
     quaternions : ndarray (n, 4), out
         The estimate; row 0 is `start`.
     """
-    a, b, c, d = start[0], start[1], start[2], start[3]
-    quaternions[0, 0], quaternions[0, 1], quaternions[0, 2], quaternions[0, 3] = a, b, c, d
-    half = 0.5 * step_s
+    q = start[0], start[1], start[2], start[3]
+    quaternions[0, 0], quaternions[0, 1], quaternions[0, 2], quaternions[0, 3] = q
     for k in range(1, rate.shape[0]):
-        x, y, z = half * rate[k, 0], half * rate[k, 1], half * rate[k, 2]
-        fx, fy, fz = force[k, 0], force[k, 1], force[k, 2]
-        length = math.sqrt(fx * fx + fy * fy + fz * fz)
-        scale = 1.0 / length if length > 0.0 else 0.0
-        f0 = 2.0 * (b * d - a * c) - fx * scale
-        f1 = 2.0 * (a * b + c * d) - fy * scale
-        f2 = 1.0 - 2.0 * (b * b + c * c) - fz * scale
-        g0 = b * f1 - c * f0
-        g1 = d * f0 + a * f1 - 2.0 * b * f2
-        g2 = d * f1 - a * f0 - 2.0 * c * f2
-        g3 = b * f0 + c * f1
-        size = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2 + g3 * g3)
-        # Without a direction of gravity (free fall) or at the exact minimum there is nothing to correct.
-        gain = beta * step_s / size if size > 0.0 and length > 0.0 else 0.0
-        a, b, c, d = (
-            a - b * x - c * y - d * z - gain * g0,
-            b + a * x + c * z - d * y - gain * g1,
-            c + a * y - b * z + d * x - gain * g2,
-            d + a * z + b * y - c * x - gain * g3,
-        )
-        inverse = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
-        a, b, c, d = a * inverse, b * inverse, c * inverse, d * inverse
-        quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3] = a, b, c, d
+        turned, pull = (rate[k, 0], rate[k, 1], rate[k, 2]), (force[k, 0], force[k, 1], force[k, 2])
+        q = descended(q, turned, pull, beta, step_s)
+        quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3] = q

@@ -36,13 +36,14 @@ NIS of a ride is well below 3 at low speed and is a test of the matched model on
 variance ("considered"), and likewise the yaw that the residual gyro bias adds up to.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from simrail.estimators.attitude.rest_bias import RestBias
 
-from simrail.core.columns import ODOMETRY_SD
-from simrail.core.jit import FloatArray
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD
+from simrail.core.jit import FloatArray, njit, njit_borrowed, njit_inline
 from simrail.recording.recording import ImuSheet, Recording, odometry_of
 from simrail.track.design import TrackFrame
 
@@ -63,7 +64,11 @@ MODEL_FORCE_SD = 1e-3
 """m/s2: rounding of counts and of the gravity model; keeps a noiseless accelerometer's R positive."""
 
 
-_NEWTON_STEPS = 8
+_NEWTON_STEPS = 12
+"""More than any start needs."""
+
+_NEAR, _DONE = 0.1, 1e-9
+"""Step of Newton's method over tau up to which a start counts as near, and after which all is rounding."""
 
 
 class Noise(NamedTuple):
@@ -125,27 +130,57 @@ def recommended_noise(
     sheet, gravity = recording.imu_sheet, recording.gravity_mps2
     n = len(recording.imu)
     step_s = 1.0 / sheet.rate_hz
-    bias = bias_variance(sheet, rest.samples * step_s)
-    speed = odometry_of(recording)["speed_mps"].to_numpy(dtype=np.float64)
-    swing = (vibration * speed) ** 2
+    motion = odometry_of(recording)
+    speed, *sds = (
+        np.ascontiguousarray(motion[name].to_numpy(dtype=np.float64)) for name in (ODOMETRY[1], *ODOMETRY_SD)
+    )
+    # Of these two curvatures and their slopes the compensation makes lateral and vertical acceleration.
+    curves = np.empty((4, 0))
+    if frame is not None:
+        curves = np.array([frame.k[:, 2], frame.dk[:, 2], frame.k[:, 1], frame.dk[:, 1]])
     white = sheet.gyro_noise_radpsqrts**2 + MODEL_RATE_INTENSITY
     sensor = sheet.accel_noise_mpsqrts**2 + MODEL_FORCE_SD**2 * step_s
-    tau = time_constant(sensor, swing, white, bias, gravity=gravity)
+    noise = Noise(np.empty(n), np.empty((n, 3)), np.empty((n, 3)))
+    bias = bias_variance(sheet, rest.samples * step_s)
+    level = sheet.accel_turn_on_bias_mps2**2 / 3.0 / gravity**2
+    given = step_s, gravity, white, sensor, vibration, level
+    _fill(np.array(given), bias, rest.samples, speed, *sds, curves, *noise)
+    return noise
 
-    force = np.empty((n, 3))
-    force[:] = ((sensor + 2.0 * swing / tau) / step_s)[:, None]
-    if frame is not None:
-        place, pace, push = odometry_of(recording)[list(ODOMETRY_SD)].to_numpy(dtype=np.float64).T
-        force[:, 0] += push**2
-        for axis, component in ((1, 2), (2, 1)):
-            by_place = speed**2 * frame.dk[:, component] * place
-            by_pace = 2.0 * speed * frame.k[:, component] * pace
-            force[:, axis] += (by_place**2 + by_pace**2) * tau / step_s
 
-    considered = np.zeros((n, 3))
-    considered[:, :2] = sheet.accel_turn_on_bias_mps2**2 / 3.0 / gravity**2
-    considered[:, 2] = bias * ((np.arange(n) - rest.samples) * step_s) ** 2
-    return Noise((white + 4.0 * bias * tau) * step_s, force, considered)
+@njit
+def _fill(
+    given: FloatArray,
+    bias: FloatArray,
+    samples: FloatArray,
+    speed: FloatArray,
+    place_sd: FloatArray,
+    speed_sd: FloatArray,
+    push_sd: FloatArray,
+    curves: FloatArray,
+    process: FloatArray,
+    force: FloatArray,
+    considered: FloatArray,
+) -> None:
+    """Work out what the module's docstring derives, by samples; ``curves`` of no columns is no frame."""
+    step_s, gravity, white, sensor, vibration, level = given
+    third, tau = white * gravity**2, 0.0
+    for i in range(speed.shape[0]):
+        swing = (vibration * speed[i]) ** 2
+        tau = _time_constant(sensor, swing, third, 4.0 * bias[i] * gravity**2, tau)
+        of_body = (sensor + 2.0 * swing / tau) / step_s
+        force[i, 0] = force[i, 1] = force[i, 2] = of_body
+        if curves.shape[1] > 0:
+            force[i, 0] += push_sd[i] ** 2
+            share, square = tau / step_s, speed[i] ** 2
+            for axis in range(1, 3):
+                row = 2 * axis - 2
+                by_place = square * curves[row + 1, i] * place_sd[i]
+                by_pace = 2.0 * speed[i] * curves[row, i] * speed_sd[i]
+                force[i, axis] += (by_place**2 + by_pace**2) * share
+        considered[i, 0] = considered[i, 1] = level
+        considered[i, 2] = bias[i] * ((i - samples[i]) * step_s) ** 2
+        process[i] = (white + 4.0 * bias[i] * tau) * step_s
 
 
 def bias_variance(sheet: ImuSheet, rest_s: FloatArray) -> FloatArray:
@@ -180,20 +215,42 @@ def time_constant(
     ndarray (n,)
         s.
     """
-    # fourth tau^4 + third tau^3 - sensor tau - 2 swing = 0 has one positive root. Both starts lie above
-    # it, and there the left-hand side is convex: Newton falls towards the root and never below. The
-    # number of steps is fixed, so that a sample's value does not depend on the others.
-    third, fourth = white * gravity**2, 4.0 * bias * gravity**2
-    with np.errstate(divide="ignore", invalid="ignore"):  # without bias the second start is not there
-        tau = np.fmin(
-            np.maximum(np.sqrt(2.0 * sensor / third), np.cbrt(4.0 * swing / third)),
-            np.maximum(np.cbrt(2.0 * sensor / fourth), np.sqrt(np.sqrt(4.0 * swing / fourth))),
-        )
+    found = np.empty(len(swing))
+    for i in range(len(swing)):
+        found[i] = _time_constant(sensor, swing[i], white * gravity**2, 4.0 * bias[i] * gravity**2, 0.0)
+    return found
+
+
+@njit_borrowed
+def _time_constant(sensor: float, swing: float, third: float, fourth: float, near: float) -> float:
+    """`time_constant` of one sample, by Newton's method from that of the sample before, if it is near.
+
+    fourth tau^4 + third tau^3 - sensor tau - 2 swing = 0 has one positive root, above which the left side
+    is convex: from a start above it, or a little below, the steps fall towards the root and never below. The
+    last step is so small that what it leaves is rounding, so that the start leaves no trace.
+    """
+    tau = near
+    if tau > 0.0:
+        step, slope = _newton(sensor, swing, third, fourth, tau)
+        tau = tau - step if slope > 0.0 and abs(step) <= _NEAR * tau else 0.0
+    if tau <= 0.0:
+        tau = max(math.sqrt(2.0 * sensor / third), (4.0 * swing / third) ** (1.0 / 3.0))
+        if fourth > 0.0:
+            other = max((2.0 * sensor / fourth) ** (1.0 / 3.0), math.sqrt(math.sqrt(4.0 * swing / fourth)))
+            tau = min(tau, other)
     for _ in range(_NEWTON_STEPS):
-        value = ((fourth * tau + third) * tau * tau - sensor) * tau - 2.0 * swing
-        slope = (4.0 * fourth * tau + 3.0 * third) * tau * tau - sensor
-        tau = tau - value / slope
+        step, _ = _newton(sensor, swing, third, fourth, tau)
+        tau -= step
+        if abs(step) <= _DONE * tau:
+            break
     return tau
+
+
+@njit_inline
+def _newton(sensor: float, swing: float, third: float, fourth: float, tau: float) -> tuple[float, float]:
+    """Newton's step, and the slope there."""
+    slope = (4.0 * fourth * tau + 3.0 * third) * tau * tau - sensor
+    return (((fourth * tau + third) * tau * tau - sensor) * tau - 2.0 * swing) / slope, slope
 
 
 READINGS = ("intensity", "per_step")

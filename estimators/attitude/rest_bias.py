@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simrail.core.columns import GYRO
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, njit, njit_borrowed
 from simrail.recording.recording import Recording
 from simrail.recording.standstill import SETTLE_S, SHORTEST_S, guard_s, motion_times
 
@@ -50,8 +50,8 @@ class RestBias(NamedTuple):
         Bias as the rests so far have it, rad/s; zero while nothing has been averaged.
     samples : ndarray (n,)
         How many samples it has been averaged over.
-    variance : ndarray (n,)
-        Variance of its error on each axis as a measure of the present bias, (rad/s)^2.
+    variance : ndarray (n,) or (0,)
+        Variance of its error on each axis as a measure of the present bias, (rad/s)^2, where it is wanted.
     """
 
     bias: FloatArray
@@ -59,7 +59,7 @@ class RestBias(NamedTuple):
     variance: FloatArray
 
 
-def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
+def rest_bias(recording: Recording, *, enabled: bool = True, with_variance: bool = False) -> RestBias:
     """Average the gyro over the rests of a ride, causally.
 
     Parameters
@@ -68,6 +68,8 @@ def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
         The recording.
     enabled : bool
         False gives zero bias from zero samples.
+    with_variance : bool
+        False leaves out the variance, which takes a third of the time.
 
     Returns
     -------
@@ -75,20 +77,20 @@ def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
         Row k uses samples older than `simrail.recording.standstill.guard_s` only, and only samples from
         rests.
     """
-    gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
+    gyro = np.ascontiguousarray(recording.imu[list(GYRO)].to_numpy(dtype=np.float64))
     sheet, n = recording.imu_sheet, gyro.shape[0]
     wander = (WANDER_PER_INSTABILITY * sheet.gyro_bias_instability_radps) ** 2
     unknown = sheet.gyro_turn_on_bias_radps**2 / 3.0 + wander
-    found = RestBias(np.zeros((n, 3)), np.zeros(n), np.full(n, unknown))
+    found = RestBias(np.zeros((n, 3)), np.zeros(n), np.full(n if with_variance else 0, unknown))
     if not enabled:
         return found
     times = recording.imu.index.to_numpy(dtype=np.float64)
     moves, guard = motion_times(recording), guard_s(recording)
     average_rests(
-        # cumsum adds in the order of time, so a prefix of the recording has the very same sums.
-        np.vstack([np.zeros(3), np.cumsum(gyro, axis=0)]),
-        np.searchsorted(times, moves),
-        np.searchsorted(times, moves + max(SETTLE_S, guard)),
+        running_sums(gyro),
+        times,
+        moves,
+        max(SETTLE_S, guard),
         round(guard * sheet.rate_hz),
         round(SHORTEST_S * sheet.rate_hz),
         1.0 / sheet.rate_hz,
@@ -101,11 +103,27 @@ def rest_bias(recording: Recording, *, enabled: bool = True) -> RestBias:
     return found
 
 
+@njit
+def running_sums(values: FloatArray) -> FloatArray:
+    """Sums (n + 1, 3) of what is before each row of ``values`` (n, 3).
+
+    They are added in the order of time, so a prefix of the recording has the very same sums.
+    """
+    sums = np.empty((values.shape[0] + 1, 3))
+    x = y = z = 0.0
+    sums[0, 0] = sums[0, 1] = sums[0, 2] = 0.0
+    for k in range(values.shape[0]):
+        x, y, z = x + values[k, 0], y + values[k, 1], z + values[k, 2]
+        sums[k + 1, 0], sums[k + 1, 1], sums[k + 1, 2] = x, y, z
+    return sums
+
+
 @njit_borrowed
 def average_rests(
     sums: FloatArray,
-    moves: np.ndarray,
-    settled: np.ndarray,
+    times: FloatArray,
+    moves: FloatArray,
+    settle_s: float,
     guard: int,
     shortest: int,
     step_s: float,
@@ -126,8 +144,12 @@ def average_rests(
     ----------
     sums : ndarray (n + 1, 3)
         Running sums of the gyro, rad/s; row k is the sum of the samples before sample k.
-    moves, settled : ndarray (m,) of int
-        First sample at or after each sign of motion, and first sample after it that a rest may use.
+    times : ndarray (n,)
+        Of the samples, s.
+    moves : ndarray (m,)
+        Times of the signs of motion, increasing, s.
+    settle_s : float
+        After each of them, until the first sample that a rest may use, s.
     guard, shortest : int
         Samples before the present one that are not used yet, and the fewest that make a later rest.
     step_s : float
@@ -140,17 +162,22 @@ def average_rests(
         Variance of the bias before any rest, (rad/s)^2.
     bias : ndarray (n, 3), out
         rad/s.
-    samples, variance : ndarray (n,), out
-        Number of samples used so far, and variance of the bias' error, (rad/s)^2.
+    samples : ndarray (n,), out
+        Number of samples used so far.
+    variance : ndarray (n,) or (0,), out
+        Of the bias' error, (rad/s)^2; of no rows if it is not wanted.
     """
     begin, needed, j = 0, 1, 0
     past, past_variance, past_samples, past_end = 0, math.inf, 0, 0
     here_variance, here_samples, here_end = math.inf, 0, 0
     for k in range(len(bias)):
-        while j < len(moves) and moves[j] < k:
+        while j < len(moves) and k > 0 and moves[j] <= times[k - 1]:
             # The rest that was under way, if one was, is over: the last row's bias is the past of the next.
             past, past_variance, past_samples, past_end = k - 1, here_variance, here_samples, here_end
-            begin, needed = settled[j], shortest
+            settled = moves[j] + settle_s
+            while begin < len(times) and times[begin] < settled:
+                begin += 1
+            needed = shortest
             j += 1
         count = k - guard - begin
         if count >= needed:
@@ -173,6 +200,8 @@ def average_rests(
             for i in range(3):
                 bias[k, i] = bias[k - 1, i] if k > 0 else 0.0
         samples[k] = here_samples
+        if len(variance) == 0:
+            continue
         if here_samples == 0:
             variance[k] = unknown
         else:
@@ -197,7 +226,16 @@ def step_rates(recording: Recording, bias: FloatArray) -> FloatArray:
     ndarray (n, 3)
         rad/s, C-contiguous; row 0 is the first sample itself.
     """
-    gyro = recording.imu[list(GYRO)].to_numpy(dtype=np.float64)
-    rates = gyro - bias
-    rates[1:] -= 0.5 * (gyro[1:] - gyro[:-1])
-    return np.ascontiguousarray(rates)
+    gyro = np.ascontiguousarray(recording.imu[list(GYRO)].to_numpy(dtype=np.float64))
+    rates = np.empty_like(gyro)
+    _step_rates(gyro, bias, rates)
+    return rates
+
+
+@njit_borrowed
+def _step_rates(gyro: FloatArray, bias: FloatArray, rates: FloatArray) -> None:
+    for axis in range(3):
+        rates[0, axis] = gyro[0, axis] - bias[0, axis]
+    for k in range(1, len(gyro)):
+        for axis in range(3):
+            rates[k, axis] = gyro[k, axis] - bias[k, axis] - 0.5 * (gyro[k, axis] - gyro[k - 1, axis])

@@ -2,6 +2,10 @@
 
     simrail run which_imu --out DIR
     python results/reference/which_imu.py DIR
+    python results/reference/which_imu.py --cells
+
+The second makes ``which_imu_cells.csv`` anew: the figures of some recordings of the first ride, each run by
+itself. A test runs them again, and so tells when the table has grown old.
 
 The table is that of the verdicts (`simrail.scoring.verdicts.verdict_table`). The picture, and the table that
 is printed, have a row per grade and a column per mount: of roll by the EKF, which cannot see the bias of its
@@ -20,9 +24,15 @@ from matplotlib.patches import Rectangle
 
 from simrail.report.figures import canvas
 from simrail.report.words.verdicts import MARKS
+from simrail.results import run_cell
+from simrail.scenario.cells import cells
+from simrail.scenario.requirements import requirements_of
+from simrail.scenario.scenario import load_scenario
 
 HERE = Path(__file__).parent
-TABLE, PICTURE = HERE / "which_imu.csv", HERE / "which_imu.png"
+TABLE, PICTURE, CELLS = HERE / "which_imu.csv", HERE / "which_imu.png", HERE / "which_imu_cells.csv"
+SAMPLE = (("axle", "lord_3dm_gx4_25"), ("frame", "consumer"), ("body", "hg1700"))
+"""Mount and grade of the recordings that are run again, of the first rails, map and device."""
 OURS, OTHER = "track_relative", "ekf"
 KEPT = [
     *("requirement", "mount", "imu", "estimator", "verdict", "devices", "passed", "share", "low95", "high95"),
@@ -92,8 +102,33 @@ def draw(table: pd.DataFrame) -> None:
         figure.savefig(PICTURE)
 
 
+def sample_figures() -> pd.DataFrame:
+    """Figures of the recordings of `SAMPLE` that are held against requirements, each run by itself."""
+    read = load_scenario("which_imu")
+    asked = requirements_of(read.spec)
+    first = {
+        (cell.imu.name, str(cell.imu.grade)): cell.number
+        for cell in cells(read)
+        if cell.track_draw == 0 and (cell.imu.name, str(cell.imu.grade)) in SAMPLE
+    }
+    tables = []
+    for mount, grade in SAMPLE:
+        scores = run_cell("which_imu", first[mount, grade]).scores
+        for wanted in asked:
+            chosen = scores
+            for name in ("quantity", "band", "reference", "window", "metric"):
+                chosen = chosen[(chosen[name] == getattr(wanted, name)).to_numpy()]
+            tables.append(chosen[["cell", "mount", "imu", "estimator", "quantity", "value", "unit"]])
+    return pd.concat(tables, ignore_index=True)
+
+
 def main() -> None:
     """Read the results named on the command line, write table and picture, print the table."""
+    if sys.argv[1] == "--cells":
+        figures = sample_figures()
+        figures.to_csv(CELLS, index=False, float_format="%.9g")
+        print(figures.to_string())
+        return
     table = pd.read_csv(Path(sys.argv[1]) / "verdicts.csv")
     table[KEPT].to_csv(TABLE, index=False, float_format="%.4g")
     draw(table)

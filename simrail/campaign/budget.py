@@ -9,6 +9,7 @@ in the budget as ``together``. A term that has nothing in common with the others
 The bandwidth, which delays and is no error of a draw, is part of the estimator's own floor.
 """
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -16,11 +17,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.campaign.cell import record_cell, simulated
+from simrail.campaign.cell import record_cell, simulated, unless_of_the_machine
 from simrail.campaign.progress import Watcher
+from simrail.campaign.time_limit import estimate_here
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.estimation.estimate import Estimator, description_of, estimate_many
+from simrail.estimation.estimate import Estimator, description_of
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.ride.truth import Truth
@@ -39,6 +41,12 @@ from simrail.track.map_errors import EXACT
 
 FLOOR, TOGETHER = "floor", "together"
 """Rows of a budget beside its terms."""
+
+OF_THE_RIDE = -1
+"""Number of the requirement of a budget that none has asked for."""
+
+OF_RIDES = tuple(Requirement(quantity, np.inf) for quantity in ("roll", "position", "speed", *RAILS))
+"""What the budget of a ride is of: the first of them that its method tells."""
 
 WORDS = {
     FLOOR: "what the method leaves with no error of sensors or map",
@@ -231,7 +239,7 @@ def _error(
     cell: Cell, recording: Recording, truth: Truth, parts: Parts, estimator: Estimator, wanted: Requirement
 ) -> "pd.Series[float]":
     """The error of one recording, over time or, of rails, over places."""
-    (estimate,) = estimate_many(estimator, [recording])
+    (estimate,) = estimate_here(estimator, [recording]).estimates
     if wanted.quantity in RAILS:
         band = None if wanted.band == "full" else bands_by_name(cell.spec)[wanted.band]
         base = cell.spec.geometry.twist_base_m
@@ -292,9 +300,64 @@ def budgets_of(plan: Plan, verdicts: pd.DataFrame, *, watcher: Watcher | None = 
             chosen = _first_draws(plan, (vehicle, mount, imu), part.budget_draws)
             labels = {"requirement": wanted.words, "number": number, "vehicle": vehicle, "mount": mount}
             labels |= {"imu": imu, "estimator": best}
-            budget = error_budget(chosen, plan.parts, plan.estimators[best], wanted, watcher=watcher)
-            tables.append(pd.DataFrame([labels] * len(budget)).join(budget))
+            tables.append(_labelled(labels, chosen, plan, [wanted], watcher or Watcher()))
+    tables = [table for table in tables if len(table)]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def ride_budget(plan: Plan, draws: int, *, watcher: Watcher | None = None) -> pd.DataFrame:
+    """What the error of the first method under test is made of, with the first IMU on the first ride.
+
+    It is of the first of `OF_RIDES` that the method tells. A draw costs as many recordings and estimates as
+    the sheets have terms, and two more; what it took is told.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was run.
+    draws : int
+        Over how many draws, of those that the scenario has.
+    watcher : Watcher, optional
+        Is told of the progress, of the cost, and of a method that has failed.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As of `budgets_of`, with `OF_THE_RIDE` as the number; of no rows if the method fails.
+    """
+    watcher = watcher or Watcher()
+    first = next(iter(cells(plan.scenario)))
+    tested = next(name for name, is_tested in _is_tested(plan).items() if is_tested)
+    group = first.spec.vehicle, first.imu.name, str(first.imu.grade)
+    labels = {"requirement": "", "number": OF_THE_RIDE, "vehicle": group[0], "mount": group[1]}
+    labels |= {"imu": group[2], "estimator": tested}
+    begun = time.perf_counter()
+    chosen = _first_draws(plan, group, draws)
+    table = _labelled(labels, chosen, plan, OF_RIDES, watcher)
+    if len(table):
+        runs = len(table) * len(chosen)  # as many as rows: of the whole in the place of `TOGETHER`
+        watcher.told(f"budget: {runs} estimates by {tested}, {time.perf_counter() - begun:.1f} s")
+    return table
+
+
+def _labelled(
+    labels: dict[str, Any], chosen: list[Cell], plan: Plan, wanted: Sequence[Requirement], watcher: Watcher
+) -> pd.DataFrame:
+    """The budget of the first figure that the method tells; none of a method that fails, which is told."""
+    name = labels["estimator"]
+    reason: Exception | None = None
+    for one in wanted:
+        try:
+            budget = error_budget(chosen, plan.parts, plan.estimators[name], one, watcher=watcher)
+        except Exception as error:
+            unless_of_the_machine(error)
+            reason = error
+            if not isinstance(error, InputError):
+                break
+        else:
+            return pd.DataFrame([labels] * len(budget)).join(budget)
+    watcher.told(f"no budget of {name} with {labels['imu']}: {' '.join(str(reason).split())}")
+    return pd.DataFrame()
 
 
 def _is_tested(plan: Plan) -> dict[str, bool]:

@@ -44,6 +44,17 @@ def run(
             help="Results that the page sets beside these, e.g. full size and 1:10.",
         ),
     ] = None,
+    budget: Annotated[
+        int,
+        typer.Option(
+            "--budget",
+            min=0,
+            max=1000,
+            metavar="DRAWS",
+            help="Find out over so many draws what the error of the first method is made of; each takes as "
+            "long as some 20 recordings.",
+        ),
+    ] = 0,
     seed: Seed = None,
     settings: Settings = None,
     plan: Annotated[
@@ -59,12 +70,13 @@ def run(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.score_tables import print_cell, print_scores
+    from simrail.cli.verdict_tables import print_budgets
     from simrail.results import run as run_scenario
     from simrail.results import run_cell
 
     starts = {"resume": resume, "fresh": fresh, "retry-failed": retry_failed}
     wanted = [name for name, is_wanted in starts.items() if is_wanted]
-    others = {"cluster": cluster, "workers": workers, "beside": beside}
+    others = {"cluster": cluster, "workers": workers, "beside": beside, "budget": budget or None}
     named = [] if cell is None else ["cell", *(name for name, given in others.items() if given)]
     if len(wanted) > 1 or len(named) > 1 or (wanted and named):
         raise InputError(
@@ -89,11 +101,13 @@ def run(
                 beside=beside,
                 watcher=watcher,
                 many=yes,
+                budget_draws=budget,
             )
     if cell is not None:
         print_cell(console, alone)
         return CELL_FAILED if alone.failures else DONE
     print_scores(console, results)
+    print_budgets(console, results.budgets)
     for note in results.campaign.plan.notes:
         console.print(note)
     return CELL_FAILED if results.campaign.failures else DONE

@@ -41,6 +41,21 @@ from simrail.track.elements import (
     element_to_dict,
     require_number,
 )
+from simrail.track.frame_kernel import (
+    CANT_TERMS,
+    DK1,
+    HEIGHT_TERMS,
+    K1,
+    RISE,
+    ROLL1,
+    ROLL2,
+    SINE,
+    SLOPE,
+    YAW_ANGLE,
+    Pieces,
+    evaluate,
+    polynomial_terms,
+)
 from simrail.track.joints import check_elements, check_stations
 from simrail.track.vertical import build_vertical, check_gradients
 
@@ -73,7 +88,7 @@ class TrackFrame(NamedTuple):
     s_m : ndarray (...)
         Arc length of the horizontal projection.
     position : ndarray (..., 3)
-        Centreline in the rail plane, global, m.
+        Centreline in the rail plane, global, m; of no rows if it was not wanted.
     roll_rad, pitch_rad, yaw_rad : ndarray (...)
         ZYX Euler angles of the track frame; yaw is unwrapped.
     rates, second : ndarray (..., 3)
@@ -103,12 +118,13 @@ class TrackFrame(NamedTuple):
 
 
 class _Shape(NamedTuple):
-    """Piecewise polynomials of a design, made once and kept."""
+    """Piecewise polynomials of a design, made once and kept; what it deviates by is in `pieces` alone."""
 
     starts_m: FloatArray
     plan: Plan
-    cant: tuple[PPoly, PPoly, PPoly]
-    height: tuple[PPoly, PPoly, PPoly, PPoly]
+    cant: PPoly
+    height: PPoly
+    pieces: Pieces
 
 
 @dataclass(frozen=True, repr=False)
@@ -267,49 +283,57 @@ class TrackDesign(Shown):
             height_m=z,
         )
         return _Shape(
-            element_starts(self.elements, self.start_m),
-            plan,
-            (cant, cant.derivative(1), cant.derivative(2)),
-            (height, height.derivative(1), height.derivative(2), height.derivative(3)),
+            element_starts(self.elements, self.start_m), plan, cant, height, self._pieces(plan, cant, height)
         )
 
-    def frame(self, s: npt.ArrayLike) -> TrackFrame:
+    def _pieces(self, plan: Plan, cant: PPoly, height: PPoly) -> Pieces:
+        """Yaw, sine of roll and height about the joints of all of them."""
+        joints = [plan.start_m, cant.x[:-1], height.x[:-1]]
+        if self.deviation is not None:
+            joints.append(self.deviation.joints_m)
+        starts = np.unique(np.concatenate(joints))
+        yaw, curvature, rate = plan.state(starts)
+        sine, rise = (
+            polynomial_terms(cant, starts, CANT_TERMS),
+            polynomial_terms(height, starts, HEIGHT_TERMS),
+        )
+        if self.deviation is not None:
+            sine += self.deviation.cant_terms(starts, CANT_TERMS)
+            rise += self.deviation.height_terms(starts, HEIGHT_TERMS)
+        terms = np.column_stack([yaw, curvature, 0.5 * rate, sine / self.rail_base_m, rise])
+        return Pieces(starts, np.ascontiguousarray(terms))
+
+    def frame(self, s: npt.ArrayLike, *, places: bool = True) -> TrackFrame:
         """Track frame at places s.
 
         Parameters
         ----------
         s : array_like (...)
             Places in [start_m, end_m], m.
+        places : bool
+            False leaves out the coordinates, which take as long as all the rest: `position` has no rows.
 
         Raises
         ------
         InputError
             If a place is off the track or not a number.
         """
-        return self.frame_extended(self.on_track(s))
+        return self.frame_extended(self.on_track(s), places=places)
 
-    def frame_extended(self, s: npt.ArrayLike) -> TrackFrame:
+    def frame_extended(self, s: npt.ArrayLike, *, places: bool = True) -> TrackFrame:
         """Like `frame`, but the first and the last element go on beyond the ends of the track."""
         s = np.asarray(s, dtype=float)
         shape = self._shape
-        x, y = shape.plan.xy(s)
-        yaw, yaw1, yaw2 = shape.plan.state(s)
-        cants = [cant(s) for cant in shape.cant]
-        heights = [height(s) for height in shape.height]
-        if self.deviation is not None:
-            cants = [a + b for a, b in zip(cants, self.deviation.cant(s, derivatives=2), strict=True)]
-            heights = [a + b for a, b in zip(heights, self.deviation.height(s, derivatives=3), strict=True)]
-        u, u1, u2 = (cant / self.rail_base_m for cant in cants)
-        z, z1, z2, z3 = heights
-        # roll = asin(u), pitch = -atan(z1), and their derivatives
-        level = 1.0 / np.sqrt(1.0 - u * u)
-        roll, roll1, roll2 = np.arcsin(u), u1 * level, u2 * level + u * u1 * u1 * level**3
-        flat = 1.0 / (1.0 + z1 * z1)
-        pitch, pitch1 = -np.arctan(z1), -z2 * flat
-        pitch2 = -z3 * flat + 2.0 * z1 * (z2 * flat) ** 2
-        rates, second = _stack(roll1, pitch1, yaw1), _stack(roll2, pitch2, yaw2)
-        k, dk = _darboux(roll, pitch, rates, second)
-        return TrackFrame(s, _stack(x, y, z), roll, pitch, yaw, rates, second, k, dk)
+        rows = evaluate(shape.pieces, s.ravel())
+        angles = np.arcsin(rows[SINE]), -np.arctan(rows[SLOPE]), rows[YAW_ANGLE]
+        position = np.empty((0, 3))
+        if places:
+            position = _stack(*shape.plan.xy(s), rows[RISE].reshape(s.shape))
+        vectors = (
+            np.moveaxis(rows[first : first + 3].reshape(3, *s.shape), 0, -1)
+            for first in (ROLL1, ROLL2, K1, DK1)
+        )
+        return TrackFrame(s, position, *(angle.reshape(s.shape) for angle in angles), *vectors)
 
     def curvature(self, s: npt.ArrayLike) -> FloatArray:
         """Plan curvature d yaw / ds at places s, 1/m, positive to the left; shaped like s."""
@@ -390,27 +414,3 @@ NO_MAP = TrackDesign("no map", 0.0, ())
 def _stack(*parts: FloatArray) -> FloatArray:
     """Join arrays of the same or broadcastable shape along a new last axis."""
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
-def _darboux(
-    roll: FloatArray, pitch: FloatArray, rates: FloatArray, second: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Darboux vector of a ZYX frame and its derivative, both per metre and in the frame's components.
-
-    k1 = roll' - sin(pitch) yaw'
-    k2 = cos(roll) pitch' + sin(roll) cos(pitch) yaw'
-    k3 = -sin(roll) pitch' + cos(roll) cos(pitch) yaw'
-
-    (EQUATIONS section 1.1; the tests derive both from the rotation matrix.)
-    """
-    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    r1, p1, y1 = np.moveaxis(rates, -1, 0)
-    r2, p2, y2 = np.moveaxis(second, -1, 0)
-    across, across1 = cp * y1, cp * y2 - sp * p1 * y1  # cos(pitch) yaw', and its derivative
-    k = _stack(r1 - sp * y1, cr * p1 + sr * across, cr * across - sr * p1)
-    dk = _stack(
-        r2 - sp * y2 - cp * p1 * y1,
-        cr * p2 + sr * across1 + r1 * k[..., 2],
-        cr * across1 - sr * p2 - r1 * k[..., 1],
-    )
-    return k, dk

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.track.elements import require_number
+from simrail.track.frame_kernel import polynomial_terms
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,33 @@ class Deviation:
 
     def _at(self, which: int, s_m: npt.ArrayLike, derivatives: int) -> list[FloatArray]:
         s = np.asarray(s_m, dtype=np.float64)
-        last = self.from_m + self.step_m * (len(self.cant_m) - 1)
-        inside = np.clip(s, self.from_m, last)
+        inside = np.clip(s, self.from_m, self._last_m)
         spline = self._splines[which]
         found = [spline(inside)]
         return found + [
             np.where(inside == s, spline(inside, order), 0.0) for order in range(1, derivatives + 1)
         ]
+
+    @property
+    def _last_m(self) -> float:
+        return self.from_m + self.step_m * (len(self.cant_m) - 1)
+
+    @cached_property
+    def joints_m(self) -> FloatArray:
+        """Where one polynomial ends and the next begins, (n,): at the values, and anywhere before them."""
+        return np.concatenate([[self.from_m - self.step_m], self._splines[0].x[:-1], [self._last_m]])
+
+    def cant_terms(self, starts_m: FloatArray, count: int) -> FloatArray:
+        """Coefficients (p, count) of the cant about places, each of its own joints among them."""
+        return self._terms(0, starts_m, count)
+
+    def height_terms(self, starts_m: FloatArray, count: int) -> FloatArray:
+        """Coefficients (p, count) of the height about places, each of its own joints among them."""
+        return self._terms(1, starts_m, count)
+
+    def _terms(self, which: int, starts_m: FloatArray, count: int) -> FloatArray:
+        spline = self._splines[which]
+        terms = polynomial_terms(spline, np.clip(starts_m, self.from_m, self._last_m), count)
+        beyond = (starts_m < self.from_m) | (starts_m >= self._last_m)
+        terms[beyond, 1:] = 0.0
+        return terms

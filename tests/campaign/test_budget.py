@@ -1,13 +1,23 @@
 """The budget of an error: of a linear estimator by closed form, and of an attitude by what is known of it."""
 
+import html
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from simrail.estimators.attitude.ekf import AttitudeEkf
 
-from simrail.campaign.budget import TERMS, TOGETHER, budget_sentence, error_budget
+from simrail.campaign.budget import (
+    OF_THE_RIDE,
+    TERMS,
+    TOGETHER,
+    budget_sentence,
+    error_budget,
+    ride_budget,
+)
 from simrail.campaign.cell import record_cell
 from simrail.campaign.progress import Watcher
 from simrail.core.errors import InputError
@@ -15,8 +25,10 @@ from simrail.core.seeds import stream
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.grades import ImuGrade
+from simrail.results import run
 from simrail.scenario.build import Parts
 from simrail.scenario.cells import Cell, cells
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import read_scenario
 from simrail.scoring.requirement import Requirement
 
@@ -120,6 +132,68 @@ def test_every_term_of_a_sheet_is_in_the_budget_or_named_as_left_out() -> None:
     left |= {"gyro_bias_correlation_s", "accel_bias_correlation_s", "gyro_range_radps", "accel_range_mps2"}
     assert taken | left == set(ImuGrade.__dataclass_fields__)
     assert not taken & left
+
+
+class Stranger(Level):
+    """Does what the fence is there for."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        print("a word of a stranger")
+        np.seterr(all="ignore")
+        os.environ["SIMRAIL_TEST_STRANGER"] = "here"
+        assert not recording.imu.to_numpy().flags.writeable
+        return super().estimate(recording)
+
+
+class Leaver(Level):
+    """Ends the process."""
+
+    def estimate(self, recording: Recording) -> Estimate:
+        raise SystemExit(3)
+
+
+def test_a_budget_runs_estimators_behind_the_fence(capsys: pytest.CaptureFixture[str]) -> None:
+    listed, parts = some_cells()
+    before = np.geterr()
+    error_budget(listed[:1], parts, Stranger(), WANTED)
+    assert np.geterr() == before and "SIMRAIL_TEST_STRANGER" not in os.environ
+    assert "a word of a stranger" not in capsys.readouterr().out
+
+
+class Listener(Watcher):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def told(self, line: str) -> None:
+        self.lines.append(line)
+
+
+@pytest.mark.long
+def test_the_page_of_a_ride_says_what_its_error_is_made_of(here: Path, own_cache: None) -> None:
+    listener = Listener()
+    found = run(read_scenario(TEXT, name="budget"), budget_draws=2, watcher=listener)
+    budget = found.budgets
+    assert set(budget["number"]) == {OF_THE_RIDE} and set(budget["draws"]) == {2}
+    assert set(budget["estimator"]) == {"ekf"} and set(budget["what"]) == {"roll rms"}
+    assert budget["share"].sum() == pytest.approx(1.0, abs=1e-9)
+    page = (found.folder / "report.html").read_text(encoding="utf-8")
+    assert "What the error is made of" in page and budget_sentence(budget) in html.unescape(page)
+    (cost,) = [line for line in listener.lines if line.startswith("budget: ")]
+    assert f"{2 * len(budget)} estimates by ekf" in cost
+    # Without, the page has no such part.
+    plain = run(read_scenario(TEXT, name="budget"), out="plain")
+    assert "What the error is made of" not in (plain.folder / "report.html").read_text(encoding="utf-8")
+    assert plain.budgets.empty
+
+
+def test_a_method_that_fails_has_no_budget_and_the_run_goes_on() -> None:
+    listener = Listener()
+    scenario = read_scenario(TEXT, name="budget")
+    plan = replace(judge_scenario(scenario), estimators={"leaver": Leaver()})
+    assert ride_budget(plan, 1, watcher=listener).empty
+    assert any("no budget of leaver" in line for line in listener.lines)
 
 
 def test_a_quantity_that_is_not_estimated() -> None:

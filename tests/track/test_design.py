@@ -80,7 +80,7 @@ properties = settings(max_examples=40, deadline=None, derandomize=True)
 def joints(design: TrackDesign) -> np.ndarray:
     """Places where a derivative may step: joints of elements, ends and ramps of vertical curves."""
     plan = design.start_m + np.cumsum([element.length_m for element in design.elements])[:-1]
-    z = design._shape.height[0].x
+    z = design._shape.height.x
     return np.unique(np.concatenate([plan, z[(z > design.start_m) & (z < design.end_m)]]))
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup
 
+from simrail.campaign.budget import OF_THE_RIDE, budget_sentence
 from simrail.campaign.cell import CellResult
 from simrail.campaign.stored_results import StoredResults
 from simrail.core.columns import IRREGULARITY
@@ -21,7 +22,7 @@ from simrail.report.campaign.axes import is_campaign
 from simrail.report.campaign.odometry import odometry_frames, page_tables
 from simrail.report.campaign.passes import passes_section
 from simrail.report.campaign.section import campaign_section
-from simrail.report.campaign.verdicts import verdicts_section
+from simrail.report.campaign.verdicts import budget_chart, verdicts_section
 from simrail.report.figures import canvas
 from simrail.report.figures.geometry import bands_figure, has_rails
 from simrail.report.figures.track import plan_figure, profile_figure, profile_words
@@ -134,6 +135,19 @@ def sections_of(data: PageData, progress: Callable[[str, float], None] | None = 
 
 def _section(name: str, title: str, *, folded: bool = False, **data: Any) -> Section:
     return Section(name, title, f"pages/sections/{name}.html.j2", data, folded)
+
+
+def _budget(data: PageData) -> list[Section]:
+    """What the error of the ride's first method is made of, where that was asked for."""
+    budgets = data.budgets
+    own = pd.DataFrame() if budgets is None or budgets.empty else budgets[budgets["number"] == OF_THE_RIDE]
+    if own.empty:
+        return []
+    first = own.iloc[0]
+    method = next((one.label for one in data.styles if one.name == first["estimator"]), first["estimator"])
+    sentence = f"{budget_sentence(own)}, by {method} with {first['imu']} on {first['mount']}."
+    chart = canvas.drawn("budget", partial(budget_chart, own, sentence))
+    return [_section("budget", "What the error is made of", sentence=sentence, chart=chart)]
 
 
 def _failures(data: PageData) -> list[Section]:
@@ -333,6 +347,7 @@ SectionMaker = Callable[[PageData], list[Section]]
 
 SECTIONS: tuple[SectionMaker, ...] = (
     verdicts_section,
+    _budget,
     _failures,
     _scores,
     campaign_section,
@@ -361,5 +376,11 @@ def in_order(data: PageData) -> list[SectionMaker]:
     if not data.asks_of_ride:
         return [*first, *SECTIONS]
     after = SECTIONS.index(_tracks) + 0.5
-    places: dict[SectionMaker, float] = {_failures: -2, _running: -1, _scores: after, campaign_section: after}
+    places: dict[SectionMaker, float] = {
+        _budget: -3,
+        _failures: -2,
+        _running: -1,
+        _scores: after,
+        campaign_section: after,
+    }
     return [*first, *sorted(SECTIONS, key=lambda make: places.get(make, SECTIONS.index(make)))]

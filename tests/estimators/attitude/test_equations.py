@@ -52,9 +52,9 @@ def frame_functions() -> list:
     return [sp.lambdify(s, part, "numpy") for part in parts]
 
 
-def track_frame(places: np.ndarray) -> SimpleNamespace:
+def track_frame(at_m: np.ndarray, *, places: bool = True) -> SimpleNamespace:
     """The frame of TRACK, as a `TrackDesign` would give it."""
-    values = [np.array([part(x).ravel() for x in places]) for part in frame_functions()]
+    values = [np.array([part(x).ravel() for x in at_m]) for part in frame_functions()]
     angles, rates, second, k, dk = values
     return SimpleNamespace(
         roll_rad=angles[:, 0],

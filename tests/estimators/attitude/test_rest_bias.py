@@ -145,7 +145,7 @@ def drawn() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         rng = np.random.default_rng([3, draw])
         bias = wandering(rng, n, SHEET, CORRELATION_S)
         white = SHEET.gyro_noise_radpsqrts * np.sqrt(SLOW) * rng.standard_normal((n, 3))
-        found = rest_bias(three_rests(bias + white))
+        found = rest_bias(three_rests(bias + white), with_variance=True)
         errors.append(found.bias - bias)
         frozen.append(found.bias[at(60.0)] - bias)
     return np.array(errors), np.array(frozen), found.variance
@@ -224,11 +224,11 @@ def test_a_crawl_in_steps_is_no_rest() -> None:
 def test_the_bias_of_a_prefix_is_the_prefix_of_the_bias(direction: int) -> None:
     rng = np.random.default_rng(5)
     recording = three_rests(wandering(rng, round(END_S * SLOW), SHEET, 100.0), direction=direction)
-    whole = rest_bias(recording)
+    whole = rest_bias(recording, with_variance=True)
     # Inside each rest (before and after it is long enough), at its ends, on the way, one sample apart.
     for n in (3, at(5.0), at(20.0), at(20.02), at(81.5), at(82.6), at(90.0), at(94.6), at(95.02), at(222.0)):
         for more in (0, 1):
-            part = rest_bias(beginning(recording, samples=n + more))
+            part = rest_bias(beginning(recording, samples=n + more), with_variance=True)
             for piece, all_of_it in zip(part, whole, strict=True):
                 np.testing.assert_array_equal(piece, all_of_it[: n + more])
 
