@@ -6,6 +6,7 @@ step to the next, and the accelerometer less gravity is the change of speed (EQU
     psd = sin(roll) q + cos(roll) r                               turning about the vertical of the body
     roll' = p + tan(pitch) psd,    pitch' = cos(roll) q - sin(roll) r
     v' = f_x - push + g sin(pitch) + lever psd^2 + askew v psd,    s' = v cos(pitch)
+                                                                  (pitch at the middle of the step in v')
     f_y = v psd + g sin(roll) cos(pitch) + sway                    lateral row, every step
 
 with p, q, r the gyro less its biases. An IMU that is ``lever`` ahead of the middle of the chord on which its
@@ -92,8 +93,8 @@ class Model(NamedTuple):
         Of the relative error of a gyro's scale.
     surely : float
         Log odds from which on the train is held to stand.
-    unheard_mps : float
-        What a train may have run by the time it is heard to leave: standard deviation.
+    unheard_m : float
+        So far a train may have run by the time it is heard to leave.
     """
 
     step_s: float
@@ -113,7 +114,7 @@ class Model(NamedTuple):
     force_variance: float
     scale_variance: float
     surely: float
-    unheard_mps: float
+    unheard_m: float
 
 
 class Found(NamedTuple):
@@ -182,7 +183,7 @@ def zero_velocity(
         stood = rests
         rests = found.log_odds[k] > model.surely if model.given[k] < 0.0 else model.given[k] > 0.0
         if stood and not rests:
-            p[V, V] += model.unheard_mps**2
+            _misled(model, p, gain)
         if echo is not None:
             _predict_echo(model, signal, fading, x, f, scaled)
             signal = scaled
@@ -233,6 +234,21 @@ def _evidence(
 
 
 @njit_borrowed
+def _misled(model: Model, p: FloatArray, gain: FloatArray) -> None:
+    """What the last rows of rest did to all states while the train ran already, unheard; ``gain`` is room.
+
+    A row v = 0 that comes when the speed is v moves the state by -K v, K = P[:, v] / R. The speeds of these
+    steps sum up to the way over the step's length.
+    """
+    share = model.unheard_m / (model.step_s * model.noise[REST])
+    for i in range(p.shape[0]):
+        gain[i] = p[i, V] * share
+    for i in range(p.shape[0]):
+        for j in range(p.shape[0]):
+            p[i, j] += gain[i] * gain[j]
+
+
+@njit_borrowed
 def _predict(
     model: Model,
     signal: FloatArray,
@@ -250,14 +266,19 @@ def _predict(
     turns = 0.0 if rests else 1.0
     psd, pitching = turns * (sr * b + cr * c), turns * (cr * b - sr * c)
     pull = 2.0 * lever * psd + x[ASKEW] * x[V]  # derivative of v' by psd
-    acceleration = signal[3] - x[PUSH] + g * sp + lever * psd * psd + x[ASKEW] * x[V] * psd
+    # Half a step of a vertical curve: by the pitch at its start each change of gradient would leave
+    # g dt/2 times that change in the speed, .01 m/s after 20 permil.
+    middle = x[PITCH] + 0.5 * dt * pitching
+    along = g * math.cos(middle)
+    acceleration = signal[3] - x[PUSH] + g * math.sin(middle) + lever * psd * psd + x[ASKEW] * x[V] * psd
     for i in range(V, PITCH + 1):
         for j in range(STATES):
             f[i, j] = 1.0 if i == j else 0.0
     f[V, V] += dt * x[ASKEW] * psd
-    f[V, PITCH], f[V, PUSH], f[V, ASKEW] = dt * g * cp, -dt, dt * x[V] * psd
-    f[V, ROLL] = dt * pull * pitching
-    f[V, DRIFT_Y], f[V, DRIFT_Z] = -dt * pull * sr * turns, -dt * pull * cr * turns
+    f[V, PITCH], f[V, PUSH], f[V, ASKEW] = dt * along, -dt, dt * x[V] * psd
+    f[V, ROLL] = dt * (pull * pitching - 0.5 * dt * along * psd)
+    f[V, DRIFT_Y] = -dt * turns * (pull * sr + 0.5 * dt * along * cr)
+    f[V, DRIFT_Z] = -dt * turns * (pull * cr - 0.5 * dt * along * sr)
     f[ROLL, ROLL] += dt * sp / cp * pitching
     f[ROLL, PITCH] = dt * psd / (cp * cp)
     f[ROLL, DRIFT_X] = -dt * turns

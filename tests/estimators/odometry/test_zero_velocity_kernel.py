@@ -9,6 +9,7 @@ import pytest
 from simrail.estimators.kalman import History, fixed_interval, room_for_history
 from simrail.estimators.odometry.standstill import PRIOR, SUREST, TURN_S
 from simrail.estimators.odometry.zero_velocity_kernel import (
+    REST,
     STATES,
     UPDATES,
     Found,
@@ -55,7 +56,7 @@ def ride_of(steps: int, *, given: np.ndarray | None = None, scale_sd: float = 0.
         force_variance=1e-6,
         scale_variance=scale_sd**2,
         surely=math.log(99.0),
-        unheard_mps=0.03,
+        unheard_m=0.006,
     )
 
 
@@ -91,7 +92,10 @@ def test_filter_and_smoother_equal_the_joint_gaussian() -> None:
     stood = True
     for k in range(n):
         f, rests = past.transitions[k], model.given[k] > 0.0
-        p = p + np.diag([0.0, 0.03**2 if stood and not rests else 0.0, *[0.0] * (STATES - 2)])
+        if stood and not rests:
+            p_then = filtered.covariances[k - 1]
+            misled = p_then[:, V] / model.noise[REST] * model.unheard_m / STEP_S
+            p = p + np.outer(misled, misled)
         stood = rests
         # Affine: what the filter took for the state a step ago is led to what it predicts.
         x = past.states[k] + f @ (x - before)

@@ -44,7 +44,7 @@ def moved(x: np.ndarray, model: Model, k: int, rests: bool) -> np.ndarray:
     push, askew = x[7], x[9]
     rates = np.zeros(3) if rests else euler_rates(model.signals[k, :3] - x[4:7], roll, pitch)
     turn = rates[2] * np.cos(pitch)
-    gravity = into_body(roll, pitch) @ np.array([0.0, 0.0, model.gravity])
+    gravity = into_body(roll, pitch + 0.5 * model.step_s * rates[1]) @ np.array([0.0, 0.0, model.gravity])
     force = model.signals[k, 3] - push - gravity[0]
     acceleration = force + (model.lever_m + np.sign(v.real) * model.lag_m) * turn**2 + askew * v * turn
     dt = model.step_s
@@ -76,7 +76,8 @@ def filterpy_zero_velocity(model: Model, x: FloatArray, p: FloatArray, rests: np
     stood = True
     for k in range(len(model.signals)):
         if stood and not rests[k]:
-            ekf.P[1, 1] += model.unheard_mps**2
+            misled = ekf.P[:, 1] / model.noise[1] * model.unheard_m / model.step_s
+            ekf.P += np.outer(misled, misled)
         stood = rests[k]
         f = derived(lambda state, k=k: moved(state, model, k, rests[k]), ekf.x)
         noise = model.rest_process if rests[k] else model.process + scaled(ekf.x, model, k)
