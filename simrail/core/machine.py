@@ -43,7 +43,7 @@ def differences(here: Mapping[str, str], others: Mapping[str, Mapping[str, str]]
     others : mapping of str to mapping
         Those of others, by their names.
     """
-    told = []
+    told: list[str] = []
     for what in (KERNELS, FEATURES, ALGEBRA, PYTHON):
         unlike = sorted(name for name, other in others.items() if other.get(what) != here[what])
         if not unlike or (

@@ -11,6 +11,7 @@ import argparse
 import compileall
 import multiprocessing
 import os
+import pickle
 import shutil
 import tempfile
 import time
@@ -50,7 +51,7 @@ def main() -> None:
     work.mkdir(parents=True, exist_ok=True)
     first = lay_out(work, "copy")
     os.chdir(first)
-    items = mutants.sample(first, seed=given.seed, count=given.count)
+    items = drawn(work, first, given)
     items = [item for item in items if item.mutations[0].module_path.as_posix().startswith(given.room)]
     with use_db(str(work / "session.sqlite"), WorkDB.Mode.create) as session:
         there = {item.job_id for item in session.work_items}
@@ -58,6 +59,15 @@ def main() -> None:
         if not given.report:
             run(session, items, work, given)
         report(session, items)
+
+
+def drawn(work: Path, first: Path, given: argparse.Namespace) -> list[WorkItem]:
+    """The sample of a session, which takes some time to draw: once."""
+    kept = work / f"sample-{given.count}.pickle"
+    if not kept.exists():
+        kept.write_bytes(pickle.dumps(mutants.sample(first, seed=given.seed, count=given.count)))
+    items: list[WorkItem] = pickle.loads(kept.read_bytes())
+    return items
 
 
 def lay_out(work: Path, name: str) -> Path:

@@ -478,7 +478,7 @@ def test_truth_at_the_imu_times_takes_samples_and_interpolates_between_them() ->
     mid = truth_at_imu(truth, recorded(between))
     expected = 0.5 * (fine["roll_rad"].to_numpy()[:-1] + fine["roll_rad"].to_numpy()[1:])
     np.testing.assert_allclose(mid["roll_rad"], expected, atol=1e-12)
-    with pytest.raises(InputError, match="time span"):
+    with pytest.raises(InputError, match=rf"time span.*limit: {fine.index[0]} to {fine.index[-11]} s"):
         truth_at_imu(FakeTruth(fine.iloc[:-10]), recorded(fine))
 
 
