@@ -20,8 +20,10 @@ SHIPPED: dict[str, tuple[str, dict[str, Any]]] = {
     "bogie_delay": ("BogieDelayOdometry", {"smoothed": False}),
     "bogie_delay_smoothed": ("BogieDelayOdometry", {"smoothed": True}),
     "curve_matched": ("CurveMatchedOdometry", {"smoothed": False}),
+    "curve_matched_hindsight": ("CurveMatchedOdometry", {"hindsight": True}),
     "curve_smoothed": ("CurveMatchedOdometry", {"smoothed": True}),
     "encoder": ("EncoderOdometry", {}),
+    "encoder_hindsight": ("EncoderOdometry", {"hindsight": True}),
     "zero_velocity": ("ZeroVelocityOdometry", {"smoothed": False}),
     "zero_velocity_smoothed": ("ZeroVelocityOdometry", {"smoothed": True}),
 }

@@ -1,6 +1,7 @@
 """A recorded ride, ready for estimators: its signals, an odometry, and whether all that can be true."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 from simrail.core.toml_files import blame, label
@@ -46,9 +47,24 @@ def judged_ride(path: Path) -> tuple[Recording, Evidence]:
     recording = read_signals(path)
     if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
         source = "encoder" if recording.odometer is None else "odometer"
-        recording = with_odometry(recording, "encoder", source=source)
+        # The ride is over: where it begins at speed, its first seconds are answered by later ones.
+        recording = with_odometry(recording, "encoder_hindsight", source=source)
+        recording = replace(recording, notes=(*recording.notes, *_begun(recording)))
     with blame(label(ride_file(path))):
         evidence = check_plausible(recording)
         check_ranges(recording)
         check_hard_iron(recording)
     return recording, evidence
+
+
+def _begun(recording: Recording) -> tuple[str, ...]:
+    """A note of a ride that begins at speed, by its odometry."""
+    if recording.odometry is None or recording.encoder is None:
+        return ()
+    first = recording.odometry.iloc[0]
+    if first["speed_mps"] == 0.0:
+        return ()
+    return (
+        f"the ride begins at speed, {first['speed_mps']:.2f} +- {first['speed_sd_mps']:.2f} m/s: the wheel's "
+        "first seconds are answered by later readings, which no causal method can do",
+    )
