@@ -76,7 +76,8 @@ def with_odometry(recording: Recording, odometry: str | Estimator, *, source: st
     recording : Recording
         The recording.
     odometry : str or Estimator
-        ``"encoder"``, ``"curve_matched"`` (causal), ``"curve_smoothed"``, any registered name or
+        ``"encoder"``, ``"curve_matched"`` (causal), ``"curve_smoothed"``, ``"encoder_hindsight"`` and
+        ``"curve_matched_hindsight"`` (for rides that begin at speed), any registered name or
         ``"file.py:Class"``; ``"none"`` for no odometry; ``"truth"`` for the true one that the recording was
         measured with; or an odometry itself.
     source : str, optional
