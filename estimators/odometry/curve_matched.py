@@ -46,6 +46,7 @@ encoder alone (`simrail.estimators.odometry.encoder`).
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -80,7 +81,7 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
-from simrail.estimators.odometry.moving_start import start_of
+from simrail.estimators.odometry.moving_start import BACK_S, Start, shown_by, start_of
 from simrail.estimators.odometry.pointing import (
     LATERAL_CREEP,
     Pointing,
@@ -98,7 +99,7 @@ from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray, IntArray
 from simrail.estimation.estimate import Estimate
-from simrail.recording.recording import Recording
+from simrail.recording.recording import AT_IMU_TIMES, AT_OWN_TIMES, Recording, beginning
 from simrail.recording.sheets.vehicle_sheet import Chord
 
 _STILL_S = 0.5
@@ -150,6 +151,9 @@ class CurveMatchedOdometry:
         Innovations of the wheel beyond so many standard deviations are slip.
     wheel : bool
         False leaves the encoder aside: an IMU and a map alone.
+    hindsight : bool
+        As of `EncoderOdometry`: the first seconds of a ride that begins at speed are answered by later ones.
+        The smoother always does; the filter hears the wheel alone until readings have shown the speed.
     """
 
     smoothed: bool = False
@@ -166,14 +170,15 @@ class CurveMatchedOdometry:
     heading_sd_rad: float = 2e-4
     gate: float = 7.0
     wheel: bool = True
+    hindsight: bool = False
 
     needs = ()
     cites = ("escalona_2021",)
 
     @property
     def causal(self) -> bool:
-        """The filter is causal, the smoother is not."""
-        return not self.smoothed
+        """The filter is causal without hindsight, the smoother is not."""
+        return not self.smoothed and not self.hindsight
 
     @property
     def label(self) -> str:
@@ -183,16 +188,58 @@ class CurveMatchedOdometry:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
-            if name not in ("smoothed", "wheel") and not 0.0 < value < math.inf:
+            if name not in ("smoothed", "wheel", "hindsight") and not 0.0 < value < math.inf:
                 raise InputError("is out of range", field=name, value=value, limit="> 0")
 
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate position, speed and acceleration along the track at every IMU sample."""
-        states = self.at_imu_times(self.trace(recording), recording)
+        heard = self._heard(recording)
+        if heard.has_wheel and self.causal:
+            states = self._once_shown(recording)
+        else:
+            states = self.at_imu_times(self.trace(recording), recording)
+            if heard.has_wheel and start_of(heard).speed_mps:
+                # Until its own states have settled, the wheel's first seconds, smoothed back, are better.
+                first = EncoderOdometry(hindsight=True).estimate(heard).states
+                early = states.index < states.index[0] + BACK_S
+                states.loc[early, list(first)] = first.loc[early]
         return Estimate(states=states, mount=recording.mount)
 
-    def trace(self, recording: Recording) -> Steps:
-        """Run the filter, and the smoother if wanted; all states at its own steps."""
+    def _once_shown(self, recording: Recording) -> pd.DataFrame:
+        """States of a ride that may begin at speed: from rest until readings show it, then from there anew.
+
+        Nothing later than a sample enters it.
+        """
+        assert recording.encoder is not None and recording.encoder_sheet is not None
+        if recording.start_speed_mps:
+            return self.at_imu_times(self.trace(recording), recording)
+        read, pulse = recording.encoder.index.to_numpy(dtype=np.float64), recording.encoder_sheet.pulse_m
+        shown = shown_by(read, recording.encoder["pulse_count"].to_numpy(dtype=np.float64) * pulse, pulse)
+        resting = replace(recording, start_speed_mps=0.0)
+        if shown.first < 0 and shown.told < 0:
+            return self.at_imu_times(self.trace(resting), resting)
+        time = recording.imu.index.to_numpy(dtype=np.float64)
+        seen = int(np.searchsorted(time, read[shown.first if shown.first >= 0 else shown.told]))
+        at = len(time) if shown.told < 0 else int(np.searchsorted(time, read[shown.told]))
+        wheel = EncoderOdometry().estimate(recording).states
+        before = beginning(resting, samples=max(seen, 2))
+        early = [self.at_imu_times(self.trace(before), before).iloc[:seen], wheel.iloc[seen : at + 1]]
+        if len(time) >= at + 2:
+            late = from_sample(recording, at, wheel)
+            start = Start(float(wheel["speed_mps"].iloc[at]), float(wheel["speed_sd_mps"].iloc[at]))
+            early.append(self.at_imu_times(self.trace(late, start), late).iloc[1:])
+        return pd.concat(early)
+
+    def trace(self, recording: Recording, start: Start | None = None) -> Steps:
+        """Run the filter, and the smoother if wanted; all states at its own steps.
+
+        Parameters
+        ----------
+        recording : Recording
+            The recording.
+        start : Start, optional
+            Speed at its first sample; as `first_speed` has it if not given.
+        """
         recording = self._heard(recording)
         if not recording.has_wheel:
             return self._without_wheel(recording)
@@ -213,7 +260,7 @@ class CurveMatchedOdometry:
             wheel_ahead_m=wheel_ahead(recording),
         )
         pointing = pointing_of(recording, chord)
-        x, p = self._start(recording, pulse, chord, pointing)
+        x, p = self._start(recording, pulse, chord, pointing, start)
         x[YAW] = line_at(grid, table, x[S]).heading
         spoken_of = STATES if self.smoothed else V + 1
         states, covariance = np.empty((n, STATES)), np.empty((n, spoken_of, spoken_of))
@@ -319,13 +366,18 @@ class CurveMatchedOdometry:
         return LineModel(**(own | sheets))
 
     def _start(
-        self, recording: Recording, pulse: float, chord: Chord | None, yaw: Pointing
+        self,
+        recording: Recording,
+        pulse: float,
+        chord: Chord | None,
+        yaw: Pointing,
+        start: Start | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands, or runs, where it is known to."""
         sheet, wheel, errors = recording.imu_sheet, recording.encoder_sheet, recording.map_errors
         x = np.zeros(STATES)
         x[S] = recording.start_position_m
-        x[V], speed_sd = first_speed(recording)
+        x[V], speed_sd = first_speed(recording) if start is None else start
         if x[V] != 0.0:  # the first step ends at the first sample, and begins one interval earlier
             x[S] -= x[V] / sheet.rate_hz
             x[WAY] = -x[V] / sheet.rate_hz
@@ -353,12 +405,29 @@ class CurveMatchedOdometry:
         return x, np.diag(sd**2)
 
 
+def from_sample(recording: Recording, sample: int, odometry: pd.DataFrame) -> Recording:
+    """The recording from a sample of the IMU on, with the place and the speed that an odometry has there."""
+    began = recording.imu.index[sample]
+    cut: dict[str, Any] = {}
+    for name in (*AT_IMU_TIMES, *AT_OWN_TIMES):
+        frame = getattr(recording, name)
+        if frame is not None:
+            first = max(int(np.searchsorted(frame.index.to_numpy(), began, side="right")) - 1, 0)
+            cut[name] = frame.iloc[sample:] if name in AT_IMU_TIMES else frame.iloc[first:]
+    return replace(
+        recording,
+        start_position_m=float(odometry["position_m"].iloc[sample]),
+        start_speed_mps=float(odometry["speed_mps"].iloc[sample]),
+        **cut,
+    )
+
+
 def first_speed(recording: Recording) -> tuple[float, float]:
-    """Speed at the first sample, and its standard deviation: of a train at rest, or by its first second."""
+    """Speed at the first sample, and its standard deviation: of a train at rest, as told, or by hindsight."""
     start = start_of(recording)
-    if start.speed_mps == 0.0 or not recording.has_wheel:
+    if start.speed_mps == 0.0 or not recording.has_wheel or recording.start_speed_mps is not None:
         return start.speed_mps, max(start.sd_mps, STILL_SD_MPS)
-    wheel = EncoderOdometry().estimate(recording).states.iloc[0]
+    wheel = EncoderOdometry(hindsight=True).estimate(recording).states.iloc[0]
     return float(wheel["speed_mps"]), max(float(wheel["speed_sd_mps"]), STILL_SD_MPS)
 
 

@@ -14,8 +14,8 @@ of pulses per reading the count's error is a slow sawtooth, which the filter fol
 
 An odometer that shows the speed, in place of a counter, runs through the same model.
 
-A recording that begins at speed is another matter (`simrail.estimators.odometry.moving_start`): its first
-seconds are answered with hindsight.
+A recording that begins at speed is another matter (`simrail.estimators.odometry.moving_start`): the filter
+begins anew where readings have shown it, or, with hindsight, answers the first seconds by later ones.
 """
 
 from dataclasses import dataclass
@@ -26,11 +26,17 @@ from simrail.estimators.kalman import mirror, update
 from simrail.estimators.odometry.moving_start import (
     ACCELERATION_SD_MPS2,
     BACK_S,
+    SHOWN_S,
+    SPEED_SD_MPS,
+    Shown,
     Start,
     reading_variance,
+    shown_by,
     smoothed_back,
     start_of,
     start_of_counts,
+    state_so_far,
+    told_start,
 )
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
@@ -62,19 +68,27 @@ class EncoderOdometry:
         last pulse is given three pulse intervals, at most ten times `still_s`.
     still_mps : float
         An odometer's reading below this is a train at rest.
+    hindsight : bool
+        Whether the first seconds of a ride that begins at speed are answered by later ones: for a ride that
+        is over, and not causal. Nothing else changes by it.
     """
 
     jerk_intensity_m2ps5: float = JERK_INTENSITY_M2PS5
     still_s: float = 0.5
     still_mps: float = 0.02
+    hindsight: bool = False
 
-    causal = True
     needs = ("encoder",)
     uses_imu = False
     label = "encoder odometry"
 
+    @property
+    def causal(self) -> bool:
+        """Without hindsight it is."""
+        return not self.hindsight
+
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
+        for name in ("jerk_intensity_m2ps5", "still_s", "still_mps"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InputError("is out of range", field=name, value=getattr(self, name), limit="> 0")
 
@@ -88,9 +102,8 @@ class EncoderOdometry:
         """
         times, start_m = recording.imu.index.to_numpy(dtype=np.float64), recording.start_position_m
         if recording.encoder is not None and recording.encoder_sheet is not None:
-            states = self.from_counts(
-                recording.encoder, recording.encoder_sheet, times, start_m, start=start_of(recording)
-            )
+            start = start_of(recording) if self.hindsight else told_start(recording)
+            states = self.from_counts(recording.encoder, recording.encoder_sheet, times, start_m, start=start)
         elif recording.odometer is not None and recording.odometer_sheet is not None:
             states = self.from_speed(recording.odometer, recording.odometer_sheet, times, start_m)
         else:
@@ -131,7 +144,8 @@ class EncoderOdometry:
         start_position_m : float
             Position s at the first count.
         start : Start, optional
-            Speed at the first count; found out by the first second if not given.
+            Speed at the first count; where it is not given, found out by the first second with hindsight,
+            and 0 without.
 
         Returns
         -------
@@ -143,9 +157,15 @@ class EncoderOdometry:
         read, counts = np.array(encoder.index.to_numpy(dtype=np.float64)), encoder["pulse_count"].to_numpy()
         way = (counts - counts[0]).astype(np.float64) * quantum
         if start is None:
-            start = start_of_counts(read, way, quantum)
+            start = start_of_counts(read, way, quantum) if self.hindsight else Start()
+        shown = Shown() if self.hindsight or start.speed_mps else shown_by(read, way, quantum)
         moves, counted = start.speed_mps != 0.0, quantum**2 / 12.0
-        variance = reading_variance(read, way, quantum) if moves else counted
+        variance = reading_variance(read, way, quantum) if moves and self.hindsight else counted
+        anew, anew_p = np.zeros(STATES), np.zeros((STATES, STATES))
+        if shown.told >= 0:
+            known = slice(shown.told + 1)
+            variance = reading_variance(read[known], way[known], quantum)
+            anew, anew_p = state_so_far(read[known], way[known], variance)
         states = _filter(
             read,
             counts.astype(np.float64),
@@ -156,8 +176,12 @@ class EncoderOdometry:
             start.speed_mps,
             start.sd_mps,
             variance - counted,
+            shown.first,
+            shown.told,
+            anew,
+            anew_p,
         )
-        if moves:
+        if moves and self.hindsight:
             self._look_back(states, read, way, times, start, variance)
         # The unknown first place between two edges shifts every position alike, by up to half a pulse.
         states[:, 3] += quantum**2 / 12.0
@@ -256,10 +280,16 @@ def _filter(
     first_speed: float,
     first_speed_sd: float,
     jitter: float,
+    seen: int,
+    shown: int,
+    anew: FloatArray,
+    anew_p: FloatArray,
 ) -> FloatArray:
     """Run over all readings; returns s, V, A and their variances (n, 6) at the wanted times.
 
     From rest, where ``first_speed`` is 0; ``jitter`` is what stamps add to the variance of a count at first.
+    At reading ``shown`` (-1 for none) it begins anew, by ``anew`` with covariance ``anew_p``; from ``seen``
+    (-1 for none) until then, for `SHOWN_S` at most, it says the mean speed so far, and how little that is.
     """
     out = np.empty((len(wanted), 6))
     x, p, h = np.zeros(STATES), np.zeros((STATES, STATES)), np.zeros(STATES)
@@ -285,7 +315,7 @@ def _filter(
         dt = time[k] - time[k - 1] if k > 0 else 0.0
         change = count[k] - count[k - 1] if k > 0 else 0.0
         way = (count[k] - count[0]) * q
-        fading = jitter * np.exp((time[0] - time[k]) / FADE_S)
+        fading = jitter * np.exp((time[max(shown, 0)] - time[k]) / FADE_S) if k > shown else 0.0
         idle += dt
         if not resting:
             predict(x, p, dt, intensity)
@@ -314,6 +344,17 @@ def _filter(
                 update(x, p, h, edge - x[S], q * q / 12.0 + fading, gain, work)
             if x[V] * direction <= 0.0 or idle > patience:
                 resting = True
+        if 0 <= seen <= k and time[k] - time[0] < SHOWN_S[0]:
+            resting = False
+            x[S], x[V], x[A] = way, way / (time[k] - time[0]), 0.0
+            p[:, :] = 0.0
+            p[S, S] = q * q / 12.0
+            p[V, V] = SPEED_SD_MPS**2
+            p[A, A] = ACCELERATION_SD_MPS2**2
+        if k == shown:
+            resting = False
+            x[:] = anew
+            p[:, :] = anew_p
         if resting:
             x[V] = 0.0
             x[A] = 0.0

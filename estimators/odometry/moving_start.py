@@ -3,9 +3,12 @@
 A filter that takes every recording to begin at rest meets a train at 40 km/h with a speed of 0, known to
 11 mm/s, and makes of its surprise an acceleration that was not there. Whether a train stands at first is seen
 by its counts: from rest no train is further than `START_JERK_MPS3` t^3 / 6 after a time t. Where it is, the
-filter begins with a speed that is unknown by metres per second, and what it says of the first `BACK_S` is
-smoothed back from some seconds later. Only there a causal odometry looks ahead: nothing before the first
-sample could tell it more.
+filter begins with a speed that is unknown by metres per second.
+
+A causal odometry says so from the reading on that shows it, and begins where half a second of them have told
+how fast (`shown_by`); before the first of them it takes the train to stand. With hindsight an odometry does
+so from the first sample on, and what it says of the first `BACK_S` is smoothed back from some seconds later:
+it is not causal then, and says so.
 """
 
 from typing import NamedTuple
@@ -26,6 +29,10 @@ SPEED_SD_MPS, ACCELERATION_SD_MPS2 = 2.0, 1.0
 
 BACK_S = 4.0
 """So much of the beginning is answered with hindsight: until an attitude filter has settled as well."""
+
+
+SHOWN_S = (0.5, 1.0)
+"""Times after the first reading between which a causal odometry holds the way against a start from rest."""
 
 
 class Start(NamedTuple):
@@ -55,11 +62,49 @@ def start_of_counts(time: FloatArray, way_m: FloatArray, pulse_m: float) -> Star
     return Start()
 
 
+class Shown(NamedTuple):
+    """Numbers of readings: the first that shows a train at speed, the first that tells how fast; or -1."""
+
+    first: int = -1
+    told: int = -1
+
+
+def shown_by(time: FloatArray, way_m: FloatArray, pulse_m: float) -> Shown:
+    """The readings by which a train is seen to have moved from the start, as `start_of_counts`.
+
+    Nothing later than each of them enters it.
+    """
+    after = time[: _within(time, SHOWN_S[1])] - time[0]
+    went = np.abs(way_m[: len(after)] - way_m[0])
+    moves = went > 2.0 * pulse_m + START_JERK_MPS3 * after**3 / 6.0
+    early, late = (np.flatnonzero(moves & flags) for flags in (after < SHOWN_S[0], after >= SHOWN_S[0]))
+    return Shown(int(early[0]) if len(early) else -1, int(late[0]) if len(late) else -1)
+
+
+def state_so_far(time: FloatArray, way_m: FloatArray, variance: float) -> tuple[FloatArray, FloatArray]:
+    """State s, V, A (3,) at the last of some readings (n,) of a train at speed, and its covariance (3, 3).
+
+    A parabola through them, each of that variance, with what is unknown of speed and acceleration before any.
+    """
+    since = time - time[-1]
+    rows = np.column_stack([np.ones_like(since), since, 0.5 * since**2])
+    mean = (way_m[-1] - way_m[0]) / (time[-1] - time[0])
+    known = np.diag([0.0, SPEED_SD_MPS**-2, ACCELERATION_SD_MPS2**-2])
+    covariance = np.linalg.inv(rows.T @ rows / variance + known)
+    state = covariance @ (rows.T @ (way_m - way_m[0]) / variance + known @ np.array([0.0, mean, 0.0]))
+    return state, covariance
+
+
+def told_start(recording: Recording) -> Start:
+    """Speed of a train at the first sample, where its ride file says one; (0, 0) where it says nothing."""
+    told = recording.start_speed_mps
+    return Start(told, SPEED_SD_MPS) if told else Start()
+
+
 def start_of(recording: Recording) -> Start:
     """Speed of a train at the first sample of a recording: as its ride file says, else by its encoder."""
     if recording.start_speed_mps is not None:
-        moves = recording.start_speed_mps != 0.0
-        return Start(recording.start_speed_mps, SPEED_SD_MPS) if moves else Start()
+        return told_start(recording)
     if recording.encoder is None or recording.encoder_sheet is None:
         return Start()
     time = recording.encoder.index.to_numpy(dtype=np.float64)

@@ -245,11 +245,11 @@ def new(
     source: Annotated[
         Path | None,
         typer.Option(
-            "--from", metavar="FILE", help="Of a track: LandXML, or a CSV of curvature over distance."
+            "--from", metavar="FILE", help="Of a track: LandXML, IFC 4.3 or a CSV of curvature and cant."
         ),
     ] = None,
     alignment: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which one, of a LandXML file with several.")
+        str | None, typer.Option(metavar="NAME", help="Which one, of a LandXML or IFC file with several.")
     ] = None,
     step_smoothing: Annotated[
         float | None,

@@ -134,11 +134,11 @@ def write_track(
     name : str
         Name of the track.
     source : Path
-        LandXML, or a table of curvature over distance.
+        LandXML, IFC 4.3, or a table of curvature over distance.
     folder : Path, optional
         Where to write it.
     alignment : str, optional
-        Which one, of a LandXML file with several.
+        Which one, of a LandXML or IFC file with several.
     step_smoothing_m : float, optional
         Length over which steps of curvature are smoothed.
 

@@ -20,8 +20,10 @@ SHIPPED: dict[str, tuple[str, dict[str, Any]]] = {
     "bogie_delay": ("BogieDelayOdometry", {"smoothed": False}),
     "bogie_delay_smoothed": ("BogieDelayOdometry", {"smoothed": True}),
     "curve_matched": ("CurveMatchedOdometry", {"smoothed": False}),
+    "curve_matched_hindsight": ("CurveMatchedOdometry", {"hindsight": True}),
     "curve_smoothed": ("CurveMatchedOdometry", {"smoothed": True}),
     "encoder": ("EncoderOdometry", {}),
+    "encoder_hindsight": ("EncoderOdometry", {"hindsight": True}),
     "zero_velocity": ("ZeroVelocityOdometry", {"smoothed": False}),
     "zero_velocity_smoothed": ("ZeroVelocityOdometry", {"smoothed": True}),
 }
@@ -74,7 +76,8 @@ def with_odometry(recording: Recording, odometry: str | Estimator, *, source: st
     recording : Recording
         The recording.
     odometry : str or Estimator
-        ``"encoder"``, ``"curve_matched"`` (causal), ``"curve_smoothed"``, any registered name or
+        ``"encoder"``, ``"curve_matched"`` (causal), ``"curve_smoothed"``, ``"encoder_hindsight"`` and
+        ``"curve_matched_hindsight"`` (for rides that begin at speed), any registered name or
         ``"file.py:Class"``; ``"none"`` for no odometry; ``"truth"`` for the true one that the recording was
         measured with; or an odometry itself.
     source : str, optional

@@ -10,7 +10,7 @@ changed, running backwards and standing still, doing without what it does not sa
 """
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -26,11 +26,15 @@ from simrail.core.columns import (
     ODOMETRY_SD,
     RATE_INNOVATION,
 )
+from simrail.core.errors import InputError
 from simrail.estimation.estimate import Estimate, Estimator, description_of
 from simrail.recording.recording import AT_IMU_TIMES, AT_OWN_TIMES, Recording, beginning
 from simrail.recording.standstill import at_rest_initially, rest_periods
 
 Check = Callable[[Estimator, Recording], None]
+
+EARLY_S = (0.05, 0.15, 0.2, 0.21, 0.3, 0.7, 1.2, 3.0)
+"""Where a ride that begins at speed is cut: while it is found out how fast, and later."""
 
 
 def check_estimator(estimator: Estimator, recording: Recording) -> None:
@@ -139,7 +143,7 @@ def is_deterministic(estimator: Estimator, recording: Recording) -> None:
     require_same(first, copy.deepcopy(estimator).estimate(recording), when="run from a copy")
 
 
-def sees_no_future(estimator: Estimator, recording: Recording) -> None:
+def sees_no_future(estimator: Estimator, recording: Recording, lengths: Sequence[int] | None = None) -> None:
     """If causal: the estimate of a prefix equals the prefix of the estimate, bit by bit.
 
     That goes for the states. Geometry lies over the track, is made after the ride, and is not compared.
@@ -147,7 +151,9 @@ def sees_no_future(estimator: Estimator, recording: Recording) -> None:
     if getattr(estimator, "causal", None) is not True:
         return
     whole = estimator.estimate(recording)
-    for n in prefix_lengths(recording):
+    for n in prefix_lengths(recording) if lengths is None else lengths:
+        if not 2 <= n < len(recording.imu):
+            continue
         part = replace(
             estimator.estimate(beginning(recording, samples=n)), geometry=None, geometry_draws=None
         )
@@ -184,7 +190,18 @@ def is_no_copy(estimator: Estimator, recording: Recording) -> None:
     require_same(estimator.estimate(recording), estimator.estimate(alone), when="without another odometry")
 
 
-ODOMETRY_CHECKS: tuple[Check, ...] = (gives_an_odometry, is_no_copy)
+def begins_at_speed(estimator: Estimator, recording: Recording) -> None:
+    """The estimate of a ride that begins at speed, and of its prefixes, if causal; or a refusal."""
+    late = begun_at_speed(recording)
+    try:
+        require_well_formed(estimator.estimate(late), late)
+    except InputError:
+        return  # it needs a rest, and says so
+    rate = late.imu_sheet.rate_hz
+    sees_no_future(estimator, late, [round(seconds * rate) for seconds in EARLY_S])
+
+
+ODOMETRY_CHECKS: tuple[Check, ...] = (gives_an_odometry, is_no_copy, begins_at_speed)
 
 
 def require_well_formed(estimate: Estimate, recording: Recording) -> None:
@@ -336,6 +353,21 @@ def _turned(frame: pd.DataFrame, *, negate: str) -> pd.DataFrame:
         if negate and str(name).startswith(negate):
             turned[name] = -turned[name]
     return turned
+
+
+def begun_at_speed(recording: Recording) -> Recording:
+    """The ride from where it has reached nine tenths of its greatest speed, by its odometry."""
+    odometry = recording.odometry
+    if odometry is None:
+        return recording
+    speed = np.abs(odometry["speed_mps"].to_numpy())
+    sample = int(np.argmax(speed >= 0.9 * speed.max()))
+    began = recording.imu.index[sample]
+    later = _changed(
+        recording, lambda name, frame: frame.iloc[sample:] if name in AT_IMU_TIMES else frame.loc[began:]
+    )
+    place = float(odometry["position_m"].iloc[sample])
+    return replace(later, name=f"{recording.name} at speed", start_position_m=place)
 
 
 def standing(recording: Recording) -> Recording:

@@ -1,7 +1,7 @@
 """A recorded ride, ready for estimators: its signals, an odometry, and whether all that can be true."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from simrail.core.toml_files import blame, label
@@ -83,9 +83,24 @@ def whole_ride(path: Path) -> RecordedRide:
     recording, spec, reference = read_whole(path)
     if recording.odometry is None and (recording.encoder is not None or recording.odometer is not None):
         source = "encoder" if recording.odometer is None else "odometer"
-        recording = with_odometry(recording, "encoder", source=source)
+        # The ride is over: where it begins at speed, its first seconds are answered by later ones.
+        recording = with_odometry(recording, "encoder_hindsight", source=source)
+        recording = replace(recording, notes=(*recording.notes, *_begun(recording)))
     with blame(label(ride_file(path))):
         evidence = check_plausible(recording)
         check_ranges(recording)
         check_hard_iron(recording)
     return RecordedRide(recording, evidence, spec, reference)
+
+
+def _begun(recording: Recording) -> tuple[str, ...]:
+    """A note of a ride that begins at speed, by its odometry."""
+    if recording.odometry is None or recording.encoder is None:
+        return ()
+    first = recording.odometry.iloc[0]
+    if first["speed_mps"] == 0.0:
+        return ()
+    return (
+        f"the ride begins at speed, {first['speed_mps']:.2f} +- {first['speed_sd_mps']:.2f} m/s: the wheel's "
+        "first seconds are answered by later readings, which no causal method can do",
+    )

@@ -17,6 +17,7 @@ from simrail.recording.evidence.judge import Evidence, refuse_wrong
 from simrail.recording.recording import Recording, imus
 from simrail.recording.signals import FORCES
 from simrail.recording.standstill import at_rest_initially
+from simrail.track.design import TrackFrame
 
 GRAVITY_SHARE = 0.05
 """At rest an accelerometer shows gravity to 5 %, beside its bias: units differ by 9.8 times and more."""
@@ -33,6 +34,12 @@ LEAST_TURN_RAD = 0.1
 LEAST_WAY_M, LEAST_VARIANCE_M2PS4 = 20.0, 0.01
 """Way, and variance of the acceleration, from which on the accelerometer is held against the odometry."""
 
+
+LEAST_SPEED_MPS, LEAST_READINGS = 2.0, 10.0
+"""Speed, and readings of a way, from which on counts are held against those of each reading."""
+
+OTHER_SIGN, OTHER_UNIT = 0.4, 4.0
+"""Slopes of a single axis beyond which (below minus, above) it has the other sign, or another unit."""
 
 SURE = 6.0
 """Standard deviations that a slope must be off 1 before a ride is refused for it; they take seconds as
@@ -68,6 +75,7 @@ def check_plausible(recording: Recording) -> Evidence:
     for table, alone in imus(recording):
         _check_gravity(alone, table)
         _check_turning(alone, table)
+    _check_counted(recording)
     evidence = weigh_all(recording)
     refuse_wrong(evidence)
     if not recording.track.is_map:
@@ -91,6 +99,11 @@ def _check_gravity(recording: Recording, table: str) -> None:
     shown = f"{size:.4g} m/s2 {when}"
     if abs(size - gravity) > slack:
         remedy = "set units.accel, or mend the scale"
+        if size < slack:
+            remedy = (
+                "gravity has been taken off (a phone's linear acceleration): log the accelerometer as it is, "
+                "with gravity"
+            )
         # What the unit would have to be, from the size alone: every unit as read in every other.
         for unit, (multiply, divide) in FORCES.items():
             for claimed, (by, over) in FORCES.items():
@@ -141,6 +154,39 @@ def _check_turning(recording: Recording, table: str) -> None:
             )
 
 
+def _check_counted(recording: Recording) -> None:
+    """Refuse counts that are those of each reading, not since the start: they rise and fall with the speed.
+
+    Told by the push: what they would be as a speed changes as the accelerometer says, and as a way they are
+    next to none.
+    """
+    encoder, sheet = recording.encoder, recording.encoder_sheet
+    if encoder is None or sheet is None or len(encoder) < 2:
+        return
+    count = encoder["pulse_count"].to_numpy(dtype=np.float64)
+    stamps = encoder.index.to_numpy(dtype=np.float64)
+    step_s = float(stamps[-1] - stamps[0]) / (len(stamps) - 1)
+    speed, way_m = count * sheet.pulse_m / step_s, float(np.ptp(count)) * sheet.pulse_m
+    went_m = abs(float(speed.sum())) * step_s
+    if np.ptp(speed) < LEAST_SPEED_MPS or went_m < LEAST_WAY_M or way_m > went_m / LEAST_READINGS:
+        return
+    time = recording.imu.index.to_numpy(dtype=np.float64)
+    seconds = max(1, round(recording.imu_sheet.rate_hz))
+    width = max(1, round(1.0 / step_s))
+    smooth = np.convolve(speed, np.ones(width) / width, mode="same")
+    push = np.gradient(np.interp(time, stamps, smooth), 1.0 / recording.imu_sheet.rate_hz)
+    expected = _means(push, seconds)
+    slope, sd = _slope(_means(recording.imu[ACCEL[0]].to_numpy(), seconds), expected)
+    if np.var(expected) > LEAST_VARIANCE_M2PS4 and abs(slope) > 0.5 and abs(slope) > SURE * sd:
+        raise InputError(
+            "rises and falls with the speed: it holds what was counted in each reading, not since the start",
+            field="encoder.count",
+            value=f"{int(count.min())} to {int(count.max())}, {way_m:.3g} m of way; summed up {went_m:.4g} m",
+            limit="counts since the start",
+            remedy="set per_reading = true in [encoder]",
+        )
+
+
 def _check_motion(recording: Recording, odometry: pd.DataFrame) -> None:
     """Hold gyro and accelerometer against what track and odometry say, in means over a second."""
     track = recording.track
@@ -159,6 +205,48 @@ def _check_motion(recording: Recording, odometry: pd.DataFrame) -> None:
     if np.ptp(position) > LEAST_WAY_M and np.var(along) > max(2.0 * noise, LEAST_VARIANCE_M2PS4):
         x, y = (_slope(_means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
         _judge_push(x, y)
+    _judge_axes(recording, frame, _means(speed, seconds), seconds)
+
+
+def _judge_axes(recording: Recording, frame: TrackFrame, speed: FloatArray, seconds: int) -> None:
+    """Hold single axes against the line: one alone may have another unit, another sign, or another's place.
+
+    Roll rates of the transitions for the gyro's X (and Y, for axes that are swapped), what speed and cant
+    leave of a curve for the accelerometer's Y.
+    """
+    twist = frame.k[:, 0] * speed
+    gravity = recording.gravity_mps2 * np.cos(frame.pitch_rad) * np.sin(frame.roll_rad)
+    beside = frame.k[:, 2] * speed**2 + gravity
+    means = {name: _means(recording.imu[name].to_numpy(), seconds) for name in (*GYRO[:2], ACCEL[1])}
+    roll, other = _slope(means[GYRO[0]], twist), _slope(means[GYRO[1]], twist)
+    side = _slope(means[ACCEL[1]], beside)
+    lines = (
+        (GYRO[0], roll, "the roll rate of the transitions"),
+        (ACCEL[1], side, "what speed and cant leave of the curves"),
+    )
+    for name, (slope, sd), of in lines:
+        if slope < -OTHER_SIGN and -slope > SURE * sd:
+            problem, remedy = f"goes against {of}", "give that column alone the other sign, or mend the axes"
+        elif slope > OTHER_UNIT and slope - 1.0 > SURE * sd:
+            problem, remedy = f"is many times {of}", "mend the unit: one axis alone has another one"
+        else:
+            continue
+        raise InputError(
+            problem,
+            field=f"imu.{name}",
+            value=f"{slope:.3g} +- {sd:.2g} times",
+            limit="about 1",
+            remedy=remedy,
+        )
+    swapped = abs(other[0]) > OTHER_SIGN and abs(other[0]) > SURE * other[1]
+    if swapped and abs(roll[0]) < OTHER_SIGN and 1.0 - roll[0] > SURE * roll[1]:
+        raise InputError(
+            "does not roll in the transitions, but its Y does: their columns are swapped",
+            field=f"imu.{GYRO[0]}",
+            value=f"{roll[0]:.2g} times the roll rate along X, {other[0]:.2g} along Y",
+            limit="about 1, and 0",
+            remedy="mend the order in columns.gyro, or the axes",
+        )
 
 
 def _check_on_track(recording: Recording, place: float, *, field: str) -> None:
@@ -199,6 +287,14 @@ def _judge_turn(recording: Recording, line: tuple[float, float]) -> None:
 
 
 def _judge_push(x: tuple[float, float], y: tuple[float, float]) -> None:
+    if x[0] > OTHER_UNIT and x[0] - 1.0 > SURE * x[1]:
+        raise InputError(
+            "pushes many times as much as the train gains speed",
+            field=f"imu.{ACCEL[0]}",
+            value=f"{x[0]:.3g} +- {x[1]:.2g} times the acceleration of the odometry",
+            limit="about 1",
+            remedy="mend the unit: one axis alone has another one; or the odometry",
+        )
     if x[0] > 0.4 or 1.0 - x[0] < SURE * x[1]:
         return
     sideways = abs(y[0]) > max(abs(x[0]), 0.4)

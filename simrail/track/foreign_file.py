@@ -1,4 +1,4 @@
-"""A design from a file of another program: by its ending, LandXML or a table of curvature over distance."""
+"""A design from a file of another program: by its ending LandXML, IFC 4.3 or a table of curvature."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from simrail.core.toml_files import blame, label
 from simrail.track.curvature_csv import read_curvature_csv
 from simrail.track.design import TrackDesign
 from simrail.track.drawn import drawn_design
+from simrail.track.ifc import read_ifc
 from simrail.track.landxml import read_landxml
 
-LANDXML, TABLES = (".xml", ".landxml"), (".csv", ".txt", ".tsv")
+LANDXML, IFC, TABLES = (".xml", ".landxml"), (".ifc",), (".csv", ".txt", ".tsv")
 
 
 def design_from_file(
@@ -22,7 +23,7 @@ def design_from_file(
     Parameters
     ----------
     path : Path
-        LandXML or a table, by its ending.
+        LandXML, IFC 4.3 or a table, by its ending.
     alignment : str, optional
         Name of the alignment, for a file with several.
     step_smoothing_m : float, optional
@@ -34,23 +35,26 @@ def design_from_file(
         If there is no such file, or it describes no line.
     """
     ending = path.suffix.lower()
-    if ending not in LANDXML + TABLES:
+    if ending not in LANDXML + IFC + TABLES:
         raise InputError(
             "is of no kind that is read",
             field="--from",
             value=str(path),
-            limit="LandXML (.xml) or a table of curvature over distance (.csv)",
-            remedy="export IFC as LandXML" if ending == ".ifc" else "export it as one of these",
+            limit="LandXML (.xml), IFC 4.3 (.ifc) or a table of curvature over distance (.csv)",
+            remedy="export it as one of these",
         )
     if not path.is_file():
         raise InputError("there is no such file", field="--from", value=str(path), limit="a file that exists")
-    if alignment is not None and ending not in LANDXML:
+    if alignment is not None and ending in TABLES:
         raise InputError(
-            "belongs to LandXML: a table has one line",
+            "belongs to LandXML and IFC: a table has one line",
             field="--alignment",
             value=alignment,
-            limit="only with a LandXML file",
+            limit="only with a LandXML or IFC file",
         )
     with blame(label(path)):
-        drawn = read_landxml(path, alignment=alignment) if ending in LANDXML else read_curvature_csv(path)
+        if ending in TABLES:
+            drawn = read_curvature_csv(path)
+        else:
+            drawn = (read_landxml if ending in LANDXML else read_ifc)(path, alignment=alignment)
         return drawn_design(drawn, step_smoothing_m=step_smoothing_m), drawn.notes

@@ -19,6 +19,7 @@ import pytest
 
 from simrail.campaign.cell import record_cell, simulated
 from simrail.campaign.progress import Watcher
+from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.judge import KINDS, weigh
 from simrail.recording.recording import Recording
 from simrail.scenario.cells import cells
@@ -83,7 +84,7 @@ def false_alarms(recordings: Sequence[tuple[str, Recording]]) -> list[str]:
     """What is said of sound rides."""
     found = []
     for name, recording in recordings:
-        found += [f"{name}: {finding.key} {finding.shown}" for finding in weigh(recording).wrong]
+        found += [f"{name}: {finding.key} {finding.shown}" for finding in weigh_all(recording).wrong]
     return found
 
 

@@ -130,7 +130,8 @@ def _fitted(recording: Recording) -> tuple[float, float, float] | None:
 
     def solve(offset: float, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         made = columns(offset).reshape(-1, 10) * weights.reshape(-1, 1)
-        solved, *_ = np.linalg.lstsq(made, change.ravel() * weights.ravel(), rcond=None)
+        found, *_ = np.linalg.lstsq(made, change.ravel() * weights.ravel(), rcond=None)
+        solved: FloatArray = np.asarray(found, dtype=np.float64)
         return solved, change - (columns(offset) @ solved)
 
     weights = np.ones_like(change)

@@ -105,7 +105,7 @@ def _compared(
     sd = math.hypot(both[0].sd, both[1].sd)
     told = [finding for finding in both if finding.rests_on == "nothing"]
     if told:
-        nothing = "could not be judged"
+        nothing: Verdict = "could not be judged"
         return Finding(kind.name, key, nominal, sd, nominal, kind.unit, "nothing", nothing, told[0].why)
     off = abs(value - nominal) / math.hypot(sd, slack)
     verdict: Verdict = "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"

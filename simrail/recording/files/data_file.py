@@ -34,6 +34,9 @@ TABLES: dict[str, Callable[[Path], Table]] = {
 }
 """Kinds of files that are no text, and what opens them."""
 
+PACKED = (".zip", ".gz", ".bz2", ".xz", ".7z", ".zst", ".tar", ".tgz", ".rar")
+"""Endings of files that hold others."""
+
 MOST_FILES = 50
 """Files of a folder that are looked into for a missing column."""
 
@@ -71,7 +74,9 @@ class DataPart(Part):
                 "is of no kind that is read",
                 value=value,
                 limit="a name that ends in " + ", ".join([*TEXTS, *TABLES]),
-                remedy="export the logger's file as CSV",
+                remedy="unpack it first"
+                if Path(value).suffix.lower() in PACKED
+                else "export the logger's file as CSV",
             )
         return value
 
@@ -246,8 +251,16 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
         field=where,
         value=name,
         limit=f"one of {listed}",
-        remedy=_elsewhere(name, data, table) or near(name, found) or f"name it in [{table}.columns]",
+        remedy=_elsewhere(name, data, table)
+        or near(name, [other for other in found if other not in _taken(data.part)])
+        or f"name it in [{table}.columns]; what no column holds cannot be read",
     )
+
+
+def _taken(part: DataPart) -> set[str]:
+    """Columns that the ride file has for other quantities: none of them was meant."""
+    said: dict[str, tuple[str, ...]] = getattr(part, "columns", {})
+    return {name for names in said.values() for name in names}
 
 
 def _names_below(name: str, data: DataFile) -> int | None:

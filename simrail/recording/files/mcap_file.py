@@ -156,8 +156,12 @@ def mcap_table(signal: Signal, columns: Sequence[str], *, axes: Frame) -> dict[s
         if axes == "ned" and len(places) == 1 and is_turned(quantity.columns[0]):
             units[quantity.key] = f"-{next(iter(quantity.units))}"
     vectors = any(len(quantity.columns) == 3 for quantity in signal.quantities)
-    turned = {"axes": list(BODY_AXES)} if axes == "ned" and vectors else {}
-    return {"columns": names} | ({"units": units} if units else {}) | turned
+    said: dict[str, object] = {"columns": names}
+    if units:
+        said["units"] = units
+    if axes == "ned" and vectors:
+        said["axes"] = list(BODY_AXES)
+    return said
 
 
 def _place(column: str, axes: Frame) -> str:

@@ -213,6 +213,8 @@ class EncoderSignalPart(SignalPart):
         What the train knows of it.
     reverse : bool
         True if the logger counts up while the train runs towards smaller s.
+    per_reading : bool
+        True if each value is what was counted since the last reading, rather than since the start.
     counter_modulus : int, optional
         Pulses after which the counter begins anew; found out where nothing is said.
     radius_relative_sd : float, optional
@@ -223,6 +225,7 @@ class EncoderSignalPart(SignalPart):
 
     sheet: EncoderSheet
     reverse: bool = False
+    per_reading: bool = False
     counter_modulus: Annotated[int, Field(ge=16)] | None = None
     radius_relative_sd: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
 
@@ -238,7 +241,7 @@ class EncoderSignalPart(SignalPart):
                 field="wheel_radius_m",
                 value=value.wheel_radius_m,
                 limit="0.05 to 1.5 m",
-                remedy="give the radius in metres",
+                remedy=_radius_meant(value.wheel_radius_m),
             )
         return value
 
@@ -248,6 +251,17 @@ class EncoderSignalPart(SignalPart):
         if self.radius_relative_sd is None:
             return self.sheet
         return replace(self.sheet, radius_relative_sd=self.radius_relative_sd)
+
+
+def _radius_meant(value: float) -> str:
+    """A remedy for a wheel radius that is none: what it is in other units."""
+    units = (("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 0.0254))
+    # Of a train's wheel, down to that of a model on a scale track.
+    meant = [f"{value * si:.4g} from {name}" for name, si in units if 0.1 <= value * si <= 0.7]
+    meant += [
+        f"{0.5 * value * si:.4g} from a diameter in {name}" for name, si in units if 0.2 <= value * si <= 1.4
+    ]
+    return "give the radius in metres" + (f": {', or '.join(meant)}" if meant else "")
 
 
 class MagnetometerSignalPart(VectorPart):

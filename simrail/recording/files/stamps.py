@@ -21,6 +21,12 @@ from simrail.recording.signals import TIMES
 COUNTER_BITS = (8, 12, 15, 16, 20, 24, 31, 32)
 """Widths of counters of time: where one begins anew, it falls by all but a step of its range."""
 
+WEEK_S = 604_800.0
+"""Receivers count the seconds of a week, which begin anew on Sunday."""
+
+SUMMER_S = 3600.0
+"""A clock of the wall goes back by an hour where summer time ends."""
+
 FEW_STEPS_BACK = 0.01
 """Share of the steps that a clock that is set may make back; more of them are samples in disorder."""
 
@@ -66,7 +72,7 @@ class RideClock:
             read = read_times(pd.Series(raw), file=file, field=name)
             if read.dates_ns is not None:
                 self._same_kind(True, unit, table)
-                return self._since(read.dates_ns, 10**9)
+                return _over(SUMMER_S, self._since(read.dates_ns, 10**9), table, notes, "summer time ends")
             assert read.seconds is not None
             self._same_kind(False, unit, table)
             return self._over_midnight(read.seconds, read.period_s, table, notes)
@@ -77,7 +83,8 @@ class RideClock:
         if unit == TICKS:
             return count / float(part.tick_rate_hz or 1.0)
         multiply, divide = TIMES[unit]
-        return count if multiply == divide else count * multiply / divide
+        seconds = count if multiply == divide else count * multiply / divide
+        return _over(WEEK_S, seconds, table, notes, "the seconds of the week begin anew")
 
     def _same_kind(self, dated: bool, unit: str, table: str) -> None:
         self._dated = dated if self._dated is None else self._dated
@@ -116,6 +123,22 @@ class RideClock:
             what = "midnight" if period_s > 3600.0 else "the full hour"
             notes.append(f"{table}: the clock passes {what}; its times go on")
         return whole
+
+
+def _over(period_s: float, seconds: FloatArray, table: str, notes: list[str], what: str) -> FloatArray:
+    """Times that go on where a clock went back once, by a period to within some samples; else as they are."""
+    known = np.flatnonzero(np.isfinite(seconds))
+    step = np.diff(seconds[known])
+    back = np.flatnonzero(step < 0.0)
+    if len(back) != 1 or len(step) < 3:
+        return seconds
+    usual = float(np.median(step))
+    if not 0.0 <= float(step[back[0]]) + period_s <= max(3.0 * usual, 1e-9):
+        return seconds
+    whole = seconds.copy()
+    whole[known[back[0]] + 1 :] += period_s
+    notes.append(f"{table}: {what} at {seconds[known[back[0]]]:.6g} s; its times go on")
+    return whole
 
 
 def _counted_on(count: FloatArray, table: str, name: str, notes: list[str]) -> FloatArray:

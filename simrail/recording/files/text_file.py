@@ -373,7 +373,9 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
             field=column,
             value=value[1],
             limit="numbers, or empty fields",
-            remedy=_remedy_of_word(value[1], decimal, line == f" in line {layout.data_line + 1}"),
+            remedy="the line of names stands there again: the logger was started anew; cut the file there"
+            if value[1].strip(' "') in [name for name in layout.names if name]
+            else _remedy_of_word(value[1], decimal, line == f" in line {layout.data_line + 1}"),
         )
     count = re.search(r"Expected (\d+) columns, got (\d+)", said)
     if count:
@@ -382,7 +384,9 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
             file=label(path),
             value=int(count[2]),
             limit=count[1],
-            remedy="mend that line; for text above the column names set skip_lines, for another separator "
+            remedy="drop the last line, which was cut when the logger was switched off"
+            if row and int(count[2]) < int(count[1]) and _is_last(path, layout, int(row[1]) - 1)
+            else "mend that line; for text above the column names set skip_lines, for another separator "
             f"than {separator!r} set separator",
         )
     return InputError(
@@ -394,7 +398,16 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
     )
 
 
+def _is_last(path: Path, layout: Layout, row: int) -> bool:
+    """Whether a row of data stands in the last line of a file."""
+    number = line_number(path, layout, row)
+    with path.open("rb") as file:
+        return not any(line.strip() for line in islice(file, number, None))
+
+
 def _remedy_of_word(word: str, decimal: str, in_first_line: bool) -> str:
+    if re.fullmatch(r"-?[1-9]\d{0,2}(,\d{3})+", word) and decimal == ".":
+        return "write numbers without separators of thousands; or, if the comma is a decimal one, set decimal"
     if "," in word and decimal == ".":
         return 'set decimal = ","'
     if "." in word and decimal == "," and _NUMBER.match(word):

@@ -87,9 +87,12 @@ def with_way(
 def _with_encoder(
     recording: Recording, part: EncoderSignalPart, longest_gap_s: float, reader: SignalReader
 ) -> Recording:
-    counts = _going_on(
-        reader.frame(part, "encoder"), part.known, part.counter_modulus, "encoder.count", reader
-    )
+    counts = reader.frame(part, "encoder")
+    if part.per_reading:
+        counts["pulse_count"] = counts["pulse_count"].cumsum()
+        reader.notes.append("encoder.count: what was counted in each reading is summed up")
+    else:
+        counts = _going_on(counts, part.known, part.counter_modulus, "encoder.count", reader)
     if part.reverse:
         counts["pulse_count"] = -counts["pulse_count"]
     _judge(counts, "encoder", longest_gap_s, 1.0, reader)

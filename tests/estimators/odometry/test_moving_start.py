@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
+from simrail.estimators.odometry.encoder import EncoderOdometry
 from simrail.estimators.odometry.moving_start import (
+    Shown,
     Start,
     reading_variance,
+    shown_by,
     smoothed_back,
     start_of_counts,
 )
 
+from simrail.recording.recording import EncoderSheet
+
 PULSE = 2.0 * np.pi * 0.29 / 1024.0
 TIME = np.arange(0.0, 6.0, 0.05)
+SHEET = EncoderSheet("wheel", 1024, 0.29, 20.0)
 
 
 def counted(way: np.ndarray) -> np.ndarray:
@@ -44,3 +51,43 @@ def test_the_smoother_has_the_sds_that_it_has() -> None:
     # The truth has no jerk, the model has: errors are smaller than told, never larger.
     assert (np.mean(np.square(errors), axis=0) < 1.3).all()
     assert (np.mean(np.square(errors), axis=0) > 0.1).all()
+
+
+def odometry(way: np.ndarray, method: EncoderOdometry, until: int | None = None) -> pd.DataFrame:
+    """What an odometry says of counts of a way at their own times."""
+    counts = pd.DataFrame({"pulse_count": np.floor(way / PULSE).astype(np.int64)}, index=TIME)[:until]
+    return method.from_counts(counts, SHEET, TIME[:until], 0.0)
+
+
+def test_what_shows_a_train_at_speed_is_seen_when_it_comes_and_no_earlier() -> None:
+    """Readings after the one that is named do not change it; a start from rest shows nothing."""
+    way = counted(8.0 * TIME)
+    whole = shown_by(TIME, way, PULSE)
+    assert whole == Shown(1, 10)
+    for n in range(2, len(TIME)):
+        part = shown_by(TIME[:n], way[:n], PULSE)
+        assert part == Shown(whole.first if n > whole.first else -1, whole.told if n > whole.told else -1)
+    assert shown_by(TIME, counted(1.4 * TIME**3 / 6.0), PULSE) == Shown()
+
+
+@pytest.mark.parametrize("speed", [8.0, -25.0])
+def test_without_hindsight_the_beginning_is_causal_and_its_errors_are_within_its_sds(speed: float) -> None:
+    """Bit by bit, a prefix gives the prefix; from the first reading that shows motion on, 3 sds hold."""
+    way = speed * TIME + 0.15 * TIME**2
+    causal = odometry(way, EncoderOdometry())
+    assert EncoderOdometry().causal and not EncoderOdometry(hindsight=True).causal
+    for n in (2, 5, 10, 11, 12, 40):
+        pd.testing.assert_frame_equal(odometry(way, EncoderOdometry(), n), causal.iloc[:n], check_exact=True)
+    off = np.abs(causal["speed_mps"] - (speed + 0.3 * TIME)).iloc[1:]
+    assert (off < 3.0 * causal["speed_sd_mps"].iloc[1:] + 0.01).all()
+    push = np.abs(causal["acceleration_mps2"] - 0.3).iloc[1:]
+    assert (push < 3.0 * causal["acceleration_sd_mps2"].iloc[1:] + 0.02).all()
+    back = odometry(way, EncoderOdometry(hindsight=True))
+    assert abs(back["speed_mps"].iloc[0] - speed) < 3.0 * back["speed_sd_mps"].iloc[0] < 0.5
+
+
+def test_a_ride_from_rest_is_the_same_with_hindsight_and_without() -> None:
+    way = 0.7 * np.maximum(TIME - 1.0, 0.0) ** 3 / 6.0
+    pd.testing.assert_frame_equal(
+        odometry(way, EncoderOdometry()), odometry(way, EncoderOdometry(hindsight=True)), check_exact=True
+    )
