@@ -21,6 +21,7 @@ from simrail.core.columns import CONTACT, ENCODER, IMU, MOTION, ODOMETRY, ODOMET
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import shipped
 from simrail.estimation.recorded_ride import read_ride
+from simrail.recording.files.frame_file import LEGEND_LINES
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
 from simrail.report.pages.explorer import stored_rides
@@ -132,7 +133,7 @@ def test_columns_of_the_files_are_those_of_the_vocabulary(here: Path) -> None:
     assert call(["export", "quick_kinematic", *SETTINGS, "--set", "imu.grade=ideal", "--out", "x"]) == DONE
     folder = here / "x" / "out_axle_ideal"
     for name, columns in (("imu", IMU), ("encoder", ENCODER), ("odometry", ODOMETRY + ODOMETRY_SD)):
-        header = (folder / f"{name}.csv").read_text().split("\n", 1)[0]
+        header = (folder / f"{name}.csv").read_text().splitlines()[LEGEND_LINES]
         assert header == ",".join(("time_s", *columns))
 
 
@@ -177,9 +178,9 @@ def test_estimate_of_an_exported_ride_is_that_of_the_campaign(
     (view,), looks = stored_rides(page)
     assert {panel.group for panel in view.panels} == {"attitude", "ride", "IMU", "innovations"}
     roll = next(panel for panel in view.panels if panel.title == "roll")
-    drawn = next(one.y for one in roll.series if one.key == "method" and one.y is not None)
+    drawn = next(one.y for one in roll.series if one.key == "AttitudeEkf" and one.y is not None)
     assert drawn.max() == pytest.approx(np.rad2deg(direct.states["roll_rad"].max()), rel=1e-6)
-    assert looks["method"].label in page
+    assert looks["AttitudeEkf"].label in page
     truth = simulate(Parts(scenario).ride(cell))
     assert len(score(direct, truth, recording))  # only with the truth at hand is there a score
     assert call([*command, "--out", "est"]) == DONE  # an earlier estimate is replaced as a whole
