@@ -49,7 +49,6 @@ PACKAGES = (
     "pandas",
     "numba",
     "pyarrow",
-    "filterpy",
     "vqf",
     "imufusion",
 )

@@ -156,7 +156,7 @@ def show(console: "Console", found: "RideEstimates") -> None:
         _print(console, rails_table(rail_summary(result.lines, found.limits)))
         console.print(OPEN_WORDS, soft_wrap=True)
         places = exceedances(result.lines, found.limits)
-        console.print(exceedance_words(places, found.limits), markup=False, soft_wrap=True)
+        console.print(exceedance_words(places, found.limits, result.lines), markup=False, soft_wrap=True)
         if len(places):
             _print(console, exceedance_table(places, most=MOST_PLACES))
             if len(places) > MOST_PLACES:

@@ -39,7 +39,8 @@ def no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Spare the figures of the report, where it does not matter what is drawn."""
 
     def write(path: Path, **keywords: object) -> None:
-        assert set(keywords) == {"scenario", "scores", "cells", "examples", "manifest", "beside", "budgets"}
+        known = {"scenario", "scores", "cells", "examples", "manifest", "beside", "budgets", "progress"}
+        assert set(keywords) == known
         path.write_text("<html></html>")
 
     monkeypatch.setattr(results, "write_report", write)

@@ -85,6 +85,10 @@ def test_the_surest_places_come_first_and_words_count_them():
     assert NO_DRAWS in exceedance_words(places(np.nan), EXAMPLE_LIMITS)
     assert "example limits" in exceedance_words(places(np.nan), EXAMPLE_LIMITS)
     assert "within the limits" in exceedance_words(places(), RailLimits())
+    limits = RailLimits(peaks={("alignment", "D1"): 4e-3})
+    unsure, sure = (result("one", 0.0, None, 1e-3, **more).lines for more in ({}, {"sd": PLACE}))
+    assert NO_DRAWS in exceedance_words(places(), limits, unsure)
+    assert NO_DRAWS not in exceedance_words(places(), limits, sure)
 
 
 def test_a_reference_is_never_called_a_truth():

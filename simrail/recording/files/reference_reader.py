@@ -71,7 +71,8 @@ def _motion(part: ReferencePart, reader: SignalReader, imu: pd.DataFrame) -> pd.
 
 def _rails(part: RailReferencePart, reader: SignalReader) -> pd.DataFrame:
     _refuse_empty(part, "rail_reference", reader.folder)
-    frame = reader.frame(part, "rail_reference").sort_values("position_m").set_index("position_m")
+    read = reader.frame(part, "rail_reference").sort_values("position_m")
+    frame: pd.DataFrame = read.set_index("position_m")
     step = np.diff(frame.index.to_numpy())
     if len(step) == 0 or not (step > 0.0).all():
         place = float(frame.index[int(np.argmin(step))]) if len(step) else float(frame.index[0])

@@ -122,7 +122,7 @@ def _rails(result: MethodResult, limits: RailLimits) -> _Rails:
     places = exceedances(result.lines, limits)
     return _Rails(
         result.name,
-        exceedance_words(places, limits),
+        exceedance_words(places, limits, result.lines),
         rails_table(rail_summary(result.lines, limits)),
         exceedance_table(places, most=MOST_PLACES),
         max(len(places) - MOST_PLACES, 0),

@@ -146,11 +146,14 @@ def exceedance_table(exceedances: pd.DataFrame, *, most: int = 25) -> TextTable:
     return TextTable(heads, tuple(rows))
 
 
-def exceedance_words(exceedances: pd.DataFrame, limits: RailLimits) -> str:
-    """How many places lie beyond the limits, and how sure that is, in a line."""
+def exceedance_words(exceedances: pd.DataFrame, limits: RailLimits, lines: Sequence[RailLine] = ()) -> str:
+    """How many places lie beyond the limits, and how sure that is, in a line; `lines` are those judged."""
     whose = "the example limits (set your own in [limits])" if limits.is_example else "the limits"
     if not len(exceedances):
-        return f"the rails as found lie within {whose}"
+        judged = [line for line in lines if (line.quantity, line.band) in limits.peaks]
+        unsure = bool(judged) and all(line.sd is None for line in judged)
+        more = f"; how sure that is, is not known: {NO_DRAWS}" if unsure else ""
+        return f"the rails as found lie within {whose}{more}"
     count, chance = len(exceedances), exceedances["chance"]
     places = f"{count} place{'s' if count > 1 else ''}"
     if chance.isna().all():

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,8 @@ import pandas as pd
 import pytest
 
 from simrail.core.errors import InputError
+from simrail.core.toml_files import judge
+from simrail.recording.files.ride_file import RideFile
 from simrail.recording.files.ride_reader import read_signals, read_whole
 
 RIDE = """
@@ -121,3 +126,12 @@ def test_a_place_that_stands_twice_is_refused(asked: Callable[[str], Path], tmp_
     pd.DataFrame({"km": [0.1, 0.1], "xl": [1.0, 2.0]}).to_csv(tmp_path / "trolley.csv", index=False)
     with pytest.raises(InputError, match=r"trolley\.csv.*has a place twice.*100"):
         read_whole(path)
+
+
+def test_the_template_shows_how_it_is_asked_for() -> None:
+    """Without the marks of comment the tables at the end of a new ride file are read."""
+    text = (files("simrail.cli") / "template_files" / "ride.toml.txt").read_text(encoding="utf-8")
+    shown = re.sub("^# ?", "", text[text.index("# [limits]") :], flags=re.MULTILINE)
+    spec = judge(RideFile, tomllib.loads(RIDE.partition("[imu.units]")[0] + shown), file="new.toml")
+    assert spec.limits.limits().peaks["vertical_profile", "D1"] == pytest.approx(6e-3)
+    assert spec.estimator[0].called == "tuned" and spec.reference is not None

@@ -269,7 +269,7 @@ def test_figures_that_need_more_rides_are_left_out() -> None:
     view = view_of(FAST)
     assert len(view.repeats) == 1  # no two slow or two forward rides: Figs. 15 to 20 are left out
     drawings = [view.each_ride, view.attitude, view.compensation, *(svg for *_, svg in view.repeats)]
-    assert all(svg.startswith("<svg") for svg in drawings)
+    assert all(svg.startswith('<div class="wide"><svg') for svg in drawings), "for desks and for phones"
 
 
 def test_the_section_stands_on_the_page(tmp_path: Path, no_pictures_of_rides: None) -> None:

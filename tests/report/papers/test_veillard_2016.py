@@ -379,5 +379,5 @@ def test_the_section_is_written() -> None:
         "frame: roll over the curve",
     ):
         assert words in text, words
-    assert text.count("<svg") == 4 and "nan" not in text.lower().replace("nan%", "")
+    assert text.count("<svg") == 8 and "nan" not in text.lower().replace("nan%", "")
     assert section(PageData(scenario, table.iloc[:0], pd.DataFrame(), [], {})) == []

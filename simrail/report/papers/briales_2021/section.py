@@ -4,11 +4,13 @@ Everything of ours is looked up in the scores, or computed from the first draw o
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from simrail.campaign.cell import CellResult
+from simrail.report.figures import canvas
 from simrail.report.figures.attitude import attitude_figure
 from simrail.report.figures.ride import direction_of
 from simrail.report.pages.section import PageData, Section
@@ -211,16 +213,25 @@ def _drawings(
     }
     return {
         "main_ride": main.recording.name if main else "",
-        "each_ride": rides_figure(rides.cases, shown) if shown else "",
-        "attitude": attitude_figure(main, first, what="Attitude, as Fig. 11") if main and first else "",
-        "compensation": compensation_figure(slow_and_fast, pairs) if pairs and slow_and_fast else "",
+        "each_ride": canvas.drawn("paper-rides", partial(rides_figure, rides.cases, shown)) if shown else "",
+        "attitude": canvas.drawn(
+            "paper-attitude", partial(attitude_figure, main, first, what="Attitude, as Fig. 11")
+        )
+        if main and first
+        else "",
+        "compensation": canvas.drawn("paper-compensation", partial(compensation_figure, slow_and_fast, pairs))
+        if pairs and slow_and_fast
+        else "",
         "repeats": [
             (
                 words,
                 {style.label: spread_of(group, style.name) for style in repeated},
-                repeatability_figure(group, repeated, what=f"Estimated roll. {words}"),
+                canvas.drawn(
+                    f"paper-repeats-{number}",
+                    partial(repeatability_figure, group, repeated, what=f"Estimated roll. {words}"),
+                ),
             )
-            for words, group in groups.items()
+            for number, (words, group) in enumerate(groups.items(), 1)
             if len(group) > 1 and repeated
         ],
     }

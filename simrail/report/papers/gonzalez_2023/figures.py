@@ -1,8 +1,10 @@
 """Our versions of the paper's Figs. A1 to A3, from the rides that a page draws."""
 
 from dataclasses import replace
+from functools import partial
 
 from simrail.campaign.cell import CellResult
+from simrail.report.figures import canvas
 from simrail.report.figures.geometry import has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.papers.gonzalez_2023.parts import PAPER, Rows
 from simrail.report.tables.methods import MethodStyle
@@ -13,7 +15,9 @@ DRAWN_M = 300.0
 """Stretch that is drawn: of a model's ride, all."""
 
 
-def tuning_figures(looks: dict[str, MethodStyle], example: CellResult, band: Band) -> list[tuple[str, str]]:
+def tuning_figures(
+    looks: dict[str, MethodStyle], example: CellResult, band: Band
+) -> list[tuple[str, canvas.Drawing]]:
     """Our versions of Figs. A1 and A3, of parts whose methods say what the rails look like."""
     first = [looks[part] for part in ("cml", "kom", "hand") if part in looks]
     if not first:
@@ -26,15 +30,30 @@ def tuning_figures(looks: dict[str, MethodStyle], example: CellResult, band: Ban
         f"{listed([style.label for style in first])} find{'s' * (len(first) == 1)} them.",
         f"As Fig. A3: the same, with the 95 % interval of {first[0].label}, {how}.",
     )
+    shown = zip(("a1", "a3"), texts, (first, first[:1]), (False, True), strict=True)
     return [
-        (text, rails_figure(example, drawn, band=band, limits=limits, with_interval=with_interval, what=text))
-        for text, drawn, with_interval in zip(texts, (first, first[:1]), (False, True), strict=True)
+        (
+            text,
+            canvas.drawn(
+                f"paper-{name}",
+                partial(
+                    rails_figure,
+                    example,
+                    drawn,
+                    band=band,
+                    limits=limits,
+                    with_interval=with_interval,
+                    what=text,
+                ),
+            ),
+        )
+        for name, text, drawn, with_interval in shown
     ]
 
 
 def noise_figure(
     rows: Rows, looks: dict[str, MethodStyle], example: CellResult, noisy: CellResult, band: Band
-) -> list[tuple[str, str]]:
+) -> list[tuple[str, canvas.Drawing]]:
     """Our version of Fig. A2: CML without and with noise added to the IMU; [] where one is missing."""
     quiet, loud = looks.get("cml"), looks.get(rows.played_by("cml_noise"))
     if quiet is None or loud is None or not (has_rails(example, quiet) and has_rails(noisy, loud)):
@@ -49,5 +68,7 @@ def noise_figure(
         "without and with noise added."
     )
     both = replace(example, estimates=estimates)
-    svg = rails_figure(both, [quiet, added], band=band, limits=limits, with_interval=False, what=text)
-    return [(text, svg)]
+    make = partial(
+        rails_figure, both, [quiet, added], band=band, limits=limits, with_interval=False, what=text
+    )
+    return [(text, canvas.drawn("paper-a2", make))]

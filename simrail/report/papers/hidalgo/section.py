@@ -2,8 +2,10 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 from simrail.campaign.cell import CellResult
+from simrail.report.figures import canvas
 from simrail.report.figures.geometry import has_rails, rails_figure, stretch_of, stretch_words
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers.claim import judged
@@ -69,7 +71,7 @@ def _with_interval(one: Interval) -> Cell:
     return Cell(f"{one.value:.3f}", behind)
 
 
-def _drawings(example: CellResult, looks: dict[str, MethodStyle]) -> list[tuple[str, str]]:
+def _drawings(example: CellResult, looks: dict[str, MethodStyle]) -> list[tuple[str, canvas.Drawing]]:
     """The profile with and without the gyro, of the rides that are drawn."""
     drawn = [looks[part] for part in ("gyro", "no_gyro", "own") if part in looks]
     drawn = [style for style in drawn if has_rails(example, style)]
@@ -81,5 +83,7 @@ def _drawings(example: CellResult, looks: dict[str, MethodStyle]) -> list[tuple[
         f"filtered to {BAND}, as {listed([style.label for style in drawn])} "
         f"find{'s' * (len(drawn) == 1)} them."
     )
-    svg = rails_figure(example, drawn, band=BANDS[BAND], limits=limits, with_interval=False, what=text)
-    return [(text, svg)]
+    make = partial(
+        rails_figure, example, drawn, band=BANDS[BAND], limits=limits, with_interval=False, what=text
+    )
+    return [(text, canvas.drawn("paper-rails", make))]

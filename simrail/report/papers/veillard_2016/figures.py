@@ -64,7 +64,7 @@ def distributions_figure(lines: Lines) -> str:
                     )
             for value in _printed(name, printed):
                 axis.axhline(value, color=canvas.INK, lw=1.0, ls=(0, (5, 2)), zorder=1)
-            canvas.categories(axis, [SHORT[part] for part in parts], size=8.0)
+            canvas.categories(axis, [SHORT[part] for part in parts], size=6.4 if canvas.is_narrow() else 8.0)
             axis.set_ylabel(words)
             if name == "distance":
                 axis.axhline(0.0, color=canvas.MUTED, lw=0.7)

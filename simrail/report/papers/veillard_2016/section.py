@@ -1,9 +1,11 @@
 """The section beside Veillard et al. 2016: tables, claims and figures of ours, gathered for its template."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from simrail.report.figures import canvas
 from simrail.report.pages.section import PageData, Section
 from simrail.report.papers.claim import judged
 from simrail.report.papers.veillard_2016 import judges
@@ -50,9 +52,12 @@ def section(data: PageData) -> list[Section]:
         "all_claims": judged(PAPER, evidence, judges, has=lines.has),
         "notes": [ours] if ours else [],
         "errata": judges.errata(evidence),
-        "distributions": distributions_figure(lines),
-        "spectrum": spectrum_figure(spectra),
-        "curves": [(mount, curve_figure(example, lines.names)) for mount, example in drawn.items()],
+        "distributions": canvas.drawn("paper-distributions", partial(distributions_figure, lines)),
+        "spectrum": canvas.drawn("paper-spectrum", partial(spectrum_figure, spectra)),
+        "curves": [
+            (mount, canvas.drawn(f"paper-curve-{mount}", partial(curve_figure, example, lines.names)))
+            for mount, example in drawn.items()
+        ],
     }
     return [Section("paper", f"Beside {PAPER.heading}", "papers/veillard_2016/section.html.j2", shown)]
 
