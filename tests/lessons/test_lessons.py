@@ -114,6 +114,21 @@ def test_edit_opens_a_copy_and_keeps_what_is_there(here, served, capsys):
     assert served[-1][-2:] == ["run", str(notebook("drift"))]
 
 
+def test_a_folder_of_the_same_name_is_not_what_a_lesson_imports(here, monkeypatch):
+    """A checkout that was installed, not as editable, has a folder ``simrail`` without its estimators."""
+    (here / "simrail").mkdir()
+    (here / "simrail" / "__init__.py").write_text("raise ImportError('the wrong one')")
+    ran = subprocess.run
+
+    def imports(command: list[str], env: dict[str, str]) -> int:
+        tried = [sys.executable, "-m", "simrail.lessons.claims"]
+        assert ran(tried, capture_output=True, check=False).returncode == 1
+        return ran(tried, capture_output=True, check=False, env=env).returncode
+
+    monkeypatch.setattr(subprocess, "call", imports)
+    assert call(["lesson", "drift"]) == 0
+
+
 def test_an_edited_lesson_without_a_browser_asks_for_the_key_that_is_told(here, served, capsys):
     assert call(["lesson", "slip", "--edit", "--headless", "--port", "8000"]) == 0
     key = served[-1][served[-1].index("--token-password") + 1]
