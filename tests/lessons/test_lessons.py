@@ -148,6 +148,25 @@ def test_edit_in_a_folder_that_cannot_be_written_is_one_line(here, served, capsy
     assert list(here.iterdir()) == []
 
 
+def test_a_figure_has_a_colour_for_every_variable_that_it_uses():
+    """Where nobody gives one, a browser paints black: axes, words and the ground itself."""
+    import re
+
+    from simrail.lessons.figures import Line, Panel, draw
+    from simrail.report.figures.canvas import LIGHT, by_itself
+
+    x = np.arange(3.0)
+    figure = draw([Panel("m", [Line("a", x, x)], spans=[(0.0, 1.0)])], x_label="s", description="a line")
+    style, svg = figure.split(">", 1)
+    used = set(re.findall(r"var\(--(\w+)\)", svg))
+    assert {"page", "ink", "line", "curve"} <= used
+    assert used <= set(re.findall(r"--(\w+): ", style))
+    assert used <= set(LIGHT)
+    alone = by_itself(svg)
+    assert "var(--" not in alone
+    assert "#ffffff" in alone
+
+
 def test_every_lesson_ends_alike():
     for name in LESSONS:
         text = notebook(name).read_text(encoding="utf-8")
