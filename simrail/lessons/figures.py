@@ -72,7 +72,8 @@ def draw(
 ) -> str:
     """Draw panels for a notebook, which gives figures their colours; otherwise as `svg_of`."""
     svg = svg_of(parts, x_label=x_label, description=description, log_x=log_x, tall_in=tall_in)
-    return f'<div style="{_STYLE}">{svg}</div>'
+    # On a phone its words would be too small to read: there it is as wide as this, and pushed aside.
+    return f'<div style="overflow-x: auto; {_STYLE}"><div style="min-width: 620px">{svg}</div></div>'
 
 
 def svg_of(

@@ -157,12 +157,12 @@ def test_a_figure_has_a_colour_for_every_variable_that_it_uses():
 
     x = np.arange(3.0)
     figure = draw([Panel("m", [Line("a", x, x)], spans=[(0.0, 1.0)])], x_label="s", description="a line")
-    style, svg = figure.split(">", 1)
+    style, svg = figure.split("<svg", 1)
     used = set(re.findall(r"var\(--(\w+)\)", svg))
     assert {"page", "ink", "line", "curve"} <= used
     assert used <= set(re.findall(r"--(\w+): ", style))
     assert used <= set(LIGHT)
-    alone = by_itself(svg)
+    alone = by_itself(f"<svg{svg}")
     assert "var(--" not in alone
     assert "#ffffff" in alone
 
