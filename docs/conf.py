@@ -25,6 +25,7 @@ exclude_patterns = ["_build", "_figures", "method_equations"]
 
 html_theme = "pydata_sphinx_theme"
 html_title = "simrail"
+html_context = {"default_mode": "auto"}  # else the theme calls it an error that nobody has chosen
 html_show_sourcelink = False
 html_css_files = ["guide.css"]
 # Equations are set by one file that lies beside the pages: they need no network either.

@@ -23,8 +23,10 @@ figures and numbers here show how a method behaves, made anew when this guide is
 on average, on trains that shake, is what campaigns say (`simrail run track_relative`, `simrail run
 odometry` and others)."""
 
-ELSEWHERE = """Signs, axes and symbols: [Conventions](../conventions.md). All methods on one sheet, in
-the form of the code, with every misprint found: [Equations](../equations.md)."""
+ELSEWHERE = """Signs, axes and symbols: [Conventions](../conventions.md). All methods on one sheet,
+in the form of the code, with every misprint found: [Equations](../equations.md). Papers are
+numbered there, and in the program: 000 Briales et al. 2021, 001 Gonzalez-Carbajal et al. 2023, 003
+Veillard et al. 2016, 004 Hidalgo et al."""
 
 INDEX = """# The methods
 

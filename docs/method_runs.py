@@ -24,7 +24,7 @@ from simrail.core.source_hash import score_code_hash, source_hash
 from simrail.core.toml_files import load
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.estimate import Estimate, Estimator, estimator_class
-from simrail.lessons.figures import Band, Line, Panel, draw
+from simrail.lessons.figures import Band, Line, Panel, svg_of
 from simrail.lessons.rides import SHIPPED_SCENARIO, short_ride
 from simrail.report.figures.canvas import drawn
 from simrail.report.figures.decimate import Bins
@@ -340,7 +340,7 @@ def svg(name: str, panels: Sequence[Panel], *, quantity: str, description: str, 
     axis = "place along the line, m" if is_rails(quantity) else "time, s"
 
     def make() -> str:
-        return draw(panels, x_label=axis, description=description, tall_in=tall_in)
+        return svg_of(panels, x_label=axis, description=description, tall_in=tall_in)
 
     return str(drawn(name, make, widths_in=WIDTHS_IN))
 

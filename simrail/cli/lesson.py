@@ -75,8 +75,10 @@ def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
         key = f"?access_token={password}"
     if headless and port is not None:
         print(f"serving {name} at http://127.0.0.1:{port}{key}", flush=True)
-    # No question whether there is a newer marimo leaves the machine.
-    return subprocess.call(command, env={**os.environ, "MARIMO_SKIP_UPDATE_CHECK": "1"}) or DONE
+    # No question whether there is a newer marimo leaves the machine; and a folder `simrail` in this one, as
+    # a checkout has it, is not what is imported.
+    environment = {**os.environ, "MARIMO_SKIP_UPDATE_CHECK": "1", "PYTHONSAFEPATH": "1"}
+    return subprocess.call(command, env=environment) or DONE
 
 
 def own_copy(name: str) -> Path:

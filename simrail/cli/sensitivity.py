@@ -65,6 +65,7 @@ def sensitivity(
 
     from simrail.campaign.sensitivity import FigureName, sensitivities, sensitivity_table
     from simrail.core.atomic_files import write_whole
+    from simrail.report.figures.canvas import by_itself
     from simrail.report.figures.responses import responses_figure
     from simrail.scenario.distributions import dimensions
 
@@ -88,9 +89,7 @@ def sensitivity(
         case = f"_{i}" if one.case else ""
         file = folder / f"{name}_{re.sub(r'[^A-Za-z0-9_.-]+', '_', one.estimator)}{case}.svg"
         if one.indices.notna().any(axis=None):
-            # By itself, without a page that chooses the font.
-            picture = str(responses_figure(one, drawn)).replace("<svg ", '<svg font-family="sans-serif" ', 1)
-            write_whole(file, picture.encode(), what="figure")
+            write_whole(file, by_itself(responses_figure(one, drawn)).encode(), what="figure")
     print(f"wrote {folder / name}.csv, and the responses beside it as .svg")
     return CELL_FAILED if failures else DONE
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from simrail.core.jit import FloatArray
-from simrail.report.figures.canvas import INK, MUTED, legend_above, look, panels, to_svg
+from simrail.report.figures.canvas import INK, LIGHT, MUTED, legend_above, look, panels, to_svg
 
 COLOURS = {
     "true": "#0b7a55",
@@ -53,10 +53,33 @@ class Panel:
     limits: tuple[float, float] | None = None
 
 
+_NOTEBOOK = {
+    "page": "background",
+    "ink": "foreground",
+    "muted": "muted-foreground",
+    "axis": "muted-foreground",
+}
+"""Which of marimo's own colours the figures take, by day and by night; all else is as on a report by day."""
+
+_STYLE = "; ".join(
+    f"--{name}: var(--{_NOTEBOOK[name]}, {colour})" if name in _NOTEBOOK else f"--{name}: {colour}"
+    for name, colour in (LIGHT | {"line": "#98a1af55", "curve": "#9aa86a33"}).items()
+)
+
+
 def draw(
     parts: Sequence[Panel], *, x_label: str, description: str, log_x: bool = False, tall_in: float = 1.7
 ) -> str:
-    """Draw panels above each other over one x axis; returns SVG.
+    """Draw panels for a notebook, which gives figures their colours; otherwise as `svg_of`."""
+    svg = svg_of(parts, x_label=x_label, description=description, log_x=log_x, tall_in=tall_in)
+    # On a phone its words would be too small to read: there it is as wide as this, and pushed aside.
+    return f'<div style="overflow-x: auto; {_STYLE}"><div style="min-width: 620px">{svg}</div></div>'
+
+
+def svg_of(
+    parts: Sequence[Panel], *, x_label: str, description: str, log_x: bool = False, tall_in: float = 1.7
+) -> str:
+    """Draw panels above each other over one x axis; returns SVG in the colours of its page.
 
     Parameters
     ----------

@@ -73,6 +73,9 @@ def test_a_slider_moves_a_figure(chromium, served):
     before = page.evaluate(FIGURES)
     assert before, "no figure is shown"
     assert "\N{BALLOT X}" not in page.inner_text("body")
+    # Its ground is that of the notebook: what has no colour is painted black.
+    ground = "getComputedStyle(document.querySelector('svg[role=img] path')).fill"
+    assert page.evaluate(ground) == "rgb(255, 255, 255)"
     slider = page.locator("[role=slider]").first
     slider.focus()
     for _ in range(4):

@@ -114,6 +114,21 @@ def test_edit_opens_a_copy_and_keeps_what_is_there(here, served, capsys):
     assert served[-1][-2:] == ["run", str(notebook("drift"))]
 
 
+def test_a_folder_of_the_same_name_is_not_what_a_lesson_imports(here, monkeypatch):
+    """A checkout that was installed, not as editable, has a folder ``simrail`` without its estimators."""
+    (here / "simrail").mkdir()
+    (here / "simrail" / "__init__.py").write_text("raise ImportError('the wrong one')")
+    ran = subprocess.run
+
+    def imports(command: list[str], env: dict[str, str]) -> int:
+        tried = [sys.executable, "-m", "simrail.lessons.claims"]
+        assert ran(tried, capture_output=True, check=False).returncode == 1
+        return ran(tried, capture_output=True, check=False, env=env).returncode
+
+    monkeypatch.setattr(subprocess, "call", imports)
+    assert call(["lesson", "drift"]) == 0
+
+
 def test_an_edited_lesson_without_a_browser_asks_for_the_key_that_is_told(here, served, capsys):
     assert call(["lesson", "slip", "--edit", "--headless", "--port", "8000"]) == 0
     key = served[-1][served[-1].index("--token-password") + 1]
@@ -131,6 +146,25 @@ def test_edit_in_a_folder_that_cannot_be_written_is_one_line(here, served, capsy
     assert err.count("\n") == 1
     assert served == []
     assert list(here.iterdir()) == []
+
+
+def test_a_figure_has_a_colour_for_every_variable_that_it_uses():
+    """Where nobody gives one, a browser paints black: axes, words and the ground itself."""
+    import re
+
+    from simrail.lessons.figures import Line, Panel, draw
+    from simrail.report.figures.canvas import LIGHT, by_itself
+
+    x = np.arange(3.0)
+    figure = draw([Panel("m", [Line("a", x, x)], spans=[(0.0, 1.0)])], x_label="s", description="a line")
+    style, svg = figure.split("<svg", 1)
+    used = set(re.findall(r"var\(--(\w+)\)", svg))
+    assert {"page", "ink", "line", "curve"} <= used
+    assert used <= set(re.findall(r"--(\w+): ", style))
+    assert used <= set(LIGHT)
+    alone = by_itself(f"<svg{svg}")
+    assert "var(--" not in alone
+    assert "#ffffff" in alone
 
 
 def test_every_lesson_ends_alike():

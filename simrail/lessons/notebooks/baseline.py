@@ -52,7 +52,7 @@ def _():
     )
     imu = mo.ui.dropdown(GRADES, value="lord_3dm_gx4_25", label="IMU")
     surveyed = mo.ui.switch(value=False, label="the map has the errors of a survey")
-    mo.vstack([rough, mo.hstack([imu, surveyed], justify="start", gap=3)])
+    mo.vstack([rough, mo.hstack([imu, surveyed], justify="start", gap=3, wrap=True)])
     return imu, rough, surveyed
 
 

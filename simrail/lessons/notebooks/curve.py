@@ -141,7 +141,7 @@ def _():
 def _():
     constant = mo.ui.slider(2, 60, 2, value=10, label="time constant T, s", show_value=True)
     compensated = mo.ui.switch(value=False, label="compensation")
-    mo.hstack([constant, compensated], justify="start", gap=3)
+    mo.hstack([constant, compensated], justify="start", gap=3, wrap=True)
     return compensated, constant
 
 

@@ -61,9 +61,9 @@ def _():
     mo.vstack(
         [
             device,
-            mo.hstack([place, quantity], justify="start", gap=3),
+            mo.hstack([place, quantity], justify="start", gap=3, wrap=True),
             band,
-            mo.hstack([grade, smoothed], justify="start", gap=3),
+            mo.hstack([grade, smoothed], justify="start", gap=3, wrap=True),
         ]
     )
     return band, grade, place, quantity, smoothed, device

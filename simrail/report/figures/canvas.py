@@ -69,6 +69,16 @@ _VARIABLES = {
 }
 """Variables of the page that stand for colours of the figures, so that dark mode has its own."""
 
+LIGHT = {name: colour for colour, name in reversed(_VARIABLES.items())}
+"""Colours of these variables by day, where no page gives them: without one, all is black."""
+
+
+def by_itself(svg: str) -> str:
+    """Inline SVG with colours and a font of its own: as a file, outside of a page."""
+    coloured = re.sub(r"var\(--(\w+)\)", lambda name: LIGHT[name[1]], svg)
+    return coloured.replace("<svg ", '<svg font-family="sans-serif" ', 1)
+
+
 _CURVE_NAME: dict[str, Any] = {
     "textcoords": "offset points",
     "ha": "center",
