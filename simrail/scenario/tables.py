@@ -38,6 +38,7 @@ from simrail.track.map_file import (
     map_errors_of,
 )
 from simrail.track.measured import MeasuredRails
+from simrail.vehicle.factors import VehicleFactors
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=64)]
 """A name that can stand in tables and file names: letters, digits and ``_ . + -``."""
@@ -104,6 +105,29 @@ class DefectPart(Part):
             rails=self.rails,
             hold_m=self.hold_m,
         )
+
+
+Factor = Annotated[float, Field(ge=0.1, le=10.0)]
+"""Beyond it lies another vehicle."""
+
+
+class VehicleFactorsPart(Part):
+    """``[vehicle_factors]``: how the vehicle that runs differs from its drawing, which the train believes.
+
+    The kinematic engine has no springs: only what follows from the drawing itself would change, so that it is
+    refused there. What the wheel's radius is believed to be is ``radius_error`` of the encoder.
+    """
+
+    load: Listed[Factor] = 1.0
+    """Factor on mass and inertias of frames and car bodies."""
+    stiffness: Listed[Factor] = 1.0
+    """Factor on the stiffness of all suspensions, rods, bushings and stops."""
+    damping: Listed[Factor] = 1.0
+    """Factor on the damping of all suspensions and dampers."""
+
+    def factors(self) -> VehicleFactors:
+        """The noun."""
+        return VehicleFactors(**self.model_dump())
 
 
 class IrregularityPart(Part):
