@@ -261,7 +261,7 @@ def test_sixteen_draws_as_lanes(benchmark: Callable, estimator: AttitudeEkf | At
     recordings = [ride(draw) for draw in range(16)]
     samples = sum(len(one.imu) for one in recordings)
     alone = best_us(lambda: [estimator.estimate(one) for one in recordings], samples)
-    # The loop itself is a quarter of an estimate, so the whole gains a tenth: no limit, a figure to be watched.
+    # The loop itself is a quarter of an estimate: the whole gains a tenth. No limit, a figure to be watched.
     report(benchmark, lambda: estimator.estimate_many(recordings), samples, ratio_to_alone=alone)
 
 
