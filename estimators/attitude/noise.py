@@ -131,7 +131,7 @@ def recommended_noise(
     n = len(recording.imu)
     step_s = 1.0 / sheet.rate_hz
     motion = odometry_of(recording)
-    speed, *sds = (
+    speed, place_sd, speed_sd, push_sd = (
         np.ascontiguousarray(motion[name].to_numpy(dtype=np.float64)) for name in (ODOMETRY[1], *ODOMETRY_SD)
     )
     # Of these two curvatures and their slopes the compensation makes lateral and vertical acceleration.
@@ -144,7 +144,7 @@ def recommended_noise(
     bias = bias_variance(sheet, rest.samples * step_s)
     level = sheet.accel_turn_on_bias_mps2**2 / 3.0 / gravity**2
     given = step_s, gravity, white, sensor, vibration, level
-    _fill(np.array(given), bias, rest.samples, speed, *sds, curves, *noise)
+    _fill(np.array(given), bias, rest.samples, speed, place_sd, speed_sd, push_sd, curves, *noise)
     return noise
 
 

@@ -82,6 +82,8 @@ class ResolvedCell:
         The words, and its place among the others.
     ride : Ride
         All that decides the motion; shared by the cells of a ride.
+    drawn_vehicle : VehicleModel
+        The vehicle as the train believes it to be; that of the ride may differ by factors.
     mount : Mount
         Where the IMU sits.
     grade : ImuGrade
@@ -108,6 +110,7 @@ class ResolvedCell:
 
     cell: Cell
     ride: Ride
+    drawn_vehicle: VehicleModel
     mount: Mount
     grade: ImuGrade
     encoder: EncoderSpec | None
@@ -125,7 +128,7 @@ class ResolvedCell:
     @property
     def vehicle_sheet(self) -> VehicleSheet:
         """The vehicle's drawing, as the train knows it."""
-        return drawing(self.ride.vehicle, each_by_itself=self.ride.engine == "kinematic")
+        return drawing(self.drawn_vehicle, each_by_itself=self.ride.engine == "kinematic")
 
 
 class Parts:
@@ -185,6 +188,7 @@ class Parts:
         return ResolvedCell(
             cell=cell,
             ride=self.ride(cell),
+            drawn_vehicle=self.drawn_vehicle(cell),
             mount=_mount(cell.imu),
             grade=self.grade(cell),
             encoder=None if spec.encoder is None else spec.encoder.spec(),
@@ -301,7 +305,18 @@ class Parts:
         return self._maps[key]
 
     def vehicle(self, cell: Cell) -> VehicleModel:
-        """Vehicle of a cell."""
+        """Vehicle of a cell, as it runs."""
+        part, name = cell.spec.vehicle_factors, cell.spec.vehicle
+        if part is None:
+            return self.drawn_vehicle(cell)
+        key = "vehicle", f"{name} {part.model_dump_json()}"
+        if key not in self._nouns:
+            self._nouns[key] = part.factors().of(self.drawn_vehicle(cell))
+        vehicle: VehicleModel = self._nouns[key]
+        return vehicle
+
+    def drawn_vehicle(self, cell: Cell) -> VehicleModel:
+        """Vehicle of a cell, as its drawing has it."""
         name = cell.spec.vehicle
         vehicle = self._noun("vehicle", VehicleFile, name, "vehicle", VehicleFile.model)
         if f"profiles {name}" not in self._content:

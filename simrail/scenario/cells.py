@@ -36,7 +36,10 @@ from simrail.scenario.scenario import Scenario, ScenarioFile, ride_count
 from simrail.scenario.study_tables import EstimatorPart
 from simrail.scoring.table import DRAWN_MAP, EXACT_MAP, SHAKEN, SILENT
 
-WORLD = ("track", "vehicle", "engine", "step_s", "truth_rate_hz", "irregularity", "vibration")
+WORLD = (
+    *("track", "vehicle", "vehicle_factors", "engine", "step_s", "truth_rate_hz"),
+    *("irregularity", "vibration"),
+)
 SENSING = (
     "odometry",
     "map",

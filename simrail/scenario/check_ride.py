@@ -64,6 +64,14 @@ def judge_ride(
         too fast for a curve, or too coarse a step for the integrator.
     """
     words, vehicle = resolved.cell.ride, resolved.ride.vehicle
+    if resolved.ride.engine == "kinematic" and resolved.cell.spec.vehicle_factors is not None:
+        raise InputError(
+            "a body that follows the rails exactly has neither weight nor springs",
+            field="vehicle_factors",
+            value=resolved.ride.engine,
+            limit="the compiled or the exudyn engine",
+            remedy='set engine = "compiled", or leave them out',
+        )
     with blame(None, f"ride[{resolved.cell.ride_index}]"):
         for i, (begin, end) in enumerate(pairwise((words.start_m, *words.ends_m))):
             if begin == end:

@@ -8,7 +8,7 @@ value is read as TOML, or else as text. What the values mean is judged by the mo
 import copy
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from simrail.core.errors import InputError, did_you_mean, one_of
@@ -19,8 +19,12 @@ _EXAMPLE = (
 )
 
 
-def override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
+def override(
+    data: dict[str, Any], settings: Sequence[str], *, tables: Collection[str] = ()
+) -> dict[str, Any]:
     """Return a copy of raw scenario data with settings ``key=value`` applied in turn.
+
+    One that names a table of ``tables`` begins it where the scenario has none.
 
     Raises
     ------
@@ -48,6 +52,8 @@ def override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
             steps.append(match[1])
             if match[2] is not None:
                 steps.append(int(match[2]))
+        if steps[0] in tables and len(steps) > 1 and isinstance(steps[1], str):
+            result.setdefault(str(steps[0]), {})
         _set(result, steps, _value(text.strip()), key.strip())
     return result
 

@@ -41,6 +41,7 @@ from simrail.scenario.study_tables import (
     StopRulePart,
     TimeLimit,
 )
+from simrail.scenario.vehicle_tables import VehicleFactorsPart
 from simrail.scenario.vibration_tables import VibrationPart
 
 
@@ -71,6 +72,8 @@ class ScenarioFile(Part):
     """A shipped track, or the path of a track file."""
     vehicle: Listed[str]
     """A shipped vehicle, or the path of a vehicle file."""
+    vehicle_factors: VehicleFactorsPart | None = None
+    """How the vehicle differs from its drawing."""
     engine: Listed[Literal["exudyn", "compiled", "kinematic"]] = "exudyn"
     """What moves the vehicle: Exudyn, our compiled integrator of the same equations, or, exactly on the
     rails and without dynamics, the kinematic one."""
@@ -331,6 +334,10 @@ def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int 
     )
 
 
+_TABLES = ("vehicle_factors",)
+"""Tables whose names are near to other keys: a setting may begin them all the same."""
+
+
 def read_scenario(
     text: str,
     *,
@@ -341,7 +348,7 @@ def read_scenario(
 ) -> Scenario:
     """Read a scenario from TOML text; see `load_scenario`."""
     file = file or f"{name}.toml"
-    data = override(parse_toml(text, file=file), overrides)
+    data = override(parse_toml(text, file=file), overrides, tables=_TABLES)
     spec = judge(ScenarioFile, data, file=file)
     listed = [
         _options_as_axes(part, f"estimator[{i}].options", file) for i, part in enumerate(spec.estimator)

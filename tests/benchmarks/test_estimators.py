@@ -62,7 +62,7 @@ SLOW = 4000
 
 
 @lru_cache
-def ride() -> Recording:
+def ride(draw: int = 0) -> Recording:
     """Some 100 s over the line at 70 km/h."""
     truth = kinematic_truth(
         track_by_name("condequinto_olivar"),
@@ -76,7 +76,7 @@ def ride() -> Recording:
         grade=load_grade("lord_3dm_gx4_25"),
         encoder=EncoderSpec("wheel"),
         seed=1,
-        draw=0,
+        draw=draw,
     )
     return with_odometry(recording, "encoder")
 
@@ -253,6 +253,16 @@ def test_gda_beside_ahrs_madgwick(benchmark: Callable) -> None:
 @pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda()], ids=["ekf", "gda"])
 def test_whole_estimate(benchmark: Callable, estimator: AttitudeEkf | AttitudeGda) -> None:
     report(benchmark, lambda: estimator.estimate(ride()), len(ride().imu), ratio_to_filterpy=filterpy_us())
+
+
+@pytest.mark.parametrize("estimator", [AttitudeEkf(), AttitudeGda()], ids=["ekf", "gda"])
+def test_sixteen_draws_as_lanes(benchmark: Callable, estimator: AttitudeEkf | AttitudeGda) -> None:
+    """Whole estimates of 16 recordings at once, beside one after the other in the same run."""
+    recordings = [ride(draw) for draw in range(16)]
+    samples = sum(len(one.imu) for one in recordings)
+    alone = best_us(lambda: [estimator.estimate(one) for one in recordings], samples)
+    # The loop itself is a quarter of an estimate: the whole gains a tenth. No limit, a figure to be watched.
+    report(benchmark, lambda: estimator.estimate_many(recordings), samples, ratio_to_alone=alone)
 
 
 def test_compensation(benchmark: Callable) -> None:

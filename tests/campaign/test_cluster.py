@@ -28,6 +28,7 @@ from simrail.campaign.campaign import run_campaign
 from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.executors import _Cluster
 from simrail.campaign.progress import Watcher
+from simrail.campaign.sensitivity import FigureName, sensitivities, sensitivity_table
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.core.errors import InputError
 from simrail.core.machine import machine
@@ -281,3 +282,22 @@ def test_a_cluster_that_cannot_be_used_is_refused_in_one_line(
         assert call(["run", str(noting_file), "--cluster", "tcp://127.0.0.1:1"]) == BAD_INPUT
     said = capsys.readouterr().err.splitlines()[-1]
     assert 'pip install -e ".[cluster]"' in said
+
+
+@pytest.mark.slow
+def test_a_sensitivity_on_a_cluster_has_the_bits_of_one_process(
+    cluster: Cluster, rides: Path, assert_same: Callable[[pd.DataFrame, pd.DataFrame], None]
+) -> None:
+    cluster.add_worker()
+    cluster.add_worker()
+    few = ["monte_carlo.samples=2", "ride.end_m=80.0", "ride.rest_s=1.0"]
+    scenario = load_scenario("sensitivity", overrides=few)
+    alone = run_campaign(scenario, workers=1)
+    found = run_campaign(scenario, cluster=cluster.address, batch_cells=3)
+    assert_same(alone.scores, found.scores)
+    tables = [
+        sensitivity_table(sensitivities(scenario.spec, one.scores, one.cells, FigureName()))
+        for one in (alone, found)
+    ]
+    pd.testing.assert_frame_equal(*tables, check_exact=True)
+    assert len(tables[0])
