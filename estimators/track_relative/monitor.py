@@ -63,7 +63,8 @@ def contradiction(trace: Trace) -> FloatArray:
     off = np.abs(trace.states[:, known] - trace.course.start[known]) / sd[known]
     off = off.max(axis=1, initial=0.0) / MOST_SDS
     sums = np.abs(_sums(trace)) / np.array([*MOST_SUM, *[MOST_OTHER_SUM] * (trace.surprises.shape[1] - 6)])
-    return np.maximum(np.maximum(off, sums.max(axis=1, initial=0.0)), in_curves(trace) / MOST_BENT)
+    worst = np.maximum(off, sums.max(axis=1, initial=0.0))
+    return np.asarray(np.maximum(worst, in_curves(trace) / MOST_BENT))
 
 
 def in_curves(trace: Trace) -> FloatArray:
@@ -84,7 +85,7 @@ def in_curves(trace: Trace) -> FloatArray:
             total = trace.surprises[runs, 2].sum()
             squares[last] = total**2 / len(runs) * speed[runs].mean() / AT_MPS
             passed[last] = 1.0
-    return np.cumsum(squares) / (np.cumsum(passed) + PATIENCE)
+    return np.asarray(np.cumsum(squares) / (np.cumsum(passed) + PATIENCE))
 
 
 def _sums(trace: Trace) -> FloatArray:
