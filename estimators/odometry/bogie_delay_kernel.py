@@ -7,7 +7,9 @@ the speed over the last seconds is that of a filter; what is searched is a const
     D(t') + c t' = D(t) + c t - L,      rho(c) = sum of b(t) a(t') / sqrt(sum of b(t)^2 sum of a(t')^2)
 
 over a window of the signal b behind and a ahead, both through the same band pass. The largest rho, and a
-parabola through it and its neighbours, give c. So a window may hold braking and setting off.
+parabola through it and its neighbours, give c. So a window may hold braking and setting off. While nobody
+knows how far the clocks are apart, that is what is searched: what it does to c grows with the speed, and over
+a window that holds setting off no one c has both ends right.
 
 The variance of c follows from rho and the band f1..f2. Of the delay between two signals of flat spectra, each
 in noise of its own, seen for W seconds (Cramer-Rao bound: A. H. Quazi, IEEE Trans. ASSP 29(3) (1981) 527-533,
@@ -32,6 +34,10 @@ STEP_S = 2e-3
 
 BESIDE, ALONE = 5, 0.8
 """Another peak more than so many steps aside, and more than this share as high, leaves open which it is."""
+
+RECENT_S, ALIKE_SDS = 20.0, 3.0
+"""Before the clocks' offset is known: searches of so long ago bear one out that tells the same within so many
+standard deviations."""
 
 MOST_NODES, MOST_CANDIDATES = 300, 4001
 """Steps that the way goes back, and steps of a search."""
@@ -134,8 +140,10 @@ class Heard(NamedTuple):
         Times of the last steps, the last first, and the way since.
     rho : ndarray (r,)
         Of each candidate.
-    searches : ndarray (k, 4)
-        By step: 1 if it was taken, 0 if not, -1 if none was made; c, m/s; rho; standard deviation of c.
+    searches : ndarray (k, 6)
+        By step: 1 if it was taken, 0 if not, -1 if none was made; c, m/s; rho; standard deviation of c, 0 if
+        none was found; how far the second clock is ahead by that delay alone, s, and the standard deviation
+        of that.
     """
 
     node_s: FloatArray
@@ -146,7 +154,7 @@ class Heard(NamedTuple):
 
 def room_to_hear(steps: int) -> Heard:
     """Room for a ride of so many steps."""
-    searches = np.zeros((steps, 4))
+    searches = np.zeros((steps, 6))
     searches[:, 0] = -1.0
     return Heard(np.empty(MOST_NODES), np.empty(MOST_NODES), np.empty(MOST_CANDIDATES), searches)
 
@@ -162,6 +170,7 @@ def search_delay(
     length: float,
     acceleration: FloatArray,
     step_s: float,
+    by_clock: bool = False,
 ) -> tuple[float, float]:
     """What the delay adds to the speed at the end of step k, in its own direction, and the variance of that.
 
@@ -179,6 +188,9 @@ def search_delay(
         Of each step so far.
     step_s : float
         Length of a step.
+    by_clock : bool
+        Search how far the second clock is ahead, in place of c, which is the c that does the same at the
+        speed of now.
 
     Returns
     -------
@@ -198,7 +210,11 @@ def search_delay(
     sides = min(math.ceil(max(echo.width_sds * sd, echo.width_mps) / step), (heard.rho.shape[0] - 1) // 2)
     best = 0
     for i in range(2 * sides + 1):
-        heard.rho[i] = _correlation(heard, pair, span, nodes, (i - sides) * step, length, echo.stride)
+        c = (i - sides) * step
+        if by_clock:
+            ahead_s = offset_s - c * length / (size * speed) * math.copysign(1.0, echo.spacing_m)
+            pair, c = _pair(echo, speed, ahead_s), 0.0
+        heard.rho[i] = _correlation(heard, pair, span, nodes, c, length, echo.stride)
         if heard.rho[i] > heard.rho[best]:
             best = i
     most = heard.rho[best]
@@ -243,6 +259,33 @@ def _is_alone(rho: FloatArray, best: int, sides: int) -> bool:
         if is_peak and abs(i - best) > BESIDE and rho[i] > ALONE * rho[best]:
             return False
     return True
+
+
+@njit_borrowed
+def is_borne_out(echo: Echo, heard: Heard, k: int, step_s: float) -> bool:
+    """Whether searches before step k, in other samples, tell the same offset of the clocks.
+
+    As long as nobody knows that offset a search is wide, and one wave in another's place leads everything
+    astray. A true offset is the same at any speed; a false one is not.
+
+    Parameters
+    ----------
+    echo, heard : Echo, Heard
+    k : int
+        Step whose search tells ``heard.searches[k, 4]``.
+    step_s : float
+        Length of a step.
+    """
+    same = others = 0
+    apart = math.ceil(echo.window_s / step_s)
+    for i in range(max(0, k - round(RECENT_S / step_s)), k + 1 - apart):
+        if heard.searches[i, 3] > 0.0:
+            sd = math.hypot(heard.searches[i, 5], heard.searches[k, 5])
+            if abs(heard.searches[i, 4] - heard.searches[k, 4]) < ALIKE_SDS * sd:
+                same += 1
+            else:
+                others += 1
+    return same > 0 and same >= others
 
 
 @njit_borrowed

@@ -39,7 +39,7 @@ from typing import NamedTuple
 
 import numpy as np
 from simrail.estimators.kalman import History, congruence, keep, remember, remember_prediction, update
-from simrail.estimators.odometry.bogie_delay_kernel import Echo, Heard, search_delay
+from simrail.estimators.odometry.bogie_delay_kernel import Echo, Heard, is_borne_out, search_delay
 from simrail.estimators.odometry.standstill import PRIOR, SUREST, TURN_S, rest_log_ratio, speed_log_ratio
 
 from simrail.core.jit import FloatArray, njit, njit_borrowed
@@ -67,6 +67,10 @@ ECHO, ECHO_UPDATES = UPDATES, UPDATES + 1
 
 ECHO_GATE = 4.0
 """Standard deviations from which on a delay is no echo."""
+
+UNKNOWN = 4.0
+"""The clocks' offset is unknown while it adds so many times more to a delay's speed than bogies that are not
+alike do: then it is what is searched, and one delay alone is not believed."""
 
 
 class Model(NamedTuple):
@@ -355,6 +359,8 @@ def _echo(
         then -= acceleration[i] * model.step_s
     h[V] = 1.0
     h[PITCH], h[PUSH] = -age * model.gravity * math.cos(x[PITCH]), age
+    floor = echo.shared * (echo.floor_mps + echo.floor_share * speed) ** 2
+    by_clock = then**4 / spacing**2 * p[OFFSET, OFFSET] > UNKNOWN * floor
     h[OFFSET], h[SPACING] = -then * then / spacing, -then / spacing
     h[UNLIKE], h[SCALE] = h[SPACING], then - x[V]
     known = 0.0
@@ -363,9 +369,18 @@ def _echo(
             for j in range(x.shape[0]):
                 known += h[i] * p[i, j] * h[j]
     c, noise = search_delay(
-        echo, heard, k, x[V], math.sqrt(known), x[OFFSET], abs(spacing), acceleration, model.step_s
+        echo, heard, k, x[V], math.sqrt(known), x[OFFSET], abs(spacing), acceleration, model.step_s, by_clock
     )
-    if noise <= 0.0 or c * c > ECHO_GATE**2 * (known + noise):
+    if by_clock:  # what was found is a delay, of the speed at that age
+        c, noise = c * (then / x[V]) ** 2, noise * (then / x[V]) ** 4
+    error = c if x[V] > 0.0 else -c
+    if noise <= 0.0:
+        return 0.0, 0.0
+    heard.searches[k, 4] = x[OFFSET] + error / h[OFFSET]
+    heard.searches[k, 5] = math.sqrt(noise / echo.shared) / abs(h[OFFSET])
+    if by_clock and not is_borne_out(echo, heard, k, model.step_s):
+        return 0.0, 0.0
+    if c * c > ECHO_GATE**2 * (known + noise):
         return 0.0, 0.0
     heard.searches[k, 0] = 1.0
-    return (c if x[V] > 0.0 else -c), noise
+    return error, noise

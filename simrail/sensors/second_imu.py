@@ -35,7 +35,7 @@ class SecondImuSpec:
     clock_offset_s : float, optional
         How far it is ahead, in the place of that draw.
     spacing_sd_m : float
-        How well the train knows the distance of both.
+        How well the train knows the distance of both: what it is told errs by a draw of that.
     """
 
     mount: Mount
@@ -75,7 +75,7 @@ def sample_second_imu(
         filled by straight lines.
     sheet : SecondImuSheet
         What the train knows of it: the spacing is measured along the rails while the train stands at its
-        start.
+        start, as well as a tape does.
 
     Raises
     ------
@@ -86,11 +86,12 @@ def sample_second_imu(
     ahead, behind = (
         float(truth.motion(one, range(1), ("position_m",)).to_numpy()[0, 0]) for one in (first, spec.mount)
     )
+    by_tape = stream(seed, "sensor", draw, "imu", spec.mount.name, "spacing").standard_normal()
     sheet = SecondImuSheet(
         mount=spec.mount.name,
         mount_body=spec.mount.body,
         mount_position_m=spec.mount.position_m,
-        spacing_m=ahead - behind,
+        spacing_m=ahead - behind + spec.spacing_sd_m * by_tape,
         imu=imu_sheet(spec.grade, delay_s=delay_s),
         spacing_sd_m=spec.spacing_sd_m,
         clock_offset_sd_s=spec.clock_offset_sd_s,

