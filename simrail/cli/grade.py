@@ -9,7 +9,6 @@ import typer
 
 from simrail.cli.options import CELL_FAILED, DONE, Seed, Settings
 from simrail.core.errors import InputError, one_of
-from simrail.core.toml_files import parse_toml
 
 DEFAULT_SCENARIO = "which_imu"
 
@@ -119,6 +118,8 @@ def imu_setting(text: str, file: str, grades: list[str], mount: str | None) -> s
     InputError
         If there is no such mount.
     """
+    from simrail.core.toml_files import parse_toml
+
     tables = parse_toml(text, file=file).get("imu", [])
     names = [str(table.get("name")) for table in tables]
     if mount is not None:

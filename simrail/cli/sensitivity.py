@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from simrail.cli.options import CELL_FAILED, DONE, Scenario, Seed, Settings, number, say
-from simrail.core.csv_files import csv_bytes
 from simrail.core.errors import one_of
 
 if TYPE_CHECKING:
@@ -65,6 +64,7 @@ def sensitivity(
 
     from simrail.campaign.sensitivity import FigureName, sensitivities, sensitivity_table
     from simrail.core.atomic_files import write_whole
+    from simrail.core.csv_files import csv_bytes
     from simrail.report.figures.canvas import by_itself
     from simrail.report.figures.responses import responses_figure
     from simrail.scenario.distributions import dimensions

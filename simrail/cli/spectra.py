@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simrail.cli.options import DONE, Scenario, Seed, Settings
-from simrail.core.csv_files import csv_bytes
 from simrail.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,6 +37,7 @@ def spectra(
     from simrail.campaign.progress import ProgressWatcher
     from simrail.campaign.spectra import scenario_spectra
     from simrail.core.atomic_files import write_whole
+    from simrail.core.csv_files import csv_bytes
     from simrail.scenario.scenario import load_scenario
     from simrail.scoring.published_spectra import MOUNTS, read_spectrum, shipped_spectra
     from simrail.scoring.vibration_levels import verdicts

@@ -84,7 +84,7 @@ def test_page_is_well_formed_and_self_contained(page: str) -> None:
     assert not re.search(r"fetch\(|XMLHttpRequest|import\(|https?://(?!www\.w3\.org)", page)
     assert checker.wanted <= set(checker.ids)
     anchors = re.findall(r'<a href="#([^"]*)">', page[: page.index("<main>")])
-    assert anchors == ["answer", "scores", "explorer", "track", "odometry", "words", "parts", "again"]
+    assert anchors == ["answer", "scores", "explorer", "track", "odometry", "words", "parts", "cite", "again"]
     assert all(checker.ids.count(name) == 1 for name in anchors)
 
 

@@ -37,10 +37,12 @@ from simrail.core.seeds import stream
 from simrail.estimation.conformance import standing, time_reversed
 from simrail.recording.recording import Recording
 from simrail.report.figures.estimate import estimate_view
+from simrail.report.tables.recorded import MethodResult
 from simrail.ride.truth import Mount
 from simrail.scenario.build_estimator import construct
 from simrail.scoring.geometry import score_geometry
 from simrail.track.bands import BANDS, band_pass
+from simrail.track.rail_limits import RailLimits
 
 DIAGONAL = np.concatenate([[0], np.cumsum(np.arange(12, 1, -1))])
 
@@ -395,5 +397,7 @@ def test_a_scenario_can_make_it_and_the_report_can_draw_it(line_recording: Calla
     with pytest.raises(InputError, match="hyperparameters"):
         construct(TrajectorySmoother, {"hyperparameters": 3.0})
     recording = WHERE["curve"](line_recording)
-    view = estimate_view(recording, made.estimate(recording))
+    estimate = made.estimate(recording)
+    result = MethodResult("smoother", "smoother", "TrajectorySmoother()", recording, estimate, (), 0.2)
+    view = estimate_view([result], RailLimits())
     assert "rad/s" in {panel.unit for panel in view.panels if panel.group == "innovations"}
