@@ -64,7 +64,11 @@ REST_FORCE_MPS2 = 0.02
 """What passengers shake the force along the track by at rest, averaged over `FORCE_S`: standard deviation."""
 
 RUN_FORCE_MPS2 = 0.2
-"""What a train's acceleration is while it runs: coasting, traction and braking together."""
+"""What a train's acceleration is while traction or brakes work."""
+
+STEADY_SHARE, STEADY_FORCE_MPS2 = 0.5, 0.05
+"""So much of its time a train keeps its speed or coasts: its acceleration is that of rolling resistance and
+of who holds a speed by hand. A train that crawls is such a one: its acceleration hardly tells it from rest."""
 
 FASTEST_MPS = 40.0
 """Speeds up to this one, of either sign, are taken as equally likely of a train that runs."""
@@ -198,7 +202,7 @@ def rest_log_ratio(
     """Logarithm of how much likelier an IMU's signs are at rest than of a train that runs; less known biases.
 
     Each sign is normal, at rest with the variance of what the sensors and passengers do, while it runs with
-    that of the least that rails and driving add to it:
+    that of the least that rails and driving add to it, of the force one of two:
 
         ln p(x | rest) - ln p(x | runs) = (ln(1 + m^2/s^2) - x^2/s^2 + x^2/(s^2 + m^2)) / 2
 
@@ -216,7 +220,10 @@ def rest_log_ratio(
         rest = turn_variance[i] + REST_TURN_RADPS**2
         total += _log_ratio(turn[i], rest, rest + LEAST_TURN_RADPS[i] ** 2)
     rest = push_variance + REST_FORCE_MPS2**2
-    return total + _log_ratio(push, rest, rest + RUN_FORCE_MPS2**2)
+    driven = math.log(1.0 - STEADY_SHARE) - _log_ratio(push, rest, rest + RUN_FORCE_MPS2**2)
+    steady = math.log(STEADY_SHARE) - _log_ratio(push, rest, rest + STEADY_FORCE_MPS2**2)
+    most = max(driven, steady)
+    return total - most - math.log(math.exp(driven - most) + math.exp(steady - most))
 
 
 @njit_borrowed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -19,6 +20,8 @@ from simrail.estimators.odometry.standstill import (
     REST_FORCE_MPS2,
     REST_TURN_RADPS,
     RUN_FORCE_MPS2,
+    STEADY_FORCE_MPS2,
+    STEADY_SHARE,
     TURN_S,
     TURNING_RADPS,
     WINDOW_S,
@@ -123,9 +126,11 @@ def test_log_ratios_are_those_of_normal_laws() -> None:
     runs = np.hypot(rest, LEAST_TURN_RADPS)
     expected = 0.3 + (norm.logpdf(turn, scale=rest) - norm.logpdf(turn, scale=runs)).sum()
     still_sd = np.hypot(0.01, REST_FORCE_MPS2)
-    expected += norm.logpdf(0.05, scale=still_sd) - norm.logpdf(
-        0.05, scale=np.hypot(still_sd, RUN_FORCE_MPS2)
+    steady, driven = (
+        math.log(share) + norm.logpdf(0.05, scale=np.hypot(still_sd, sd))
+        for share, sd in ((STEADY_SHARE, STEADY_FORCE_MPS2), (1.0 - STEADY_SHARE, RUN_FORCE_MPS2))
     )
+    expected += norm.logpdf(0.05, scale=still_sd) - np.logaddexp(steady, driven)
     assert rest_log_ratio(0.3, turn, variance, 0.05, 0.01**2) == pytest.approx(expected, rel=1e-10)
     for speed in (0.0, 1.0, 5.0):
         law = (1.0 - ASTRAY) * norm.pdf(speed, scale=0.5) + ASTRAY * norm.pdf(speed, scale=0.5 * ASTRAY_SDS)
