@@ -68,7 +68,7 @@ RUN_FORCE_MPS2 = 0.2
 
 STEADY_SHARE, STEADY_FORCE_MPS2 = 0.5, 0.05
 """So much of its time a train keeps its speed or coasts: its acceleration is that of rolling resistance and
-of who holds a speed by hand. A train that crawls is such a one: its acceleration hardly tells it from rest."""
+of who holds a speed by hand. So does one that crawls: its acceleration hardly tells it from rest."""
 
 FASTEST_MPS = 40.0
 """Speeds up to this one, of either sign, are taken as equally likely of a train that runs."""
