@@ -33,7 +33,8 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         ``high95`` (its 95 % interval, over tracks, or over the draws of the sensors where there is one
         track: `simrail.scoring.bootstrap`), ``sd_sensor`` (pooled standard deviation between sensor draws of
         one track), ``sd_track`` (standard deviation between the means of the tracks, of all samples),
-        ``track_draws``, ``draws`` (ok), ``failed``. What the number of draws does not allow is empty.
+        ``track_draws``, ``draws`` (ok), ``failed`` (`simrail.scoring.table.is_failure`). What the number of
+        draws does not allow is empty.
     """
     axes: list[str] = []
     track = ["track_draw"]
@@ -44,7 +45,7 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
         track = [*(["sample"] if "sample" in cells else []), *track]
         frame = frame.merge(cells[["cell", *axes, *track[:-1]]], on="cell", how="left")
     # A failed figure keeps the group of its fellows: the reason is counted, not grouped by.
-    frame["failed"] = (~frame["status"].isin((table.OK, *table.LEFT_OPEN))).astype(np.int64)
+    frame["failed"] = table.is_failure(frame).astype(np.int64)
     labels = [name for name in table.LABEL_COLUMNS if name not in table.INTEGER_COLUMNS]
     figure = [name for name in table.FIGURE_COLUMNS if name not in ("value", "n_samples", "status")]
     keys = [*labels, *axes, *figure]

@@ -8,7 +8,7 @@ import pytest
 
 from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
 from simrail.scoring.bootstrap import interval
-from simrail.scoring.table import UNOBSERVABLE, as_score_table, concat_scores, labelled
+from simrail.scoring.table import NO_SAMPLES, UNOBSERVABLE, as_score_table, concat_scores, labelled
 
 LABELS: dict[str, object] = {
     "scenario": "test",
@@ -71,8 +71,10 @@ def test_every_group_has_the_interval_of_its_own_draws() -> None:
 
 
 def test_failed_draws_are_all_counted_and_only_they() -> None:
-    """By estimator: whole tracks, several draws of one track, none; what is left open is not a failure."""
-    scores, cells = table({"none": (3, 4), "some": (3, 4), "track": (3, 4), "all": (1, 3), "open": (2, 2)})
+    """By estimator: whole tracks, several draws of one, none. What is left open or not there is no failure."""
+    scores, cells = table(
+        {"none": (3, 4), "some": (3, 4), "track": (3, 4), "all": (1, 3), "open": (2, 2), "none there": (1, 2)}
+    )
     ok = scores["status"].astype(str)
     track, sensor = scores["track_draw"], scores["sensor_draw"]
     some = (track.eq(1) & sensor.lt(3)) | (track.eq(2) & sensor.eq(0))
@@ -80,8 +82,9 @@ def test_failed_draws_are_all_counted_and_only_they() -> None:
     failed |= scores["estimator"].eq("track") & track.eq(0)
     failed |= scores["estimator"].eq("all")
     is_open = scores["estimator"].eq("open") & sensor.eq(1)
-    scores["status"] = ok.mask(failed, "broken").mask(is_open, UNOBSERVABLE)
-    scores.loc[failed | is_open, "value"] = np.nan
+    empty = scores["estimator"].eq("none there")
+    scores["status"] = ok.mask(failed, "broken").mask(is_open, UNOBSERVABLE).mask(empty, NO_SAMPLES)
+    scores.loc[failed | is_open | empty, "value"] = np.nan
     found = aggregate(scores, cells).set_index("estimator")
     columns = ["draws", "failed", "track_draws"]
     assert found[columns].T.to_dict("list") == {
@@ -90,8 +93,9 @@ def test_failed_draws_are_all_counted_and_only_they() -> None:
         "track": [8, 4, 2],
         "all": [0, 3, 0],
         "open": [2, 0, 2],
+        "none there": [0, 0, 0],
     }
-    assert found["value"].isna().to_dict() == {name: name == "all" for name in found.index}
+    assert found["value"].isna().to_dict() == {name: name in ("all", "none there") for name in found.index}
     for name in ("some", "track", "open"):
         mean = scores.loc[scores["estimator"] == name, "value"].mean()
         assert found.loc[name, "value"] == pytest.approx(mean, rel=1e-12)
