@@ -71,7 +71,7 @@ def test_every_group_has_the_interval_of_its_own_draws() -> None:
 
 
 def test_failed_draws_are_all_counted_and_only_they() -> None:
-    """By estimator: whole tracks, several draws of one, none. What is left open or not there is no failure."""
+    """By estimator: whole tracks, several draws of one, none. What is left open or not there is none."""
     scores, cells = table(
         {"none": (3, 4), "some": (3, 4), "track": (3, 4), "all": (1, 3), "open": (2, 2), "none there": (1, 2)}
     )
