@@ -55,6 +55,11 @@ def check_ride(path: Path, write: Path | None) -> int:
             f"{recording.name}: fine" if not evidence.wrong else f"{recording.name}: likely wrong in part"
         )
         return DONE
+    if not evidence.wrong:
+        judged_ride(path)
+        console.print(f"{recording.name}: fine; nothing is to be mended, and {write} was not written")
+        console.print(f"next: simrail estimate {path}")
+        return DONE
     changes = write_mended(path, evidence, write)
     console.print(f"wrote {write}, with {number(len(changes), 'setting')} changed; comments are not kept:")
     for change in changes:
