@@ -6,6 +6,7 @@ returns a `Plan` that says what will be run, with warnings. Each ride is judged 
 (`simrail.scenario.check_sensors`).
 """
 
+import re
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -126,9 +127,19 @@ def judge_scenario(
         total,
         simulated,
         estimators,
-        tuple(dict.fromkeys(warnings)),
+        _by_kind(warnings),
         parts.hash,
         tuple(dict.fromkeys(notes)),
+    )
+
+
+def _by_kind(warnings: list[str]) -> tuple[str, ...]:
+    """The first of each kind, with how many more there are: of draws and axes they differ by numbers."""
+    kinds: dict[str, list[str]] = {}
+    for warning in dict.fromkeys(warnings):
+        kinds.setdefault(re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", warning), []).append(warning)
+    return tuple(
+        first if not more else f"{first} (and {len(more)} more like it)" for first, *more in kinds.values()
     )
 
 

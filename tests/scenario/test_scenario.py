@@ -412,3 +412,11 @@ def test_what_is_judged_is_what_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
         noun = getattr(judged[0], name)
         assert noun is getattr(parts.resolve(first), name) is getattr(parts.resolve(second), name)
     assert parts.ride(second) is judged[0].ride
+
+
+def test_warnings_that_differ_by_numbers_are_told_once() -> None:
+    plan = judge_scenario(
+        load_scenario("track_relative", overrides=["ride.speed_kmh=[78.0, 80.0]", "monte_carlo.samples=1"])
+    )
+    (told,) = [one for one in plan.warnings if "uncompensated" in one]
+    assert told.endswith("(and 3 more like it)") and "78 km/h" in told
