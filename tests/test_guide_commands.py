@@ -99,7 +99,7 @@ def test_a_command_runs_as_it_stands(
     code = call(words_of(line))
     shown = capsys.readouterr()
     assert code == 0, shown.err
-    for file in re.findall(r"^wrote (\S+?)[:,]?(?: |$)", shown.out, re.MULTILINE):
+    for file in re.findall(r"^wrote (?!into )(\S+?)[:,]?(?: |$)", shown.out, re.MULTILINE):
         assert (desk / file).exists(), file
 
 

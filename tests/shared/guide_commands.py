@@ -25,6 +25,8 @@ PATTERNS = {
     "simrail sensitivity NAME": "stands for simrail sensitivity sensitivity",
     "simrail grade NAME --for ...": "stands for simrail grade consumer",
     "simrail new track my_line --from FILE": "run by tests/cli with files of both kinds",
+    "simrail export SCENARIO --format mcap --out rides": "tests/campaign export and read one",
+    "python results/reference/bounds.py DIR ...": "of the results of an hour",
     "simrail run which_imu --out DIR": "half an hour; it is read with its settings",
     "python results/reference/which_imu.py DIR": "of the results of half an hour",
     "simrail estimate RIDE.toml --estimator ZeroVelocityOdometry --set smoothed=true": "my_ride.toml is",
@@ -35,6 +37,11 @@ TOO_LONG = {
     "simrail grade all": "many minutes: each shipped grade, with its budget",
     "simrail grade consumer --for 'roll<0.5deg'": "a minute and more: run by tests/cli at its own settings",
     "simrail grade lord_3dm_gx4_25 --for 'roll<0.1deg at 60km/h'": "likewise",
+    "simrail grade lord_3dm_gx4_25,tactical --for 'roll<0.1deg at 60km/h'": "likewise",
+    "simrail tune my_ride.toml": "two minutes; tests/cli tune a short ride",
+    "simrail estimate my_ride.toml --set tuning=my_ride_cml.toml": "of the tuning above; tests/cli do it",
+    "simrail sensitivity sensitivity --method morris --set engine=compiled --set "
+    "'vehicle_factors.load={ uniform = [0.9, 1.3] }'": "minutes; tests/scenario have a short one",
     "simrail grade my_imu.toml --for 'roll<0.1deg in curves at 60km/h'": "likewise",
     "simrail sensitivity sensitivity": "some minutes; tests/campaign runs small ones",
     "simrail spectra shaking": "a multibody ride with all waves; tests/cli runs a short one",
@@ -61,6 +68,8 @@ TOO_LONG = {
 ELSEWHERE = {
     "pip install 'simrail[lessons]'": "by hand, in a new environment",
     "pip install 'simrail[loggers]'": "what it brings is in the extra test",
+    'pip install "simrail[loggers]"': "likewise",
+    "pip install 'simrail[ifc]'": "by hand: 55 MB for one kind of file",
     "pytest -n 0": "this is one",
     "pytest -m long": "by .ci/run",
     "pytest -m slow": "minutes",
@@ -77,6 +86,9 @@ ELSEWHERE = {
     "python -m simrail.lessons.notebooks.drift": "by tests/lessons",
     "python results/reference/make.py": "an hour",
     "python results/reference/track_relative.py results/track_relative": "of half an hour's results",
+    "python results/reference/track_relative_faults.py": "minutes",
+    "python tests/statistics/across_machines.py": "minutes; tests/statistics run it",
+    "python tests/statistics/soak.py": "an hour",
     "python tests/bad_input/fuzz.py --seed 1 --count 1000": "tests/bad_input run a hundred",
     "python tests/benchmarks/page_rates.py --film FILE.html": "a benchmark",
     "python tests/benchmarks/page_rates.py --lessons": "a benchmark",
@@ -87,7 +99,17 @@ PARTS_ONLY = {"simrail new ride": "one of simrail new, whose NAME is not said"}
 """Commands that a sentence names without their arguments."""
 
 LONG_RUNS = (
-    *("compensation", "go20a", "imu_only", "leaves", "manchester_cases", "metro_geometry", "metro_ride"),
+    *(
+        "bounds_multibody",
+        "bounds",
+        "compensation",
+        "go20a",
+        "imu_only",
+        "leaves",
+        "manchester_cases",
+        "metro_geometry",
+        "metro_ride",
+    ),
     *("metro_table3", "odometry", "passes", "scale_track", "shaking", "track_relative"),
     *("track_relative_parts", "validation", "validation_quick", "vertical_profile", "which_imu"),
 )
