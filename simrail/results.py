@@ -35,7 +35,10 @@ from simrail.core.csv_files import write_csv
 from simrail.core.errors import InputError
 from simrail.core.shown import Facts, Shown, names
 from simrail.core.toml_files import label
+from simrail.report.campaign.verdicts import groups_of
 from simrail.report.pages.page import SETS_BESIDE, write_report
+from simrail.report.tables.methods import method_styles
+from simrail.report.words.verdicts import verdict_sentence
 from simrail.scenario.cells import cells
 from simrail.scenario.check import Plan, judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
@@ -163,6 +166,7 @@ def run(
         campaign = run_campaign(
             plan, workers=workers, cluster=cluster, checkpoint=checkpoint, watcher=watcher
         )
+        _tell_verdicts(campaign, watcher)
         budgets = budgets_of(plan, campaign.verdicts, watcher=watcher)
         if budget_draws:
             budgets = pd.concat(
@@ -348,6 +352,21 @@ def _is_there(folder: Path) -> bool:
         return folder.exists()
     except (OSError, ValueError):  # by such a name there can be none
         return False
+
+
+def _tell_verdicts(campaign: CampaignResult, watcher: Watcher | None) -> None:
+    """Say what has been settled before the error is taken apart, which takes as long again and more."""
+    scenario = campaign.plan.scenario
+    if (
+        watcher is None
+        or campaign.verdicts.empty
+        or not any(one.budget_draws for one in scenario.spec.require)
+    ):
+        return
+    styles = list(method_styles(scenario).values())
+    for _, _, _, rows in groups_of(campaign.verdicts):
+        watcher.told(verdict_sentence(rows, styles))
+    watcher.told("what the error is made of follows")
 
 
 def _judge_folder(folder: Path) -> None:

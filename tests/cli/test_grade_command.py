@@ -94,7 +94,10 @@ def test_one_grade_is_told_what_its_error_is_made_of(
     ladder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert grade("./coarse.toml", "--for", "roll<0.1deg", "--mount", "axle") == 0
-    assert "of the squared error of roll rms" in capsys.readouterr().out
+    shown = capsys.readouterr()
+    assert "of the squared error of roll rms" in shown.out
+    verdict, _ = shown.err.split("what the error is made of follows")
+    assert "on the axle with EKF: not enough" in verdict
     (folder,) = (ladder / "results").iterdir()
     budget = pd.read_csv(folder / "budget.csv")
     assert budget["term"].iloc[0] == "accel_turn_on_bias"
