@@ -12,6 +12,9 @@ from simrail.report.film.film import FRAME_HZ, Film, film_of
 from simrail.report.film.page import write_film
 
 
+pytestmark = pytest.mark.long
+
+
 @pytest.fixture(scope="module")
 def film(own_cache: None) -> Film:
     """A short ride with forces, of the engine that starts soonest."""

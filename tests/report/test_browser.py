@@ -20,6 +20,8 @@ from simrail.report.tables.recorded import MethodResult
 from simrail.scenario.scenario import Scenario, read_scenario
 from simrail.track.rail_limits import EXAMPLE_LIMITS
 
+pytestmark = pytest.mark.long
+
 Rides = Callable[..., CellResult]
 Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
 
