@@ -11,7 +11,6 @@ from simrail import load_scenario
 from simrail.report.film.film import FRAME_HZ, Film, film_of
 from simrail.report.film.page import write_film
 
-
 pytestmark = pytest.mark.long
 
 
