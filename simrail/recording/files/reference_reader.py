@@ -57,7 +57,7 @@ def read_reference(spec: RideFile, reader: SignalReader, imu: pd.DataFrame) -> R
 def _motion(part: ReferencePart, reader: SignalReader, imu: pd.DataFrame) -> pd.DataFrame:
     _refuse_empty(part, "reference", reader.folder)
     frame = reader.frame(part, "reference")
-    within = frame[(frame.index >= imu.index[0]) & (frame.index <= imu.index[-1])]
+    within: pd.DataFrame = frame[(frame.index >= imu.index[0]) & (frame.index <= imu.index[-1])]
     if not len(within):
         raise InputError(
             "has no sample while the IMU recorded",
