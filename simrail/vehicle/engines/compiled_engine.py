@@ -63,6 +63,7 @@ class CompiledEngine:
         for time_s, rows, slopes in stretches(
             self.setup,
             self._solve,
+            self._halt,
             lambda steps: self._bodies(steps)[:, :, 7:],
             duration_s=duration_s,
             segment_s=segment_s,
@@ -98,6 +99,11 @@ class CompiledEngine:
         return march(
             first, setup.step_s, self.state, rows, *scratch, self.memory, self.data, setup.every, contacts
         )
+
+    def _halt(self) -> None:
+        """Stop all bodies and spins."""
+        self._bodies(self.state)[:, 7:] = 0.0
+        self.state[self._turned + len(self.data.spins) : self._first_state] = 0.0
 
     def _solve(self, first: int, last: int) -> FloatArray:
         """Integrate from the present state; the state (steps + 1, n) at every step."""

@@ -84,6 +84,7 @@ class ExudynEngine:
         for time_s, rows, slopes in stretches(
             self.setup,
             self._solve,
+            self._halt,
             lambda steps: steps[:, 1, : 6 * bodies].reshape(-1, bodies, 6),
             duration_s=duration_s,
             segment_s=segment_s,
@@ -198,6 +199,13 @@ class ExudynEngine:
             return _NOTHING
 
         return user_function
+
+    def _halt(self) -> None:
+        """Stop all bodies and spins; what else is a rate here is a first-order state."""
+        rates = np.array(self.mbs.systemData.GetODE2Coordinates_t())
+        rates[: self.size - self._states] = 0.0
+        for kind in (exu.ConfigurationType.Initial, exu.ConfigurationType.Current):
+            self.mbs.systemData.SetODE2Coordinates_t(rates.tolist(), configuration=kind)
 
     def _solve(self, first: int, last: int) -> FloatArray:
         """Integrate from the present state; coordinates and rates (steps + 1, 2, n) at every step."""
