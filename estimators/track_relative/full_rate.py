@@ -34,6 +34,7 @@ from simrail.recording.recording import Recording
 FAST = (
     at.ROLL,
     at.ROLL_RATE,
+    at.ROLL_SLOW,
     at.PITCH,
     at.PITCH_RATE,
     at.Y,
@@ -125,10 +126,10 @@ def held_of(recording: Recording, trace: Trace) -> Held:
     ground, around = ground_at(recording, course.lines, states[:, at.S]), course.around
     seen, track = shown(x, ground, around), deviation_of(x, ground, around)
     # Leaned, a body feels along z what pulls it to the side.
-    for state in (at.ROLL, at.PITCH):
+    for state in (at.ROLL, at.ROLL_SLOW, at.PITCH):
         x[state] = Dual(trace.states[:, state])
     seen[5] = shown(x, ground, around)[5]
-    for state in (at.ROLL, at.PITCH):
+    for state in (at.ROLL, at.ROLL_SLOW, at.PITCH):
         x[state] = Dual(states[:, state])
     pose = pose_of(x, ground, around, track)
     speed, g, frame = states[:, at.V], recording.gravity_mps2, ground.frame
@@ -154,8 +155,10 @@ def held_of(recording: Recording, trace: Trace) -> Held:
 
 
 def found_before(recording: Recording, trace: Trace) -> FloatArray:
-    """ROLL, Y and Z of the smoother at the samples, (n, 3)."""
-    return _at_samples(recording, trace, trace.states[:, [at.ROLL, at.Y, at.Z]])
+    """ROLL less what is slow of it, Y and Z of the smoother at the samples, (n, 3)."""
+    found = trace.states[:, [at.ROLL, at.Y, at.Z]]
+    found[:, 0] -= trace.states[:, at.ROLL_SLOW]
+    return _at_samples(recording, trace, found)
 
 
 def _at_samples(recording: Recording, trace: Trace, values: FloatArray) -> FloatArray:

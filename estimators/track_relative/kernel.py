@@ -1,6 +1,6 @@
 """Compiled loops of the track-relative smoother: the filter, and the way back, in segments.
 
-A linear Kalman filter of 51 states whose transition is a few small blocks: what is a process over the
+A linear Kalman filter of 52 states whose transition is a few small blocks: what is a process over the
 distance stands still with the train. The way back is the modified Bryson-Frazier recursion of
 `simrail.estimators.kalman`. It needs the filter's covariance at every step, 20 kB: the filter keeps one in
 `SEGMENT` steps, and the way back runs it again over each segment, so that memory grows with the square root
@@ -41,6 +41,7 @@ from simrail.estimators.track_relative.states import (
     PITCH,
     RIGHT,
     ROLL,
+    ROLL_SLOW,
     SCALE,
     SLOPE,
     STATES,
@@ -63,17 +64,17 @@ SEGMENT = 256
 OUTPUTS = 7
 """Roll, pitch, yaw, place, speed, y, z."""
 
-INTO = (WAY, WAY, WAY, WAY, WAY, WAY, HEADING, HEADING, HEADING, S, S, V)
-ORIGIN = (V, A, SCALE, TREAD, LEFT, RIGHT, CURVE, EVEN, ODD, V, A, A)
+INTO = (WAY, WAY, WAY, WAY, WAY, WAY, HEADING, HEADING, HEADING, S, S, V, ROLL_SLOW)
+ORIGIN = (V, A, SCALE, TREAD, LEFT, RIGHT, CURVE, EVEN, ODD, V, A, A, ROLL)
 """Where the transition is a chain, as `simrail.estimators.kalman.chain` takes it."""
 
-FORGETS = (TREAD, SLOPE, CURVE, CANT, EVEN, ODD)
+FORGETS = (TREAD, SLOPE, CURVE, CANT, EVEN, ODD, ROLL_SLOW)
 """States that a step may shrink, to nothing where what they speak of is behind."""
 
-FLOWS = 13
+FLOWS = 14
 """Numbers of a step: way run (m, >= 0), way (m, signed), shares of heading by CURVE, EVEN and ODD, shares of
-the wheel's path in curves to the left and right, what is kept of `FORGETS` but for the first: 5, and the
-variance that WAY gains, m2."""
+the wheel's path in curves to the left and right, what is kept of `FORGETS` but for the first and last: 5, the
+variance that WAY gains, m2, and what is kept of ROLL_SLOW, which forgets what is behind and follows ROLL."""
 
 
 class Noise(NamedTuple):
@@ -122,7 +123,7 @@ class Model(NamedTuple):
         z less what the linearised model has as its constant: e = measured - H x.
     variances : ndarray (n, m)
         Of each; not finite for one that is not made.
-    flows : ndarray (n, 13)
+    flows : ndarray (n, 14)
         `FLOWS` of the step that leads there.
     said_columns, said : ndarray of int (7, u), ndarray (n, 7, u)
         Rows of the outputs.
@@ -161,10 +162,10 @@ class Scratch(NamedTuple):
         Of the pairs and triples, in the order of `Noise.sd`.
     back : ndarray (3, 3)
         Transpose of one of ``f``.
-    kept : ndarray (6,)
+    kept : ndarray (7,)
         What is kept of `FORGETS`.
     h, v : ndarray (52,)
-    gain : ndarray (51,)
+    gain : ndarray (52,)
     lines : ndarray (3, 52)
     """
 
@@ -193,7 +194,7 @@ def room_for_segment(steps: int, rows: int) -> Segment:
 
 def room_to_work() -> Scratch:
     """Scratch, all zero."""
-    shapes = ((6, 3, 3), (6, 3, 3), (3, 3), (6,), (WIDTH,), (WIDTH,), (STATES,), (3, WIDTH))
+    shapes = ((6, 3, 3), (6, 3, 3), (3, 3), (7,), (WIDTH,), (WIDTH,), (STATES,), (3, WIDTH))
     return Scratch(*(np.zeros(shape) for shape in shapes))
 
 
@@ -267,13 +268,15 @@ def transition(flow: FloatArray, dt: float, noise: Noise, scratch: Scratch) -> N
     scratch.kept[0] = math.exp(-run / noise.tread_length)
     for i in range(5):
         scratch.kept[1 + i] = flow[7 + i]
+    scratch.kept[6] = flow[13]
 
 
 @njit_borrowed
 def shares(flow: FloatArray, dt: float) -> tuple[float, ...]:
     """Entries of the chains at (`INTO`, `ORIGIN`)."""
     way, half = flow[1], 0.5 * dt * dt
-    return (dt, half, way, way, way * flow[5], way * flow[6], flow[2], flow[3], flow[4], dt, half, dt)
+    slow = (1.0 - flow[13]) / flow[13]  # it is shrunk after that
+    return (dt, half, way, way, way * flow[5], way * flow[6], flow[2], flow[3], flow[4], dt, half, dt, slow)
 
 
 @njit_borrowed
@@ -290,8 +293,9 @@ def predict(
         if kept != 1.0:
             i = FORGETS[r]
             shrink(x, p, i, kept)
-            sd = noise.tread_sd if r == 0 else noise.forgotten_sd[r - 1]
-            p[i, i] += sd * sd * (1.0 - kept * kept)
+            if r < 6:
+                sd = noise.tread_sd if r == 0 else noise.forgotten_sd[r - 1]
+                p[i, i] += sd * sd * (1.0 - kept * kept)
     for b in range(6):
         if flow[0] > 0.0 or (b == 0 and noise.sway_hz > 0.0):
             first, m, q = FIRST[b], SIZE[b], scratch.q[b]
@@ -414,7 +418,7 @@ def run_segment(
 ) -> float:
     """Steps ``first`` to ``last`` of the filter, in place; returns -2 log-likelihood but for a constant.
 
-    ``kept``, ``filtered`` (n, 51) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, m), the
+    ``kept``, ``filtered`` (n, 52) with ``covariance`` (n, 7, 7) of the outputs, and ``surprises`` (n, m), the
     innovations over their sds, are written where there is room.
     """
     total = 0.0
@@ -506,9 +510,9 @@ def run_back(
     said: FloatArray,
     work: FloatArray,
 ) -> None:
-    """Smoothed states (n, 51) and covariances (n, 7, 7) of the outputs, from the starts of the segments.
+    """Smoothed states (n, 52) and covariances (n, 7, 7) of the outputs, from the starts of the segments.
 
-    ``said`` and ``work`` are (7, 52) and (7, 52), all zero, as ``lam`` (51,) and ``info`` (51, 52).
+    ``said`` and ``work`` are (7, 52) and (7, 52), all zero, as ``lam`` (52,) and ``info`` (52, 52).
     """
     n = model.measured.shape[0]
     none, none3 = smoothed[:0], covariance[:0]

@@ -7,7 +7,7 @@ they cost something, with the states of `simrail.estimators.track_relative.state
     h_m     = CURVE h - EVEN even - ODD odd                       curvature that the map has not
     q       = V^2 (bend + h_m)/g + lean + cant_m                  cant deficiency over g, over the chord
     cant_m  = CANT share + CANT_ALONG - EVEN even_r - ODD odd_r   roll that the map has not
-    rho     = (ROLL + TILT q + TILT_RATE q_dot + TORSION twist + cant_m + askew,
+    rho     = (ROLL - ROLL_SLOW + TILT q + TILT_RATE q_dot + TORSION twist + cant_m + askew,
                PITCH + SQUAT A/g - sense LEAD dip + SLOPE + askew,
                YAW - sense LAG bend + askew)                      body in the map's track
     w       = V k + V h_m e_v,      e_v upwards in track axes
@@ -33,7 +33,7 @@ class Around(NamedTuple):
 
     Attributes
     ----------
-    states : ndarray (n, 51)
+    states : ndarray (n, 52)
     jerk : ndarray (n,)
         Slope of the acceleration, m/s3.
     sense : ndarray (n,)
@@ -44,6 +44,8 @@ class Around(NamedTuple):
         m/s2.
     in_time : bool
         The derivative of the roll is by time, not by distance: a body that sways.
+    slow_m : float
+        Way in which ROLL_SLOW follows ROLL.
     """
 
     states: FloatArray
@@ -52,6 +54,7 @@ class Around(NamedTuple):
     nominal: tuple[float, float]
     gravity: float
     in_time: bool
+    slow_m: float
 
 
 class Deviation(NamedTuple):
@@ -97,7 +100,7 @@ class Pose(NamedTuple):
 
 
 def duals(states: FloatArray) -> list[Dual]:
-    """Every state of (n, 51) as a Dual."""
+    """Every state of (n, 52) as a Dual."""
     one = np.ones(len(states))
     return [Dual(states[:, i], {i: one}) for i in range(states.shape[1])]
 
@@ -128,11 +131,14 @@ def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> 
     v, a, g = x[at.V], x[at.A], around.gravity
     run, behind = _run(x, around), -around.sense
     lag, lead = x[at.LAG] * behind, x[at.LEAD] * behind
-    rolls = x[at.ROLL_RATE] * (1.0 if around.in_time else run)
+    roll, rolls = x[at.ROLL], x[at.ROLL_RATE]
+    if not around.in_time:
+        roll = roll - x[at.ROLL_SLOW]
+        rolls = (rolls - roll * (1.0 / around.slow_m)) * run
     tilt = x[at.TILT] * track.q + x[at.TILT_RATE] * track.q_rate
     tilt_rate = x[at.TILT] * track.q_rate + x[at.TILT_RATE] * track.q_rate_2
     rho = (
-        x[at.ROLL] + tilt + track.cant + x[at.TORSION] * ground.torsion[0] + ground.askew[0],
+        roll + tilt + track.cant + x[at.TORSION] * ground.torsion[0] + ground.askew[0],
         x[at.PITCH] + x[at.SQUAT] * a * (1.0 / g) + lead * ground.dip[0] + x[at.SLOPE] + ground.askew[1],
         x[at.YAW] + lag * ground.bend[0] + ground.askew[2],
     )

@@ -18,7 +18,7 @@ from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.kernel import FLOWS, Model, Noise
 from simrail.estimators.track_relative.line import Ground, Lines, ground_at, lines_of, numbers_at
 from simrail.estimators.track_relative.measurement import Around, duals, shown, told
-from simrail.estimators.track_relative.noise import AT_MPS, Motion
+from simrail.estimators.track_relative.noise import AT_MPS, SLOW_M, Motion, scale_of
 from simrail.estimators.track_relative.prior import first_state, noise_of, start_of
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
@@ -114,7 +114,7 @@ class Course(NamedTuple):
     lines : Lines
     motion : Motion
     noise : Noise
-    start, start_covariance : ndarray (51,), (51, 52)
+    start, start_covariance : ndarray (52,), (52, 52)
     steps : Steps
     around : Around
         Of all n steps.
@@ -158,7 +158,15 @@ def course_of(
     states[:, [at.S, at.V, at.A]] = steps.odometry[:, :3]
     empty = np.empty(0)
     _, lateral, height = recording.mount_position_m
-    around = Around(states, empty, empty, (lateral, height), recording.gravity_mps2, motion.sway_hz > 0.0)
+    around = Around(
+        states,
+        empty,
+        empty,
+        (lateral, height),
+        recording.gravity_mps2,
+        motion.sway_hz > 0.0,
+        SLOW_M * scale_of(recording),
+    )
     each = [kind.rows(recording, steps) for kind in aiding]
     none = np.empty((len(steps.time_s), 0))
     aided = Rows(
@@ -179,7 +187,7 @@ motion is smaller than the true one, so that a state that is constant would make
 
 
 def about(course: Course, states: FloatArray) -> Course:
-    """The course with states (n, 51) to linearise about; of those, what is `FOLLOWED`."""
+    """The course with states (n, 52) to linearise about; of those, what is `FOLLOWED`."""
     followed = np.zeros_like(states)
     followed[:, FOLLOWED] = states[:, FOLLOWED]
     speed, dt = states[:, at.V], course.steps.dt
@@ -240,6 +248,8 @@ def _flows(course: Course, ground: Ground, rows: slice) -> FloatArray:
     element, curve, vertical = numbers_at(course.lines, np.concatenate([[before], place[rows]]))
     slips = course.steps.slipping[rows]
     out[:, 12] = np.where(slips, LOST_M**2, CurveMatchedOdometry().wheel_walk_m * np.abs(way))
+    if not course.around.in_time:
+        out[:, 13] = np.exp(-np.abs(way) / course.around.slow_m)
     out[:, 7] = np.where(vertical[1:] > 0.0, np.exp(-np.abs(way) / VERTICAL_LENGTH_M), 1.0)
     out[np.diff(curve) != 0, 8:10] = 0.0
     # Element i lies between joints i and i + 1: a train from below has i behind it and meets i + 1, one

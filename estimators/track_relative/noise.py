@@ -5,6 +5,7 @@ chosen by hand near the largest likelihood of rides that are not those of any sh
 alone drives the processes of y and z to nothing where a mount shakes, and the rails with them.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -16,6 +17,12 @@ from simrail.recording.recording import Recording
 
 AT_MPS = 70.0 / 3.6
 """Speed at which `Motion.gyro` and `Motion.accel` hold; they grow with its power of 1.5."""
+
+
+SLOW_M = 70.0 / (2.0 * math.pi)
+"""The cross-level of rails is measured in waves of up to 70 m (EN 13848-1: D1 and D2): what is slower is a
+deviation from the map, of which the map's sheet speaks. Of a wave of that length half the power is left, of a
+kilometre half a percent."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +120,7 @@ FRAME = Motion(
 
 BODY = Motion(
     roll_sd=3e-3,
-    sway_hz=0.51,
+    sway_hz=0.52,
     pitch_sd=6e-4,
     pitch_length=3.0,
     yaw_sd=1e-3,

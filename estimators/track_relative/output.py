@@ -50,7 +50,7 @@ class Trace(NamedTuple):
     ----------
     course : Course
         About which the last pass was linearised.
-    states : ndarray (n, 51)
+    states : ndarray (n, 52)
     covariance : ndarray (n, 7, 7)
         Of roll, pitch, yaw, S, V, y and z.
     surprises : ndarray (n, m)

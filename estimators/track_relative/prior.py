@@ -13,7 +13,7 @@ from simrail.estimators.odometry.moving_start import ACCELERATION_SD_MPS2
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of, pointing_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import Noise
-from simrail.estimators.track_relative.noise import Motion
+from simrail.estimators.track_relative.noise import SLOW_M, Motion, scale_of
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import ImuSheet, Recording
@@ -109,7 +109,7 @@ def _walk(sheet: ImuSheet, sensor: str) -> float:
 def start_of(
     recording: Recording, motion: Motion, noise: Noise, without: Collection[str] = ()
 ) -> tuple[FloatArray, FloatArray]:
-    """State (51,) and covariance (51, 52) of a train that stands where it is known to stand."""
+    """State (52,) and covariance (52, 52) of a train that stands where it is known to stand."""
     x, sd = first_state(recording, motion), np.zeros(at.STATES)
     _body_sds(sd, noise)
     _train_sds(sd, recording, motion)
@@ -120,14 +120,29 @@ def start_of(
         sd[list(PARTS[name])] = 0.0
     p = np.zeros((at.STATES, at.WIDTH))
     p[np.arange(at.STATES), np.arange(at.STATES)] = sd**2
+    if noise.sway_hz == 0.0:
+        _slow_roll(p, noise, SLOW_M * scale_of(recording))
     for state in at.TRIPLES:
         # A Matern 5/2 process and its second derivative: minus the variance of the first.
         p[state, state + 2] = p[state + 2, state] = -(sd[state + 1] ** 2)
     return x, p
 
 
+def _slow_roll(p: FloatArray, noise: Noise, slow_m: float) -> None:
+    """Covariances of ROLL_SLOW with ROLL (Matern 3/2) and its derivative, of a way without beginning.
+
+    L(u) = integral of a exp(-a w) M(u - w): its covariance with M is that integral of M's, and so is its own.
+    """
+    a, rate, square = 1.0 / slow_m, math.sqrt(3.0) / noise.length[0], noise.sd[0] ** 2
+    together = square * a * (1.0 / (a + rate) + rate / (a + rate) ** 2)
+    rising = -square * a * (rate / (a + rate)) ** 2
+    p[at.ROLL_SLOW, at.ROLL_SLOW] = together
+    p[at.ROLL_SLOW, at.ROLL] = p[at.ROLL, at.ROLL_SLOW] = together
+    p[at.ROLL_SLOW, at.ROLL_RATE] = p[at.ROLL_RATE, at.ROLL_SLOW] = rising
+
+
 def first_state(recording: Recording, motion: Motion) -> FloatArray:
-    """State (51,) before anything is measured."""
+    """State (52,) before anything is measured."""
     chord, x = chord_of(recording), np.zeros(at.STATES)
     x[at.S], x[at.TILT] = recording.start_position_m, motion.tilt
     x[at.V] = first_speed(recording)[0]

@@ -4,6 +4,9 @@ The state has three layers, each relative to the one below, and what the sensors
 
     body in the track    ROLL, ROLL_RATE, PITCH, PITCH_RATE, YAW, YAW_RATE
                                   rad, and derivatives by distance (of a roll that sways: by time)
+                         ROLL_SLOW
+                                  rad, of ROLL what is slower than irregularities are: it is taken off again,
+                                  since the map's own CANT_ALONG has it (none of a roll that sways)
                          Y, Y_1, Y_2, Z, Z_1, Z_2
                                   m, place of the mount beside the nominal one, and derivatives by distance
                          TILT     rad of roll per rad of cant deficiency: suspension (quasi-static)
@@ -48,12 +51,12 @@ GYRO_OF_Z = (40, 41, 42)
 ACCEL_OF_X = (43, 44, 45)
 ACCEL_OF_Y = (46, 47, 48)
 
-TORSION, TILT_RATE = 49, 50
+TORSION, TILT_RATE, ROLL_SLOW = 49, 50, 51
 
-STATES = 51
+STATES = 52
 
 WIDTH = 52
-"""Length of a row of the covariance: the last one is always zero, and fills the vector registers."""
+"""Length of a row of the covariance: a multiple of four, which fills the vector registers."""
 
 PAIRS = (ROLL, PITCH, YAW, CANT_ALONG)
 """First states of those with one derivative."""

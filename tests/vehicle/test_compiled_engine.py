@@ -19,7 +19,7 @@ from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import lay
 from simrail.vehicle.engines.compiled_engine import CompiledEngine
 from simrail.vehicle.engines.derailment import DerailedError
-from simrail.vehicle.engines.engine import Setup
+from simrail.vehicle.engines.engine import Setup, start_poses
 from simrail.vehicle.engines.stepper import BODY
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
@@ -260,3 +260,23 @@ def test_needs_no_exudyn():
         "from simrail.vehicle.engines.compiled_engine import CompiledEngine"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("stopped", [True, False])
+def test_a_ride_in_a_canted_curve_begins_at_rest(monkeypatch, stopped):
+    """The body leans further than the rails; of that lean 1/25 is left to sway, on either side of rest.
+
+    Settling that only waits leaves a half: the sway takes 2 s and is damped by a third in that.
+    """
+    if not stopped:
+        monkeypatch.setattr("simrail.vehicle.engines.engine.HALTS", ())
+    laid, model = curve(SMOOTH), bogie()
+    frame = laid.design.frame(np.arange(laid.design.start_m, laid.design.end_m))
+    start_m = laid.design.start_m + float(np.argmax(np.abs(frame.roll_rad))) + 20.0
+    setup = Setup(model, laid, SpeedProfile(start_m, start_m + 30.0, 5.0, rest_s=6.0))
+    body = [b.name for b in model.bodies].index("body")
+    left = np.concatenate([part.rotation[:, body, 2, 1] for part in CompiledEngine(setup).run(5.0)])
+    first = [rotation for _, rotation in start_poses(setup)][body]
+    lean, swing = abs(left[-1000:].mean() - first[2, 1]), np.ptp(left)
+    assert lean > 1e-3
+    assert (swing < 2.0 * lean / 25.0) == stopped

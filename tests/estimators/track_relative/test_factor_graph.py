@@ -52,12 +52,12 @@ def stretch(rough: Callable) -> tuple[Model, FloatArray, FloatArray]:
     first = int(np.searchsorted(steps.odometry[:, 0], 70.0))
     start, covariance = course.start.copy(), course.start_covariance.copy()
     start[[at.S, at.V, at.A, at.WAY]] = *steps.odometry[first - 1, :3], steps.way[first - 1]
-    covariance[at.HEADING, at.HEADING] = 1e-6
+    covariance[at.HEADING, at.HEADING] = covariance[at.ROLL_SLOW, at.ROLL_SLOW] = 1e-6
     return linearised(course, slice(first, first + STEPS)), start, covariance
 
 
 def smoothed(model: Model, start: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """States (n, 51), and sds (n, 7) of the outputs."""
+    """States (n, 52), and sds (n, 7) of the outputs."""
     n, work = len(model.measured), room_to_work()
     x, p, rows = start.copy(), covariance.copy(), model.measured.shape[1]
     starts, squares = np.empty((1, at.STATES)), np.empty((1, at.STATES, at.WIDTH))

@@ -119,6 +119,7 @@ def random_model(noise: Noise, steps: int = 15) -> Model:
     flows[:, 5:7] = rng.uniform(0.0, 1.0, (steps, 2))
     for row in range(7, 12):
         flows[rng.integers(1, steps), row], flows[rng.integers(1, steps), row] = 0.0, 0.6
+    flows[:, 13] = np.exp(-0.1 * np.abs(way))
     flows[:, 12] = 1e-6 * np.abs(way)
     flows[4, 12] = 1.0
     variances = rng.uniform(0.5, 4.0, (steps, ROWS))

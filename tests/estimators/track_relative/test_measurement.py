@@ -22,7 +22,7 @@ GRAVITY = 9.81
 NOMINAL = (0.2, 0.6)
 
 SIZES = {
-    (at.ROLL, at.PITCH, at.YAW): 5e-3,
+    (at.ROLL, at.ROLL_SLOW, at.PITCH, at.YAW): 5e-3,
     (at.ROLL_RATE, at.PITCH_RATE, at.YAW_RATE): 2e-3,
     (at.CANT_ALONG,): 1e-3,
     (at.CANT_ALONG_1,): 1e-4,
@@ -44,10 +44,22 @@ SIZES = {
 }
 """Of random states; the train's own are given apart."""
 
+SLOW = 12.0
+"""m, in which ROLL_SLOW follows."""
+
 MOTION = [
     at.ROLL_RATE, at.PITCH_RATE, at.YAW_RATE, at.CANT_ALONG_1, at.Y_1, at.Y_2, at.Z_1, at.Z_2,
 ]  # fmt: skip
 """States that are multiplied by a speed that is taken for known."""
+
+
+def at_rest(states: FloatArray, *, in_time: bool = False) -> FloatArray:
+    """The states of a body that does not move in its track: what is slow of its roll stands still as well."""
+    still = states.copy()
+    still[:, MOTION] = 0.0
+    if not in_time:
+        still[:, at.ROLL_RATE] = (still[:, at.ROLL] - still[:, at.ROLL_SLOW]) / SLOW
+    return still
 
 
 def random_states(place: FloatArray, speed: FloatArray, name: str) -> FloatArray:
@@ -62,7 +74,7 @@ def random_states(place: FloatArray, speed: FloatArray, name: str) -> FloatArray
 
 def around_of(states: FloatArray, *, in_time: bool = False, jerk: float = 0.1) -> Around:
     sense = np.where(states[:, at.V].real < 0.0, -1.0, 1.0)
-    return Around(states, np.full(len(states), jerk), sense, NOMINAL, GRAVITY, in_time)
+    return Around(states, np.full(len(states), jerk), sense, NOMINAL, GRAVITY, in_time, SLOW)
 
 
 # --- Slopes -----------------------------------------------------------------------------------------------
@@ -109,8 +121,7 @@ def test_slopes_equal_the_complex_step(exact_bend: Recording, formula: Shown, in
         if i == at.S:
             continue
         if i in (at.V, at.A):
-            resting = states.copy()
-            resting[:, MOTION] = 0.0
+            resting = at_rest(states, in_time=in_time)
             around = around_of(resting, in_time=in_time)
             ours, wanted = (
                 formula(duals(resting), ground, around),
@@ -128,8 +139,7 @@ def test_the_speed_is_known_where_the_body_moves(exact_bend: Recording) -> None:
     states = random_states(PLACES, SPEEDS, "slopes")
     states[:, at.TILT_RATE] = 0.0  # it turns the body by the rate of the cant: of second order in all
     ground = ground_at(exact_bend, lines_of(exact_bend), states[:, at.S])
-    still = states.copy()
-    still[:, MOTION] = 0.0
+    still = at_rest(states)
     moving, resting = (shown(duals(x), ground, around_of(x)) for x in (states, still))
     for row in range(3):
         np.testing.assert_array_equal(moving[row].slopes[at.V], resting[row].slopes[at.V])
@@ -246,13 +256,14 @@ class Moving(NamedTuple):
         """Rotation vector (n, 3) of the body out of the map's track."""
         x, d, acceleration = self.x, self.distance(t), self.x[at.A] + self.jerk * t
         run, (_, cant, q) = self.sense * d, self.deviation(t)
-        rolled = x[at.ROLL_RATE] * (t if self.in_time else run)
+        roll = x[at.ROLL] - (0.0 if self.in_time else x[at.ROLL_SLOW])
+        rolled = x[at.ROLL_RATE] * t if self.in_time else (x[at.ROLL_RATE] - roll / SLOW) * run
         pitch = x[at.PITCH] + x[at.PITCH_RATE] * run + x[at.SQUAT] * acceleration / GRAVITY + x[at.SLOPE]
         pitch = pitch - self.sense * x[at.LEAD] * polynomial("dip", d)
         yaw = x[at.YAW] + x[at.YAW_RATE] * run - self.sense * x[at.LAG] * polynomial("bend", d)
         h = 1e-3
         late = x[at.TILT_RATE] * (self.deviation(t + h)[2] - self.deviation(t - h)[2]) / (2.0 * h)
-        roll = x[at.ROLL] + rolled + x[at.TILT] * q + late + x[at.TORSION] * polynomial("torsion", d) + cant
+        roll = roll + rolled + x[at.TILT] * q + late + x[at.TORSION] * polynomial("torsion", d) + cant
         askew = [polynomial(name, d) for name in ("askew_roll", "askew_pitch", "askew_yaw")]
         return np.column_stack([roll + askew[0], pitch + askew[1], yaw + askew[2]])
 

@@ -9,8 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import twins.track_relative as twin
+from scipy.linalg import solve_continuous_lyapunov
 from simrail.estimators.track_relative import states as at
-from simrail.estimators.track_relative.noise import AXLE, BODY, FRAME, JOINTED, Motion, motion_of
+from simrail.estimators.track_relative.noise import (
+    AXLE,
+    BODY,
+    FRAME,
+    JOINTED,
+    SLOW_M,
+    Motion,
+    motion_of,
+)
 from simrail.estimators.track_relative.prior import PARTS, first_state, heading_sd, noise_of, start_of
 
 from simrail.core.errors import InputError
@@ -87,11 +96,29 @@ def test_the_body_begins_as_it_stays(rough: Callable, motion: Motion) -> None:
             np.testing.assert_allclose(p[rows, rows], process.p, rtol=1e-9, atol=1e-9 * process.p.max())
         across = p[rows].copy()
         across[:, rows] = 0.0
+        if process.first == at.ROLL and noise.sway_hz == 0.0:
+            across[:, at.ROLL_SLOW] = 0.0
         assert not across.any()
     along = p[at.CANT_ALONG, at.CANT_ALONG]
     assert math.sqrt(along) == pytest.approx(5e-4 / recording.track.rail_base_m)
-    assert not p[:, at.STATES :].any()
     assert np.array_equal(p[:, : at.STATES], p[:, : at.STATES].T)
+
+
+def test_the_slow_roll_begins_as_on_a_way_without_beginning(rough: Callable) -> None:
+    """Stationary covariance of the Matern pair and of what follows it, by Lyapunov's equation."""
+    recording = rough()
+    noise = noise_of(recording, AXLE)
+    _, p = start_of(recording, AXLE, noise)
+    generator = np.zeros((3, 3))
+    generator[:2, :2] = twin.matern_3_2(noise.length[0])
+    generator[2, 0], generator[2, 2] = 1.0 / SLOW_M, -1.0 / SLOW_M
+    drive = np.zeros((3, 3))
+    drive[1, 1] = 4.0 * (math.sqrt(3.0) / noise.length[0]) ** 3 * noise.sd[0] ** 2
+    wanted = solve_continuous_lyapunov(generator, -drive)
+    rows = [at.ROLL, at.ROLL_RATE, at.ROLL_SLOW]
+    np.testing.assert_allclose(p[np.ix_(rows, rows)], wanted, rtol=1e-9, atol=1e-9 * wanted.max())
+    swaying = start_of(recording, BODY, noise_of(recording, BODY))[1]
+    assert not swaying[at.ROLL_SLOW].any()
 
 
 def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:

@@ -95,6 +95,8 @@ def _step(model: Model, flow: FloatArray, ours: list[Process]) -> Step:
         chains[at.WAY, state] = way * share
     for state, share in ((at.CURVE, by_curve), (at.EVEN, by_even), (at.ODD, by_odd)):
         chains[at.HEADING, state] = share
+    chains[at.ROLL_SLOW, at.ROLL] = (1.0 - flow[13]) / flow[13]
+    kept[at.ROLL_SLOW] = flow[13]
     forgotten = [at.SLOPE, at.CURVE, at.CANT, at.EVEN, at.ODD]
     kept[at.TREAD], kept[forgotten] = math.exp(-run / noise.tread_length), flow[7:12]
     sd[at.TREAD], sd[forgotten] = noise.tread_sd, noise.forgotten_sd
