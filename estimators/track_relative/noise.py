@@ -1,8 +1,10 @@
 """How much a body moves in its track, by the class of its mount.
 
-The sizes are synthetic: of simrail's `metro_irw_bogie` and `manchester_1` on good rails at 20 and 60 km/h,
-chosen by hand near the largest likelihood of rides that are not those of any shipped scenario. Likelihood
-alone drives the processes of y and z to nothing where a mount shakes, and the rails with them.
+The sizes are synthetic: of simrail's `metro_irw_bogie` and `manchester_1` on good rails at 20 to 73 km/h,
+chosen by hand near the largest likelihood of rides that are not those of any shipped scenario (roll and pitch
+of a body on bogies: of `manchester_1` in `bounds_multibody`). Likelihood alone drives the processes of y and
+z to nothing where a mount shakes, and the rails with them; a yaw that it finds, half as large on a frame,
+makes the place worse by a tenth.
 """
 
 import math
@@ -118,9 +120,9 @@ FRAME = Motion(
 )
 """A bogie frame."""
 
-BODY = Motion(
+WAGON = Motion(
     roll_sd=3e-3,
-    sway_hz=0.52,
+    sway_hz=0.51,
     pitch_sd=6e-4,
     pitch_length=3.0,
     yaw_sd=1e-3,
@@ -139,10 +141,14 @@ BODY = Motion(
     y_tilt_sd=0.3,
     y_bend_sd=5.0,
 )
-"""What rests on two bogies, or on axles with nothing upon it; and a body of which there is no drawing."""
+"""What rests on axles with nothing upon it, which one stage of springs shakes more; and a body of which there
+is no drawing."""
+
+BODY = replace(WAGON, roll_sd=2e-3, sway_hz=0.55, damping=0.2, pitch_length=12.0)
+"""What rests on two bogies."""
 
 JOINTED = replace(
-    BODY,
+    WAGON,
     pitch_sd=8e-4,
     pitch_length=8.0,
     yaw_sd=3e-3,
@@ -157,7 +163,7 @@ swings on after a transition. Of a section of three modules that is 1.2 times as
 1.6 times as stiff in its springs and half as damped in its joints: yaw, pitch and place by likelihood, the
 torsion by regression on its truth (0.65 to 0.68 of how much more the track rolls under its neighbour)."""
 
-CLASSES = {"axle": AXLE, "frame": FRAME, "body": BODY, "jointed": JOINTED}
+CLASSES = {"axle": AXLE, "frame": FRAME, "body": BODY, "wagon": WAGON, "jointed": JOINTED}
 """Classes of mounts, by the word that a tuned size begins with, e.g. ``axle_yaw_sd``."""
 
 STANDARD_BASE_M = 1.5
@@ -232,7 +238,7 @@ def class_of(recording: Recording) -> Motion:
     sheet = recording.vehicle_sheet
     here = None if sheet is None else sheet.body(recording.mount_body)
     if sheet is None or here is None:
-        return BODY
+        return WAGON
     if not here.supports:
         return AXLE
     if pointing_of(recording, chord_of(recording)) is OTHER_BODY:
@@ -240,4 +246,6 @@ def class_of(recording: Recording) -> Motion:
     below = [sheet.body(support.on) for support in here.supports]
     on_axles = all(body is None or not body.supports for body in below)
     bears = any(support.on == here.name for body in sheet.bodies for support in body.supports)
-    return FRAME if on_axles and bears else BODY
+    if on_axles:
+        return FRAME if bears else WAGON
+    return BODY

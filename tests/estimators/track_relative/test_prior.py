@@ -17,6 +17,7 @@ from simrail.estimators.track_relative.noise import (
     FRAME,
     JOINTED,
     SLOW_M,
+    WAGON,
     Motion,
     motion_of,
 )
@@ -25,7 +26,7 @@ from simrail.estimators.track_relative.prior import PARTS, first_state, heading_
 from simrail.core.errors import InputError
 from simrail.recording.sheets.vehicle_sheet import SheetBody, Support, VehicleSheet
 
-WAGON = VehicleSheet(
+TRUCK = VehicleSheet(
     (
         SheetBody("front axle", 2.0),
         SheetBody("rear axle", -2.0),
@@ -38,11 +39,11 @@ WAGON = VehicleSheet(
 
 
 def test_the_class_of_a_mount_is_that_of_the_drawing(rough: Callable) -> None:
-    drawn = replace(rough(), vehicle_sheet=WAGON)
-    classes = {"front axle": AXLE, "frame": FRAME, "car": BODY, "tender": BODY, "not drawn": BODY}
+    drawn = replace(rough(), vehicle_sheet=TRUCK)
+    classes = {"front axle": AXLE, "frame": FRAME, "car": BODY, "tender": WAGON, "not drawn": WAGON}
     for body, motion in classes.items():
         assert motion_of(replace(drawn, mount_body=body)) is motion
-    assert motion_of(rough()) is BODY
+    assert motion_of(rough()) is WAGON
 
 
 def test_a_body_on_one_bogie_or_between_others_is_jointed(rough: Callable) -> None:
@@ -188,7 +189,7 @@ def test_the_heading_is_as_sure_as_the_curves_before(rough: Callable) -> None:
 
 def test_a_mount_is_carried_inside_a_curve_by_the_versine(rough: Callable) -> None:
     """Over a chord of half length c the middle lies c^2/(2 R) inside the arc: that much per curvature."""
-    drawn = replace(rough(), vehicle_sheet=WAGON, mount_body="frame", mount_position_m=(0.5, 0.0, 1.0))
+    drawn = replace(rough(), vehicle_sheet=TRUCK, mount_body="frame", mount_position_m=(0.5, 0.0, 1.0))
     x = first_state(drawn, FRAME)
     radius, half = 300.0, 2.0
     arc = lambda u: radius - math.sqrt(radius**2 - u**2)  # noqa: E731

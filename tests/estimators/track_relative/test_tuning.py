@@ -17,7 +17,7 @@ import pytest
 import twins.track_relative as twin
 from scipy.optimize import minimize
 from simrail.estimators.track_relative.model import linearised
-from simrail.estimators.track_relative.noise import AXLE, BODY, motion_of
+from simrail.estimators.track_relative.noise import AXLE, WAGON, motion_of
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 from simrail.estimators.track_relative.tuning import MotionLikelihood, MotionTuning, tuned
 from simrail.estimators.tuning.cube import Cube
@@ -94,7 +94,7 @@ def test_what_is_tuned_is_taken_on_mounts_of_its_class_alone(rough: Callable) ->
     motion = replace(AXLE, yaw_sd=yaw, pitch_length=length)
     ours, same = smoother.trace(axle), TrackRelativeSmoother(smoothed=False, motion=motion).trace(axle)
     np.testing.assert_array_equal(ours.states, same.states)
-    assert motion_of(body, smoother.motions()) is BODY
+    assert motion_of(body, smoother.motions()) is WAGON
     # On a model track of a tenth, lengths are a tenth, and angles as they are.
     track = replace(axle.track, rail_base_m=0.15)
     small = motion_of(replace(axle, track=track), smoother.motions())
@@ -122,7 +122,7 @@ def test_the_search_keeps_to_its_box_and_begins_at_what_is() -> None:
         ({"axle_yaw_sd": float("nan")}, ["tuning.axle_yaw_sd: ", "nan"]),
         (
             {"axel_yaw_sd": 1.0},
-            ["tuning.axel_yaw_sd: ", "axle_, frame_, body_, jointed_", "did you mean axle_yaw_sd?"],
+            ["tuning.axel_yaw_sd: ", "axle_, frame_, body_, wagon_, jointed_", "did you mean axle_yaw_sd?"],
         ),
         ({"yaw_sd": 1.0}, ["tuning.yaw_sd: ", "yaw_length"]),
         ({"roll_rad2ps3": 1.0}, ["tuning.roll_rad2ps3: ", "remedy: "]),
@@ -158,7 +158,7 @@ def test_a_search_of_nothing_is_told(settings: dict[str, Any], parts: list[str])
 
 
 def test_rides_from_other_mounts_and_two_motions_are_told(rough: Callable) -> None:
-    with pytest.raises(InputError, match=r"none of the rides.*'axle_yaw_sd'.*sizes of body"):
+    with pytest.raises(InputError, match=r"none of the rides.*'axle_yaw_sd'.*sizes of wagon"):
         MotionTuning(OURS, ("axle_yaw_sd",)).likelihood([beginning(rough(), samples=800)])
     with pytest.raises(InputError, match="tuning: a file and a motion"):
         TrackRelativeSmoother(motion=AXLE, tuning=TunedValues())
