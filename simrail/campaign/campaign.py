@@ -190,10 +190,14 @@ class _Loop:
             self._chosen = partial(chosen_cells, self.plan, draws=draws, former=state)
             numbers = {cell.number for cell in self._chosen()}
             self.total, self.left = len(numbers), len(numbers - self.done)
+            most = chosen_cells(self.plan, draws=rule.draws, former=state)
+            self.watcher.may_come_to(sum(1 for _ in most))
             self._run()
             tables = (result.scores for result in self.checkpoint.results())
             state = rule.state(chosen_cells(self.plan), tables, draws, state)
             self.tell(state.words)
+            for line in state.so_far if isinstance(state, VerdictState) else ():
+                self.tell(line)
             if state.reached:
                 break
         return state
