@@ -37,7 +37,7 @@ from simrail.ride import cache as ride_cache
 from simrail.ride.ride import is_cached
 from simrail.scenario.cells import Cell, rides_of
 from simrail.scenario.check import Plan, judge_scenario
-from simrail.scenario.requirements import VerdictState, stop_rule_of
+from simrail.scenario.requirements import VerdictRule, VerdictState, stop_rule_of
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import StopState
 
@@ -185,6 +185,8 @@ class _Loop:
         if rule is None:
             self._run()
             return None
+        if isinstance(rule, VerdictRule):
+            self.tell(rule.words)
         state = None
         for draws in rule.stages:
             self._chosen = partial(chosen_cells, self.plan, draws=draws, former=state)

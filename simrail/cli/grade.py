@@ -100,7 +100,6 @@ def grade(
     read = load_scenario(scenario, overrides=[*overrides, *(settings or [])], seed=seed)
     folder = out or Path("results") / ("grade_" + re.sub(r"\W+", "_", Path(name).stem))
     with ProgressWatcher(Console(stderr=True)) as watcher:
-        watcher.told(devices_words(read))
         results = run(read, out=folder, workers=workers, watcher=watcher)
     console = Console()
     print_scores(console, results)
@@ -236,19 +235,3 @@ def device_settings(scenario: Scenario, devices: int | None) -> list[str]:
         return [stop, f"monte_carlo.sensor_draws={devices}"]
     # Devices that share a draw of the upper level stay as many: the draws become fewer.
     return [stop, f"monte_carlo.{of[level]}={max(2, -(-devices // spec.monte_carlo.sensor_draws))}"]
-
-
-def devices_words(scenario: Scenario) -> str:
-    """How many devices are drawn, and how many the answer takes."""
-    from simrail.scenario.requirements import looks_of, requirements_of
-    from simrail.scoring.share import least_devices
-
-    most = max(looks_of(scenario.spec))
-    parts = []
-    for share, chance in dict.fromkeys((one.share, one.chance) for one in requirements_of(scenario.spec)):
-        least = least_devices(share, chance)
-        parts.append(
-            f"'enough' for {100.0 * share:g} % of the devices takes {least} that all pass"
-            + ("" if most >= least else ", more than are drawn: it cannot be the answer")
-        )
-    return f"at most {most} devices of each IMU and mount; " + "; ".join(parts)

@@ -27,7 +27,7 @@ from simrail.scenario.stop_rule import (
 )
 from simrail.scenario.study_tables import RequirePart
 from simrail.scoring.requirement import Requirement, judge_band
-from simrail.scoring.share import UNDECIDED
+from simrail.scoring.share import UNDECIDED, least_devices
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, QUANTITY_UNITS, WINDOWS, concat_scores
 from simrail.scoring.verdicts import GROUP, settled, verdict_table
 from simrail.track.bands import TOO_SHORT, Band, why_not
@@ -201,6 +201,16 @@ def group_of(vehicle: object, mount: object, imu: object) -> str:
 @dataclass(frozen=True)
 class VerdictRule(Looks):
     """The rule that draws until every verdict of a scenario is settled, or its draws are spent."""
+
+    @property
+    def words(self) -> str:
+        """How many devices are drawn, and how many the answer takes."""
+        most, parts = max(looks_of(self.spec)), []
+        for share, chance in dict.fromkeys((one.share, one.chance) for one in requirements_of(self.spec)):
+            least = least_devices(share, chance)
+            beyond = "" if most >= least else ", more than are drawn: it cannot be the answer"
+            parts.append(f"'enough' for {100.0 * share:g} % of them takes {least} that all pass{beyond}")
+        return f"at most {most} devices of each IMU at each mount; " + "; ".join(parts)
 
     def has(self, cell: Cell, draws: int, former: StopState | VerdictState | None) -> bool:
         """Whether a cell is among those of the first so many draws, or of fewer if it was settled before."""
