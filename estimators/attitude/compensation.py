@@ -74,8 +74,19 @@ def start_frame(recording: Recording) -> TrackFrame:
 
 
 def _frame(recording: Recording, position_m: FloatArray) -> TrackFrame:
-    clipped = np.clip(position_m, recording.track.start_m, recording.track.end_m)
-    return recording.track.frame(clipped, places=False)
+    return recording.track.frame(_on_map(recording, position_m), places=False)
+
+
+def _on_map(recording: Recording, position_m: FloatArray) -> FloatArray:
+    """Positions, those beyond the ends of the map at its ends.
+
+    Raises
+    ------
+    InputError
+        If one is not a number.
+    """
+    on_map = recording.track.on_track(np.clip(position_m, recording.track.start_m, recording.track.end_m))
+    return np.ascontiguousarray(on_map, dtype=np.float64)
 
 
 class TrackMotion(NamedTuple):
@@ -110,9 +121,7 @@ class TrackMotion(NamedTuple):
         return self.rows[9:12].T
 
 
-def track_motion(
-    recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
-) -> TrackMotion:
+def track_motion(recording: Recording, *, printed: bool = False) -> TrackMotion:
     """Motion of the track frame abeam of the IMU (EQUATIONS 1.1 and 2.1).
 
     With k the Darboux curvatures of the track frame per metre of horizontal arc length, k' their
@@ -129,33 +138,25 @@ def track_motion(
     ----------
     recording : Recording
         Its odometry frame and design track are used; its signals are not.
-    frame : TrackFrame, optional
-        `design_frame(recording)`, if it is at hand.
     printed : bool
         Use paper 000, Eqs. 3-6 as they are printed, to show what it costs: k = (roll', pitch', yaw')
         without the coupling of cant and slope, k' = (0, 0, yaw''), no 1/cos th.
     """
-    course = _course(recording, frame, printed=printed)
+    course = _course(recording, printed=printed)
     rows = np.empty((MOTION, len(course.speed)))
     frame_motion(course, rows)
     return TrackMotion(rows)
 
 
-def _course(recording: Recording, frame: TrackFrame | None, *, printed: bool) -> Course:
-    """What the kernel takes of the frame, in one of two readings, and of the odometry."""
-    frame = design_frame(recording) if frame is None else frame
-    speeds = (odometry_of(recording)[name].to_numpy(dtype=np.float64) for name in ODOMETRY[1:])
-    if printed:
-        flat = np.zeros(len(frame.pitch_rad))
-        track = frame.rates.T, np.array([flat, flat, frame.second[:, 2]]), flat, flat
-    else:
-        track = frame.k.T, frame.dk.T, frame.rates[:, 1], np.tan(frame.pitch_rad)
-    return Course(*(np.ascontiguousarray(values) for values in (*track, *speeds)))
+def _course(recording: Recording, *, printed: bool) -> Course:
+    """What the kernels take of the map and of the odometry."""
+    place, speed, rate = (
+        np.ascontiguousarray(odometry_of(recording)[name].to_numpy(dtype=np.float64)) for name in ODOMETRY
+    )
+    return Course(*recording.track.pieces, _on_map(recording, place), speed, rate, printed)
 
 
-def track_acceleration(
-    recording: Recording, frame: TrackFrame | None = None, *, printed: bool = False
-) -> FloatArray:
+def track_acceleration(recording: Recording, *, printed: bool = False) -> FloatArray:
     """Acceleration of the IMU's nominal place in the moving track frame; see `track_motion`.
 
     Returns
@@ -163,22 +164,45 @@ def track_acceleration(
     ndarray (n, 3)
         c, m/s2, components in the track frame.
     """
-    motion = track_motion(recording, frame, printed=printed)
+    motion = track_motion(recording, printed=printed)
     _, r_y, r_z = recording.mount_position_m
     return motion.origin + r_y * motion.of_y + r_z * motion.of_z
 
 
-def gravity_force(
-    recording: Recording, frame: TrackFrame | None = None, *, compensated: bool, printed: bool = False
-) -> FloatArray:
+class GravityForce(NamedTuple):
+    """Specific force that is left for gravity, n samples.
+
+    Attributes
+    ----------
+    force : ndarray (n, 3)
+        m/s2, body frame, C-contiguous.
+    curves : ndarray (4, n)
+        Horizontal curvature of the track, 1/m, its slope, 1/m2, and the same of the vertical one, wherever
+        they were met; (4, 0) without compensation.
+    """
+
+    force: FloatArray
+    curves: FloatArray
+
+
+def gravity_and_curves(recording: Recording, *, compensated: bool, printed: bool = False) -> GravityForce:
+    """`gravity_force`, and of what curves the compensation is made."""
+    measured = np.ascontiguousarray(recording.imu[list(ACCEL)].to_numpy(dtype=np.float64))
+    if not compensated:
+        return GravityForce(measured, np.empty((4, 0)))
+    found = GravityForce(np.empty_like(measured), np.empty((4, len(measured))))
+    _, r_y, r_z = recording.mount_position_m
+    force_less_motion(_course(recording, printed=printed), measured, r_y, r_z, *found)
+    return found
+
+
+def gravity_force(recording: Recording, *, compensated: bool, printed: bool = False) -> FloatArray:
     """Specific force that is left for gravity, z = accelerometer - c (paper 000, Eq. 33).
 
     Parameters
     ----------
     recording : Recording
         The recording.
-    frame : TrackFrame, optional
-        `design_frame(recording)`, if it is at hand.
     compensated : bool
         False leaves the accelerometer as it is: the general-purpose filter.
     printed : bool
@@ -189,10 +213,4 @@ def gravity_force(
     ndarray (n, 3)
         m/s2, body frame, C-contiguous.
     """
-    measured = np.ascontiguousarray(recording.imu[list(ACCEL)].to_numpy(dtype=np.float64))
-    if not compensated:
-        return measured
-    _, r_y, r_z = recording.mount_position_m
-    force = np.empty_like(measured)
-    force_less_motion(_course(recording, frame, printed=printed), measured, r_y, r_z, force)
-    return force
+    return gravity_and_curves(recording, compensated=compensated, printed=printed).force

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from simrail.estimators.attitude.compensation import design_frame, gravity_force, role_of, start_frame
+from simrail.estimators.attitude.compensation import gravity_and_curves, role_of, start_frame
 from simrail.estimators.attitude.kernel import attitude_ekf, with_deviations
 from simrail.estimators.attitude.lanes import (
     Board,
@@ -40,7 +40,6 @@ from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording
-from simrail.track.design import TrackFrame
 
 LIMITS = {
     "gyro_intensity_rad2ps": ">= 0",
@@ -190,11 +189,11 @@ class AttitudeEkf:
 
     def _arrays(self, recording: Recording) -> tuple[_Arrays, FloatArray]:
         rest = rest_bias(recording, enabled=self.rest_bias)
-        frame = design_frame(recording) if self.compensated else None
-        noise = self._noise(recording, rest, frame)
+        left = gravity_and_curves(recording, compensated=self.compensated, printed=self.printed)
+        force = left.force
+        noise = self._noise(recording, rest, left.curves)
         first = start_frame(recording)
         sd = np.array([self.start_sd_rad, self.start_sd_rad, self.start_yaw_sd_rad])
-        force = gravity_force(recording, frame, compensated=self.compensated, printed=self.printed)
         doubted = noise.force
         if self.doubt:
             excess = np.linalg.norm(force, axis=1) - recording.gravity_mps2
@@ -211,9 +210,9 @@ class AttitudeEkf:
         )
         return arrays, noise.considered
 
-    def _noise(self, recording: Recording, rest: RestBias, frame: TrackFrame | None) -> Noise:
+    def _noise(self, recording: Recording, rest: RestBias, curves: FloatArray) -> Noise:
         if self.tuning == "recommended":
-            noise = recommended_noise(recording, rest, frame=frame, vibration=self.vibration)
+            noise = recommended_noise(recording, rest, curves=curves, vibration=self.vibration)
         else:
             noise = paper_noise(recording, self.tuning, reading=self.process_noise)
         if self.gyro_intensity_rad2ps is not None:

@@ -45,7 +45,6 @@ from simrail.estimators.attitude.rest_bias import RestBias
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.jit import FloatArray, njit, njit_borrowed, njit_inline
 from simrail.recording.recording import ImuSheet, Recording, odometry_of
-from simrail.track.design import TrackFrame
 
 PAPER = {"paper_initial": (1e-2, 1.5e-2), "paper_final": (1e-3, 15.0)}
 """Paper 000, Section 6: the printed "Q_{k-1}" and the sd of the accelerometer in m/s2."""
@@ -109,7 +108,7 @@ def paper_noise(recording: Recording, tuning: str, *, reading: str) -> Noise:
 
 
 def recommended_noise(
-    recording: Recording, rest: RestBias, *, frame: TrackFrame | None, vibration: float = SWING_PER_SPEED
+    recording: Recording, rest: RestBias, *, curves: FloatArray | None, vibration: float = SWING_PER_SPEED
 ) -> Noise:
     """Settings that follow from the data sheet; the module's docstring derives them.
 
@@ -121,9 +120,9 @@ def recommended_noise(
         Its data sheet and odometry are used.
     rest : RestBias
         How much rest the gyro bias was averaged over.
-    frame : TrackFrame or None
-        Design track frame at the odometry's positions; None for a filter without compensation, which
-        no odometry can disturb.
+    curves : ndarray (4, n) or None
+        What the compensation is made of (`simrail.estimators.attitude.compensation.GravityForce`); None for a
+        filter without, which no odometry can disturb.
     vibration : float
         Velocity sd of the body in the track frame, as a fraction of train speed.
     """
@@ -134,10 +133,7 @@ def recommended_noise(
     speed, place_sd, speed_sd, push_sd = (
         np.ascontiguousarray(motion[name].to_numpy(dtype=np.float64)) for name in (ODOMETRY[1], *ODOMETRY_SD)
     )
-    # Of these two curvatures and their slopes the compensation makes lateral and vertical acceleration.
-    curves = np.empty((4, 0))
-    if frame is not None:
-        curves = np.array([frame.k[:, 2], frame.dk[:, 2], frame.k[:, 1], frame.dk[:, 1]])
+    curves = np.empty((4, 0)) if curves is None else curves
     white = sheet.gyro_noise_radpsqrts**2 + MODEL_RATE_INTENSITY
     sensor = sheet.accel_noise_mpsqrts**2 + MODEL_FORCE_SD**2 * step_s
     noise = Noise(np.empty(n), np.empty((n, 3)), np.empty((n, 3)))

@@ -141,9 +141,9 @@ def relative_signals(recording: Recording) -> tuple[FloatArray, FloatArray]:
     curvature k_2 (EQUATIONS 1.1): a canted curve alone would be 0.05 m/s2 and 3 mrad/s.
     """
     frame = design_frame(recording)
-    force = gravity_force(recording, frame, compensated=True)[:, 2]
+    force = gravity_force(recording, compensated=True)[:, 2]
     vertical = force - recording.gravity_mps2 * np.cos(frame.roll_rad) * np.cos(frame.pitch_rad)
-    turn = track_motion(recording, frame).rate[:, 1]
+    turn = track_motion(recording).rate[:, 1]
     return vertical, turn - recording.imu["gyro_y_radps"].to_numpy(dtype=np.float64)
 
 

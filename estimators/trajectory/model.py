@@ -120,7 +120,7 @@ def track_terms(recording: Recording, frame: TrackFrame, *, printed: bool = Fals
     Printed, the rotation about the vertical takes the place of that about Y where the body's height enters
     (paper 001, appendix 1, g4C, g5C, g6C).
     """
-    motion = track_motion(recording, frame, printed=printed)
+    motion = track_motion(recording, printed=printed)
     of_z = motion.of_z.copy()
     if printed:
         of_z[:, 2] = motion.of_y[:, 1]

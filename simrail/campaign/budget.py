@@ -294,12 +294,16 @@ def budgets_of(plan: Plan, verdicts: pd.DataFrame, *, watcher: Watcher | None = 
         if not part.budget_draws or verdicts.empty:
             continue
         of_this = verdicts[(verdicts["number"] == number) & verdicts["estimator"].map(_is_tested(plan))]
-        for names, rows in of_this.groupby(list(GROUP), sort=False):
-            vehicle, mount, imu = (str(name) for name in names)
-            best = str(rows.sort_values("at_share", na_position="last")["estimator"].iloc[0])
+        of_this = of_this.assign(group=of_this.groupby(list(GROUP), sort=False).ngroup())
+        best = of_this.sort_values("at_share", na_position="last").drop_duplicates("group")
+        if part.budget_at == "worst":
+            best = best.sort_values("at_share", ascending=False, na_position="last")
+            best = best.drop_duplicates(["vehicle", "imu"])
+        for row in best.sort_values("group").to_dict("records"):
+            vehicle, mount, imu = (str(row[name]) for name in GROUP)
             chosen = _first_draws(plan, (vehicle, mount, imu), part.budget_draws)
             labels = {"requirement": wanted.words, "number": number, "vehicle": vehicle, "mount": mount}
-            labels |= {"imu": imu, "estimator": best}
+            labels |= {"imu": imu, "estimator": str(row["estimator"])}
             tables.append(_labelled(labels, chosen, plan, [wanted], watcher or Watcher()))
     tables = [table for table in tables if len(table)]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()

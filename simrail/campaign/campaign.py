@@ -37,7 +37,7 @@ from simrail.ride import cache as ride_cache
 from simrail.ride.ride import is_cached
 from simrail.scenario.cells import Cell, rides_of
 from simrail.scenario.check import Plan, judge_scenario
-from simrail.scenario.requirements import VerdictState, stop_rule_of
+from simrail.scenario.requirements import VerdictRule, VerdictState, stop_rule_of
 from simrail.scenario.scenario import Scenario
 from simrail.scenario.stop_rule import StopState
 
@@ -185,15 +185,21 @@ class _Loop:
         if rule is None:
             self._run()
             return None
+        if isinstance(rule, VerdictRule):
+            self.tell(rule.words)
         state = None
         for draws in rule.stages:
             self._chosen = partial(chosen_cells, self.plan, draws=draws, former=state)
             numbers = {cell.number for cell in self._chosen()}
             self.total, self.left = len(numbers), len(numbers - self.done)
+            most = chosen_cells(self.plan, draws=rule.draws, former=state)
+            self.watcher.may_come_to(sum(1 for _ in most))
             self._run()
             tables = (result.scores for result in self.checkpoint.results())
             state = rule.state(chosen_cells(self.plan), tables, draws, state)
             self.tell(state.words)
+            for line in state.so_far if isinstance(state, VerdictState) else ():
+                self.tell(line)
             if state.reached:
                 break
         return state

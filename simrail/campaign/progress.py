@@ -33,6 +33,9 @@ class Watcher:
     def cells_begin(self, done: int, count: int) -> None:
         """Cells are run from now on; `done` of `count` were done before."""
 
+    def may_come_to(self, most: int) -> None:
+        """A stop rule asks for the cells that begin next, and may ask for more later: for `most` in all."""
+
     def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
         """So many cells of `count` are done, `failed` of them failed; the last by this worker."""
 
@@ -72,6 +75,8 @@ class ProgressWatcher(Watcher):
         self._begun = self._cells_begun = 0.0
         self._said = -_EVERY_S
         self._before = self._done = 0
+        self._most: int | None = None
+        self._is_look = self._was_look = False
         self._by_worker: dict[str, int] = {}
         self._searches: dict[str, TaskID] = {}
         self._expected: dict[str, tuple[float, int]] = {}
@@ -129,13 +134,24 @@ class ProgressWatcher(Watcher):
             note = "running its cells" if self._cells is not None else "simulated"
             self._progress.update(self._ride, total=1.0, completed=1.0, note=note)
 
+    def may_come_to(self, most: int) -> None:
+        """See `Watcher`."""
+        self._most, self._is_look = most, True
+
     def cells_begin(self, done: int, count: int) -> None:
         """See `Watcher`."""
-        self._before = self._done = done
-        self._cells_begun = self._said = time.perf_counter()
+        if not self._is_look:
+            self._most = None
+        if not (self._is_look and self._was_look):  # what a stop rule asks for later goes on from before
+            self._before = self._done = done
+            self._cells_begun = time.perf_counter()
+            self._by_worker = {}
+        self._was_look, self._is_look = self._is_look, False
+        self._said = time.perf_counter()
         if self._cells is not None:
             self._progress.remove_task(self._cells)
-        self._cells = self._progress.add_task("cells", total=count, completed=done, note="")
+        most = max(count, self._most or 0)
+        self._cells = self._progress.add_task("cells", total=most, completed=done, note="")
 
     def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
         """See `Watcher`."""
@@ -143,13 +159,15 @@ class ProgressWatcher(Watcher):
         self._by_worker[worker] = self._by_worker.get(worker, 0) + done - self._done
         self._done = done
         seconds = max(now - self._cells_begun, 1e-6)
-        left = (count - done) * seconds / max(done - self._before, 1)
+        each_s = seconds / max(done - self._before, 1)
+        left = f"{timedelta(seconds=round((count - done) * each_s))} left"
+        of = f"{done} of {count}"
+        if self._most is not None and self._most > count:
+            of += f" (at most {self._most})"
+            left += f", at most {timedelta(seconds=round((self._most - done) * each_s))}"
         each = "+".join(map(str, self._by_worker.values()))
         by = f", by {len(self._by_worker)} workers: {each}" if len(self._by_worker) > 1 else ""
-        note = (
-            f"{done} of {count}, {failed} failed, {(done - self._before) / seconds:.3g} per second, "
-            f"{timedelta(seconds=round(left))} left{by}"
-        )
+        note = f"{of}, {failed} failed, {1.0 / each_s:.3g} per second, {left}{by}"
         if self._cells is not None:
             self._progress.update(self._cells, completed=done, note=note)
         if not self._console.is_terminal and (now > self._said + _EVERY_S or done == count):

@@ -7,6 +7,7 @@ vehicle that moves by itself.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PPoly
@@ -14,7 +15,7 @@ from scipy.interpolate import PPoly
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import euler_angles, rotation_matrix
 from simrail.ride.truth import BodyMotion, Truth
-from simrail.track.design import TrackDesign
+from simrail.track.design import TrackDesign, TrackFrame
 from simrail.track.laid_track import RAILS, LaidTrack
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -114,32 +115,74 @@ def kinematic_truth(
         name: np.array(channels[name](t, s, v, a)) if channels and name in channels else zero
         for name in CHANNELS
     }
-    design = frame.rotation
+    return Truth(
+        time_s=t,
+        track=track,
+        reference_position_m=reference,
+        bodies={
+            "body": _body_motion(frame, _carrier(frame, v, a), value, offset_m=offset_m, height_m=height_m)
+        },
+        wheel_angles={"wheel": (s - s[0]) / wheel_radius_m},
+        wheel_states={},
+        wheel_radius_m={"wheel": wheel_radius_m},
+        gravity_mps2=gravity_mps2,
+        manifest={"engine": "kinematic"},
+    )
+
+
+class _Carrier(NamedTuple):
+    """How the track frame moves along with a body, its own components, (n, 3) each: EQUATIONS 1.1.
+
+    Attributes
+    ----------
+    velocity, acceleration : ndarray
+        Of its origin, m/s and m/s2.
+    rate, rate_change : ndarray
+        Angular rate, rad/s, and its derivative.
+    """
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    rate: FloatArray
+    rate_change: FloatArray
+
+
+def _carrier(frame: TrackFrame, v: FloatArray, a: FloatArray) -> _Carrier:
+    """The motion of the track frame at speeds and accelerations (n,) along the track."""
     k, dk = frame.k, frame.dk
-    omega_t = v[:, None] * k
-    alpha_t = a[:, None] * k + (v**2)[:, None] * dk
     secant, tangent = 1.0 / np.cos(frame.pitch_rad), np.tan(frame.pitch_rad)
-    velocity_t = np.column_stack([v * secant, 0.0 * v, 0.0 * v])
-    acceleration_t = np.column_stack(
+    acceleration = np.column_stack(
         [
             a * secant + v**2 * tangent * frame.rates[:, 1] * secant,
             v**2 * k[:, 2] * secant,
             -(v**2) * k[:, 1] * secant,
         ]
     )
+    return _Carrier(
+        velocity=np.column_stack([v * secant, 0.0 * v, 0.0 * v]),
+        acceleration=acceleration,
+        rate=v[:, None] * k,
+        rate_change=a[:, None] * k + (v**2)[:, None] * dk,
+    )
+
+
+def _body_motion(
+    frame: TrackFrame, carrier: _Carrier, value: dict[str, FloatArray], *, offset_m: float, height_m: float
+) -> BodyMotion:
+    """Motion of a body from that of the track frame and its own in it, ``value`` (3, n) of each channel."""
+    design, flat = frame.rotation, np.zeros(len(frame.pitch_rad))
     rho, rho_rate, rho_rate2 = (
-        np.column_stack([np.zeros(n), value["lateral"][order], value["vertical"][order]])
-        for order in range(3)
+        np.column_stack([flat, value["lateral"][order], value["vertical"][order]]) for order in range(3)
     )
     rho[:, 2] += height_m
-    turn = np.cross(omega_t, rho)
-    velocity = velocity_t + rho_rate + turn
+    turn = np.cross(carrier.rate, rho)
+    velocity = carrier.velocity + rho_rate + turn
     acceleration = (
-        acceleration_t
+        carrier.acceleration
         + rho_rate2
-        + 2.0 * np.cross(omega_t, rho_rate)
-        + np.cross(alpha_t, rho)
-        + np.cross(omega_t, turn)
+        + 2.0 * np.cross(carrier.rate, rho_rate)
+        + np.cross(carrier.rate_change, rho)
+        + np.cross(carrier.rate, turn)
     )
     angles, rates, rates2 = (
         np.column_stack([value["roll"][order], value["pitch"][order], value["yaw"][order]])
@@ -147,30 +190,18 @@ def kinematic_truth(
     )
     relative = rotation_matrix(angles)
     omega_r, alpha_r = _body_rates(angles, rates, rates2)
-    omega_tb = np.einsum("nji,nj->ni", relative, omega_t)
-    omega = omega_tb + omega_r
+    omega_tb = np.einsum("nji,nj->ni", relative, carrier.rate)
     # d/dt of (C_rel^T omega_t), body components: the track's own rate seen from the turning body.
-    alpha = np.einsum("nji,nj->ni", relative, alpha_t) - np.cross(omega_r, omega_tb) + alpha_r
-    body = BodyMotion(
+    alpha = np.einsum("nji,nj->ni", relative, carrier.rate_change) - np.cross(omega_r, omega_tb) + alpha_r
+    return BodyMotion(
         offset_m=offset_m,
         height_m=height_m,
         position=frame.position + np.einsum("nij,nj->ni", design, rho),
         velocity=np.einsum("nij,nj->ni", design, velocity),
         acceleration=np.einsum("nij,nj->ni", design, acceleration),
         angles=euler_angles(design @ relative),
-        rate=omega,
+        rate=omega_tb + omega_r,
         angular_acceleration=alpha,
-    )
-    return Truth(
-        time_s=t,
-        track=track,
-        reference_position_m=reference,
-        bodies={"body": body},
-        wheel_angles={"wheel": (s - s[0]) / wheel_radius_m},
-        wheel_states={},
-        wheel_radius_m={"wheel": wheel_radius_m},
-        gravity_mps2=gravity_mps2,
-        manifest={"engine": "kinematic"},
     )
 
 

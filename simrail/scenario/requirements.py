@@ -6,7 +6,7 @@ elimination). All looks together have no more than the requirement's chance of a
 (`simrail.scoring.share.decide`).
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -27,9 +27,9 @@ from simrail.scenario.stop_rule import (
 )
 from simrail.scenario.study_tables import RequirePart
 from simrail.scoring.requirement import Requirement, judge_band
-from simrail.scoring.share import UNDECIDED
+from simrail.scoring.share import UNDECIDED, least_devices
 from simrail.scoring.table import CURVE_PREFIX, EVERY_CURVE, QUANTITY_UNITS, WINDOWS, concat_scores
-from simrail.scoring.verdicts import settled, verdict_table
+from simrail.scoring.verdicts import GROUP, settled, verdict_table
 from simrail.track.bands import TOO_SHORT, Band, why_not
 from simrail.track.design import TrackDesign
 
@@ -157,6 +157,8 @@ class VerdictState:
         Verdicts that are not settled, of how many.
     settled : dict of str to int
         After how many draws all verdicts of a group were; its name is that of `group_of`.
+    so_far : tuple of str
+        How many devices of each group pass that is open, by method, in words.
     """
 
     draws: int
@@ -165,6 +167,7 @@ class VerdictState:
     open: int
     verdicts: int
     settled: dict[str, int] = field(default_factory=dict)
+    so_far: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def reached(self) -> bool:
@@ -181,7 +184,9 @@ class VerdictState:
     @property
     def record(self) -> dict[str, Any]:
         """Plain values for the manifest."""
-        return asdict(self) | {"reached": self.reached, "told": self.words}
+        own = asdict(self) | {"reached": self.reached, "told": self.words}
+        del own["so_far"]
+        return own
 
 
 def _settled_by(state: StopState | VerdictState | None) -> dict[str, int]:
@@ -196,6 +201,16 @@ def group_of(vehicle: object, mount: object, imu: object) -> str:
 @dataclass(frozen=True)
 class VerdictRule(Looks):
     """The rule that draws until every verdict of a scenario is settled, or its draws are spent."""
+
+    @property
+    def words(self) -> str:
+        """How many devices are drawn, and how many the answer takes."""
+        most, parts = max(looks_of(self.spec)), []
+        for share, chance in dict.fromkeys((one.share, one.chance) for one in requirements_of(self.spec)):
+            least = least_devices(share, chance)
+            beyond = "" if most >= least else ", more than are drawn: it cannot be the answer"
+            parts.append(f"'enough' for {100.0 * share:g} % of them takes {least} that all pass{beyond}")
+        return f"at most {most} devices of each IMU at each mount; " + "; ".join(parts)
 
     def has(self, cell: Cell, draws: int, former: StopState | VerdictState | None) -> bool:
         """Whether a cell is among those of the first so many draws, or of fewer if it was settled before."""
@@ -221,7 +236,30 @@ class VerdictRule(Looks):
         for vehicle, mount, imu in sorted(settled(table)):
             done.setdefault(group_of(vehicle, mount, imu), draws)
         is_open = int((table["verdict"] == UNDECIDED).sum()) if len(table) else 0
-        return VerdictState(draws, self.draws, self.level, is_open, len(table), done)
+        so_far = tuple(_so_far(table, done)) if draws < self.draws else ()
+        return VerdictState(draws, self.draws, self.level, is_open, len(table), done, so_far)
+
+
+def _so_far(table: pd.DataFrame, done: dict[str, int]) -> Iterator[str]:
+    """How many devices pass by each method, of the groups that are open, a line each."""
+    if table.empty:
+        return
+    left = 0
+    for (vehicle, mount, imu), rows in table.groupby(list(GROUP), sort=False):
+        if group_of(vehicle, mount, imu) in done:
+            continue
+        left += 1
+        if left <= _MOST_TOLD:
+            passed = [
+                f"{row.estimator} {row.passed} of {row.devices}" for row in rows.itertuples() if row.devices
+            ]
+            yield f"so far, {imu} on the {mount}: {', '.join(passed)} pass"
+    if left > _MOST_TOLD:
+        yield f"so far, and {left - _MOST_TOLD} more"
+
+
+_MOST_TOLD = 12
+"""Groups that are told of between two looks."""
 
 
 def stop_rule_of(scenario: Scenario) -> StopRule | VerdictRule | None:

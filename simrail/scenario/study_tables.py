@@ -95,7 +95,8 @@ class RequirePart(Part):
     number is in that of the score table). With ``over = "all"`` a device must meet it on every ride of the
     scenario, with ``"each"`` every kind of ride has a verdict of its own. ``chance`` is that of a false
     verdict. See `simrail.scoring.verdicts`. ``budget_draws`` is over how many draws it is found out which
-    terms of the sheets the error is made of (`simrail.campaign.budget`); 0 for not at all.
+    terms of the sheets the error is made of (`simrail.campaign.budget`); 0 for not at all. That is found out
+    at ``"each"`` mount, or for each IMU at the one where it is ``"worst"``.
     """
 
     quantity: str
@@ -118,10 +119,12 @@ class RequirePart(Part):
     """Chance of a false verdict that is accepted."""
     budget_draws: Annotated[int, Field(ge=0, le=1000)] = 0
     """Over how many draws it is found out what the error is made of; 0 for not at all."""
+    budget_at: Literal["each", "worst"] = "each"
+    """Of each IMU at each mount, or at the one where its devices are worst."""
 
     def requirement(self) -> Requirement:
         """The requirement, in the unit of the score table."""
-        own = self.model_dump(exclude={"budget_draws"})
+        own = self.model_dump(exclude={"budget_draws", "budget_at"})
         return Requirement(**own | {"limit": limit_of(self.limit, self.quantity)})
 
 

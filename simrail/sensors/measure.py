@@ -5,6 +5,7 @@ out holds no true value, unless the true odometry is asked for by name (an ablat
 """
 
 import math
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -103,54 +104,22 @@ def measure(
         If body or wheel is unknown, a rate is above the truth's (of an encoder: does not divide it), or a
         rail sensor has no rails to see; or if another odometry than the true one is asked for.
     """
-    # Held by nobody else: of a long ride it is the largest array there is.
-    imu, delay_s = sample_imu(
-        truth.motion(mount, columns=IMU if earth_rate is None else (*IMU, *ATTITUDE, *VELOCITY)),
-        grade,
-        seed=seed,
-        draw=draw,
-        name=mount.name,
-        earth=earth_rate,
-        temperature=temperature,
+    _judge(odometry, is_blind=rail_sensor is not None and rails is None)
+    imu, gaps, delay_s = _inertial(
+        truth, mount, grade, seed=seed, draw=draw, earth=earth_rate, temperature=temperature
     )
-    gaps = None
-    if grade.dropped_fraction > 0.0:
-        came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
-        imu, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
     counts, sheet = None, None
     if encoder is not None:
         counts, sheet = _counted(truth, mount, encoder, seed=seed, draw=draw)
     # What else is beside the IMU meets the motion at its stamps only.
     motion = truth.motion(mount, _rows_of(truth, imu)) if magnetometer or rail_sensor or odometry else None
-    magnetic = None
+    of_mount: dict[str, Any] = {"seed": seed, "draw": draw, "name": mount.name}
+    magnetic, seen = None, None
     if magnetometer is not None and motion is not None:
-        magnetic = sample_magnetometer(
-            motion,
-            imu.index,
-            magnetometer,
-            seed=seed,
-            draw=draw,
-            name=mount.name,
-            track_m=(truth.track.start_m, truth.track.end_m),
-        )
-    seen = None
-    if rail_sensor is not None and motion is not None:
-        if rails is None:
-            raise InputError(
-                "a rail sensor needs rails to see",
-                field="rails",
-                remedy="give rails_of(ride)",
-                limit="rails of the ride",
-            )
-        seen = sample_rails(motion, imu.index, rail_sensor, rails, seed=seed, draw=draw, name=mount.name)
-    if odometry not in (None, "truth"):
-        raise InputError(
-            "no such thing is measured: an odometry is concluded from a recording",
-            field="odometry",
-            value=odometry,
-            limit="truth",
-            remedy=f'use simrail.with_odometry(recording, "{odometry}")',
-        )
+        line = truth.track.start_m, truth.track.end_m
+        magnetic = sample_magnetometer(motion, imu.index, magnetometer, track_m=line, **of_mount)
+    if rail_sensor is not None and rails is not None and motion is not None:
+        seen = sample_rails(motion, imu.index, rail_sensor, rails, **of_mount)
     second, second_sheet = None, None
     if second_imu is not None:
         second, second_sheet = sample_second_imu(
@@ -187,6 +156,53 @@ def measure(
         gnss=received,
         gnss_sheet=None if gnss is None else gnss.sheet,
     )
+
+
+def _judge(odometry: str | None, *, is_blind: bool) -> None:
+    """Refuse an odometry that nothing measures, and a rail sensor without rails to see."""
+    if is_blind:
+        raise InputError(
+            "a rail sensor needs rails to see",
+            field="rails",
+            remedy="give rails_of(ride)",
+            limit="rails of the ride",
+        )
+    if odometry not in (None, "truth"):
+        raise InputError(
+            "no such thing is measured: an odometry is concluded from a recording",
+            field="odometry",
+            value=odometry,
+            limit="truth",
+            remedy=f'use simrail.with_odometry(recording, "{odometry}")',
+        )
+
+
+def _inertial(
+    truth: Truth,
+    mount: Mount,
+    grade: ImuGrade,
+    *,
+    seed: int,
+    draw: int,
+    earth: EarthRate | None,
+    temperature: Temperature | None,
+) -> tuple[pd.DataFrame, pd.DataFrame | None, float]:
+    """Samples of an IMU at all its stamps, the gaps that were filled, and its delay, s."""
+    # Held by nobody else: of a long ride it is the largest array there is.
+    imu, delay_s = sample_imu(
+        truth.motion(mount, columns=IMU if earth is None else (*IMU, *ATTITUDE, *VELOCITY)),
+        grade,
+        seed=seed,
+        draw=draw,
+        name=mount.name,
+        earth=earth,
+        temperature=temperature,
+    )
+    if grade.dropped_fraction == 0.0:
+        return imu, None, delay_s
+    came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
+    filled, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
+    return filled, gaps, delay_s
 
 
 def _counted(

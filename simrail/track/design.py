@@ -303,6 +303,11 @@ class TrackDesign(Shown):
         terms = np.column_stack([yaw, curvature, 0.5 * rate, sine / self.rail_base_m, rise])
         return Pieces(starts, np.ascontiguousarray(terms))
 
+    @property
+    def pieces(self) -> Pieces:
+        """The polynomials that it is made of, for kernels that take no frame."""
+        return self._shape.pieces
+
     def frame(self, s: npt.ArrayLike, *, places: bool = True) -> TrackFrame:
         """Track frame at places s.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PPoly
 
-from simrail.core.jit import FloatArray, njit, njit_borrowed
+from simrail.core.jit import FloatArray, njit, njit_borrowed, njit_inline
 
 CANT_TERMS, HEIGHT_TERMS = 6, 8
 """A smooth ramp of cant is a quintic; the height under a bend that rises as a quintic has two powers more."""
@@ -71,25 +71,35 @@ def evaluate(pieces: Pieces, s: FloatArray) -> FloatArray:
 @njit
 def _evaluate(starts: FloatArray, terms: FloatArray, s: FloatArray, out: FloatArray) -> None:
     """Run by run: as many samples as lie in one piece, at most `BLOCK`."""
-    block, n, last, at, begin = np.empty(ROWS * BLOCK), s.shape[0], starts.shape[0] - 1, 0, 0
+    block, n, at, begin = np.empty(ROWS * BLOCK), s.shape[0], 0, 0
     while begin < n:
-        place = s[begin]
-        if (at > 0 and place < starts[at]) or (at < last and place >= starts[at + 1]):
-            at = max(0, np.searchsorted(starts, place, side="right") - 1)
-        low = starts[at] if at > 0 else -math.inf
-        high = starts[at + 1] if at < last else math.inf
-        end, most = begin + 1, min(n, begin + BLOCK)
-        while end < most and low <= s[end] < high:
-            end += 1
-        _of_piece(terms[at], starts[at], s[begin:end], block)
+        end, at = run_of(starts, s, begin, at)
+        of_piece(terms[at], starts[at], s[begin:end], block)
         for row in range(ROWS):
             for j in range(end - begin):
                 out[row, begin + j] = block[row * BLOCK + j]
         begin = end
 
 
+@njit_inline
+def run_of(starts: FloatArray, s: FloatArray, begin: int, at: int) -> tuple[int, int]:
+    """End of the run of samples from ``begin`` that lie in one piece, at most `BLOCK`, and that piece.
+
+    ``at`` is the piece of the sample before, or 0.
+    """
+    place, last = s[begin], starts.shape[0] - 1
+    if (at > 0 and place < starts[at]) or (at < last and place >= starts[at + 1]):
+        at = max(0, np.searchsorted(starts, place, side="right") - 1)
+    low = starts[at] if at > 0 else -math.inf
+    high = starts[at + 1] if at < last else math.inf
+    end, most = begin + 1, min(s.shape[0], begin + BLOCK)
+    while end < most and low <= s[end] < high:
+        end += 1
+    return end, at
+
+
 @njit_borrowed
-def _of_piece(terms: FloatArray, first: float, s: FloatArray, block: FloatArray) -> None:
+def of_piece(terms: FloatArray, first: float, s: FloatArray, block: FloatArray) -> None:
     """Evaluate samples of one piece into ``block`` (18 * 64).
 
     With u the sine of roll, z the height, and ' for d/ds:

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from simrail.estimators.attitude.ekf import AttitudeEkf
 
+from simrail.campaign import budget as budgets
 from simrail.campaign.budget import (
     OF_THE_RIDE,
     TERMS,
@@ -200,3 +201,49 @@ def test_a_quantity_that_is_not_estimated() -> None:
     listed, parts = some_cells()
     with pytest.raises(InputError, match="says nothing of it"):
         error_budget(listed[:1], parts, Level(), replace(WANTED, quantity="position"))
+
+
+OTHER_MOUNT = """
+[[imu]]
+name = "high"
+grade = "lord_3dm_gx4_25"
+body = "front"
+position_m = [0.0, 0.0, 2.0]
+[[require]]
+quantity = "roll"
+limit = "0.1 deg"
+budget_draws = 3
+"""
+
+
+@pytest.mark.parametrize(
+    "budget_at, mounts", [("each", ["axle", "high"]), ("worst", ["high"])], ids=["each", "worst"]
+)
+def test_a_budget_is_of_the_mount_that_is_asked_for(
+    budget_at: str, mounts: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The worst is where devices of the best method there are the worst; one that is not judged is none."""
+    text = TEXT + OTHER_MOUNT + f'budget_at = "{budget_at}"\n'
+    plan = judge_scenario(read_scenario(text, name="budget"))
+    asked: list[tuple[str, int]] = []
+
+    def taken_apart(draws: list[Cell], *_: object, **__: object) -> pd.DataFrame:
+        asked.append((draws[0].imu.name, len(draws)))
+        return pd.DataFrame({"term": ["floor"], "share": [1.0]})
+
+    monkeypatch.setattr(budgets, "error_budget", taken_apart)
+    rows = [("axle", 0.2), ("high", 0.3), ("high", 0.9)]
+    verdicts = pd.DataFrame(
+        [
+            {"number": 0, "vehicle": "metro_irw_bogie", "mount": mount, "imu": "lord_3dm_gx4_25"}
+            | {"estimator": "ekf", "at_share": value}
+            for mount, value in rows
+        ]
+    )
+    found = budgets.budgets_of(plan, verdicts)
+    assert asked == [(mount, 3) for mount in mounts]
+    assert list(found["mount"]) == mounts
+    verdicts.loc[verdicts["mount"] == "high", "at_share"] = np.nan
+    asked.clear()
+    budgets.budgets_of(plan, verdicts)
+    assert asked == [(mount, 3) for mount in (["axle", "high"] if budget_at == "each" else ["axle"])]

@@ -47,3 +47,23 @@ def test_a_search_says_before_how_long_it_will_take_and_what_is_left(clock: list
     assert first.startswith("search, all: some 240 evaluations of 0.5 s each: about 0:02:00")
     # 120 evaluations took a minute: the other half takes another.
     assert later[-1] == "search, all: 120 evaluations, -1.250000, some 0:01:00 left"
+
+
+def test_what_is_left_counts_what_a_stop_rule_may_still_ask_for(clock: list[float]) -> None:
+    """A look at 20 of 60 cells, a second each: never less is left than it turns out to take at most."""
+    watcher, stream = watched()
+    with watcher:
+        for done, count in ((0, 20), (20, 30)):
+            watcher.may_come_to(60)
+            watcher.cells_begin(done, count)
+            clock[0] += count - done
+            watcher.cells_done(count, count, 0, "here")
+        watcher.cells_begin(0, 5)  # something else, after the rule has ended it
+        clock[0] += 50.0
+        watcher.cells_done(5, 5, 0, "here")
+    first, second, other = stream.getvalue().splitlines()
+    assert first.startswith("cells: 20 of 20 (at most 60)") and "0:00:00 left, at most 0:00:40" in first
+    # At the pace of all that was run, not of the ten alone.
+    assert second.startswith("cells: 30 of 30 (at most 60)") and "1 per second" in second
+    assert "at most 0:00:30" in second
+    assert "at most" not in other and "0.1 per second" in other

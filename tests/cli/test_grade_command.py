@@ -6,7 +6,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from simrail.cli.grade import device_settings, requirement_settings, scope_settings
 from simrail.cli.main import call
+from simrail.scenario.requirements import VerdictRule, looks_of, stop_rule_of
+from simrail.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = """
 title = "Grades on a short ride"
@@ -126,3 +129,54 @@ def test_what_cannot_be_asked(
     error = capsys.readouterr().err
     assert told in error and error.count("\n") == 1
     assert not (ladder / "results").exists()
+
+
+def settings_of(line: str, *, devices: int | None = None, settings: tuple[str, ...] = ()) -> Scenario:
+    """The shipped scenario as the command asks it."""
+    asked = load_scenario("which_imu")
+    own = [
+        *requirement_settings([line]),
+        *scope_settings(asked, [line]),
+        *device_settings(asked, devices),
+        *settings,
+    ]
+    return load_scenario("which_imu", overrides=own)
+
+
+def test_rails_are_made_where_they_are_asked_for() -> None:
+    """And a figure or a window that the shipped scenario does not keep is kept where it is asked for."""
+    ours = {part.name: part.options for part in settings_of("roll p95<0.1deg in transitions").spec.estimator}
+    assert ours["track_relative"] == {"geometry_step_m": 0} and ours["vqf"] == {}
+    score = settings_of("roll p95<0.1deg in transitions").spec.score
+    assert score.windows == ("whole", "curve", "transition")
+    assert score.metrics == ("rms", "max", "coverage95", "p95")
+    ours = {part.name: part.options for part in settings_of("alignment<1mm").spec.estimator}
+    assert ours["track_relative"] == {}
+    wanted = settings_of("roll<1deg", settings=("estimator.track_relative.options.geometry_step_m=0.5",))
+    assert wanted.spec.estimator[0].options == {"geometry_step_m": 0.5}
+
+
+@pytest.mark.parametrize("devices, least", [(None, 20), (30, 20), (12, 12)])
+def test_so_many_devices_are_drawn(devices: int | None, least: int) -> None:
+    read = settings_of("roll<0.1deg", devices=devices)
+    assert looks_of(read.spec)[-1] == (devices or 60) and looks_of(read.spec)[0] == least
+    rule = stop_rule_of(read)
+    assert isinstance(rule, VerdictRule)
+    told = rule.words
+    assert told.startswith(f"at most {devices or 60} devices of each IMU at each mount; 'enough' for 95 %")
+    # Of 58 devices of which 95 % pass, all do more often than once in twenty times.
+    assert ("it cannot be the answer" in told) == (devices is not None) and "takes 59" in told
+
+
+def test_devices_on_shared_rides_stay_as_many_on_each(ladder: Path) -> None:
+    asked = load_scenario("own.toml", overrides=["monte_carlo={ track_draws = 9, sensor_draws = 4 }"])
+    settings = [*requirement_settings(["roll<0.1deg"]), *device_settings(asked, 10)]
+    read = load_scenario(
+        "own.toml", overrides=["monte_carlo={ track_draws = 9, sensor_draws = 4 }", *settings]
+    )
+    assert looks_of(read.spec) == (12,)
+    alone = load_scenario(
+        "own.toml",
+        overrides=[*requirement_settings(["roll<0.1deg"]), *device_settings(load_scenario("own.toml"), 7)],
+    )
+    assert looks_of(alone.spec) == (7,)

@@ -202,13 +202,14 @@ def test_shipped_ride_is_small_and_of_its_scenario():
 def test_curve_with_the_sign_of_the_compensation_turned_is_no_longer_true(monkeypatch):
     import simrail.estimators.attitude.ekf as ekf
 
-    right = ekf.gravity_force
+    right = ekf.gravity_and_curves
 
-    def turned(recording, frame, **options):
+    def turned(recording, **options):
         felt = recording.imu[["accel_x_mps2", "accel_y_mps2", "accel_z_mps2"]].to_numpy()
-        return 2.0 * felt - right(recording, frame, **options)
+        left = right(recording, **options)
+        return left._replace(force=2.0 * felt - left.force)
 
-    monkeypatch.setattr(ekf, "gravity_force", turned)
+    monkeypatch.setattr(ekf, "gravity_and_curves", turned)
     assert any("compensated EKF in the curve" in words for words in broken("curve"))
 
 

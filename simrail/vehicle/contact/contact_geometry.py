@@ -183,16 +183,14 @@ def build_contact(
     distance, and ds/d(roll) is minus the spread. The lateral curvature of Hertz's ellipse is
     <g'^2>/eps; eps/var(s) would be wrong where two places share the load.
     """
-    for field, value in (
-        ("static_load_n", static_load_n),
-        ("gauge_m", gauge_m),
-        ("wheel_radius_m", wheel_radius_m),
-        ("tape_circle_half_m", tape_circle_half_m),
-        ("friction", friction),
-        ("smoothing", smoothing),
-    ):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError("must be a positive number", field=field, value=value, limit="> 0")
+    _judge_positive(
+        static_load_n=static_load_n,
+        gauge_m=gauge_m,
+        wheel_radius_m=wheel_radius_m,
+        tape_circle_half_m=tape_circle_half_m,
+        friction=friction,
+        smoothing=smoothing,
+    )
     scale = wheel_radius_m / _FULL_SCALE_RADIUS_M
     depth = wheel_depth(wheel)
     head = incline(rail, rail_inclination, gauge_depth_m=gauge_depth_m or 0.014 * scale)
@@ -210,23 +208,8 @@ def build_contact(
     derailed, split_at = _limits(pair, scale)
     finest = smoothing * ((grid_load_n or static_load_n) / hertz) ** (2.0 / 3.0)
     step = min(_SHIFT_STEP_M * scale, _SHIFT_STEPS_PER_SMOOTHING * finest)
-    count = round((2.0 * derailed + 0.009 * scale) / step)
-    u: FloatArray = np.linspace(0.0, (count - 1) * step, count) - (derailed + 0.008 * scale)
-    # Where the gauge is wide, a wheel stands far from its flange while its fellow climbs; the table goes
-    # on for that, as long as the wheel's outer edge lies beyond the middle of the rail.
-    wide = max(0.0, min(_WIDENING_PER_GAUGE * gauge_m, float(pair.s[-1]) + float(u[0])))
-    u = np.concatenate([u[0] - step * np.arange(int(wide / step), 0, -1), u])
-    masks = [pair.s >= (pair.s[0] if split_at is None else split_at)]
-    if split_at is not None:
-        masks.append(pair.s < split_at)
-    coef = np.zeros((2, u.size - 1, len(COLUMNS), 4))
-    coef[1, :, 0, 3] = -1.0  # a flange patch that never touches, unless there is one
-    for k, mask in enumerate(masks):
-        factor = 1.0 if k == 0 else _FLANGE_SMOOTHING
-        contact = pair.soften(u, mask, eps_m=factor * eps, k0_1pm=_K0_1PM / scale)
-        creep = _creep_factors(contact, pair, hertz=hertz, scale=scale)
-        columns = np.stack([*contact[:6], *creep], axis=1)
-        coef[k] = np.moveaxis(CubicSpline(u, columns).c, 0, -1)
+    u = _shifts(pair, derailed, step=step, scale=scale, gauge_m=gauge_m)
+    coef = _patches(pair, u, split_at, eps_m=eps, hertz=hertz, scale=scale)
     values = {
         "first_shift_m": u[0],
         "intervals_per_m": 1.0 / step,
@@ -255,6 +238,41 @@ def build_contact(
         smoothing_m=eps,
         split_m=split_at,
     )
+
+
+def _judge_positive(**values: float) -> None:
+    """Refuse a number that is not positive, by its name."""
+    for field, value in values.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError("must be a positive number", field=field, value=value, limit="> 0")
+
+
+def _shifts(pair: ContactPair, derailed: float, *, step: float, scale: float, gauge_m: float) -> FloatArray:
+    """Lateral shifts (n,) of the table's grid, m."""
+    count = round((2.0 * derailed + 0.009 * scale) / step)
+    u: FloatArray = np.linspace(0.0, (count - 1) * step, count) - (derailed + 0.008 * scale)
+    # Where the gauge is wide, a wheel stands far from its flange while its fellow climbs; the table goes
+    # on for that, as long as the wheel's outer edge lies beyond the middle of the rail.
+    wide = max(0.0, min(_WIDENING_PER_GAUGE * gauge_m, float(pair.s[-1]) + float(u[0])))
+    return np.concatenate([u[0] - step * np.arange(int(wide / step), 0, -1), u])
+
+
+def _patches(
+    pair: ContactPair, u: FloatArray, split_at: float | None, *, eps_m: float, hertz: float, scale: float
+) -> FloatArray:
+    """Cubics of tread and flange over the intervals between shifts: (2, n - 1, columns, 4)."""
+    masks = [pair.s >= (pair.s[0] if split_at is None else split_at)]
+    if split_at is not None:
+        masks.append(pair.s < split_at)
+    coef = np.zeros((2, u.size - 1, len(COLUMNS), 4))
+    coef[1, :, 0, 3] = -1.0  # a flange patch that never touches, unless there is one
+    for k, mask in enumerate(masks):
+        factor = 1.0 if k == 0 else _FLANGE_SMOOTHING
+        contact = pair.soften(u, mask, eps_m=factor * eps_m, k0_1pm=_K0_1PM / scale)
+        creep = _creep_factors(contact, pair, hertz=hertz, scale=scale)
+        columns = np.stack([*contact[:6], *creep], axis=1)
+        coef[k] = np.moveaxis(CubicSpline(u, columns).c, 0, -1)
+    return coef
 
 
 def _limits(pair: ContactPair, scale: float) -> tuple[float, float | None]:

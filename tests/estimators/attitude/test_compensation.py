@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from simrail.estimators.attitude.compensation import design_frame, gravity_force, track_acceleration
+from simrail.estimators.attitude.compensation import (
+    design_frame,
+    gravity_and_curves,
+    gravity_force,
+    track_acceleration,
+)
 
+from simrail.core.errors import InputError
 from simrail.ride.truth import Truth
 
 
@@ -60,3 +67,17 @@ def test_positions_beyond_the_ends_are_taken_at_the_end(bend: Callable, exactly:
     frame = design_frame(recording)
     assert frame.s_m.max() == recording.track.end_m
     assert np.isfinite(track_acceleration(recording)).all()
+
+
+def test_the_curves_are_those_of_the_design_where_the_odometry_is(bend: Callable, exactly: Callable) -> None:
+    """Bit by bit, whatever pieces the design is made of; without compensation there are none."""
+    recording = exactly(bend())
+    frame, found = design_frame(recording), gravity_and_curves(recording, compensated=True)
+    np.testing.assert_array_equal(
+        found.curves, [frame.k[:, 2], frame.dk[:, 2], frame.k[:, 1], frame.dk[:, 1]]
+    )
+    assert gravity_and_curves(recording, compensated=False).curves.shape == (4, 0)
+    place = recording.odometry.copy()
+    place.iloc[7, 0] = np.nan
+    with pytest.raises(InputError, match="is not on track"):
+        gravity_and_curves(replace(recording, odometry=place), compensated=True)

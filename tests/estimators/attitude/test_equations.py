@@ -17,6 +17,8 @@ from simrail.estimators.attitude.compensation import track_acceleration
 from simrail.estimators.attitude.kernel import attitude_ekf
 from turning import rotation, turning
 
+from simrail.track.frame_kernel import CANT_TERMS, HEIGHT_TERMS, Pieces
+
 t, s, r_y, r_z, g = sp.symbols("t s r_y r_z g", real=True)
 
 
@@ -67,17 +69,38 @@ def track_frame(at_m: np.ndarray, *, places: bool = True) -> SimpleNamespace:
     )
 
 
+@lru_cache
+def track_pieces() -> Pieces:
+    """TRACK by its Taylor polynomials at the places of the ride: exact there, as far as its curvatures ask."""
+    of_roll, of_pitch, of_yaw = TRACK
+    slope = -sp.tan(of_pitch)
+    functions = [
+        *(of_yaw.diff(s, k) / sp.factorial(k) for k in range(3)),
+        *(sp.sin(of_roll).diff(s, k) / sp.factorial(k) for k in range(3)),
+        *[sp.Integer(0)] * (CANT_TERMS - 3),
+        sp.Integer(0),
+        *(slope.diff(s, k - 1) / sp.factorial(k) for k in range(1, 4)),
+        *[sp.Integer(0)] * (HEIGHT_TERMS - 4),
+    ]
+    places = np.array([float(RIDE.subs(t, time)) for time in TIMES])
+    rows = sp.lambdify(s, functions, "numpy", cse=True)
+    return Pieces(places, np.array([rows(place) for place in places], dtype=np.float64))
+
+
 class Line:
     """A design track that is TRACK."""
 
     start_m, end_m = 0.0, 1e4
     frame = staticmethod(track_frame)
+    on_track = staticmethod(np.asarray)
+    pieces = property(lambda _: track_pieces())
 
 
 @pytest.fixture(scope="module")
 def ride() -> SimpleNamespace:
     columns = [sp.lambdify(t, RIDE.diff(t, order), "numpy") for order in range(3)]
     data = np.array([[column(time) for column in columns] for time in TIMES])
+    data[:, 0] = track_pieces().starts  # to the last bit
     odometry = pd.DataFrame(data, columns=["position_m", "speed_mps", "acceleration_mps2"])
     return SimpleNamespace(track=Line(), odometry=odometry, mount_position_m=(1.0, *PLACE))
 

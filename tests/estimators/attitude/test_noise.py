@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
-from simrail.estimators.attitude.compensation import design_frame
+from simrail.estimators.attitude.compensation import design_frame, gravity_and_curves
 from simrail.estimators.attitude.noise import bias_variance, paper_noise, recommended_noise, time_constant
 from simrail.estimators.attitude.rest_bias import rest_bias
 
@@ -44,10 +44,15 @@ def test_time_constant_minimises_the_error(sensor: float, swing: float, bias: fl
     assert abs(residual) < 1e-9 * (white + 4 * bias * tau)
 
 
+def curves_of(recording: Recording) -> np.ndarray:
+    """What the compensation of a recording is made of."""
+    return gravity_and_curves(recording, compensated=True).curves
+
+
 def test_process_noise_gives_that_time_constant(recording: Recording) -> None:
     """sqrt(R Ts / Qc) / g = tau on every sample, without the odometry's share of R."""
     rest = rest_bias(recording)
-    noise = recommended_noise(recording, rest, frame=None)
+    noise = recommended_noise(recording, rest, curves=None)
     intensity = noise.process * 250.0
     tau = np.sqrt(noise.force[:, 2] / 250.0 / intensity) / GRAVITY
     white = recording.imu_sheet.gyro_noise_radpsqrts**2 + 1e-10
@@ -60,8 +65,8 @@ def test_process_noise_gives_that_time_constant(recording: Recording) -> None:
 
 def test_odometry_widens_the_force_where_it_matters(recording: Recording) -> None:
     rest, frame = rest_bias(recording), design_frame(recording)
-    blind = recommended_noise(recording, rest, frame=None)
-    aware = recommended_noise(recording, rest, frame=frame)
+    blind = recommended_noise(recording, rest, curves=None)
+    aware = recommended_noise(recording, rest, curves=curves_of(recording))
     np.testing.assert_allclose((aware.force - blind.force)[:, 0], 0.04**2, rtol=1e-9)
     extra = (aware.force - blind.force)[:, 1]
     kind = recording.track.kind(frame.s_m)
@@ -94,7 +99,7 @@ def test_a_perfect_imu_gets_finite_positive_noise(recording: Recording) -> None:
         if field.endswith(("radps", "mps2", "radpsqrts", "mpsqrts"))
     }
     ideal = replace(recording, imu_sheet=replace(recording.imu_sheet, **zero))
-    noise = recommended_noise(ideal, rest_bias(ideal), frame=design_frame(ideal))
+    noise = recommended_noise(ideal, rest_bias(ideal), curves=curves_of(ideal))
     assert (noise.process > 0.0).all() and (noise.force > 0.0).all()
     assert np.isfinite(noise.process).all() and np.isfinite(noise.force).all()
     assert not noise.considered.any()
@@ -110,7 +115,7 @@ def test_paper_noise_in_both_readings(recording: Recording) -> None:
 
 def test_noise_of_a_prefix_is_the_prefix_of_the_noise(recording: Recording) -> None:
     def noise(ride: Recording) -> tuple[np.ndarray, ...]:
-        return recommended_noise(ride, rest_bias(ride), frame=design_frame(ride))
+        return recommended_noise(ride, rest_bias(ride), curves=curves_of(ride))
 
     for n in (3, 301, 7001):
         for whole, part in zip(noise(recording), noise(beginning(recording, samples=n)), strict=True):
