@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import operator
+import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,7 +98,7 @@ def swapped(frame: pd.DataFrame) -> pd.DataFrame:
 @pytest.mark.parametrize(
     ("plant", "said"),
     [
-        (times("ax", 9.80665), r"accel_x_mps2: pushes many times.*one axis alone"),
+        (times("ax", 9.80665), r"accel_x_mps2: is many times.*one axis alone"),
         (times("ay", 9.80665), r"accel_y_mps2: is many times.*9.8.*one axis alone"),
         (times("ay", -1.0), r"accel_y_mps2: goes against what speed and cant leave.*that column alone"),
         (times("wx", -1.0), r"gyro_x_radps: goes against the roll rate.*that column alone"),
@@ -142,3 +146,68 @@ def test_a_packed_file_is_to_be_unpacked_and_a_radius_in_inches_is_known(tmp_pat
     inches = ("wheel_radius_m = 0.2900", "wheel_radius_m = 22.83")
     with pytest.raises(InputError, match=r"0\.2899 from a diameter in inches"):
         read_signals(written(tmp_path, (BASE / "ride.csv").read_text(), inches))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-8-sig"])
+@pytest.mark.parametrize("head", [True, False])
+def test_text_of_other_widths_is_read(encoding: str, head: bool, sound: Recording, tmp_path: Path) -> None:
+    """Windows' "Unicode" with its mark and without, and a mark before a file without names."""
+    numbers = [('"t"', "1"), ('["wx","wy","wz"]', "[2, 3, 4]"), ('["ax","ay","az"]', "[5, 6, 7]")]
+    text = logged().to_csv(index=False, header=head)
+    pairs = [] if head else [*numbers, ('"pulses"', "8")]
+    assert_as_sound(read_signals(written(tmp_path, text, *pairs, encoding=encoding)), sound)
+
+
+def test_a_fault_in_a_wide_text_is_told_by_its_line(tmp_path: Path) -> None:
+    text = (BASE / "ride.csv").read_text().replace("\n20.0,", "\nabc,", 1)
+    line = text.split("\nabc,")[0].count("\n") + 2
+    with pytest.raises(InputError, match=rf"holds no number in line {line}: |in line {line};"):
+        read_signals(written(tmp_path, text, encoding="utf-16"))
+
+
+def in_long_form(frame: pd.DataFrame) -> pd.DataFrame:
+    molten = frame.melt(id_vars="t", var_name="channel", value_name="value")
+    return molten.sort_values("t", kind="stable")
+
+
+@pytest.mark.parametrize("time", ["t", "time"])
+def test_long_form_is_told_and_its_remedy_makes_it_wide(
+    time: str, sound: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = in_long_form(logged()).rename(columns={"t": time}).to_csv(index=False)
+    stamped = ('time = "t"', f'time = "{time}"')
+    folder = written(tmp_path, text, stamped)
+    with pytest.raises(InputError, match=r"long form.*'channel'.*wx, wy, wz") as refused:
+        read_signals(folder)
+    code = re.search('python -c "([^"]*)"', str(refused.value))
+    assert code is not None and "\n" not in str(refused.value)
+    monkeypatch.chdir(tmp_path)
+    exec(code[1], {})
+    ride = (tmp_path / "ride.toml").read_text().replace('"ride.csv"', '"ride_wide.csv"')
+    (tmp_path / "ride.toml").write_text(ride)
+    assert_as_sound(read_signals(folder), sound)
+
+
+def sentence(words: str) -> str:
+    """A line as NMEA 0183 has it."""
+    return f"${words}*{functools.reduce(operator.xor, words.encode()):02X}"
+
+
+def test_sentences_with_checksums_are_told_and_the_remedy_makes_a_table_of_them(
+    sound: Recording, tmp_path: Path
+) -> None:
+    rows = logged().to_csv(index=False, header=False).split()
+    fix = sentence("GPGGA,121530.00,4807.03,N,01131.00,E,1,08,0.9,545.4,M,46.9,M,,")
+    text = "\n".join(line for row in rows for line in (sentence(f"PIMU,{row}"), fix)[: 1 + (row[-1] == "0")])
+    folder = written(tmp_path, text)
+    with pytest.raises(InputError, match=r"sentences with checksums") as refused:
+        read_signals(folder)
+    command = re.search(r"(sed -n .*\.csv),", str(refused.value))
+    assert command is not None and "\n" not in str(refused.value)
+    subprocess.run(command[1], shell=True, cwd=tmp_path, check=True)
+    numbers = [('"t"', "1"), ('["wx","wy","wz"]', "[2, 3, 4]"), ('["ax","ay","az"]', "[5, 6, 7]")]
+    ride = (BASE / "ride.toml").read_text().replace('"ride.csv"', '"ride_PIMU.csv"')
+    for old, new in [*numbers, ('"pulses"', "8")]:
+        ride = ride.replace(old, new)
+    (tmp_path / "ride.toml").write_text(ride)
+    assert_as_sound(read_signals(folder), sound)
