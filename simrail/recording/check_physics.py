@@ -14,6 +14,7 @@ from simrail.core.errors import InputError
 from simrail.recording.evidence.axes import SURE, Slope, means, slope
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.judge import Evidence, refuse_wrong
+from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording, imus
 from simrail.recording.signals import FORCES
 from simrail.recording.standstill import at_rest_initially
@@ -35,6 +36,12 @@ LEAST_SPEED_MPS, LEAST_READINGS = 2.0, 10.0
 
 LEAST_WAY_M, LEAST_VARIANCE_M2PS4 = 20.0, 0.01
 """Way, and variance of the acceleration, from which on the accelerometer is held against the odometry."""
+
+STANDING_MPS, STANDING_S = 0.05, 5
+"""Slower than this a train stands; and means over so many seconds of it are held against each other."""
+
+STANDING_RADPS = 0.02
+"""No gyro of a train that stands wanders by a degree a second; in a curve of 500 m it turns so at 36 km/h."""
 
 BEYOND_TRACK_M = 20.0
 """How far an odometry may be off the end of the track by its own error."""
@@ -67,6 +74,7 @@ def check_plausible(recording: Recording) -> Evidence:
         _check_gravity(alone, table)
         _check_turning(alone, table)
     _check_counted(recording)
+    _check_standing(recording)
     evidence = weigh_all(recording)
     refuse_wrong(evidence)
     if not recording.track.is_map:
@@ -143,6 +151,29 @@ def _check_turning(recording: Recording, table: str) -> None:
                 limit=f"{MEAN_RATE_RADPS:g} rad/s",
                 remedy='the values look like degrees: set units.gyro = "deg/s"',
             )
+
+
+def _check_standing(recording: Recording) -> None:
+    """Refuse a way that stands still while the train turns: its counter has stopped."""
+    way = way_of(recording)
+    if way is None:
+        return
+    count, time = max(1, round(recording.imu_sheet.rate_hz)), recording.imu.index.to_numpy(dtype=np.float64)
+    moves = means(np.abs(np.interp(time, way.time_s, way.speed_mps)), count) > STANDING_MPS
+    near = np.convolve(moves, np.ones(5), mode="same") > 0.5
+    turning = means(recording.imu[GYRO[2]].to_numpy(), count)[~near]
+    if len(turning) < 2 * STANDING_S:
+        return
+    spread = float(np.ptp(means(turning, STANDING_S)))
+    limit = STANDING_RADPS + 12.0 * recording.imu_sheet.gyro_noise_radpsqrts / np.sqrt(STANDING_S)
+    if spread > limit:
+        raise InputError(
+            f"stands still while the train turns: the {way.device} has stopped",
+            field=way.device,
+            value=f"{np.degrees(spread):.2g} deg/s of turn while it stands",
+            limit=f"{np.degrees(limit):.2g} deg/s, as a gyro may wander",
+            remedy="cut the recording where it stops, or mend its sensor",
+        )
 
 
 def _check_counted(recording: Recording) -> None:

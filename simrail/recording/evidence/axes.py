@@ -9,7 +9,7 @@ without cant nothing tells of the gyro's Y, and that is said.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,12 @@ from simrail.recording.recording import Recording
 
 OTHER_SIGN, OTHER_UNIT = 0.4, 4.0
 """Slopes beyond which (below minus, above) an axis has the other sign, or another unit."""
+
+NEXT_TO_NONE = 0.2
+"""Size of a slope below which an axis does not follow at all; in rad/s for deg/s it has 0.017."""
+
+SQUARE = 1.4
+"""Slopes between 1 over this and this, of either sign, are those of an axis that follows."""
 
 SURE = 6.0
 """Standard deviations that a slope must be off 1 before a ride is refused for it; they take seconds as
@@ -52,6 +58,11 @@ class Slope(NamedTuple):
         """Whether it is many times too large."""
         return self.value > OTHER_UNIT and self.value - 1.0 > SURE * self.sd
 
+    @property
+    def none(self) -> bool:
+        """Whether it is next to none."""
+        return abs(self.value) < NEXT_TO_NONE and 1.0 - self.value > SURE * self.sd
+
 
 class Axis(NamedTuple):
     """How an axis is told: its name, what it is held against, and what a ride without a word of it lacks."""
@@ -61,21 +72,28 @@ class Axis(NamedTuple):
     lacks: str
 
 
+RX, RY, RZ = GYRO
+FX, FY = ACCEL[:2]
+
 AXES = {
-    GYRO[0]: Axis("gyro X alone", "the roll rate of the transitions", "no transition with cant"),
-    GYRO[1]: Axis(
-        "gyro Y alone",
-        "the pitch rate of the line",
-        "no vertical curve and no canted curve that tells of it",
-    ),
-    ACCEL[0]: Axis("accelerometer X alone", "the change of speed", "no change of speed that tells of it"),
-    ACCEL[1]: Axis(
-        "accelerometer Y alone",
-        "what speed and cant leave of the curves",
-        "no curve that speed or cant is felt in",
-    ),
+    RX: Axis("gyro X alone", "the roll rate of the transitions", "no transition with cant"),
+    RY: Axis("gyro Y alone", "the pitch rate of the line", "no vertical and no canted curve to tell it by"),
+    RZ: Axis("gyro Z alone", "the curves", "no curve"),
+    FX: Axis("accelerometer X alone", "the change of speed", "no change of speed to tell it by"),
+    FY: Axis("accelerometer Y alone", "what speed and cant leave of the curves", "no curve to feel"),
 }
-"""Which axes are judged, in the order in which they are told; of the gyro's Z the whole fit tells."""
+"""Which axes are judged, in the order in which they are told."""
+
+AS_A_WHOLE = (
+    ((RX, RY, FX, FY), (RZ,)),
+    ((RX, RY, RZ), (FX, FY)),
+    ((RX, RY, RZ, FX), (FY,)),
+    ((FX,), ()),
+    ((RZ,), ()),
+)
+"""Axes that go against the line, and those that go along, of a device as a whole: one that looks backwards, a
+gyro of the other sense, a train that ran the other way; and what either of them comes to where no other axis
+tells anything."""
 
 
 def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
@@ -84,7 +102,7 @@ def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
     Parameters
     ----------
     recording : Recording
-        A ride in which no device as a whole is wrong.
+        A ride.
     """
     way = way_of(recording) if recording.track.is_map else None
     if way is None:
@@ -96,21 +114,22 @@ def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
     )
     frame = recording.track.frame_extended(recording.start_position_m + went)
     along, level = -np.sin(frame.pitch_rad), np.cos(frame.pitch_rad) * np.sin(frame.roll_rad)
-    twist, gravity = frame.k[:, 0] * speed, recording.gravity_mps2
+    gravity = recording.gravity_mps2
     expected = {
-        GYRO[0]: twist,
-        GYRO[1]: frame.k[:, 1] * speed,
-        ACCEL[0]: push + gravity * along,
-        ACCEL[1]: frame.k[:, 2] * speed**2 + gravity * level,
+        RX: frame.k[:, 0] * speed,
+        RY: frame.k[:, 1] * speed,
+        RZ: frame.k[:, 2] * speed,
+        FX: push + gravity * along,
+        FY: frame.k[:, 2] * speed**2 + gravity * level,
     }
     found = {name: means(recording.imu[name].to_numpy(), count) for name in AXES}
     slopes = {name: slope(found[name], expected[name]) for name in AXES}
-    findings = [_judged(name, slopes) for name in AXES]
-    across = slope(found[GYRO[1]], twist)
-    if findings[0].verdict != "surely wrong" and _is_swapped(slopes[GYRO[0]], across):
+    findings = [_judged(name, slopes[name]) for name in AXES]
+    across = slope(found[RY], expected[RX])
+    if findings[0].wrong and abs(across.value) > OTHER_SIGN and abs(across.value) > SURE * across.sd:
         findings[0] = _finding(
-            GYRO[0],
-            slopes[GYRO[0]],
+            RX,
+            slopes[RX],
             "surely wrong",
             f"does not roll in the transitions, but its Y does, {across.value:.2g} times: their columns are "
             "swapped",
@@ -119,28 +138,59 @@ def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _judged(name: str, slopes: Mapping[str, Slope]) -> Finding:
+def are_columns(findings: Sequence[Finding]) -> bool:
+    """Whether all axes that a ride tells of follow the line, some against it, as no whole device would.
+
+    Then the place, the way and the device are right, and the signs of columns wrong.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        Those of `weigh_axes`.
+    """
+    told = {finding.key: finding for finding in findings if finding.sd < WANTED}
+    against = {key for key, finding in told.items() if finding.value < 0.0}
+    follow = all(1.0 / SQUARE < abs(finding.value) < SQUARE for finding in told.values())
+    whole = any(
+        against == told.keys() & {key_of(name) for name in turned} and told.keys() <= _keys(turned, kept)
+        for turned, kept in AS_A_WHOLE
+    )
+    return bool(against) and follow and not whole
+
+
+def _keys(*groups: Sequence[str]) -> set[str]:
+    return {key_of(name) for group in groups for name in group}
+
+
+def key_of(name: str) -> str:
+    """Key of the finding of an axis."""
+    return f"alone_{name}"
+
+
+def _judged(name: str, found: Slope) -> Finding:
     """What is found of one axis."""
-    axis, found = AXES[name], slopes[name]
-    # Where nothing tells that its others are right, the device may look backwards as a whole.
-    others = any(slopes[other].along for other in (GYRO[0], GYRO[1], ACCEL[1]))
-    if found.against and (name != ACCEL[0] or others):
-        remedy = "give that column alone the other sign, or mend the axes"
-        return _finding(name, found, "surely wrong", f"goes against {axis.of}", remedy)
+    of = AXES[name].of
+    sign, unit = "give that column alone the other sign", "mend the unit: one axis alone has another one"
+    if found.against and found.value < -OTHER_UNIT:
+        return _finding(name, found, "surely wrong", f"has nothing of {of}", "mend the order of the columns")
+    if found.against:
+        return _finding(name, found, "surely wrong", f"goes against {of}", f"{sign}, or mend the axes")
     if found.many:
-        remedy = "mend the unit: one axis alone has another one"
-        return _finding(name, found, "surely wrong", f"is many times {axis.of}", remedy)
+        return _finding(name, found, "surely wrong", f"is many times {of}", unit)
+    if found.none:
+        remedy = f"{unit}; or the order of the columns, or what it is measured by"
+        return _finding(name, found, "surely wrong", f"has next to nothing of {of}", remedy)
     if found.sd > WANTED:
-        return _finding(name, found, "could not be judged", f"the ride has {axis.lacks}")
+        return _finding(name, found, "could not be judged", f"the ride has {AXES[name].lacks}")
     return _finding(name, found, "sound")
 
 
 def _finding(name: str, found: Slope, verdict: Verdict, why: str = "", remedy: str = "") -> Finding:
-    axis, key = AXES[name], f"alone_{name}"
+    axis = AXES[name]
     rests_on = "nothing" if verdict == "could not be judged" else axis.of
     return Finding(
         axis.name,
-        key,
+        key_of(name),
         found.value,
         found.sd,
         1.0,
@@ -151,12 +201,6 @@ def _finding(name: str, found: Slope, verdict: Verdict, why: str = "", remedy: s
         field=f"imu.{name}",
         remedy=remedy,
     )
-
-
-def _is_swapped(roll: Slope, across: Slope) -> bool:
-    """Whether the gyro's Y rolls where its X should, which does not."""
-    rolls = abs(across.value) > OTHER_SIGN and abs(across.value) > SURE * across.sd
-    return rolls and abs(roll.value) < OTHER_SIGN and 1.0 - roll.value > SURE * roll.sd
 
 
 def slope(measured: FloatArray, expected: FloatArray) -> Slope:

@@ -6,6 +6,7 @@ or no number, with the line of the file. What the columns mean is said by the ri
 """
 
 import difflib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -216,6 +217,11 @@ def read_columns(
 def near(word: str, known: Sequence[str]) -> str | None:
     """A remedy that names the word that was probably meant, if there is one."""
     folded = {name.casefold(): name for name in known}
+    # A unit behind the name: "wx [deg/s]", "wx (deg/s)", "wx_deg/s" for wx.
+    own = {name: re.split(r"[\s\[(_]", name, maxsplit=1)[0].casefold() for name in known}
+    bare = [name for name in known if own[name] == word.casefold()]
+    if len(bare) == 1:
+        return f"did you mean {bare[0]!r}?"
     close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
     return f"did you mean {folded[close[0]]!r}?" if close else None
 
@@ -249,7 +255,7 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             field=f"{table}.separator",
             value=part.separator,
             limit="what sets the columns apart",
-            remedy=f"set separator = {other!r}".replace("'", '"'),
+            remedy=f"set separator = {other!r}".replace("'", '"') + _decimal_of(data, other),
         )
     if not data.named:
         return InputError(
@@ -270,6 +276,15 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
         or near(name, [other for other in found if other not in _taken(data.part)])
         or f"name it in [{table}.columns]; what no column holds cannot be read",
     )
+
+
+def _decimal_of(data: DataFile, separator: str) -> str:
+    """What to say of the decimals of a file whose columns stand apart by another mark than a comma."""
+    with open_text(data.path) as file:
+        lines = [raw.decode("utf-8", errors="replace") for raw in islice(file, MOST_TEXT)]
+    fields = [field for line in lines[1:] for field in split(line.rstrip("\r\n"), separator)]
+    comma = sum(bool(re.fullmatch(r"-?\d+,\d+", field)) for field in fields)
+    return ' and decimal = ","' if 2 * comma > len(fields) and data.part.decimal == "." else ""
 
 
 def _taken(part: DataPart) -> set[str]:

@@ -452,6 +452,8 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
             limit="numbers, or empty fields",
             remedy="the line of names stands there again: the logger was started anew; cut the file there"
             if value[1].strip(' "') in [name for name in layout.names if name]
+            else "drop the last line, which holds no sample"
+            if row and _is_last(path, layout, int(row[1]) - 1)
             else _remedy_of_word(value[1], decimal, line == f" in line {layout.data_line + 1}"),
         )
     count = re.search(r"Expected (\d+) columns, got (\d+)", said)
@@ -491,6 +493,8 @@ def _remedy_of_word(word: str, decimal: str, in_first_line: bool) -> str:
         return 'set decimal = "."'
     if re.match(r"\d+:\d\d|\d{4}-\d\d|\d\d?[./]\d\d?[./]\d{4}", word):
         return 'for clock times and dates set units.time = "iso"'
+    if re.fullmatch(r"0x[0-9a-fA-F]+", word):
+        return "write numbers to base ten"
     if in_first_line:
         return "if that line holds units set units_row = true; if not, mend it"
     return "empty that line's fields, so that it is a gap; or mend it"
