@@ -6,7 +6,8 @@ import functools
 import operator
 import re
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,10 @@ import pytest
 from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
+from simrail.recording.evidence.axes import weigh_axes
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
+from simrail.track.design import Straight
 
 BASE = Path(__file__).parent / "cases" / "00-base"
 
@@ -211,3 +214,163 @@ def test_sentences_with_checksums_are_told_and_the_remedy_makes_a_table_of_them(
         ride = ride.replace(old, new)
     (tmp_path / "ride.toml").write_text(ride)
     assert_as_sound(read_signals(folder), sound)
+
+
+@pytest.mark.parametrize(
+    ("flipped", "told"),
+    [
+        (["wy"], ["gyro_y_radps: goes against the pitch rate"]),
+        (["ax"], ["accel_x_mps2: goes against the change of speed"]),
+        (["wz"], ["gyro_z_radps: goes against the curves"]),
+        pytest.param(
+            ["wx", "wz", "ay"],
+            ["gyro_x_radps: goes", "gyro_z_radps: goes", "accel_y_mps2: goes"],
+            marks=pytest.mark.long,
+        ),
+        pytest.param(["ax", "ay"], ["accel_x_mps2: goes", "accel_y_mps2: goes"], marks=pytest.mark.long),
+        pytest.param(["ax", "ay", "wx", "wy"], ["imu.yaw_deg: pushes backwards"], marks=pytest.mark.long),
+        pytest.param(["wx", "wy", "wz"], ["gyro_z_radps: turns against"], marks=pytest.mark.long),
+    ],
+)
+def test_columns_of_the_other_sign_are_named_and_a_device_that_is_turned_is_one(
+    flipped: list[str], told: list[str], tmp_path: Path
+) -> None:
+    """Left-handed axes, too; what is a device as a whole is mended as one."""
+    frame = logged()
+    folder = written(tmp_path, frame.assign(**{name: -frame[name] for name in flipped}).to_csv(index=False))
+    with pytest.raises(InputError) as refused:
+        check_plausible(with_odometry(read_signals(folder), "encoder"))
+    lines = str(refused.value).splitlines()
+    assert len(lines) == len(told)
+    assert all(words in line for words, line in zip(told, lines, strict=True))
+
+
+def axis_verdicts(recording: Recording) -> dict[str, str]:
+    return {finding.key.removeprefix("alone_"): finding.verdict for finding in weigh_axes(recording)}
+
+
+def test_each_axis_of_the_sound_ride_is_sound_and_on_a_level_straight_line_not_judged(
+    sound: Recording,
+) -> None:
+    assert set(axis_verdicts(sound).values()) == {"sound"}
+    straight = replace(sound.track, elements=(Straight(sound.track.length_m),))
+    assert axis_verdicts(replace(sound, track=straight)) == {
+        "gyro_x_radps": "could not be judged",
+        "gyro_y_radps": "could not be judged",
+        "gyro_z_radps": "could not be judged",
+        "accel_x_mps2": "sound",
+        "accel_y_mps2": "could not be judged",
+    }
+
+
+TRIADS = ["wx", "wy", "wz", "ax", "ay", "az"]
+
+
+def held(frame: pd.DataFrame, rows: Iterable[int]) -> pd.DataFrame:
+    """Samples of the IMU that a logger wrote again."""
+    frame = frame.copy()
+    for row in sorted(rows):
+        frame.loc[row, TRIADS] = frame.loc[row - 1, TRIADS].to_numpy()
+    return frame
+
+
+def stopped(frame: pd.DataFrame, row: int) -> pd.DataFrame:
+    return frame.assign(pulses=frame["pulses"].where(frame.index < row, frame.loc[row, "pulses"]))
+
+
+@pytest.mark.parametrize(
+    ("plant", "said"),
+    [
+        (lambda frame: held(frame, range(11, 800, 13)), r"wx, wy, wz: repeats the sample before.*7\.6%.*5%"),
+        (lambda frame: held(frame, range(1, 801, 2)), r"reads faster than.*50\.1%.*some 9\.98 Hz"),
+        (lambda frame: held(frame, range(300, 320)), r"nothing was measured there.*20 times"),
+        (lambda frame: stopped(frame, 0), "encoder: stands still while the train turns"),
+        (lambda frame: stopped(frame, 300), "encoder: stands still while the train turns"),
+        (lambda frame: frame.assign(wz=frame["wz"].clip(lower=-1.0)), r"wz: .*saturated.*wider range"),
+        (times("wx", np.pi / 180.0), r"gyro_x_radps: has next to nothing of the roll rate.*one axis alone"),
+    ],
+)
+def test_what_a_logger_held_and_what_has_stopped_is_told(
+    plant: Callable[[pd.DataFrame], pd.DataFrame], said: str, tmp_path: Path
+) -> None:
+    folder = written(tmp_path, plant(logged()).to_csv(index=False))
+    with pytest.raises(InputError, match=said) as refused:
+        check_plausible(with_odometry(read_signals(folder), "encoder"))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_lost_sample_now_and_then_and_a_slow_magnetometer_may_be_held(
+    sound: Recording, tmp_path: Path
+) -> None:
+    text = held(logged(), range(20, 800, 40)).to_csv(index=False)
+    assert len(read_signals(written(tmp_path, text)).imu) == len(sound.imu)
+
+
+@pytest.mark.parametrize(
+    ("period_s", "first_s", "word"),
+    [(1.0, 0.0, "second"), (60.0, 40.0, "minute"), (3600.0, 3590.0, "hour"), (86_400.0, 86_390.0, "day")],
+)
+def test_a_clock_that_shows_a_part_of_the_time_goes_on(
+    period_s: float, first_s: float, word: str, sound: Recording, tmp_path: Path
+) -> None:
+    frame = logged()
+    shown = ((frame["t"] + first_s) % period_s).round(6) % period_s
+    found = read_signals(written(tmp_path, frame.assign(t=shown).to_csv(index=False)))
+    assert_as_sound(found, sound)
+    assert any(f"the seconds of the {word} begin anew" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("day", "goes_on"), [("2024-03-31", True), ("2024-04-02", False)])
+def test_the_begin_of_summer_time_goes_on_and_an_hour_of_another_day_does_not(
+    day: str, goes_on: bool, sound: Recording, tmp_path: Path
+) -> None:
+    frame = logged()
+    seconds = frame["t"] + 3600.0 * (frame["t"] >= 15.0)
+    dates = (pd.Timestamp(f"{day}T01:59:45") + pd.to_timedelta(seconds, unit="s")).dt
+    text = frame.assign(t=dates.strftime("%Y-%m-%dT%H:%M:%S.%f")).to_csv(index=False)
+    folder = written(tmp_path, text, ('time = "s"', 'time = "iso"'))
+    if goes_on:
+        found = read_signals(folder)
+        assert_as_sound(found, sound)
+        assert any("summer time begins" in note for note in found.notes)
+    else:
+        with pytest.raises(InputError, match="the clock jumps by 1 hours"):
+            read_signals(folder)
+
+
+def test_a_block_that_stands_twice_is_told_by_its_samples(tmp_path: Path) -> None:
+    frame = logged()
+    twice = pd.concat([frame[:400], frame[300:]])
+    with pytest.raises(InputError, match=r"has 100 samples twice: samples 401 to 500.*drop the second"):
+        read_signals(written(tmp_path, twice.to_csv(index=False)))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda frame: frame.to_csv(index=False, sep=";", decimal=","), r'separator = ";" and decimal = ","'),
+        (lambda frame: frame.to_csv(index=False, sep=";"), r'separator = ";"$'),
+        (lambda frame: frame.to_csv(index=False) + "Mean,0,0,0,0,0,0,0\n", "drop the last line, which holds"),
+        (
+            lambda frame: frame.assign(pulses=[hex(count) for count in frame["pulses"]]).to_csv(index=False),
+            "write numbers to base ten",
+        ),
+        (
+            lambda frame: frame.rename(columns={"t": "t [s]", "wx": "wx [deg/s]"}).to_csv(index=False),
+            r"did you mean 't \[s\]'",
+        ),
+    ],
+)
+def test_what_stands_beside_the_numbers_is_told(
+    spoil: Callable[[pd.DataFrame], str], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=said):
+        read_signals(written(tmp_path, spoil(logged())))
+
+
+def test_a_row_of_units_that_the_ride_file_contradicts_is_noted(sound: Recording, tmp_path: Path) -> None:
+    names, rest = logged().to_csv(index=False).split("\n", 1)
+    found = read_signals(written(tmp_path, f"{names}\n[s],rad/s,°/s,deg/s,g,m/s^2,g,-\n{rest}"))
+    assert_as_sound(found, sound)
+    odd = [note for note in found.notes if "by its row of units" in note]
+    assert ["wx is in rad/s" in odd[0], "ay is in m/s2" in odd[1], len(odd)] == [True, True, 2]
