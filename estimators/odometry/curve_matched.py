@@ -81,7 +81,13 @@ from simrail.estimators.odometry.kernel import (
     room_to_work,
 )
 from simrail.estimators.odometry.line_table import line_at, line_table
-from simrail.estimators.odometry.moving_start import BACK_S, Start, shown_by, start_of
+from simrail.estimators.odometry.moving_start import (
+    BACK_S,
+    Start,
+    reading_variance,
+    shown_by,
+    start_of,
+)
 from simrail.estimators.odometry.pointing import (
     LATERAL_CREEP,
     Pointing,
@@ -227,10 +233,13 @@ class CurveMatchedOdometry:
         if len(time) >= at + 2:
             late = from_sample(recording, at, wheel)
             start = Start(float(wheel["speed_mps"].iloc[at]), float(wheel["speed_sd_mps"].iloc[at]))
-            early.append(self.at_imu_times(self.trace(late, start), late).iloc[1:])
+            steps = self.trace(late, start, jitter_m2=jitter_of(read[: shown.told + 1], recording))
+            early.append(self.at_imu_times(steps, late, wheel=wheel.iloc[at:]).iloc[1:])
         return pd.concat(early)
 
-    def trace(self, recording: Recording, start: Start | None = None) -> Steps:
+    def trace(
+        self, recording: Recording, start: Start | None = None, *, jitter_m2: float | None = None
+    ) -> Steps:
         """Run the filter, and the smoother if wanted; all states at its own steps.
 
         Parameters
@@ -239,6 +248,9 @@ class CurveMatchedOdometry:
             The recording.
         start : Start, optional
             Speed at its first sample; as `first_speed` has it if not given.
+        jitter_m2 : float, optional
+            Variance that stamps which jitter add to a reading of the way; if not given, as the first second
+            of a ride that begins at speed shows it, with hindsight, and 0 without.
         """
         recording = self._heard(recording)
         if not recording.has_wheel:
@@ -267,7 +279,10 @@ class CurveMatchedOdometry:
         rate = sheet.rate_hz / block
         steps = Steps(rate, ends, states, covariance, np.empty(n), *np.empty((2, n), bool))
         past = room_for_history(n, STATES, UPDATES) if self.smoothed else None
-        model = self._model(recording, pulse, pointing)
+        if jitter_m2 is None:
+            begun = not self.causal and start_of(recording).speed_mps != 0.0
+            jitter_m2 = jitter_of(None, recording) if begun else 0.0
+        model = self._model(recording, pulse, pointing)._replace(jitter_m2=jitter_m2)
         dt, gravity = block / sheet.rate_hz, recording.gravity_mps2
         curve_matched(dt, signals, counts, model, gravity, grid, table, x, p, steps, room_to_work(), past)
         if past is not None:
@@ -289,8 +304,14 @@ class CurveMatchedOdometry:
             return recording
         return replace(recording, encoder=None, encoder_sheet=None, odometer=None, odometer_sheet=None)
 
-    def at_imu_times(self, steps: Steps, recording: Recording) -> pd.DataFrame:
-        """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later."""
+    def at_imu_times(
+        self, steps: Steps, recording: Recording, *, wheel: pd.DataFrame | None = None
+    ) -> pd.DataFrame:
+        """Position, speed and acceleration at every IMU sample: interpolated, or of nothing later.
+
+        ``wheel`` is the wheel's own odometry at the same samples, of one that has heard more than this
+        recording: its beginning, too.
+        """
         recording, rate = self._heard(recording), steps.rate_hz
         wanted = recording.imu.index.to_numpy(dtype=np.float64)
         if self.smoothed:
@@ -306,9 +327,12 @@ class CurveMatchedOdometry:
         sd[:, 0] = np.hypot(sd[:, 0], chainage_sd(recording, values[:, 0]))
         lines = np.column_stack([values, sd, np.sqrt(ACCELERATION_SD_MPS2**2 + shaking)])
         # Until the filter's first step: at the start, standing or at its first speed.
-        speed, speed_sd = first_speed(recording)
-        place = [recording.start_position_m, speed, 0.0]
-        start = [*place, self.start_sd_m, speed_sd, ACCELERATION_SD_MPS2]
+        if wheel is None:
+            speed, speed_sd = first_speed(recording)
+            place = [recording.start_position_m, speed, 0.0]
+            start = [*place, self.start_sd_m, speed_sd, ACCELERATION_SD_MPS2]
+        else:
+            start = wheel[[*ODOMETRY, *ODOMETRY_SD]].iloc[0].to_list()
         lines, times = np.vstack([start, lines]), np.concatenate([[-np.inf], steps.time_s])
         if self.smoothed:
             times[0] = min(wanted[0], steps.time_s[0]) - 1.0 / rate
@@ -318,28 +342,13 @@ class CurveMatchedOdometry:
             values = lines[last]
             if recording.has_wheel:
                 rolls = ~np.concatenate([[False], _held(steps.slipping, HOLD_S)])[last]
-                wheel = self._wheel_acceleration(recording, steps.time_s, own, shaking, last)
-                values[rolls, 2::3] = wheel[rolls]
+                if wheel is None:
+                    wheel = EncoderOdometry().estimate(recording).states
+                values[rolls, 2::3] = _acceleration_of(wheel, steps.time_s, own, shaking, last)[rolls]
             ahead = np.where(last > 0, wanted - times[last], 0.0)
             values[:, 0] += ahead * (values[:, 1] + 0.5 * ahead * values[:, 2])
             values[:, 1] += ahead * values[:, 2]
         return pd.DataFrame(values, index=recording.imu.index, columns=[*ODOMETRY, *ODOMETRY_SD])
-
-    def _wheel_acceleration(
-        self, recording: Recording, times: FloatArray, calmed: FloatArray, shaking: FloatArray, last: IntArray
-    ) -> FloatArray:
-        """The wheel's own acceleration and its sd (n, 2), for where it rolls.
-
-        An attitude filter takes the acceleration off the accelerometer. Made from that same accelerometer
-        it would take the body's own pitch away as well. What parts the two is the wheel's error, which is
-        mostly its rolling radius that changes, and is measured so.
-        """
-        wheel = EncoderOdometry().estimate(recording).states
-        read = np.searchsorted(wheel.index.to_numpy(), times + 1e-9, side="right") - 1
-        own = wheel["acceleration_mps2"].to_numpy()
-        off = power((own[read] - calmed) ** 2, RATE_HZ, both_ways=False)
-        sd = np.sqrt(wheel["acceleration_sd_mps2"].to_numpy() ** 2 + np.append(off + shaking, 0.0)[last - 1])
-        return np.column_stack([own, sd])
 
     def _model(self, recording: Recording, pulse: float, yaw: Pointing) -> LineModel:
         """Noise and constants: those of the method under their own names, with what the data sheet adds."""
@@ -348,6 +357,7 @@ class CurveMatchedOdometry:
         own = {name: value for name, value in vars(self).items() if name in LineModel._fields}
         sheets = {
             "pulse_m": pulse,
+            "jitter_m2": 0.0,
             "still_s": _STILL_S,
             "force_m2ps3": sheet.accel_noise_mpsqrts**2 + self.force_m2ps3,
             "gyro_rad2ps": sheet.gyro_noise_radpsqrts**2 + 1e-12,
@@ -431,6 +441,15 @@ def first_speed(recording: Recording) -> tuple[float, float]:
     return float(wheel["speed_mps"]), max(float(wheel["speed_sd_mps"]), STILL_SD_MPS)
 
 
+def jitter_of(read: FloatArray | None, recording: Recording) -> float:
+    """Variance that stamps add to a reading of the wheel's way, m2, by those first readings, or by all."""
+    assert recording.encoder is not None and recording.encoder_sheet is not None
+    time = recording.encoder.index.to_numpy(dtype=np.float64) if read is None else read
+    pulse = recording.encoder_sheet.pulse_m
+    way = recording.encoder["pulse_count"].to_numpy()[: len(time)].astype(np.float64) * pulse
+    return reading_variance(time, way, pulse) - pulse**2 / 12.0
+
+
 def counts_at(recording: Recording, times: FloatArray) -> tuple[FloatArray, float]:
     """Counts since the first reading, by the last one at each time (n,), and the way of a count, m.
 
@@ -460,6 +479,22 @@ def tread_share(recording: Recording) -> float:
     sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
     axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
     return WHEELSET_TREAD if axle is not None and axle.wheelset else 1.0
+
+
+def _acceleration_of(
+    wheel: pd.DataFrame, times: FloatArray, calmed: FloatArray, shaking: FloatArray, last: IntArray
+) -> FloatArray:
+    """The wheel's own acceleration and its sd (n, 2), for where it rolls.
+
+    An attitude filter takes the acceleration off the accelerometer. Made from that same accelerometer it
+    would take the body's own pitch away as well. What parts the two is the wheel's error, which is mostly its
+    rolling radius that changes, and is measured so.
+    """
+    read = np.searchsorted(wheel.index.to_numpy(), times + 1e-9, side="right") - 1
+    own = wheel["acceleration_mps2"].to_numpy()
+    off = power((own[read] - calmed) ** 2, RATE_HZ, both_ways=False)
+    sd = np.sqrt(wheel["acceleration_sd_mps2"].to_numpy() ** 2 + np.append(off + shaking, 0.0)[last - 1])
+    return np.column_stack([own, sd])
 
 
 def _held(flags: BoolArray, hold_s: float) -> BoolArray:

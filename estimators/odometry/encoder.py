@@ -269,6 +269,29 @@ def ahead(x: FloatArray, p: FloatArray, lead: float, intensity: float, out: Floa
     out[5] = p[A, A] + intensity * lead
 
 
+@njit_inline
+def _begin(p: FloatArray, q: float, speed_sd: float) -> None:
+    """Covariance of a train at speed before any reading has been followed, in place."""
+    p[:, :] = 0.0
+    p[S, S] = q * q / 12.0
+    p[V, V] = speed_sd**2
+    p[A, A] = ACCELERATION_SD_MPS2**2
+
+
+@njit_inline
+def _stand(
+    x: FloatArray, p: FloatArray, q: float, quiet: float, start_speed: float, start_acceleration: float
+) -> None:
+    """Put a train to rest that has had no pulse for a time ``quiet``, in place."""
+    x[V] = 0.0
+    x[A] = 0.0
+    p[:, :] = 0.0
+    p[S, S] = q * q / 12.0
+    # Less than one pulse in this time, in either direction: uniform in [-b, b] has sd b/sqrt(3).
+    p[V, V] = min(start_speed, q / quiet) ** 2 / 3.0
+    p[A, A] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
+
+
 @njit
 def _filter(
     time: FloatArray,
@@ -307,9 +330,7 @@ def _filter(
         resting = False
         direction = np.sign(first_speed)
         x[V] = first_speed
-        p[S, S] = q * q / 12.0
-        p[V, V] = first_speed_sd**2
-        p[A, A] = ACCELERATION_SD_MPS2**2
+        _begin(p, q, first_speed_sd)
     next_out = 0
     for k in range(len(time)):
         dt = time[k] - time[k - 1] if k > 0 else 0.0
@@ -347,23 +368,13 @@ def _filter(
         if 0 <= seen <= k and time[k] - time[0] < SHOWN_S[0]:
             resting = False
             x[S], x[V], x[A] = way, way / (time[k] - time[0]), 0.0
-            p[:, :] = 0.0
-            p[S, S] = q * q / 12.0
-            p[V, V] = SPEED_SD_MPS**2
-            p[A, A] = ACCELERATION_SD_MPS2**2
+            _begin(p, q, SPEED_SD_MPS)
         if k == shown:
             resting = False
             x[:] = anew
             p[:, :] = anew_p
         if resting:
-            x[V] = 0.0
-            x[A] = 0.0
-            quiet = max(idle, 1e-3)
-            p[:, :] = 0.0
-            p[S, S] = q * q / 12.0
-            # Less than one pulse in this time, in either direction: uniform in [-b, b] has sd b/sqrt(3).
-            p[V, V] = min(start_speed, q / quiet) ** 2 / 3.0
-            p[A, A] = min(start_acceleration, 2.0 * q / quiet**2) ** 2 / 3.0
+            _stand(x, p, q, max(idle, 1e-3), start_speed, start_acceleration)
         until = time[k + 1] if k + 1 < len(time) else np.inf
         while next_out < len(wanted) and wanted[next_out] < until:
             ahead(x, p, 0.0 if resting else wanted[next_out] - time[k], intensity, out[next_out])

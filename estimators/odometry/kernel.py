@@ -58,9 +58,9 @@ class LineModel(NamedTuple):
 
     Attributes
     ----------
-    pulse_m, still_s, gate : float
-        Way of a pulse; longest time without one that is no rest; innovations of the wheel beyond so many
-        standard deviations are slip.
+    pulse_m, jitter_m2, still_s, gate : float
+        Way of a pulse; variance that stamps which jitter add to a reading of the way; longest time without a
+        pulse that is no rest; innovations of the wheel beyond so many standard deviations are slip.
     wheel_walk_m, tread_sd, tread_length_m : float
         Random walk of `way` (m2 per m), and the Markov process `tread` in distance.
     force_m2ps3, unsteady_s05 : float
@@ -78,6 +78,7 @@ class LineModel(NamedTuple):
     """
 
     pulse_m: float
+    jitter_m2: float
     still_s: float
     gate: float
     wheel_walk_m: float
@@ -401,7 +402,7 @@ def curve_matched(
                 moving = 0.0
             resting = False
         off_way, width = wheel_reading(change, measured, x, p, pulse, dt)
-        way_variance = width * width / 12.0
+        way_variance = width * width / 12.0 + model.jitter_m2
 
         # Slip: the innovation gives it away, and it ends when wheel and filter agree on the speed again.
         if slipping:

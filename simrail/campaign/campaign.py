@@ -47,6 +47,9 @@ _MOST_CELLS, _MOST_SECONDS = 20, 600.0
 _MOST_TRIES = 3
 """How often a cell is run whose worker dies each time; then it has failed."""
 
+_LOOK_S = 5.0
+"""How often the workers are looked after while nothing comes of them."""
+
 _PACKAGES = ("numpy", "scipy", "pandas", "numba", "exudyn")
 """Whose versions a score depends on."""
 
@@ -233,7 +236,8 @@ class _Loop:
         No future that has been taken is held on to from here: a cluster keeps a result for as long as
         somebody does, and computes it again when the worker dies that has it.
         """
-        done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+        while not (done := wait(waiting, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done):
+            self.executor.look_after()
         if any(broken(error_of(future)) for future in done):
             done = set(waiting)  # all that were under way are lost; which one it was, is not known
             wait(done)

@@ -46,6 +46,10 @@ class Executor(Protocol):
         """Begin to run a function."""
         ...
 
+    def look_after(self) -> None:
+        """See to the workers now and then; nothing to do unless there is a pool of one's own."""
+        return
+
     def renew(self) -> None:
         """Go on after workers were lost; nothing to do unless there is a pool of one's own."""
         return
@@ -136,6 +140,7 @@ class _Processes(Executor):
     def __init__(self, workers: int) -> None:
         self._workers = workers
         self._pool = self._new()
+        self._dead: frozenset[int] = frozenset()
 
     def _new(self) -> Any:
         from joblib.externals.loky import ProcessPoolExecutor
@@ -161,9 +166,27 @@ class _Processes(Executor):
             future.set_exception(error)
         return future
 
+    def look_after(self) -> None:
+        """Break a pool that waits for a dead worker.
+
+        A worker that is killed as it hands in a result leaves half of it in the pipe: the pool then waits for
+        the rest, and looks after its workers no more. Who was dead before and is still on its list is one:
+        without any worker, and without an end of its own to write to, what it reads comes to an end.
+        """
+        processes = dict(self._pool._processes or {})
+        dead = frozenset(pid for pid, process in processes.items() if not process.is_alive())
+        waited_for, self._dead = dead & self._dead, dead
+        queue = self._pool._result_queue
+        if not waited_for or queue is None:
+            return
+        for pid in processes.keys() - dead:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        queue._writer.close()
+
     def renew(self) -> None:
         self._pool.shutdown(wait=True, kill_workers=True)
-        self._pool = self._new()
+        self._pool, self._dead = self._new(), frozenset()
 
     def close(self) -> None:
         self._pool.shutdown(wait=True, kill_workers=True)

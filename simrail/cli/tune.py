@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -165,41 +167,49 @@ def tune(
         "band": ("--band", band),
         "step_m": ("--step", step),
     }
+    given = {str(name): value for name, (_, value) in own.items() if value is not None}
     best = unfinished(file)
+    search: dict[str, Any] = {"settings": given, "evaluations": evaluations, "at_most": at_most}
+    with _going_on(best, own), ProgressWatcher(Console(stderr=True)) as watcher:
+        if recorded:
+            result, identified, use = tune_rides(
+                [Path(scenario), *map(Path, rides or [])],
+                file,
+                estimator=estimator,
+                options=settings or [],
+                seed=1 if seed is None else seed,
+                command=_command(context),
+                watcher=watcher,
+                **search,
+            )
+        else:
+            result, identified = tune_scenario(
+                read,
+                file,
+                estimator=str(estimator),
+                method=str(method),
+                rides=rides or [],
+                draws=draws,
+                imu=imu,
+                within_m=within,
+                command=_command(context),
+                watcher=watcher,
+                **search,
+            )
+    _show(Console(), result, identified)
+    print(f"{result.evaluations} evaluations; wrote {file}")
+    if recorded:
+        print(f"use it: {use}")
+    return DONE
+
+
+@contextmanager
+def _going_on(best: Path, own: Mapping[str | None, tuple[str, Any]]) -> Iterator[None]:
+    """Say from where a search goes on, and where it would, if it is broken off; faults by their options."""
     if best.is_file():
         print(f"going on from {best}")
     try:
-        given = {str(name): value for name, (_, value) in own.items() if value is not None}
-        with ProgressWatcher(Console(stderr=True)) as watcher:
-            if recorded:
-                result, identified, use = tune_rides(
-                    [Path(scenario), *map(Path, rides or [])],
-                    file,
-                    estimator=estimator,
-                    options=settings or [],
-                    settings=given,
-                    evaluations=evaluations,
-                    at_most=at_most,
-                    seed=1 if seed is None else seed,
-                    command=_command(context),
-                    watcher=watcher,
-                )
-            else:
-                result, identified = tune_scenario(
-                    read,
-                    file,
-                    estimator=str(estimator),
-                    method=str(method),
-                    rides=rides or [],
-                    draws=draws,
-                    imu=imu,
-                    within_m=within,
-                    settings=given,
-                    evaluations=evaluations,
-                    at_most=at_most,
-                    command=_command(context),
-                    watcher=watcher,
-                )
+        yield
     except InputError as error:
         error.field = own.get(error.field, (error.field,))[0]
         raise
@@ -207,11 +217,6 @@ def tune(
         if best.is_file():
             print(f"the best so far is in {best}; the same command goes on from there")
         raise
-    _show(Console(), result, identified)
-    print(f"{result.evaluations} evaluations; wrote {file}")
-    if recorded:
-        print(f"use it: {use}")
-    return DONE
 
 
 def _required(option: str, value: str | None) -> str:

@@ -11,13 +11,13 @@ import pandas as pd
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.errors import InputError
-from simrail.core.jit import FloatArray
+from simrail.recording.evidence.axes import SURE, Slope, means, slope
 from simrail.recording.evidence.devices import weigh_all
 from simrail.recording.evidence.judge import Evidence, refuse_wrong
+from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording, imus
 from simrail.recording.signals import FORCES
 from simrail.recording.standstill import at_rest_initially
-from simrail.track.design import TrackFrame
 
 GRAVITY_SHARE = 0.05
 """At rest an accelerometer shows gravity to 5 %, beside its bias: units differ by 9.8 times and more."""
@@ -31,19 +31,17 @@ MEAN_RATE_RADPS, MEAN_OVER_S = 0.5, 10.0
 LEAST_TURN_RAD = 0.1
 """Turn of the track on a ride, there and back counted, from which on the gyro is held against it."""
 
-LEAST_WAY_M, LEAST_VARIANCE_M2PS4 = 20.0, 0.01
-"""Way, and variance of the acceleration, from which on the accelerometer is held against the odometry."""
-
-
 LEAST_SPEED_MPS, LEAST_READINGS = 2.0, 10.0
 """Speed, and readings of a way, from which on counts are held against those of each reading."""
 
-OTHER_SIGN, OTHER_UNIT = 0.4, 4.0
-"""Slopes of a single axis beyond which (below minus, above) it has the other sign, or another unit."""
+LEAST_WAY_M, LEAST_VARIANCE_M2PS4 = 20.0, 0.01
+"""Way, and variance of the acceleration, from which on the accelerometer is held against the odometry."""
 
-SURE = 6.0
-"""Standard deviations that a slope must be off 1 before a ride is refused for it; they take seconds as
-independent, which sway and drift are not."""
+STANDING_MPS, STANDING_S = 0.05, 5
+"""Slower than this a train stands; and means over so many seconds of it are held against each other."""
+
+STANDING_RADPS = 0.02
+"""No gyro of a train that stands wanders by a degree a second; in a curve of 500 m it turns so at 36 km/h."""
 
 BEYOND_TRACK_M = 20.0
 """How far an odometry may be off the end of the track by its own error."""
@@ -76,6 +74,7 @@ def check_plausible(recording: Recording) -> Evidence:
         _check_gravity(alone, table)
         _check_turning(alone, table)
     _check_counted(recording)
+    _check_standing(recording)
     evidence = weigh_all(recording)
     refuse_wrong(evidence)
     if not recording.track.is_map:
@@ -154,6 +153,29 @@ def _check_turning(recording: Recording, table: str) -> None:
             )
 
 
+def _check_standing(recording: Recording) -> None:
+    """Refuse a way that stands still while the train turns: its counter has stopped."""
+    way = way_of(recording)
+    if way is None:
+        return
+    count, time = max(1, round(recording.imu_sheet.rate_hz)), recording.imu.index.to_numpy(dtype=np.float64)
+    moves = means(np.abs(np.interp(time, way.time_s, way.speed_mps)), count) > STANDING_MPS
+    near = np.convolve(moves, np.ones(5), mode="same") > 0.5
+    turning = means(recording.imu[GYRO[2]].to_numpy(), count)[~near]
+    if len(turning) < 2 * STANDING_S:
+        return
+    spread = float(np.ptp(means(turning, STANDING_S)))
+    limit = STANDING_RADPS + 12.0 * recording.imu_sheet.gyro_noise_radpsqrts / np.sqrt(STANDING_S)
+    if spread > limit:
+        raise InputError(
+            f"stands still while the train turns: the {way.device} has stopped",
+            field=way.device,
+            value=f"{np.degrees(spread):.2g} deg/s of turn while it stands",
+            limit=f"{np.degrees(limit):.2g} deg/s, as a gyro may wander",
+            remedy="cut the recording where it stops, or mend its sensor",
+        )
+
+
 def _check_counted(recording: Recording) -> None:
     """Refuse counts that are those of each reading, not since the start: they rise and fall with the speed.
 
@@ -175,9 +197,9 @@ def _check_counted(recording: Recording) -> None:
     width = max(1, round(1.0 / step_s))
     smooth = np.convolve(speed, np.ones(width) / width, mode="same")
     push = np.gradient(np.interp(time, stamps, smooth), 1.0 / recording.imu_sheet.rate_hz)
-    expected = _means(push, seconds)
-    slope, sd = _slope(_means(recording.imu[ACCEL[0]].to_numpy(), seconds), expected)
-    if np.var(expected) > LEAST_VARIANCE_M2PS4 and abs(slope) > 0.5 and abs(slope) > SURE * sd:
+    expected = means(push, seconds)
+    found = slope(means(recording.imu[ACCEL[0]].to_numpy(), seconds), expected)
+    if np.var(expected) > LEAST_VARIANCE_M2PS4 and abs(found.value) > max(0.5, SURE * found.sd):
         raise InputError(
             "rises and falls with the speed: it holds what was counted in each reading, not since the start",
             field="encoder.count",
@@ -189,64 +211,21 @@ def _check_counted(recording: Recording) -> None:
 
 def _check_motion(recording: Recording, odometry: pd.DataFrame) -> None:
     """Hold gyro and accelerometer against what track and odometry say, in means over a second."""
-    track = recording.track
     position, speed = odometry["position_m"].to_numpy(), odometry["speed_mps"].to_numpy()
     for place in (position.min(), position.max()):
         _check_on_track(recording, float(place), field="odometry.position_m")
     seconds = max(1, round(recording.imu_sheet.rate_hz))
-    frame = track.frame_extended(_means(position, seconds))
-    bend = frame.rates[:, 2] * _means(speed, seconds)
+    frame = recording.track.frame_extended(means(position, seconds))
+    bend = frame.rates[:, 2] * means(speed, seconds)
     if np.abs(bend).sum() > LEAST_TURN_RAD:
-        _judge_turn(recording, _slope(_means(recording.imu[GYRO[2]].to_numpy(), seconds), bend))
+        _judge_turn(recording, slope(means(recording.imu[GYRO[2]].to_numpy(), seconds), bend))
     acceleration = odometry["acceleration_mps2"].to_numpy()
-    along = _means(acceleration, seconds) - recording.gravity_mps2 * np.sin(frame.pitch_rad)
+    along = means(acceleration, seconds) - recording.gravity_mps2 * np.sin(frame.pitch_rad)
     # A noisy regressor flattens the line: only an acceleration that the odometry knows is one to hold to.
     noise = float(np.mean(odometry["acceleration_sd_mps2"].to_numpy() ** 2))
     if np.ptp(position) > LEAST_WAY_M and np.var(along) > max(2.0 * noise, LEAST_VARIANCE_M2PS4):
-        x, y = (_slope(_means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
+        x, y = (slope(means(recording.imu[name].to_numpy(), seconds), along) for name in ACCEL[:2])
         _judge_push(x, y)
-    _judge_axes(recording, frame, _means(speed, seconds), seconds)
-
-
-def _judge_axes(recording: Recording, frame: TrackFrame, speed: FloatArray, seconds: int) -> None:
-    """Hold single axes against the line: one alone may have another unit, another sign, or another's place.
-
-    Roll rates of the transitions for the gyro's X (and Y, for axes that are swapped), what speed and cant
-    leave of a curve for the accelerometer's Y.
-    """
-    twist = frame.k[:, 0] * speed
-    gravity = recording.gravity_mps2 * np.cos(frame.pitch_rad) * np.sin(frame.roll_rad)
-    beside = frame.k[:, 2] * speed**2 + gravity
-    means = {name: _means(recording.imu[name].to_numpy(), seconds) for name in (*GYRO[:2], ACCEL[1])}
-    roll, other = _slope(means[GYRO[0]], twist), _slope(means[GYRO[1]], twist)
-    side = _slope(means[ACCEL[1]], beside)
-    lines = (
-        (GYRO[0], roll, "the roll rate of the transitions"),
-        (ACCEL[1], side, "what speed and cant leave of the curves"),
-    )
-    for name, (slope, sd), of in lines:
-        if slope < -OTHER_SIGN and -slope > SURE * sd:
-            problem, remedy = f"goes against {of}", "give that column alone the other sign, or mend the axes"
-        elif slope > OTHER_UNIT and slope - 1.0 > SURE * sd:
-            problem, remedy = f"is many times {of}", "mend the unit: one axis alone has another one"
-        else:
-            continue
-        raise InputError(
-            problem,
-            field=f"imu.{name}",
-            value=f"{slope:.3g} +- {sd:.2g} times",
-            limit="about 1",
-            remedy=remedy,
-        )
-    swapped = abs(other[0]) > OTHER_SIGN and abs(other[0]) > SURE * other[1]
-    if swapped and abs(roll[0]) < OTHER_SIGN and 1.0 - roll[0] > SURE * roll[1]:
-        raise InputError(
-            "does not roll in the transitions, but its Y does: their columns are swapped",
-            field=f"imu.{GYRO[0]}",
-            value=f"{roll[0]:.2g} times the roll rate along X, {other[0]:.2g} along Y",
-            limit="about 1, and 0",
-            remedy="mend the order in columns.gyro, or the axes",
-        )
 
 
 def _check_on_track(recording: Recording, place: float, *, field: str) -> None:
@@ -261,17 +240,16 @@ def _check_on_track(recording: Recording, place: float, *, field: str) -> None:
         )
 
 
-def _judge_turn(recording: Recording, line: tuple[float, float]) -> None:
-    slope, sd = line
-    if 0.2 < slope < 5.0 or abs(slope - 1.0) < SURE * sd:
+def _judge_turn(recording: Recording, found: Slope) -> None:
+    if 0.2 < found.value < 5.0 or abs(found.value - 1.0) < SURE * found.sd:
         return
-    if slope <= -0.2:
+    if found.value <= -0.2:
         problem = "turns against the curves of the track"
         remedy = (
             "mend the axes; or the direction: a train that ran towards smaller s has falling pulse counts "
             "(reverse = true)"
         )
-    elif slope < 0.2:
+    elif found.value < 0.2:
         problem = "does not turn with the curves of the track"
         remedy = "mend units.gyro (rad/s?), the axes, start_position_m, or the track"
     else:
@@ -280,58 +258,31 @@ def _judge_turn(recording: Recording, line: tuple[float, float]) -> None:
     raise InputError(
         problem,
         field=f"imu.{GYRO[2]}",
-        value=f"{slope:.3g} times the curvature of {recording.track.name!r} times speed",
+        value=f"{found.value:.3g} times the curvature of {recording.track.name!r} times speed",
         limit="about 1",
         remedy=remedy,
     )
 
 
-def _judge_push(x: tuple[float, float], y: tuple[float, float]) -> None:
-    if x[0] > OTHER_UNIT and x[0] - 1.0 > SURE * x[1]:
-        raise InputError(
-            "pushes many times as much as the train gains speed",
-            field=f"imu.{ACCEL[0]}",
-            value=f"{x[0]:.3g} +- {x[1]:.2g} times the acceleration of the odometry",
-            limit="about 1",
-            remedy="mend the unit: one axis alone has another one; or the odometry",
-        )
-    if x[0] > 0.4 or 1.0 - x[0] < SURE * x[1]:
+def _judge_push(x: Slope, y: Slope) -> None:
+    if x.value > 0.4 or 1.0 - x.value < SURE * x.sd:
         return
-    sideways = abs(y[0]) > max(abs(x[0]), 0.4)
-    if x[0] < -0.4 and not sideways:
+    sideways = abs(y.value) > max(abs(x.value), 0.4)
+    if x.value < -0.4 and not sideways:
         problem = "pushes backwards when the train gains speed"
         remedy = (
             'a device that looks backwards has axes = ["-x", "-y", "z"]; a train that ran towards smaller s '
             "has falling pulse counts (reverse = true)"
         )
     elif sideways:
-        axes = '["y", "-x", "z"]' if y[0] > 0.0 else '["-y", "x", "z"]'
+        axes = '["y", "-x", "z"]' if y.value > 0.0 else '["-y", "x", "z"]'
         problem, remedy = "pushes sideways when the train gains speed", f"turn the axes as by axes = {axes}"
     else:
         problem, remedy = "does not push when the train gains speed", "mend the axes, or the odometry"
     raise InputError(
         problem,
         field=f"imu.{ACCEL[0]}",
-        value=f"{x[0]:.2g} times the acceleration of the odometry along X, {y[0]:.2g} along Y",
+        value=f"{x.value:.2g} times the acceleration of the odometry along X, {y.value:.2g} along Y",
         limit="about 1, and 0",
         remedy=remedy,
     )
-
-
-def _means(values: FloatArray, count: int) -> FloatArray:
-    """Means (n // count,) of a signal over `count` samples each; of all of it, if it is shorter."""
-    count = min(count, len(values))
-    whole = len(values) // count * count
-    means: FloatArray = values[:whole].reshape(-1, count).mean(axis=1)
-    return means
-
-
-def _slope(measured: FloatArray, expected: FloatArray) -> tuple[float, float]:
-    """Slope of the least-squares line measured = a + slope * expected, and its standard deviation (white)."""
-    x, y = expected - expected.mean(), measured - measured.mean()
-    power = float(x @ x)
-    if power == 0.0:
-        return 1.0, np.inf
-    slope = float(x @ y) / power
-    rest = y - slope * x
-    return slope, float(np.sqrt(rest @ rest / len(x) / power))

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
+from simrail.core.resample import MOST_LOST
 from simrail.recording.recording import ImuSheet, MagnetometerSheet
 
 APART = 10.0
@@ -38,6 +39,10 @@ STUCK_S, STUCK_SAMPLES = 2.0, 60
 sample equals the last is 0.65 even where the noise is a fifth of its sheet's, so 6e-12 of sixty."""
 
 STUCK_COUNTS = 2.0
+
+HELD_SAMPLES = 10
+"""So many times in a row no living device repeats all three axes at once: of three whose noise is a fifth of
+the sheet's each does by chance 0.65 of the time, so all of them 10 times in 2e-6."""
 
 LIVING = 0.5
 """Standard deviation of second differences, over the noise of the sheet, of a device that measures: sqrt(6)
@@ -130,7 +135,8 @@ def check_samples(
     ------
     InputError
         At the first of: zeros on all axes at once amid a signal; samples beyond the range that stand apart
-        from the rest; numbers that mark missing samples; one number for seconds, where the sheet has noise.
+        from the rest; numbers that mark missing samples; one number for seconds, where the sheet has noise;
+        all axes of an IMU repeated, ten times in a row or in more than `MOST_LOST` of the samples.
     """
 
     def place(sample: int) -> str:
@@ -142,6 +148,8 @@ def check_samples(
         if apart.any():
             raise _no_measurement(channel, apart, bounds, place, file)
     _check_stuck(channels, bounds, time, place, file)
+    if kind != "field":  # a slow magnetometer is often logged at the rate of the IMU
+        _check_held(channels, bounds, time, place, file)
 
 
 def markers(
@@ -306,12 +314,70 @@ def _check_stuck(
             continue
         others = any(lives(other, first, end) for other in range(len(channels)) if other != axis)
         if others or (lives(axis, first - STUCK_SAMPLES, first) and lives(axis, end, end + STUCK_SAMPLES)):
+            held, least, most = channel.values[first], channel.values.min(), channel.values.max()
+            ends = least < most and held in (least, most)
             raise InputError(
-                f"repeats one number from {place(first)} to time_s = {time[end - 1]:.6g}; "
-                "the device is stuck",
+                f"repeats one number from {place(first)} to time_s = {time[end - 1]:.6g}; the device is "
+                + ("saturated: it shows nothing beyond that" if ends else "stuck"),
                 file=file,
                 field=channel.name,
-                value=f"{channel.values[first] / channel.si:.6g} {channel.unit}",
+                value=f"{held / channel.si:.6g} {channel.unit}",
                 limit=f"noise of {noise / channel.si:.2g} {channel.unit}, as {bounds.sheet} says",
-                remedy="cut the recording there, or mend the logger",
+                remedy="set a wider range of the device, or cut the recording there"
+                if ends
+                else "cut the recording there, or mend the logger",
             )
+
+
+def _check_held(
+    channels: tuple[Channel, ...],
+    bounds: Bounds,
+    time: FloatArray,
+    place: Callable[[int], str],
+    file: str | None,
+) -> None:
+    """Refuse samples that a logger wrote again where it had no new ones: all axes at once are the last ones.
+
+    Only of a device that shows its noise, of several counts, in the other samples.
+    """
+    span = float(time[-1] - time[0]) if len(time) else 0.0
+    if not 0.0 < span < np.inf or len(time) <= STUCK_SAMPLES:
+        return
+    rate = (len(time) - 1) / span
+    noise = bounds.noise * np.sqrt(rate)
+    steps = np.array([np.abs(np.diff(channel.values)) for channel in channels])
+    same = np.all(steps <= 1e-9 * noise, axis=0)
+    if noise == 0.0 or not same.any():
+        return
+    new = np.concatenate([[True], ~same])
+    if new.sum() < STUCK_SAMPLES:
+        return
+    for channel, step in zip(channels, steps, strict=True):
+        count = float(step[step > 1e-9 * noise].min(initial=np.inf))
+        if noise < STUCK_COUNTS * count or float(np.diff(channel.values[new], n=2).std()) < LIVING * noise:
+            return
+    starts = np.flatnonzero(new)
+    runs = np.diff(np.append(starts, len(new)))
+    longest, share = int(np.argmax(runs)), float(same.mean())
+    if runs[longest] > HELD_SAMPLES:
+        first, end = int(starts[longest]) + 1, int(starts[longest] + runs[longest])
+        raise InputError(
+            f"repeats the sample before on all axes from {place(first)} to time_s = {time[end - 1]:.6g}; "
+            "nothing was measured there",
+            file=file,
+            field=", ".join(channel.name for channel in channels),
+            value=f"{end - first} times",
+            limit=f"{HELD_SAMPLES} times",
+            remedy="drop those lines, so that they are a gap; or cut the recording there",
+        )
+    if share > MOST_LOST:
+        raise InputError(
+            f"repeats the sample before on all axes, first in {place(int(np.argmax(same)) + 1)}: they were "
+            "lost, or the logger reads faster than the device measures",
+            file=file,
+            field=", ".join(channel.name for channel in channels),
+            value=f"{share:.1%} of the samples",
+            limit=f"{MOST_LOST:.0%}",
+            remedy=f"log at the rate of the device, some {rate * (1.0 - share):.3g} Hz; or drop the lines "
+            "that repeat, so that they are gaps",
+        )

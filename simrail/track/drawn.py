@@ -1,8 +1,8 @@
 """A design made of what other programs write: pieces of linear curvature, cant by places, gradients.
 
-Readers of foreign files (`simrail.track.landxml`, `simrail.track.curvature_csv`) hand over what a file says;
-`drawn_design` makes elements of it, states what they meet with, and tells what was rounded, smoothed or left
-out.
+Readers of foreign files (`simrail.track.landxml`, `simrail.track.ifc`, `simrail.track.curvature_csv`) hand
+over what a file says, by what they share of reading it; `drawn_design` makes elements of it, states what they
+meet with, and tells what was rounded, smoothed or left out.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from simrail.core.errors import InputError
+from simrail.core.errors import InputError, did_you_mean
 from simrail.track.design import TrackDesign
 from simrail.track.elements import (
     RAIL_BASE_M,
@@ -32,6 +32,9 @@ SNAP_1PM = 1e-7
 
 STRAIGHT_1PM = 1e-8
 """Curvature below which a piece is straight: a radius of 100 000 km."""
+
+KINK_RAD = 1e-3
+"""Difference of the directions of two pieces where they meet from which on the line has a kink."""
 
 SMOOTHING_M = 5.0
 """Length over which steps of curvature are smoothed unless another one is asked for: a bogie's base."""
@@ -98,6 +101,76 @@ class Drawn:
     rail_base_m: float = RAIL_BASE_M
     breaks: list[tuple[float, float, float]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+
+def chosen_alignment(names: Sequence[str], wanted: str | None, *, kind: str) -> int:
+    """Number of the alignment that is meant, of those of a file.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Theirs.
+    wanted : str, optional
+        Name of one; needed where there are several.
+    kind : str
+        What the file calls one.
+
+    Raises
+    ------
+    InputError
+        If there is none, none of this name, or several of which none is named.
+    """
+    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    if not names:
+        raise InputError(f"has no {kind}", limit=f">= 1 {kind}")
+    if wanted is None and len(names) == 1:
+        return 0
+    if wanted not in names:
+        raise InputError(
+            "has several alignments" if wanted is None else "has no alignment of this name",
+            field="--alignment",
+            value=len(names) if wanted is None else wanted,
+            limit=f"one of {listed}",
+            remedy=f"name one: --alignment {names[0]!r}" if wanted is None else did_you_mean(wanted, names),
+        )
+    return list(names).index(wanted)
+
+
+def refuse_kink(turned_rad: float, field: str, *, remedy: str, problem: str = "the line has a kink") -> None:
+    """Refuse pieces whose directions differ by an angle where they meet; whole turns aside.
+
+    Raises
+    ------
+    InputError
+        If the angle is more than `KINK_RAD`.
+    """
+    kink = math.remainder(turned_rad, 2.0 * math.pi)
+    if abs(kink) > KINK_RAD:
+        raise InputError(
+            problem,
+            field=field,
+            value=f"{1e3 * kink:.3f} mrad",
+            limit=f"{1e3 * KINK_RAD:g} mrad",
+            remedy=remedy,
+        )
+
+
+def add_cant(drawn: Drawn, at_m: float, cross_slope_m: float) -> None:
+    """Add a station of cant behind those that there are; a step goes over a length that a rail can take.
+
+    Parameters
+    ----------
+    drawn : Drawn
+        Takes the station, and a note where the cant steps.
+    at_m, cross_slope_m : float
+        Its place, and the height of the left rail over the right one.
+    """
+    if drawn.cant and at_m <= drawn.cant[-1].at_m + 1e-6:
+        if abs(cross_slope_m - drawn.cant[-1].cross_slope_m) > 1e-9:
+            drawn.notes.append(f"cant steps at {at_m:.3f} m: the second value is laid 1 m behind")
+            drawn.cant.append(CantStation(drawn.cant[-1].at_m + 1.0, cross_slope_m))
+        return
+    drawn.cant.append(CantStation(at_m, cross_slope_m))
 
 
 def drawn_design(drawn: Drawn, *, step_smoothing_m: float | None = None) -> TrackDesign:

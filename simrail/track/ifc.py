@@ -12,21 +12,16 @@ IFC 4.3.2 (ISO 16739-1:2024), the entities named above.
 from __future__ import annotations
 
 import importlib
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from simrail.core.errors import InputError, did_you_mean, joined
-from simrail.track.design import CantStation
-from simrail.track.drawn import Drawn, Piece, Turn
+from simrail.core.errors import InputError, joined
+from simrail.track.drawn import Drawn, Piece, Turn, add_cant, chosen_alignment, refuse_kink
 
 PLAN = ("LINE", "CIRCULARARC", "CLOTHOID")
 PROFILE = ("CONSTANTGRADIENT", "PARABOLICARC", "CIRCULARARC")
 CANT = ("CONSTANTCANT", "LINEARTRANSITION")
-
-KINK_RAD = 1e-3
-"""As of LandXML: difference of directions where segments meet from which on the line has a kink."""
 
 SHORT_M = 1e-6
 """Segments of no length end each part of an alignment."""
@@ -106,20 +101,7 @@ def _nested(item: Any) -> Iterator[Any]:
 def _alignment(model: Any, wanted: str | None) -> Any:
     found = model.by_type("IfcAlignment")
     names = [one.Name or one.GlobalId for one in found]
-    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    if not found:
-        raise InputError("has no IfcAlignment", limit=">= 1 IfcAlignment")
-    if wanted is None and len(found) == 1:
-        return found[0]
-    if wanted not in names:
-        raise InputError(
-            "has several alignments" if wanted is None else "has no alignment of this name",
-            field="--alignment",
-            value=len(found) if wanted is None else wanted,
-            limit=f"one of {listed}",
-            remedy=f"name one: --alignment {names[0]!r}" if wanted is None else did_you_mean(wanted, names),
-        )
-    return found[names.index(wanted)]
+    return found[chosen_alignment(names, wanted, kind="IfcAlignment")]
 
 
 def _station(alignment: Any, unit: float) -> float:
@@ -166,12 +148,11 @@ def _plan(drawn: Drawn, part: Any, unit: float, angle: float) -> None:
         told = angle * float(said.StartDirection)
         if heading is None:
             drawn.start_yaw_rad = heading = told
-        elif abs(math.remainder(told - heading, 2.0 * math.pi)) > KINK_RAD:
-            raise InputError(
-                "the line has a kink, or a radius has the wrong sign",
-                field=f"{where}.StartDirection",
-                value=f"{1e3 * math.remainder(told - heading, 2.0 * math.pi):.3f} mrad",
-                limit=f"{1e3 * KINK_RAD:g} mrad",
+        else:
+            refuse_kink(
+                told - heading,
+                f"{where}.StartDirection",
+                problem="the line has a kink, or a radius has the wrong sign",
                 remedy="put an arc there, or mend the direction or the radius (positive to the left)",
             )
         heading += 0.5 * (bends[0] + bends[1]) * length
@@ -194,12 +175,7 @@ def _cant(drawn: Drawn, part: Any, unit: float) -> None:
         if said.PredefinedType == "LINEARTRANSITION" and None not in ends:
             last = unit * (float(ends[0]) - float(ends[1]))
         for at, level in ((begin, first), (begin + unit * float(said.HorizontalLength), last)):
-            if drawn.cant and at <= drawn.cant[-1].at_m + 1e-6:
-                if abs(level - drawn.cant[-1].cross_slope_m) > 1e-9:
-                    drawn.notes.append(f"cant steps at {at:.3f} m: the second value is laid 1 m behind")
-                    drawn.cant.append(CantStation(drawn.cant[-1].at_m + 1.0, level))
-                continue
-            drawn.cant.append(CantStation(at, level))
+            add_cant(drawn, at, level)
 
 
 def _profile(drawn: Drawn, part: Any, unit: float) -> None:

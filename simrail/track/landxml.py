@@ -21,9 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simrail.core.errors import InputError, did_you_mean
-from simrail.track.design import CantStation
-from simrail.track.drawn import Drawn, Piece, Turn
+from simrail.core.errors import InputError
+from simrail.track.drawn import Drawn, Piece, Turn, add_cant, chosen_alignment, refuse_kink
 
 _UNITS_M = {
     "meter": 1.0,
@@ -37,8 +36,6 @@ _UNITS_M = {
     "inch": 0.0254,
     "mile": 1609.344,
 }
-_KINK_RAD = 1e-3
-"""Difference of two elements' directions where they meet from which on the line has a kink."""
 _NORMAL_GAUGE_M = (1.40, 1.52)
 """Gauges whose cant is over 1500 mm, from one rail's middle to the other's, also where that is so called."""
 _HEAD_M = 0.065
@@ -127,28 +124,7 @@ def _unit(root: ET.Element) -> tuple[float, bool]:
 def _alignment(root: ET.Element, wanted: str | None) -> ET.Element:
     found = [one for group in _children(root, "Alignments") for one in _children(group, "Alignment")]
     names = [one.get("name", "") for one in found]
-    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    if not found:
-        raise InputError("has no Alignment", limit=">= 1 Alignment")
-    if wanted is None:
-        if len(found) > 1:
-            raise InputError(
-                "has several alignments",
-                field="--alignment",
-                value=len(found),
-                limit=f"one of {listed}",
-                remedy=f"name one: --alignment {names[0]!r}",
-            )
-        return found[0]
-    if wanted not in names:
-        raise InputError(
-            "has no alignment of this name",
-            field="--alignment",
-            value=wanted,
-            limit=f"one of {listed}",
-            remedy=did_you_mean(wanted, names),
-        )
-    return found[names.index(wanted)]
+    return found[chosen_alignment(names, wanted, kind="Alignment")]
 
 
 def _float(element: ET.Element, key: str, *, default: float | None = None) -> float:
@@ -276,15 +252,11 @@ def _place(drawn: Drawn, parts: Sequence[_Part]) -> None:
     for before, after in itertools.pairwise(parts):
         station += before.piece.length_m
         if before.end_rad is not None and after.start_rad is not None:
-            kink = math.remainder(after.start_rad - before.end_rad, 2.0 * math.pi)
-            if abs(kink) > _KINK_RAD:
-                raise InputError(
-                    "the line has a kink",
-                    field=f"{before.kind} to {after.kind} at {station:.3f} m",
-                    value=f"{1e3 * kink:.3f} mrad",
-                    limit=f"{1e3 * _KINK_RAD:g} mrad",
-                    remedy="put an arc there, or mend rot or the coordinates",
-                )
+            refuse_kink(
+                after.start_rad - before.end_rad,
+                f"{before.kind} to {after.kind} at {station:.3f} m",
+                remedy="put an arc there, or mend rot or the coordinates",
+            )
     first = parts[0]
     if first.start is None or first.start_rad is None:
         drawn.notes.append("no coordinates at the start: the line begins at 0, 0 to the east")
@@ -366,13 +338,7 @@ def _cant(drawn: Drawn, alignment: ET.Element, unit: float, *, inches: bool) -> 
         bend = {"cw": -1.0, "ccw": 1.0}.get(turned or "", _curvature(drawn, at))
         bend = -bend if station.get("adverse", "false").lower() == "true" else bend
         level = scale * height * (-1.0 if bend >= 0.0 else 1.0)
-        if drawn.cant and at <= drawn.cant[-1].at_m + 1e-9:
-            if abs(level - drawn.cant[-1].cross_slope_m) > 1e-9:
-                # A step of cant is read as one over a length that a rail can take.
-                drawn.notes.append(f"cant steps at {at:.3f} m: the second value is laid 1 m behind")
-                drawn.cant.append(CantStation(drawn.cant[-1].at_m + 1.0, level))
-            continue
-        drawn.cant.append(CantStation(at, level))
+        add_cant(drawn, at, level)
 
 
 def _rail_base(drawn: Drawn, table: ET.Element, unit: float) -> float:

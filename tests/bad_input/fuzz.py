@@ -39,50 +39,30 @@ from simrail.cli.main import call
 from simrail.cli.templates import write_template
 from simrail.core.toml_files import shipped
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "shared"))
+from shortest_ride import DESIGN, SHORTEST_RIDE
+
 MOST_S = 20
 
-SCENARIO = """
-title = "t"
-seed = 3
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-step_s = 0.0005
-truth_rate_hz = 250.0
-monte_carlo = { sensor_draws = 2 }
-[[ride]]
-name = "line"
-start_m = 40.0
-end_m = 60.0
-speed_kmh = 10.0
-acceleration_mps2 = 1.5
-jerk_mps3 = 1.5
-rest_s = 1.0
-final_rest_s = 1.0
+SCENARIO = (
+    SHORTEST_RIDE.replace("seed = 3", "seed = 3\nstep_s = 0.0005\nmonte_carlo = { sensor_draws = 2 }")
+    + """
+[imu.sheet]
+gyro_turn_on_bias_degps = 0.1
 [irregularity]
 spectrum = "erri_b176_low"
 wavelengths_m = [3.0, 100.0]
 fade_m = 20.0
-[encoder]
-wheel = "trailing.left"
-pulses_per_revolution = 1024
-rate_hz = 250.0
-[[imu]]
-name = "axle"
-grade = "consumer"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
-[imu.sheet]
-gyro_turn_on_bias_degps = 0.1
-[[estimator]]
-name = "design"
-method = "DesignAngles"
-[[estimator]]
-name = "ekf"
-method = "AttitudeEkf"
 [score]
 windows = ["whole"]
 """
+    + DESIGN
+    + """
+[[estimator]]
+name = "ekf"
+method = "AttitudeEkf"
+"""
+)
 
 ODD_TEXTS = [
     "",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import random
 import signal
+import struct
+import sys
 import threading
 import time
 import warnings
@@ -169,6 +171,8 @@ def test_killed_workers_lose_nothing(
 KILLER = """
 import os
 import signal
+import struct
+import sys
 from dataclasses import dataclass
 
 from simrail.estimators.baselines import DesignAngles
@@ -259,3 +263,26 @@ def test_a_worker_that_is_replaced_is_no_news() -> None:
             for words in ("A worker stopped while some jobs were given to the executor.", "something else"):
                 warnings.warn(words, UserWarning, stacklevel=1)
     assert [str(warning.message) for warning in shown] == ["something else"]
+
+
+def half_a_result() -> None:
+    """What a worker does that is killed as it hands in a result."""
+    frame = sys._getframe()
+    while frame.f_back is not None and "result_queue" not in frame.f_locals:
+        frame = frame.f_back
+    os.write(frame.f_locals["result_queue"]._writer.fileno(), struct.pack("!i", 1000) + b"half")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_pool_that_waits_for_a_dead_worker_is_broken_and_renewed() -> None:
+    with executor_of(2, None, cells=FEW_CELLS + 1) as executor:
+        assert executor.submit(os.getpid).result()
+        killed, other = executor.submit(half_a_result), executor.submit(time.sleep, 0.0)
+        while not killed.done():
+            executor.look_after()
+            time.sleep(0.1)
+        assert executors.broken(killed.exception())
+        assert other.done()
+        executor.renew()
+        executor.look_after()
+        assert executor.submit(os.getpid).result()

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+import operator
+import re
+import subprocess
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +17,10 @@ import pytest
 from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
+from simrail.recording.evidence.axes import weigh_axes
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
+from simrail.track.design import Straight
 
 BASE = Path(__file__).parent / "cases" / "00-base"
 
@@ -94,7 +101,7 @@ def swapped(frame: pd.DataFrame) -> pd.DataFrame:
 @pytest.mark.parametrize(
     ("plant", "said"),
     [
-        (times("ax", 9.80665), r"accel_x_mps2: pushes many times.*one axis alone"),
+        (times("ax", 9.80665), r"accel_x_mps2: is many times.*one axis alone"),
         (times("ay", 9.80665), r"accel_y_mps2: is many times.*9.8.*one axis alone"),
         (times("ay", -1.0), r"accel_y_mps2: goes against what speed and cant leave.*that column alone"),
         (times("wx", -1.0), r"gyro_x_radps: goes against the roll rate.*that column alone"),
@@ -142,3 +149,228 @@ def test_a_packed_file_is_to_be_unpacked_and_a_radius_in_inches_is_known(tmp_pat
     inches = ("wheel_radius_m = 0.2900", "wheel_radius_m = 22.83")
     with pytest.raises(InputError, match=r"0\.2899 from a diameter in inches"):
         read_signals(written(tmp_path, (BASE / "ride.csv").read_text(), inches))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-8-sig"])
+@pytest.mark.parametrize("head", [True, False])
+def test_text_of_other_widths_is_read(encoding: str, head: bool, sound: Recording, tmp_path: Path) -> None:
+    """Windows' "Unicode" with its mark and without, and a mark before a file without names."""
+    numbers = [('"t"', "1"), ('["wx","wy","wz"]', "[2, 3, 4]"), ('["ax","ay","az"]', "[5, 6, 7]")]
+    text = logged().to_csv(index=False, header=head)
+    pairs = [] if head else [*numbers, ('"pulses"', "8")]
+    assert_as_sound(read_signals(written(tmp_path, text, *pairs, encoding=encoding)), sound)
+
+
+def test_a_fault_in_a_wide_text_is_told_by_its_line(tmp_path: Path) -> None:
+    text = (BASE / "ride.csv").read_text().replace("\n20.0,", "\nabc,", 1)
+    line = text.split("\nabc,")[0].count("\n") + 2
+    with pytest.raises(InputError, match=rf"holds no number in line {line}: |in line {line};"):
+        read_signals(written(tmp_path, text, encoding="utf-16"))
+
+
+def in_long_form(frame: pd.DataFrame) -> pd.DataFrame:
+    molten = frame.melt(id_vars="t", var_name="channel", value_name="value")
+    return molten.sort_values("t", kind="stable")
+
+
+@pytest.mark.parametrize("time", ["t", "time"])
+def test_long_form_is_told_and_its_remedy_makes_it_wide(
+    time: str, sound: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = in_long_form(logged()).rename(columns={"t": time}).to_csv(index=False)
+    stamped = ('time = "t"', f'time = "{time}"')
+    folder = written(tmp_path, text, stamped)
+    with pytest.raises(InputError, match=r"long form.*'channel'.*wx, wy, wz") as refused:
+        read_signals(folder)
+    code = re.search('python -c "([^"]*)"', str(refused.value))
+    assert code is not None and "\n" not in str(refused.value)
+    monkeypatch.chdir(tmp_path)
+    exec(code[1], {})
+    ride = (tmp_path / "ride.toml").read_text().replace('"ride.csv"', '"ride_wide.csv"')
+    (tmp_path / "ride.toml").write_text(ride)
+    assert_as_sound(read_signals(folder), sound)
+
+
+def sentence(words: str) -> str:
+    """A line as NMEA 0183 has it."""
+    return f"${words}*{functools.reduce(operator.xor, words.encode()):02X}"
+
+
+def test_sentences_with_checksums_are_told_and_the_remedy_makes_a_table_of_them(
+    sound: Recording, tmp_path: Path
+) -> None:
+    rows = logged().to_csv(index=False, header=False).split()
+    fix = sentence("GPGGA,121530.00,4807.03,N,01131.00,E,1,08,0.9,545.4,M,46.9,M,,")
+    text = "\n".join(line for row in rows for line in (sentence(f"PIMU,{row}"), fix)[: 1 + (row[-1] == "0")])
+    folder = written(tmp_path, text)
+    with pytest.raises(InputError, match=r"sentences with checksums") as refused:
+        read_signals(folder)
+    command = re.search(r"(sed -n .*\.csv),", str(refused.value))
+    assert command is not None and "\n" not in str(refused.value)
+    subprocess.run(command[1], shell=True, cwd=tmp_path, check=True)
+    numbers = [('"t"', "1"), ('["wx","wy","wz"]', "[2, 3, 4]"), ('["ax","ay","az"]', "[5, 6, 7]")]
+    ride = (BASE / "ride.toml").read_text().replace('"ride.csv"', '"ride_PIMU.csv"')
+    for old, new in [*numbers, ('"pulses"', "8")]:
+        ride = ride.replace(old, new)
+    (tmp_path / "ride.toml").write_text(ride)
+    assert_as_sound(read_signals(folder), sound)
+
+
+@pytest.mark.parametrize(
+    ("flipped", "told"),
+    [
+        (["wy"], ["gyro_y_radps: goes against the pitch rate"]),
+        (["ax"], ["accel_x_mps2: goes against the change of speed"]),
+        (["wz"], ["gyro_z_radps: goes against the curves"]),
+        pytest.param(
+            ["wx", "wz", "ay"],
+            ["gyro_x_radps: goes", "gyro_z_radps: goes", "accel_y_mps2: goes"],
+            marks=pytest.mark.long,
+        ),
+        pytest.param(["ax", "ay"], ["accel_x_mps2: goes", "accel_y_mps2: goes"], marks=pytest.mark.long),
+        pytest.param(["ax", "ay", "wx", "wy"], ["imu.yaw_deg: pushes backwards"], marks=pytest.mark.long),
+        pytest.param(["wx", "wy", "wz"], ["gyro_z_radps: turns against"], marks=pytest.mark.long),
+    ],
+)
+def test_columns_of_the_other_sign_are_named_and_a_device_that_is_turned_is_one(
+    flipped: list[str], told: list[str], tmp_path: Path
+) -> None:
+    """Left-handed axes, too; what is a device as a whole is mended as one."""
+    frame = logged()
+    folder = written(tmp_path, frame.assign(**{name: -frame[name] for name in flipped}).to_csv(index=False))
+    with pytest.raises(InputError) as refused:
+        check_plausible(with_odometry(read_signals(folder), "encoder"))
+    lines = str(refused.value).splitlines()
+    assert len(lines) == len(told)
+    assert all(words in line for words, line in zip(told, lines, strict=True))
+
+
+def axis_verdicts(recording: Recording) -> dict[str, str]:
+    return {finding.key.removeprefix("alone_"): finding.verdict for finding in weigh_axes(recording)}
+
+
+def test_each_axis_of_the_sound_ride_is_sound_and_on_a_level_straight_line_not_judged(
+    sound: Recording,
+) -> None:
+    assert set(axis_verdicts(sound).values()) == {"sound"}
+    straight = replace(sound.track, elements=(Straight(sound.track.length_m),))
+    assert axis_verdicts(replace(sound, track=straight)) == {
+        "gyro_x_radps": "could not be judged",
+        "gyro_y_radps": "could not be judged",
+        "gyro_z_radps": "could not be judged",
+        "accel_x_mps2": "sound",
+        "accel_y_mps2": "could not be judged",
+    }
+
+
+TRIADS = ["wx", "wy", "wz", "ax", "ay", "az"]
+
+
+def held(frame: pd.DataFrame, rows: Iterable[int]) -> pd.DataFrame:
+    """Samples of the IMU that a logger wrote again."""
+    frame = frame.copy()
+    for row in sorted(rows):
+        frame.loc[row, TRIADS] = frame.loc[row - 1, TRIADS].to_numpy()
+    return frame
+
+
+def stopped(frame: pd.DataFrame, row: int) -> pd.DataFrame:
+    return frame.assign(pulses=frame["pulses"].where(frame.index < row, frame.loc[row, "pulses"]))
+
+
+@pytest.mark.parametrize(
+    ("plant", "said"),
+    [
+        (lambda frame: held(frame, range(11, 800, 13)), r"wx, wy, wz: repeats the sample before.*7\.6%.*5%"),
+        (lambda frame: held(frame, range(1, 801, 2)), r"reads faster than.*50\.1%.*some 9\.98 Hz"),
+        (lambda frame: held(frame, range(300, 320)), r"nothing was measured there.*20 times"),
+        (lambda frame: stopped(frame, 0), "encoder: stands still while the train turns"),
+        (lambda frame: stopped(frame, 300), "encoder: stands still while the train turns"),
+        (lambda frame: frame.assign(wz=frame["wz"].clip(lower=-1.0)), r"wz: .*saturated.*wider range"),
+        (times("wx", np.pi / 180.0), r"gyro_x_radps: has next to nothing of the roll rate.*one axis alone"),
+    ],
+)
+def test_what_a_logger_held_and_what_has_stopped_is_told(
+    plant: Callable[[pd.DataFrame], pd.DataFrame], said: str, tmp_path: Path
+) -> None:
+    folder = written(tmp_path, plant(logged()).to_csv(index=False))
+    with pytest.raises(InputError, match=said) as refused:
+        check_plausible(with_odometry(read_signals(folder), "encoder"))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_lost_sample_now_and_then_and_a_slow_magnetometer_may_be_held(
+    sound: Recording, tmp_path: Path
+) -> None:
+    text = held(logged(), range(20, 800, 40)).to_csv(index=False)
+    assert len(read_signals(written(tmp_path, text)).imu) == len(sound.imu)
+
+
+@pytest.mark.parametrize(
+    ("period_s", "first_s", "word"),
+    [(1.0, 0.0, "second"), (60.0, 40.0, "minute"), (3600.0, 3590.0, "hour"), (86_400.0, 86_390.0, "day")],
+)
+def test_a_clock_that_shows_a_part_of_the_time_goes_on(
+    period_s: float, first_s: float, word: str, sound: Recording, tmp_path: Path
+) -> None:
+    frame = logged()
+    shown = ((frame["t"] + first_s) % period_s).round(6) % period_s
+    found = read_signals(written(tmp_path, frame.assign(t=shown).to_csv(index=False)))
+    assert_as_sound(found, sound)
+    assert any(f"the seconds of the {word} begin anew" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("day", "goes_on"), [("2024-03-31", True), ("2024-04-02", False)])
+def test_the_begin_of_summer_time_goes_on_and_an_hour_of_another_day_does_not(
+    day: str, goes_on: bool, sound: Recording, tmp_path: Path
+) -> None:
+    frame = logged()
+    seconds = frame["t"] + 3600.0 * (frame["t"] >= 15.0)
+    dates = (pd.Timestamp(f"{day}T01:59:45") + pd.to_timedelta(seconds, unit="s")).dt
+    text = frame.assign(t=dates.strftime("%Y-%m-%dT%H:%M:%S.%f")).to_csv(index=False)
+    folder = written(tmp_path, text, ('time = "s"', 'time = "iso"'))
+    if goes_on:
+        found = read_signals(folder)
+        assert_as_sound(found, sound)
+        assert any("summer time begins" in note for note in found.notes)
+    else:
+        with pytest.raises(InputError, match="the clock jumps by 1 hours"):
+            read_signals(folder)
+
+
+def test_a_block_that_stands_twice_is_told_by_its_samples(tmp_path: Path) -> None:
+    frame = logged()
+    twice = pd.concat([frame[:400], frame[300:]])
+    with pytest.raises(InputError, match=r"has 100 samples twice: samples 401 to 500.*drop the second"):
+        read_signals(written(tmp_path, twice.to_csv(index=False)))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda frame: frame.to_csv(index=False, sep=";", decimal=","), r'separator = ";" and decimal = ","'),
+        (lambda frame: frame.to_csv(index=False, sep=";"), r'separator = ";"$'),
+        (lambda frame: frame.to_csv(index=False) + "Mean,0,0,0,0,0,0,0\n", "drop the last line, which holds"),
+        (
+            lambda frame: frame.assign(pulses=[hex(count) for count in frame["pulses"]]).to_csv(index=False),
+            "write numbers to base ten",
+        ),
+        (
+            lambda frame: frame.rename(columns={"t": "t [s]", "wx": "wx [deg/s]"}).to_csv(index=False),
+            r"did you mean 't \[s\]'",
+        ),
+    ],
+)
+def test_what_stands_beside_the_numbers_is_told(
+    spoil: Callable[[pd.DataFrame], str], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=said):
+        read_signals(written(tmp_path, spoil(logged())))
+
+
+def test_a_row_of_units_that_the_ride_file_contradicts_is_noted(sound: Recording, tmp_path: Path) -> None:
+    names, rest = logged().to_csv(index=False).split("\n", 1)
+    found = read_signals(written(tmp_path, f"{names}\n[s],rad/s,°/s,deg/s,g,m/s^2,g,-\n{rest}"))
+    assert_as_sound(found, sound)
+    odd = [note for note in found.notes if "by its row of units" in note]
+    assert ["wx is in rad/s" in odd[0], "ay is in m/s2" in odd[1], len(odd)] == [True, True, 2]

@@ -93,12 +93,13 @@ def planted(sound: Recording, key: str, size: float) -> Recording:
 
 
 def test_a_sound_ride_is_left_alone_and_what_was_told_before_stays(sound: Recording) -> None:
-    """To the bit: a ride with one IMU is judged as it was, and that of two says the same of the first."""
+    """To the bit: the fit of a ride with one IMU is as it was, that of two says the same of the first."""
     both = weigh_all(sound)
-    assert not both.wrong and [finding.verdict for finding in both.findings[8:]] == ["sound"] * 8
+    beside = [finding.verdict for finding in both.findings[8:] if not finding.key.startswith("alone_")]
+    assert not both.wrong and beside == ["sound"] * 8
     assert both.findings[:8] == weigh(sound).findings
     alone = replace(sound, second_imu=None, second_imu_sheet=None, magnetometer=None, magnetometer_sheet=None)
-    assert weigh_all(alone) == weigh(alone)
+    assert weigh_all(alone).findings[:8] == weigh(alone).findings
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,9 @@ from pathlib import Path
 
 import pandas as pd
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "shared"))
+from shortest_ride import DESIGN, SHORTEST_RIDE
+
 TOKEN = "SIMRAIL_SOAK"
 """In the environment of every process that is begun here, and of all that these begin."""
 
@@ -59,35 +62,7 @@ class Rogue:
         return DesignAngles().estimate(recording)
 """
 
-SCENARIO = """
-title = "A soak"
-seed = 5
-track = "condequinto_olivar"
-vehicle = "metro_irw_bogie"
-engine = "kinematic"
-truth_rate_hz = 250.0
-monte_carlo = {{ sensor_draws = {draws} }}
-[[ride]]
-name = "line"
-start_m = 40.0
-end_m = 60.0
-speed_kmh = [10.0, 20.0]
-acceleration_mps2 = 1.5
-jerk_mps3 = 1.5
-rest_s = 1.0
-final_rest_s = 1.0
-[encoder]
-wheel = "trailing.left"
-pulses_per_revolution = 1024
-rate_hz = 250.0
-[[imu]]
-name = "axle"
-grade = "consumer"
-body = "front"
-position_m = [0.0, 0.0, 0.6]
-[[estimator]]
-name = "design"
-method = "DesignAngles"
+METHODS = """
 [[estimator]]
 name = "ekf"
 method = "AttitudeEkf"
@@ -98,6 +73,14 @@ time_limit_s = {limit_s}
 memory_limit_mb = 500.0
 options = {{ often = {often} }}
 """
+
+
+def scenario(*, draws: int, limit_s: float, often: float) -> str:
+    """Two rides of so many draws, with three methods."""
+    ride = SHORTEST_RIDE.replace("speed_kmh = 10.0", "speed_kmh = [10.0, 20.0]")
+    ride = ride.replace("seed = 3", f"seed = 5\nmonte_carlo = {{ sensor_draws = {draws} }}")
+    return ride + DESIGN + METHODS.format(limit_s=limit_s, often=often)
+
 
 PROGRAM = """
 import sys
@@ -401,7 +384,7 @@ def main() -> int:
         (folder / "rogue.py").write_text(ROGUE)
         (folder / "program.py").write_text(PROGRAM)
         (folder / "mine.toml").write_text(
-            SCENARIO.format(draws=given.cells // 2, limit_s=given.limit_s, often=given.often)
+            scenario(draws=given.cells // 2, limit_s=given.limit_s, often=given.often)
         )
         soak = Soak(folder, given.cells, events_of(given.events, chance), chance)
         with small_disk(soak.disk, 64 + given.cells // 20):

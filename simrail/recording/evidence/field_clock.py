@@ -14,6 +14,7 @@ residual's variance is enlarged by its correlations, and large residuals weigh l
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -88,8 +89,60 @@ def _turn(recording: Recording) -> float:
     return float(np.abs(means - np.median(means)).sum() * block / rate)
 
 
-def _fitted(recording: Recording) -> tuple[float, float, float] | None:
-    """Seconds to add to the field's stamps, their sd, and the share of the field's changes explained."""
+class _Blocks(NamedTuple):
+    """Field and turn of a ride, in blocks that are far enough from its ends to be moved.
+
+    Attributes
+    ----------
+    values : ndarray (b, 3)
+        Means of the field, over its size.
+    first_s, block_s : ndarray (b,), float
+        When each block begins, and its length.
+    at_s, held : ndarray (n,), ndarray (n, 3)
+        Times, and the integral of the angle that the gyro has turned by then.
+    most_s : float
+        Largest offset that can be told.
+    """
+
+    values: FloatArray
+    first_s: FloatArray
+    block_s: float
+    at_s: FloatArray
+    held: FloatArray
+    most_s: float
+
+    @property
+    def change(self) -> FloatArray:
+        """Of the field (b - 1, 3) from block to block."""
+        return np.diff(self.values, axis=0)
+
+    def columns(self, offset: float) -> FloatArray:
+        """Expected changes (n, 3, 10) at an offset: by the turn, by iron, by a gyro's bias, of itself."""
+        first = self.first_s + offset
+        begins = [np.interp(first, self.at_s, self.held[:, i]) for i in range(3)]
+        ends = [np.interp(first + self.block_s, self.at_s, self.held[:, i]) for i in range(3)]
+        # Means of the angle over the blocks, as the field's are.
+        angle = np.diff((np.array(ends) - np.array(begins)).T / self.block_s, axis=0)
+        between = 0.5 * (self.values[1:] + self.values[:-1])
+        made = np.zeros((len(angle), 3, 10))
+        made[:, :, 0] = -np.cross(angle, between)
+        for i, axis in enumerate(np.eye(3)):
+            made[:, :, 1 + i] = np.cross(angle, axis)
+            made[:, :, 4 + i] = -np.cross(axis, between)
+            made[:, :, 7 + i] = axis
+        return made
+
+    def solve(self, offset: float, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Factors (10,) of the columns at an offset, and what they leave of the changes."""
+        columns = self.columns(offset)
+        made, change = columns.reshape(-1, 10) * weights.reshape(-1, 1), self.change
+        found, *_ = np.linalg.lstsq(made, change.ravel() * weights.ravel(), rcond=None)
+        solved: FloatArray = np.asarray(found, dtype=np.float64)
+        return solved, change - (columns @ solved)
+
+
+def _blocks(recording: Recording) -> _Blocks | None:
+    """The blocks of a ride; None of one that is too short."""
     assert recording.magnetometer is not None
     time = recording.imu.index.to_numpy()
     rate = recording.imu_sheet.rate_hz
@@ -108,52 +161,37 @@ def _fitted(recording: Recording) -> tuple[float, float, float] | None:
     turned = np.vstack([np.zeros(3), np.cumsum(rates, axis=0) / rate])
     held = np.vstack([np.zeros(3), np.cumsum(0.5 * (turned[1:] + turned[:-1]), axis=0) / rate])
     at = (np.arange(len(turned)) - 0.5) / rate - recording.imu_sheet.lag_s
-    first_s, block_s = (edges[margin : len(smooth) - margin] - 0.5) / rate, block / rate
-    values = smooth[margin : len(smooth) - margin]
-    change = np.diff(values, axis=0)
-    most = float(min(OFFSETS_S[-1], margin * block_s - 0.5))
+    inner = slice(margin, len(smooth) - margin)
+    most = float(min(OFFSETS_S[-1], margin * block / rate - 0.5))
+    return _Blocks(smooth[inner], (edges[inner] - 0.5) / rate, block / rate, at, held, most)
 
-    def columns(offset: float) -> FloatArray:
-        """Expected changes (n, 3, 10) at an offset: by the turn, by iron, by a gyro's bias, of itself."""
-        begins = [np.interp(first_s + offset, at, held[:, i]) for i in range(3)]
-        ends = [np.interp(first_s + offset + block_s, at, held[:, i]) for i in range(3)]
-        # Means of the angle over the blocks, as the field's are.
-        angle = np.diff((np.array(ends) - np.array(begins)).T / block_s, axis=0)
-        between = 0.5 * (values[1:] + values[:-1])
-        made = np.zeros((len(angle), 3, 10))
-        made[:, :, 0] = -np.cross(angle, between)
-        for i, axis in enumerate(np.eye(3)):
-            made[:, :, 1 + i] = np.cross(angle, axis)
-            made[:, :, 4 + i] = -np.cross(axis, between)
-            made[:, :, 7 + i] = axis
-        return made
 
-    def solve(offset: float, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-        made = columns(offset).reshape(-1, 10) * weights.reshape(-1, 1)
-        found, *_ = np.linalg.lstsq(made, change.ravel() * weights.ravel(), rcond=None)
-        solved: FloatArray = np.asarray(found, dtype=np.float64)
-        return solved, change - (columns(offset) @ solved)
-
+def _fitted(recording: Recording) -> tuple[float, float, float] | None:
+    """Seconds to add to the field's stamps, their sd, and the share of the field's changes explained."""
+    blocks = _blocks(recording)
+    if blocks is None:
+        return None
+    change = blocks.change
     weights = np.ones_like(change)
     trials = [
-        (float(np.sum(np.abs(solve(offset, weights)[1]))), offset)
+        (float(np.sum(np.abs(blocks.solve(offset, weights)[1]))), offset)
         for offset in OFFSETS_S
-        if abs(offset) <= most
+        if abs(offset) <= blocks.most_s
     ]
     _, offset = min(trials)
     sd, left, solved = math.inf, change, np.zeros(10)
     for _ in range(12):
-        solved, left = solve(offset, weights)
+        solved, left = blocks.solve(offset, weights)
         spread = np.maximum(1.4826 * np.median(np.abs(left), axis=0), 1e-9)
         weights = np.minimum(1.0, OUTLIER * spread / np.maximum(np.abs(left), 1e-12)) / spread
-        slope = (columns(offset + STEP_S) - columns(offset - STEP_S)) @ solved / (2.0 * STEP_S)
-        full = np.concatenate([columns(offset), slope[:, :, None]], axis=2).reshape(-1, 11)
+        slope = (blocks.columns(offset + STEP_S) - blocks.columns(offset - STEP_S)) @ solved / (2.0 * STEP_S)
+        full = np.concatenate([blocks.columns(offset), slope[:, :, None]], axis=2).reshape(-1, 11)
         normal = (full * (weights**2).reshape(-1, 1)).T @ full
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
         inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
         step = float((inverse @ ((full * (weights**2).reshape(-1, 1)).T @ left.ravel()))[-1])
-        sd = math.sqrt(inverse[-1, -1]) * _longer(left * weights, block_s)
-        offset = float(np.clip(offset + np.clip(step, -0.5, 0.5), -most, most))
+        sd = math.sqrt(inverse[-1, -1]) * _longer(left * weights, blocks.block_s)
+        offset = float(np.clip(offset + np.clip(step, -0.5, 0.5), -blocks.most_s, blocks.most_s))
         if abs(step) < 0.01 * sd:
             break
     total = (change - change.mean(axis=0)) * weights

@@ -281,7 +281,12 @@ def _words(key: str, value: float, ride: Ride) -> tuple[str, str]:
         if value < 0.2:
             return f"does not turn with {curves}", "mend units.gyro (rad/s?), or the axes"
         if value > 5.0:
-            return f"turns many times as much as {curves}", 'mend units.gyro: the values look like "deg/s"'
+            remedy = 'mend units.gyro: the values look like "deg/s"'
+            if value < 40.0:
+                remedy = (
+                    "mend units.gyro; or the times: numbers of samples are no seconds (give rate_hz instead)"
+                )
+            return f"turns many times as much as {curves}", remedy
         return f"turns {value:.3g} times as much as {curves}", ""
     if key == "wheel":
         if value < 0.0:

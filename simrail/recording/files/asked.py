@@ -107,10 +107,8 @@ class LimitsPart(Part):
         return RailLimits(peaks, sds, self.section_m, self.twist_base_m)
 
 
-class ReferencePart(SignalPart):
-    """``[reference]``: angles, place or speed as something better measured them, to compare with.
-
-    Its times are on the clock of the IMU; it may be slower, have gaps, and lack quantities.
+class MeasuredPart(SignalPart):
+    """What something better measured, to compare with.
 
     Attributes
     ----------
@@ -120,7 +118,7 @@ class ReferencePart(SignalPart):
         Quantity -> standard deviation of the reference itself, with its unit, e.g. ``roll = "0.02 deg"``.
     """
 
-    signal: ClassVar[Signal] = REFERENCE_SIGNAL
+    sd_units: ClassVar[dict[str, str]]
 
     source: Annotated[str, Field(min_length=1, max_length=200)]
     sd: dict[str, float | str] = Field(default_factory=dict)
@@ -131,65 +129,70 @@ class ReferencePart(SignalPart):
         return self
 
     def sds(self) -> dict[str, float]:
-        """Standard deviations by column, SI."""
-        units = {"roll": "rad", "pitch": "rad", "yaw": "rad", "position": "m", "speed": "m/s"}
-        return _sds(self, units)
+        """Standard deviations by column, SI.
+
+        Raises
+        ------
+        InputError
+            If a quantity is none of these, or a standard deviation has not its unit.
+        """
+        columns = {quantity.key: quantity.columns[0] for quantity in self.signal.quantities}
+        found = {}
+        for key, value in self.sd.items():
+            if key not in self.sd_units:
+                raise InputError(
+                    "has no such quantity",
+                    field=f"sd.{key}",
+                    value=key,
+                    limit=", ".join(self.sd_units),
+                    remedy="name one of them",
+                )
+            unit = self.sd_units[key]
+            if not isinstance(value, str):
+                example = {"rad": "0.02 deg", "m": "0.5 mm", "m/s": "0.05 m/s"}[unit]
+                raise InputError(
+                    "lacks its unit",
+                    field=f"sd.{key}",
+                    value=value,
+                    limit=f'a text with a unit, e.g. "{example}"',
+                    remedy="add the unit",
+                )
+            with blame(None, "sd"):
+                found[columns[key]] = amount_in(value, unit, what=key, field=key)
+        return found
 
 
-class RailReferencePart(SignalPart):
+class ReferencePart(MeasuredPart):
+    """``[reference]``: angles, place or speed, on the clock of the IMU.
+
+    It may be slower than the IMU, have gaps, and lack quantities.
+    """
+
+    signal: ClassVar[Signal] = REFERENCE_SIGNAL
+    sd_units: ClassVar[dict[str, str]] = {
+        "roll": "rad",
+        "pitch": "rad",
+        "yaw": "rad",
+        "position": "m",
+        "speed": "m/s",
+    }
+
+
+class RailReferencePart(MeasuredPart):
     """``[rail_reference]``: the rails as a trolley or a car measured them, over the distance of the track.
 
     Attributes
     ----------
-    source : str
-        What measured it, as pages call it.
     band : str, optional
         The band that it was filtered to, if it was; compared with in that band alone.
-    sd : dict
-        Quantity -> standard deviation of the reference itself, with its unit: ``cross_level = "0.5 mm"``.
     """
 
     signal: ClassVar[Signal] = RAIL_REFERENCE_SIGNAL
+    sd_units: ClassVar[dict[str, str]] = {
+        quantity.key: "m" for quantity in RAIL_REFERENCE_SIGNAL.quantities if quantity.key != "position"
+    }
 
-    source: Annotated[str, Field(min_length=1, max_length=200)]
     band: Literal["D0", "D1", "D2", "D3"] | None = None
-    sd: dict[str, float | str] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _readable(self) -> Self:
-        self.sds()
-        return self
-
-    def sds(self) -> dict[str, float]:
-        """Standard deviations by column, SI."""
-        names = [quantity.key for quantity in self.signal.quantities if quantity.key != "position"]
-        return _sds(self, dict.fromkeys(names, "m"))
-
-
-def _sds(part: ReferencePart | RailReferencePart, units: dict[str, str]) -> dict[str, float]:
-    columns = {quantity.key: quantity.columns[0] for quantity in part.signal.quantities}
-    found = {}
-    for key, value in part.sd.items():
-        if key not in units:
-            raise InputError(
-                "has no such quantity",
-                field=f"sd.{key}",
-                value=key,
-                limit=", ".join(units),
-                remedy="name one of them",
-            )
-        if not isinstance(value, str):
-            example = {"rad": "0.02 deg", "m": "0.5 mm", "m/s": "0.05 m/s"}[units[key]]
-            raise InputError(
-                "lacks its unit",
-                field=f"sd.{key}",
-                value=value,
-                limit=f'a text with a unit, e.g. "{example}"',
-                remedy="add the unit",
-            )
-        with blame(None, "sd"):
-            found[columns[key]] = amount_in(value, units[key], what=key, field=key)
-    return found
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ or no number, with the line of the file. What the columns mean is said by the ri
 """
 
 import difflib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -19,7 +20,16 @@ from simrail.core.jit import FloatArray
 from simrail.core.toml_files import Part, label
 from simrail.recording.files.bag_file import open_bag
 from simrail.recording.files.table_file import Read, Table, open_hdf5, open_mat, open_parquet
-from simrail.recording.files.text_file import MOST_TEXT, Layout, layout_of, line_number, read_text, split
+from simrail.recording.files.text_file import (
+    MOST_TEXT,
+    Layout,
+    is_number,
+    layout_of,
+    line_number,
+    open_text,
+    read_text,
+    split,
+)
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
 TABLES: dict[str, Callable[[Path], Table]] = {
@@ -36,6 +46,9 @@ TABLES: dict[str, Callable[[Path], Table]] = {
 
 PACKED = (".zip", ".gz", ".bz2", ".xz", ".7z", ".zst", ".tar", ".tgz", ".rar")
 """Endings of files that hold others."""
+
+MOST_LONG_COLUMNS = 5
+"""Columns of a file in long form: time, name of the signal, value, and perhaps its unit and its device."""
 
 MOST_FILES = 50
 """Files of a folder that are looked into for a missing column."""
@@ -204,6 +217,11 @@ def read_columns(
 def near(word: str, known: Sequence[str]) -> str | None:
     """A remedy that names the word that was probably meant, if there is one."""
     folded = {name.casefold(): name for name in known}
+    # A unit behind the name: "wx [deg/s]", "wx (deg/s)", "wx_deg/s" for wx.
+    own = {name: re.split(r"[\s\[(_]", name, maxsplit=1)[0].casefold() for name in known}
+    bare = [name for name in known if own[name] == word.casefold()]
+    if len(bare) == 1:
+        return f"did you mean {bare[0]!r}?"
     close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
     return f"did you mean {folded[close[0]]!r}?" if close else None
 
@@ -218,6 +236,9 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             limit="a name that one column has",
             remedy="rename them, or give the number of the column",
         )
+    channels = _channels_below(name, data)
+    if channels is not None:
+        return _long_form(name, data, table, *channels)
     below = _names_below(name, data)
     if below is not None:
         return InputError(
@@ -234,7 +255,7 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
             field=f"{table}.separator",
             value=part.separator,
             limit="what sets the columns apart",
-            remedy=f"set separator = {other!r}".replace("'", '"'),
+            remedy=f"set separator = {other!r}".replace("'", '"') + _decimal_of(data, other),
         )
     if not data.named:
         return InputError(
@@ -257,6 +278,15 @@ def _no_such_column(name: str, data: DataFile, table: str) -> InputError:
     )
 
 
+def _decimal_of(data: DataFile, separator: str) -> str:
+    """What to say of the decimals of a file whose columns stand apart by another mark than a comma."""
+    with open_text(data.path) as file:
+        lines = [raw.decode("utf-8", errors="replace") for raw in islice(file, MOST_TEXT)]
+    fields = [field for line in lines[1:] for field in split(line.rstrip("\r\n"), separator)]
+    comma = sum(bool(re.fullmatch(r"-?\d+,\d+", field)) for field in fields)
+    return ' and decimal = ","' if 2 * comma > len(fields) and data.part.decimal == "." else ""
+
+
 def _taken(part: DataPart) -> set[str]:
     """Columns that the ride file has for other quantities: none of them was meant."""
     said: dict[str, tuple[str, ...]] = getattr(part, "columns", {})
@@ -267,9 +297,10 @@ def _names_below(name: str, data: DataFile) -> int | None:
     """Number, from 0, of a line below the first ones that holds the name of a column."""
     if data.layout is None or not data.named or name.isdecimal():
         return None
-    with data.path.open(encoding="utf-8-sig", errors="replace") as file:
-        for number, line in enumerate(islice(file, MOST_TEXT)):
-            fields = split(line.rstrip("\n"), data.part.separator)
+    with open_text(data.path) as file:
+        for number, raw in enumerate(islice(file, MOST_TEXT)):
+            line = raw.decode("utf-8", errors="replace")
+            fields = split(line.rstrip("\r\n"), data.part.separator)
             if (
                 number >= data.part.skip_lines
                 and len(fields) > 1
@@ -278,6 +309,42 @@ def _names_below(name: str, data: DataFile) -> int | None:
             ):
                 return number
     return None
+
+
+def _channels_below(name: str, data: DataFile) -> tuple[str, list[str]] | None:
+    """A column that holds names of signals, and these: of a file that has one line for each value."""
+    layout, part = data.layout, data.part
+    if layout is None or len(set(layout.names)) < 3:
+        return None
+    with open_text(data.path) as file:
+        lines = [raw.decode("utf-8", errors="replace") for raw in islice(file, layout.data_line + MOST_TEXT)]
+    rows = [split(line.rstrip("\r\n"), part.separator) for line in lines[layout.data_line :] if line.strip()]
+    rows = [row for row in rows if len(row) == len(layout.names)]
+    for column, called in enumerate(layout.names):
+        words = list(dict.fromkeys(row[column] for row in rows))
+        repeated = 3 <= len(words) <= len(rows) / 2 and not any(is_number(word) for word in words)
+        if called and repeated and (name in words or len(layout.names) <= MOST_LONG_COLUMNS):
+            return called, words
+    return None
+
+
+def _long_form(name: str, data: DataFile, table: str, channel: str, words: list[str]) -> InputError:
+    names, part = data.names, data.part
+    time = next((one for one in part.__dict__.get("columns", {}).get("time", ()) if one in names), names[0])
+    value = next((one for one in names[::-1] if one not in (channel, time) and one), names[-1])
+    wide = f"{data.path.stem}_wide.csv"
+    given = "" if part.separator == "," else f", sep={part.separator!r}".replace("'", '"')
+    code = (
+        f"import pandas as p; p.read_csv('{data.path.name}'{given}).pivot(index='{time}', "
+        f"columns='{channel}', values='{value}').to_csv('{wide}')"
+    ).replace('"', "'")
+    return InputError(
+        f"{label(data.path)} is in long form: one line for each value, the name of its signal in {channel!r}",
+        field=f"{table}.columns",
+        value=name,
+        limit=f"a column for each signal; {channel!r} holds " + ", ".join(words[:12]),
+        remedy=f'make it wide, python -c "{code}", and name that file',
+    )
 
 
 def _elsewhere(name: str, data: DataFile, table: str) -> str | None:

@@ -125,6 +125,11 @@ class SignalReader:
             named = list(part.columns.get(quantity.key, quantity.columns))
             if quantity.required or quantity.key in part.columns or set(named) <= set(data.names):
                 names[quantity.key] = named
+        for key, name, unit in _other_units(part, data, names):
+            self._note(
+                f"{label(data.path)}: {name} is in {unit} by its row of units; the ride file has another "
+                f"units.{key}, which is taken"
+            )
         times = list(part.columns.get("time", ("time_s",)))
         stamped = signal.timed and ("time" in part.columns or times[0] in data.names or part.rate_hz is None)
         if not stamped:
@@ -201,6 +206,23 @@ class SignalReader:
     def _note(self, text: str) -> None:
         if text not in self.notes:
             self.notes.append(text)
+
+
+def _other_units(
+    part: SignalPart, data: DataFile, names: Mapping[str, list[str]]
+) -> list[tuple[str, str, str]]:
+    """Quantities, columns and units of a row of units that names other ones than the ride file."""
+    units = dict(zip(data.names, data.layout.units if data.layout else (), strict=False))
+    found = []
+    for quantity in part.signal.quantities:
+        known = quantity.units | quantity.increments
+        taken = part.units.get(quantity.key, next(iter(known), "")).removeprefix("-")
+        for name in names.get(quantity.key, ()):
+            unit = units.get(data.column(name), "").strip("[]() ").replace("°", "deg").replace("²", "2")
+            unit = unit.replace("^2", "2")
+            if unit in known and taken in known and known[unit] != known[taken]:
+                found.append((quantity.key, name, unit))
+    return found
 
 
 def _own(read: dict[str, FloatArray | pd.Series], name: str, wanted: list[str]) -> FloatArray:

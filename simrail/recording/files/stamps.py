@@ -21,8 +21,8 @@ from simrail.recording.signals import TIMES
 COUNTER_BITS = (8, 12, 15, 16, 20, 24, 31, 32)
 """Widths of counters of time: where one begins anew, it falls by all but a step of its range."""
 
-WEEK_S = 604_800.0
-"""Receivers count the seconds of a week, which begin anew on Sunday."""
+PERIODS_S = {604_800.0: "week", 86_400.0: "day", 3600.0: "hour", 60.0: "minute", 1.0: "second"}
+"""Clocks that show a part of the time begin anew with the next: of receivers the week, of loggers others."""
 
 SUMMER_S = 3600.0
 """A clock of the wall goes back by an hour where summer time ends."""
@@ -72,7 +72,8 @@ class RideClock:
             read = read_times(pd.Series(raw), file=file, field=name)
             if read.dates_ns is not None:
                 self._same_kind(True, unit, table)
-                return _over(SUMMER_S, self._since(read.dates_ns, 10**9), table, notes, "summer time ends")
+                since = _over(SUMMER_S, self._since(read.dates_ns, 10**9), table, notes, "summer time ends")
+                return _summer_begins(since, float(self._zero_s or 0), table, notes)
             assert read.seconds is not None
             self._same_kind(False, unit, table)
             return self._over_midnight(read.seconds, read.period_s, table, notes)
@@ -84,7 +85,11 @@ class RideClock:
             return count / float(part.tick_rate_hz or 1.0)
         multiply, divide = TIMES[unit]
         seconds = count if multiply == divide else count * multiply / divide
-        return _over(WEEK_S, seconds, table, notes, "the seconds of the week begin anew")
+        for period, word in PERIODS_S.items():
+            whole = _over(period, seconds, table, notes, f"the seconds of the {word} begin anew")
+            if whole is not seconds:
+                return whole
+        return seconds
 
     def _same_kind(self, dated: bool, unit: str, table: str) -> None:
         self._dated = dated if self._dated is None else self._dated
@@ -126,18 +131,44 @@ class RideClock:
 
 
 def _over(period_s: float, seconds: FloatArray, table: str, notes: list[str], what: str) -> FloatArray:
-    """Times that go on where a clock went back once, by a period to within some samples; else as they are."""
+    """Times that go on where a clock went back, by a period to within some samples; else as they are."""
     known = np.flatnonzero(np.isfinite(seconds))
     step = np.diff(seconds[known])
     back = np.flatnonzero(step < 0.0)
-    if len(back) != 1 or len(step) < 3:
+    if not len(back) or len(step) < 3 * len(back):
         return seconds
     usual = float(np.median(step))
-    if not 0.0 <= float(step[back[0]]) + period_s <= max(3.0 * usual, 1e-9):
+    after = step[back] + period_s
+    if not (usual > 0.0 and (after >= 0.0).all() and (after <= 3.0 * usual).all()):
         return seconds
     whole = seconds.copy()
-    whole[known[back[0]] + 1 :] += period_s
-    notes.append(f"{table}: {what} at {seconds[known[back[0]]]:.6g} s; its times go on")
+    whole[known[1:]] += period_s * np.cumsum(step < 0.0)
+    more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
+    notes.append(f"{table}: {what} at {seconds[known[back[0]]]:.6g} s{more}; its times go on")
+    return whole
+
+
+def _summer_begins(seconds: FloatArray, zero_s: float, table: str, notes: list[str]) -> FloatArray:
+    """Times without the hour that a clock of the wall leaves out where summer time begins; else as they are.
+
+    It leaves out an hour of a Sunday's night, from one full hour to the next.
+    """
+    known = np.flatnonzero(np.isfinite(seconds))
+    step = np.diff(seconds[known])
+    ahead = np.flatnonzero(step >= SUMMER_S)
+    if len(ahead) != 1 or len(step) < 3:
+        return seconds
+    usual, before = float(np.median(step)), float(seconds[known[ahead[0]]])
+    left_out = 0.0 < float(step[ahead[0]]) - SUMMER_S <= 3.0 * usual
+    hour = round((zero_s + before) / 3600.0)
+    at_the_hour = abs(zero_s + before - 3600.0 * hour) <= 3.0 * usual
+    # 1970 began on a Thursday.
+    is_sunday, is_night = (hour // 24 + 4) % 7 == 0, hour % 24 <= 3
+    if not (left_out and at_the_hour and is_sunday and is_night):
+        return seconds
+    whole = seconds.copy()
+    whole[known[ahead[0]] + 1 :] -= SUMMER_S
+    notes.append(f"{table}: summer time begins at {before:.6g} s; its times go on")
     return whole
 
 
@@ -195,6 +226,7 @@ def mended(
         notes.append(f"{table}: {_counted(int(twice.sum()), 'sample')} that the logger wrote twice left out")
         step = np.diff(time)
     if (step < 0.0).any():
+        _refuse_again(frame, time, step, file, field)
         _refuse_back(time, step, file, field)
     with blame(file):
         check_stamps(time, field=field)
@@ -232,6 +264,25 @@ def _shared(time: FloatArray, first: int, count: int, file: str, field: str) -> 
         remedy="these are stamps of packets, or too coarse; if no samples are lost leave time out and give "
         + (f"rate_hz = {rate:.6g}" if np.isfinite(rate) else "rate_hz"),
     )
+
+
+def _refuse_again(frame: pd.DataFrame, time: FloatArray, step: FloatArray, file: str, field: str) -> None:
+    """Refuse a block of samples that stands there twice, behind itself."""
+    first = int(np.argmax(step < 0.0)) + 1
+    begin = int(np.searchsorted(time[:first], time[first]))
+    size = first - begin
+    once, again = slice(begin, first), slice(first, first + size)
+    values = frame.to_numpy()
+    same = size > 1 and np.array_equal(time[once], time[again])
+    if same and np.array_equal(values[once], values[again], equal_nan=values.dtype.kind == "f"):
+        raise InputError(
+            f"has {size} samples twice: samples {first + 1} to {first + size} are those before them",
+            file=file,
+            field=field,
+            value=f"{time[first]:.9g} to {time[first + size - 1]:.9g} s",
+            limit="each sample once",
+            remedy="drop the second of the two blocks",
+        )
 
 
 def _refuse_back(time: FloatArray, step: FloatArray, file: str, field: str) -> None:

@@ -1,10 +1,11 @@
 """Text as loggers write it: which line holds the names, which the units, where the data begin.
 
 Comment lines (``#``, ``%``, ``//``), blank lines, a row of units below the names, separators at the ends of
-lines, several blanks between values and files without a line of names are all read; `Layout` says what was
-found, so that the user can be told. Only the columns that are asked for are kept, as float64.
+lines, several blanks between values, files without a line of names and those in UTF-16 are all read; `Layout`
+says what was found, so that the user can be told. Only the columns that are asked for are kept, as float64.
 """
 
+import codecs
 import csv
 import io
 import re
@@ -55,6 +56,9 @@ _PADDED_NULLS = [
     *(before + word for before in ("", " ") for word in NULLS),
     *(" " * count for count in range(2, 13)),
 ]
+_SENTENCE = re.compile(r"[$!]([A-Z]\w*),[^*]*\*[0-9A-F]{2}\s*", re.IGNORECASE)
+"""A line as NMEA 0183 has it: what kind it is, its values, and a checksum."""
+
 _NUMBER = re.compile(r"[-+]?(\d|[.,]\d|inf|nan)", re.IGNORECASE)
 
 
@@ -98,9 +102,10 @@ def layout_of(path: Path, *, separator: str, skip_lines: int, units_row: bool | 
     Raises
     ------
     InputError
-        If the file is empty, cannot be read, or is no UTF-8.
+        If the file is empty, cannot be read, is no UTF-8 or UTF-16, or holds sentences with checksums.
     """
     lines = _first_lines(path, skip_lines + MOST_TEXT)
+    _refuse_sentences(lines[skip_lines:], path)
     rows = [
         (number, line)
         for number, line in enumerate(lines)
@@ -190,19 +195,20 @@ def read_text(
             skip_rows=layout.data_line, column_names=names, use_threads=False, block_size=BLOCK_BYTES
         )
         try:
-            return _blocks_read(path, read, parse, convert, types, blocks)
+            with open_text(path) as file:
+                return _blocks_read(file, read, parse, convert, types, blocks)
         except pa.ArrowInvalid:
             pass  # comments between the data, or some lines that end in a separator: once more, line by line
     read = pa_csv.ReadOptions(column_names=names, use_threads=False, block_size=BLOCK_BYTES)
     try:
-        with path.open("rb") as file:
+        with open_text(path) as file:
             return _blocks_read(_Cleaned(file, layout, separator), read, parse, convert, types, blocks)
     except pa.ArrowInvalid as error:
         raise _bad_text(str(error), path, layout, separator, decimal) from None
 
 
 def _blocks_read(
-    source: "Path | _Cleaned",
+    source: "io.BufferedReader | _Cleaned",
     read: pa_csv.ReadOptions,
     parse: pa_csv.ParseOptions,
     convert: pa_csv.ConvertOptions,
@@ -245,9 +251,58 @@ class _Column:
         return values if self._is_number else pd.Series(values, dtype=object)
 
 
+def open_text(path: Path) -> io.BufferedReader:
+    """Open a text file as bytes of UTF-8, without the mark that may stand at its beginning.
+
+    A file in UTF-16 (Windows' "Unicode"), by its mark or by its zeros, is told anew as it is read.
+    """
+    file = path.open("rb")
+    head = file.read(64)
+    file.seek(len(codecs.BOM_UTF8) if head.startswith(codecs.BOM_UTF8) else 0)
+    encoding = _wide_encoding(head)
+    if encoding is None:
+        return file
+    return io.BufferedReader(_AsUtf8(io.TextIOWrapper(file, encoding, errors="replace", newline="")))
+
+
+def _wide_encoding(head: bytes) -> str | None:
+    """Encoding of a text whose letters take two bytes or four; None of any other."""
+    if head.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
+        return "utf-32"
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    low, high = head[0::2], head[1::2]
+    if len(head) >= 4 and not any(high) and all(low):
+        return "utf-16-le"
+    return "utf-16-be" if len(head) >= 4 and not any(low) and all(high) else None
+
+
+class _AsUtf8(io.RawIOBase):
+    """A text of another encoding as bytes of UTF-8."""
+
+    def __init__(self, text: io.TextIOWrapper) -> None:
+        self._text = text
+        self._rest = b""
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: "bytearray | memoryview") -> int:  # type: ignore[override]
+        if not self._rest:
+            self._rest = self._text.read(1 << 18).encode("utf-8", errors="replace")
+        count = min(len(buffer), len(self._rest))
+        buffer[:count] = self._rest[:count]
+        self._rest = self._rest[count:]
+        return count
+
+    def close(self) -> None:
+        self._text.close()
+        super().close()
+
+
 def line_number(path: Path, layout: Layout, row: int) -> int:
     """Number, from 1, of the line that holds a row of data, counted from 0."""
-    with path.open("rb") as file:
+    with open_text(path) as file:
         data = (
             number
             for number, line in enumerate(file, start=1)
@@ -301,8 +356,8 @@ def _holds_data(line: bytes) -> bool:
 
 def _first_lines(path: Path, count: int) -> list[str]:
     try:
-        with path.open(encoding="utf-8-sig") as file:
-            return [line.rstrip("\n") for line in islice(file, count)]
+        with open_text(path) as file, io.TextIOWrapper(file, "utf-8") as text:
+            return [line.rstrip("\n") for line in islice(text, count)]
     except OSError as error:
         raise InputError(
             f"cannot be read ({error.strerror})",
@@ -321,6 +376,23 @@ def _first_lines(path: Path, count: int) -> list[str]:
         ) from None
 
 
+def _refuse_sentences(lines: Sequence[str], path: Path) -> None:
+    """Refuse lines with checksums, which are sentences of several kinds and no table."""
+    kinds = [found[1] for line in lines if (found := _SENTENCE.fullmatch(line.strip()))]
+    if 2 * len(kinds) <= sum(bool(line.strip()) for line in lines):
+        return
+    usual = max(dict.fromkeys(kinds), key=kinds.count)
+    raise InputError(
+        "holds sentences with checksums, each of its kind, and no table of samples",
+        file=label(path),
+        value=next(line.strip() for line in lines if _SENTENCE.fullmatch(line.strip()))[:60],
+        limit="one line per sample, of numbers",
+        remedy="take the values of one kind out, "
+        rf"sed -n 's/^.{usual},\(.*\)\*.*$/\1/p' {path.name} > {path.stem}_{usual}.csv, "
+        "and give the numbers of its columns, e.g. time = 1, gyro = [2, 3, 4]",
+    )
+
+
 def _uncommented(line: str) -> str:
     """A line without the mark of a comment, where more than the mark is left."""
     for mark in COMMENTS:
@@ -329,10 +401,15 @@ def _uncommented(line: str) -> str:
     return line
 
 
+def is_number(field: str) -> bool:
+    """Whether a field begins as a number does."""
+    return bool(_NUMBER.match(field))
+
+
 def _is_data(fields: Sequence[str]) -> bool:
     """Whether a line holds values rather than words; a column or two may hold words."""
     filled = [field for field in fields if field]
-    return 2 * sum(bool(_NUMBER.match(field)) for field in filled) > len(filled)
+    return 2 * sum(is_number(field) for field in filled) > len(filled)
 
 
 def _unit_rows(below: list[tuple[int, list[str]]]) -> int:
@@ -375,6 +452,8 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
             limit="numbers, or empty fields",
             remedy="the line of names stands there again: the logger was started anew; cut the file there"
             if value[1].strip(' "') in [name for name in layout.names if name]
+            else "drop the last line, which holds no sample"
+            if row and _is_last(path, layout, int(row[1]) - 1)
             else _remedy_of_word(value[1], decimal, line == f" in line {layout.data_line + 1}"),
         )
     count = re.search(r"Expected (\d+) columns, got (\d+)", said)
@@ -401,7 +480,7 @@ def _bad_text(said: str, path: Path, layout: Layout, separator: str, decimal: st
 def _is_last(path: Path, layout: Layout, row: int) -> bool:
     """Whether a row of data stands in the last line of a file."""
     number = line_number(path, layout, row)
-    with path.open("rb") as file:
+    with open_text(path) as file:
         return not any(line.strip() for line in islice(file, number, None))
 
 
@@ -414,6 +493,8 @@ def _remedy_of_word(word: str, decimal: str, in_first_line: bool) -> str:
         return 'set decimal = "."'
     if re.match(r"\d+:\d\d|\d{4}-\d\d|\d\d?[./]\d\d?[./]\d{4}", word):
         return 'for clock times and dates set units.time = "iso"'
+    if re.fullmatch(r"0x[0-9a-fA-F]+", word):
+        return "write numbers to base ten"
     if in_first_line:
         return "if that line holds units set units_row = true; if not, mend it"
     return "empty that line's fields, so that it is a gap; or mend it"

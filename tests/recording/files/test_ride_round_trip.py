@@ -15,6 +15,7 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.estimation.recorded_ride import read_ride
 from simrail.recording.check_form import check_recording
 from simrail.recording.check_physics import check_plausible
+from simrail.recording.files.asked import MeasuredPart
 from simrail.recording.files.ride_file import ImuSignalPart, RideFile
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.files.ride_writer import write_ride
@@ -308,9 +309,9 @@ def test_every_frame_of_a_recording_is_a_signal():
     for signal in SIGNALS:
         form = next(
             p
-            for part in (SignalPart, VectorPart, ImuSignalPart)
+            for part in (SignalPart, VectorPart, ImuSignalPart, MeasuredPart)
             for p in part.__subclasses__()
-            if p is not VectorPart and p.signal is signal
+            if p not in (VectorPart, MeasuredPart) and p.signal is signal
         )
         assert form.signal is signal
 
