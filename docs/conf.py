@@ -37,7 +37,7 @@ mathjax_path = "tex-svg-full.js"
 html_sidebars = {"*": []}  # pages that stand alone; those in folders list their neighbours
 html_theme_options = {
     "show_prev_next": True,
-    "header_links_before_dropdown": 8,
+    "header_links_before_dropdown": 6,
     "navigation_with_keys": True,
     "secondary_sidebar_items": ["page-toc"],
 }

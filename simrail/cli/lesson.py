@@ -14,6 +14,7 @@ from simrail.cli.options import DONE
 from simrail.core.atomic_files import write_whole
 from simrail.core.errors import InputError, did_you_mean, one_of
 from simrail.lessons import LESSONS, notebook, teacher_page
+from simrail.lessons.serve import free_port
 
 
 def lesson(
@@ -57,10 +58,12 @@ def lesson(
 def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
     """Serve a lesson until it is stopped; returns the exit code of the server."""
     path = own_copy(name) if edit else notebook(name)
+    if not edit and port is None:
+        port = free_port()  # who loads beforehand has to know it
     command = [
         sys.executable,
         "-m",
-        "marimo",
+        "marimo" if edit else "simrail.lessons.serve",
         "-q" if headless else "-y",
         "edit" if edit else "run",
         str(path),

@@ -1,5 +1,6 @@
 """Figures of lessons in the look of the reports, as inline SVG that a notebook shows."""
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -53,6 +54,9 @@ class Panel:
     limits: tuple[float, float] | None = None
 
 
+_ONE_AT_A_TIME = threading.Lock()
+"""The look of a figure is matplotlib's for all threads: each browser's lesson runs in one of its own."""
+
 _NOTEBOOK = {
     "page": "background",
     "ink": "foreground",
@@ -92,7 +96,7 @@ def svg_of(
     tall_in : float
         Height of a panel.
     """
-    with look():
+    with _ONE_AT_A_TIME, look():
         figure, axes = panels([tall_in] * len(parts))
         for axis, panel in zip(axes, parts, strict=True):
             for low, high in panel.spans:

@@ -111,7 +111,9 @@ def test_edit_opens_a_copy_and_keeps_what_is_there(here, served, capsys):
     assert "is there already" in capsys.readouterr().out
     assert notebook("drift").read_bytes() == shipped
     assert call(["lesson", "drift"]) == 0
-    assert served[-1][-2:] == ["run", str(notebook("drift"))]
+    assert served[-1][2] == "simrail.lessons.serve"
+    assert served[-1][4:6] == ["run", str(notebook("drift"))]
+    assert int(served[-1][served[-1].index("--port") + 1]) > 0
 
 
 def test_a_folder_of_the_same_name_is_not_what_a_lesson_imports(here, monkeypatch):
@@ -146,6 +148,26 @@ def test_edit_in_a_folder_that_cannot_be_written_is_one_line(here, served, capsy
     assert err.count("\n") == 1
     assert served == []
     assert list(here.iterdir()) == []
+
+
+def test_two_browsers_at_once_get_the_figures_that_one_gets():
+    """Each has a thread of its own, and matplotlib has one look for all of them."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    import matplotlib as mpl
+
+    from simrail.lessons.figures import Line, Panel, svg_of
+
+    def drawn(_: int) -> str:
+        x = np.arange(3.0)
+        return svg_of([Panel("m", [Line("a", x, x)])], x_label="s", description="a line")
+
+    before = dict(mpl.rcParams)
+    alone = drawn(0)
+    with ThreadPoolExecutor(4) as crowd:
+        figures = list(crowd.map(drawn, range(8)))
+    assert [len(figure) for figure in figures] == [len(alone)] * 8
+    assert dict(mpl.rcParams) == before
 
 
 def test_a_figure_has_a_colour_for_every_variable_that_it_uses():

@@ -177,7 +177,10 @@ def budget_chart(budget: pd.DataFrame, description: str) -> str:
         panel.set_yticks(place, names, fontsize=8.0)
         panel.tick_params(axis="y", length=0)
         panel.grid(axis="y", visible=False)
-        panel.set_position((0.22, panel.get_position().y0, 0.76, panel.get_position().height))
+        # Room for the longest name, of some 0.56 of the font's size a letter.
+        left = (0.56 * 8.0 / 72.0 * max(map(len, names)) + 0.2) / canvas.width_in()
+        right = 1.0 - 0.2 / canvas.width_in()
+        panel.set_position((left, panel.get_position().y0, right - left, panel.get_position().height))
         panel.set_xlabel("share of the squared error, %")
         return canvas.to_svg(figure, description=description)
 

@@ -52,6 +52,7 @@ _VARIABLES = {
     INK: "ink",
     MUTED: "muted",
     "#6b7280": "muted",
+    "#66714a": "muted",
     GRID: "line",
     "#d0d5dd": "line",
     "#f2f4f7": "line",
@@ -396,7 +397,7 @@ def fitting_columns(labels: Sequence[str], width_in: float) -> int:
     return 1
 
 
-LEGEND_ROW_IN = 0.175
+LEGEND_ROW_IN = 0.184
 """Height of a row of a legend."""
 
 

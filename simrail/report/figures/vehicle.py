@@ -3,7 +3,17 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from simrail.report.figures.canvas import INK, LEFT_IN, MUTED, is_narrow, look, panels, to_svg, width_in
+from simrail.report.figures.canvas import (
+    INK,
+    LEFT_IN,
+    MUTED,
+    add_panel,
+    is_narrow,
+    look,
+    panels,
+    to_svg,
+    width_in,
+)
 from simrail.report.tables.vehicle_text import MOST_HZ
 from simrail.vehicle.contact.contact_pair import incline
 from simrail.vehicle.contact.profile_files import profiles_of
@@ -14,6 +24,9 @@ from simrail.vehicle.study import Conicity, VehicleStudy
 _LEFT, _RIGHT, _THIRD = "#0072B2", "#D55E00", "#009E73"
 _GAUGE_DEPTH_M = 0.014
 _MOST_HZ = 20.0
+_PAIR_IN = 3.32
+_BAR_IN = 0.78
+"""Room for the bar of colours beside a panel: the bar, its numbers and what they are."""
 
 
 def pair_figure(model: VehicleModel, contact: Conicity) -> str:
@@ -29,13 +42,17 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     at = float(contact.abscissa_m[middle, 0])
     lift = float(head.depth(np.array([at + offset]))[0])
     touch = float(np.interp(at, wheel.lateral_m, wheel.depth_m))
+    rail_z = -1e3 * (head.depth(e) - lift)
+    wheel_z = -1e3 * (wheel.depth_m - touch)
+    rail_y, wheel_y = -1e3 * (e - offset), -1e3 * wheel.lateral_m
+    floor, roof = min(rail_z.min(), wheel_z.min()) - 4.0 * size, max(wheel_z.max(), 0.0) + 14.0 * size
     with look():
-        figure = Figure(figsize=(width_in(), 4.0))
-        axis = figure.add_axes((LEFT_IN / width_in(), 0.13, (width_in() - LEFT_IN - 0.2) / width_in(), 0.83))
-        rail_z = -1e3 * (head.depth(e) - lift)
-        wheel_z = -1e3 * (wheel.depth_m - touch)
-        rail_y, wheel_y = -1e3 * (e - offset), -1e3 * wheel.lateral_m
-        floor, roof = min(rail_z.min(), wheel_z.min()) - 4.0 * size, max(wheel_z.max(), 0.0) + 14.0 * size
+        wide = width_in() - LEFT_IN - 0.2
+        # To scale: on a phone all of the width, and as tall as that asks for.
+        across = 1.05 * np.ptp(np.concatenate([rail_y, wheel_y]))
+        tall = min(wide * (roof - floor) / across, _PAIR_IN)
+        figure = Figure(figsize=(width_in(), tall + 0.68))
+        axis = add_panel(figure, LEFT_IN, 0.52, wide, tall)
         axis.fill_between(rail_y[::-1], rail_z[::-1], floor, color="#dfe4ea", lw=0)
         axis.plot(rail_y, rail_z, color=MUTED, lw=1.6)
         axis.fill_between(wheel_y[::-1], wheel_z[::-1], roof, color="#dbe9f4", lw=0)
@@ -90,17 +107,17 @@ def locus_figure(study: VehicleStudy) -> str:
     values = study.locus.eigenvalues_1ps
     with look():
         figure = Figure(figsize=(width_in(), 6.7))
-        wide = (width_in() - LEFT_IN - 0.2) / width_in()
-        scale = 0.45 / width_in() if is_narrow() else 0.0  # the numbers of the colour bar
-        plane = figure.add_axes((LEFT_IN / width_in(), 0.41, wide - scale, 0.56))
-        below = figure.add_axes((LEFT_IN / width_in(), 0.08, wide, 0.22))
+        wide = width_in() - LEFT_IN - 0.2
+        plane = add_panel(figure, LEFT_IN, 2.75, wide - _BAR_IN, 3.75)
+        below = add_panel(figure, LEFT_IN, 0.54, wide, 1.47)
+        scale = add_panel(figure, LEFT_IN + wide - _BAR_IN + 0.1, 2.75, 0.11, 3.75)
         frequency = values.imag / (2.0 * np.pi)
         shown = (frequency > SLOWEST_HZ) & (frequency < _MOST_HZ) & (values.real > -40.0)
         tint = np.broadcast_to(speed[:, None], values.shape)
         marks = plane.scatter(
             values.real[shown], frequency[shown], c=tint[shown], s=9, cmap="plasma", linewidths=0
         )
-        bar = figure.colorbar(marks, ax=plane, pad=0.01, aspect=30, fraction=0.03)
+        bar = figure.colorbar(marks, cax=scale)
         bar.set_label("speed, km/h")
         bar.outline.set_visible(False)
         plane.axvline(0.0, color=INK, lw=0.9, ls=(0, (4, 3)))

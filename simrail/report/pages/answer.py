@@ -163,7 +163,11 @@ def answer_chart(question: Question, *, what: str) -> str:
         panel.set_ylim(0.75 * values.min(), 1.35 * values.max())
         canvas.log_scale(panel.yaxis)
         words = question.words.replace(" in curves", "") if len(slots) > 1 else question.words
-        panel.set_ylabel(textwrap.fill(f"{words}, {question.unit.strip()}", 34), fontsize=8.4)
+        label = textwrap.fill(f"{words}, {question.unit.strip()}", 34)
+        panel.set_ylabel(label, fontsize=8.4)
+        if "\n" in label:
+            # Beside numbers as usual there is no room for a second line.
+            panel.yaxis.set_label_coords(-0.5 / (panel.get_position().width * canvas.width_in()), 0.5)
         handles = [
             Line2D([], [], color=s.colour, marker="o", mfc="none" if s.baseline else s.colour, lw=0, ms=5.0)
             for s in styles

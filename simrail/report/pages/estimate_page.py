@@ -210,7 +210,7 @@ def _gaps(recording: Recording) -> Sequence[str]:
     if recording.gaps is None:
         return []
     lines = [
-        f"{missing:.0f} samples between {start_s:.3f} and {end_s:.3f} s"
+        f"{missing:.0f} {'sample' if missing == 1 else 'samples'} between {start_s:.3f} and {end_s:.3f} s"
         for start_s, end_s, missing in recording.gaps.head(MOST_GAPS)[list(GAPS)].to_numpy(dtype=np.float64)
     ]
     more = len(recording.gaps) - MOST_GAPS

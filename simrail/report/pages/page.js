@@ -22,9 +22,14 @@
   };
   const ticks = (low, high, most) => {
     const raw = (high - low) / most, ten = 10 ** Math.floor(Math.log10(raw));
-    const step = ten * ([1, 2, 5, 10].find(k => k * ten >= raw) || 10);
-    const marks = [];
-    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) marks.push(k * step);
+    const at = [1, 2, 5, 10].findIndex(k => k * ten >= raw);
+    let step, marks = [];
+    // One mark alone says nothing of the scale: then the next finer step.
+    for (let k = at < 0 ? 3 : at; marks.length < 2 && k > at - 3; k--) {
+      step = ten * (k < 0 ? [0.1, 0.2, 0.5][k + 3] : [1, 2, 5, 10][k]);
+      marks = [];
+      for (let i = Math.ceil(low / step); i * step <= high + 1e-9 * step; i++) marks.push(i * step);
+    }
     return [marks, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
   };
   const short = value => Number.isFinite(value) ? String(+value.toPrecision(3)).replace("-", "\u2212") : "\u2013";

@@ -241,7 +241,8 @@ def _scores(data: PageData) -> list[Section]:
     drawings = distance_figures(data)
     if first is not None and bands_of_case(first):
         make = partial(bands_figure, first, data.styles, known=data.bands)
-        drawings.append((BANDS_CAPTION, canvas.drawn("bands", make)))
+        if by_bands := canvas.drawn("bands", make):
+            drawings.append((BANDS_CAPTION, by_bands))
     said = [] if first is None or campaign else _said(data, first)
     words = {
         "cases": shown,

@@ -25,7 +25,7 @@ def write_vehicle_page(folder: Path, study: VehicleStudy) -> Path:
         contents=[item for item in contents.items() if study.conicity or item[0] != "contact"],
         model=model,
         tiles=_tiles(study),
-        bodies=body_rows(model),
+        bodies=[(row[0], *map(signed, row[1:])) for row in body_rows(model)],
         wheels=[
             (wheel.name, f"{load / 1e3:.4g}", f"{wheel.radius_m:g}", _turns(model, wheel.spin))
             for wheel, load in zip(model.wheels, study.wheel_load_n, strict=True)

@@ -25,6 +25,8 @@ _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"
 _MOST_ALIKE = 3
 """So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
 shades of it, which stay beside those of their twins."""
+_SHADES = (-0.3, 0.65)
+"""From the share of black to that of white: darker ones are not seen on the ground of dark mode."""
 _APART = ("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7", "#332288", "#882255", "#7b5e2a", "#999933")
 """Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
@@ -136,7 +138,7 @@ def _shaded(styles: dict[str, MethodStyle]) -> dict[str, MethodStyle]:
             for name in names[1:]:
                 shaded[name] = replace(styles[name], colour=free.pop(0))
         elif len(names) > _MOST_ALIKE:
-            for place, name in zip(np.linspace(-0.6, 0.6, len(names)), names, strict=True):
+            for place, name in zip(np.linspace(*_SHADES, len(names)), names, strict=True):
                 shaded[name] = replace(styles[name], colour=_mixed(colour, float(place)))
     return shaded
 

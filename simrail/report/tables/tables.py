@@ -167,7 +167,11 @@ _WORDS = {
 
 
 def _group_spans(columns: Sequence[tuple[str, str, str, str]]) -> list[tuple[str, int]]:
-    """Title and width of columns of one quantity and metric; what is no rms has its title below."""
-    groups = groupby(columns, key=lambda column: column[:2])
-    spans = [(quantity, metric, len(list(group))) for (quantity, metric), group in groups]
-    return [(f"{_WORDS[quantity]} rms" if metric == "rms" else "", n) for quantity, metric, n in spans]
+    """Title and width of columns of one quantity: rms, and others that are named below."""
+    spans = []
+    for quantity, group in groupby(columns, key=lambda column: column[0]):
+        metrics = [metric for _, metric, *_ in group]
+        others = [metric for metric in metrics if metric != "rms"]
+        words = ": " + ", ".join(["rms", *others]) if others else " rms"
+        spans.append((_WORDS[quantity] + words, len(metrics)))
+    return spans
