@@ -21,10 +21,10 @@ AT_MPS = 70.0 / 3.6
 """Speed at which `Motion.gyro` and `Motion.accel` hold; they grow with its power of 1.5."""
 
 
-SLOW_M = 70.0 / (2.0 * math.pi)
-"""The cross-level of rails is measured in waves of up to 70 m (EN 13848-1: D1 and D2): what is slower is a
+SLOW_M = 150.0 / (2.0 * math.pi)
+"""Irregularities of rails are measured in waves of up to 150 m (EN 13848-1: D3 ends there): what is slower is a
 deviation from the map, of which the map's sheet speaks. Of a wave of that length half the power is left, of a
-kilometre half a percent."""
+kilometre two percent."""
 
 
 @dataclass(frozen=True)
