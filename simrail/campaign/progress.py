@@ -1,6 +1,7 @@
 """Who is told how a campaign, an export or a tuning goes, and what the command line shows of it."""
 
 import time
+from collections import deque
 from datetime import timedelta
 from types import TracebackType
 from typing import Self
@@ -13,6 +14,9 @@ SILENT_S = 2.0
 
 _EVERY_S = 10.0
 """On a plain stream, how often the progress is told."""
+
+_PACE_S = 120.0
+"""Over so long, or longer where less than a cell was done, a pace is taken: a machine may become busy."""
 
 
 class Watcher:
@@ -75,6 +79,7 @@ class ProgressWatcher(Watcher):
         self._begun = self._cells_begun = 0.0
         self._said = -_EVERY_S
         self._before = self._done = 0
+        self._paces: deque[tuple[float, int]] = deque()
         self._most: int | None = None
         self._is_look = self._was_look = False
         self._by_worker: dict[str, int] = {}
@@ -145,6 +150,7 @@ class ProgressWatcher(Watcher):
         if not (self._is_look and self._was_look):  # what a stop rule asks for later goes on from before
             self._before = self._done = done
             self._cells_begun = time.perf_counter()
+            self._paces = deque([(self._cells_begun, done)])
             self._by_worker = {}
         self._was_look, self._is_look = self._is_look, False
         self._said = time.perf_counter()
@@ -159,7 +165,11 @@ class ProgressWatcher(Watcher):
         self._by_worker[worker] = self._by_worker.get(worker, 0) + done - self._done
         self._done = done
         seconds = max(now - self._cells_begun, 1e-6)
-        each_s = seconds / max(done - self._before, 1)
+        while len(self._paces) > 1 and self._paces[1][0] <= now - _PACE_S:
+            self._paces.popleft()
+        since, had = self._paces[0]
+        each_s = max(now - since, 1e-6) / max(done - had, 1)
+        self._paces.append((now, done))
         left = f"{timedelta(seconds=round((count - done) * each_s))} left"
         of = f"{done} of {count}"
         if self._most is not None and self._most > count:
@@ -167,7 +177,7 @@ class ProgressWatcher(Watcher):
             left += f", at most {timedelta(seconds=round((self._most - done) * each_s))}"
         each = "+".join(map(str, self._by_worker.values()))
         by = f", by {len(self._by_worker)} workers: {each}" if len(self._by_worker) > 1 else ""
-        note = f"{of}, {failed} failed, {1.0 / each_s:.3g} per second, {left}{by}"
+        note = f"{of}, {failed} failed, {(done - self._before) / seconds:.3g} per second, {left}{by}"
         if self._cells is not None:
             self._progress.update(self._cells, completed=done, note=note)
         if not self._console.is_terminal and (now > self._said + _EVERY_S or done == count):

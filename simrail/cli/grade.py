@@ -210,13 +210,11 @@ def scope_settings(scenario: Scenario, lines: list[str]) -> list[str]:
             settings.append(f"score.{name}={json.dumps(list(dict.fromkeys((*kept, *more))))}")
     if any(one.quantity in RAILS for one in asked):
         return settings
+    known = registered()
     for part in scenario.spec.estimator:
-        fields = (
-            estimator_class(part.method).__dict__.get("__dataclass_fields__", {})
-            if (part.method in registered())
-            else {}
-        )
-        if "geometry_step_m" in fields and not {"geometry_step_m", "draws"}.intersection(part.options):
+        method = estimator_class(part.method) if part.method in known else None
+        makes_rails = "geometry_step_m" in getattr(method, "__dataclass_fields__", {})
+        if makes_rails and not {"geometry_step_m", "draws"}.intersection(part.options):
             settings.append(f"estimator.{part.name}.options.geometry_step_m=0")
     return settings
 
@@ -226,12 +224,10 @@ def device_settings(scenario: Scenario, devices: int | None) -> list[str]:
     from simrail.scenario.stop_rule import draws_of, level_of
 
     of = {"track_draw": "track_draws", "sample": "samples", "sensor_draw": "sensor_draws"}
-    least = LEAST_DRAWS if devices is None else min(LEAST_DRAWS, devices)
-    stop = f"stop={{ verdicts = true, least_draws = {least} }}"
-    if devices is None:
-        return [stop]
-    level, spec = level_of(scenario.spec), scenario.spec
-    if level == "sensor_draw" or draws_of(spec) == 1:
-        return [stop, f"monte_carlo.sensor_draws={devices}"]
-    # Devices that share a draw of the upper level stay as many: the draws become fewer.
-    return [stop, f"monte_carlo.{of[level]}={max(2, -(-devices // spec.monte_carlo.sensor_draws))}"]
+    level, draws, settings = level_of(scenario.spec), draws_of(scenario.spec), []
+    if devices is not None:
+        # Devices that share a draw of the upper level stay as many: the draws become fewer.
+        within = 1 if level == "sensor_draw" else scenario.spec.monte_carlo.sensor_draws
+        draws = max(2, -(-devices // within))
+        settings.append(f"monte_carlo.{of[level]}={draws}")
+    return [f"stop={{ verdicts = true, least_draws = {max(2, min(LEAST_DRAWS, draws))} }}", *settings]

@@ -284,16 +284,44 @@ def test_a_cluster_that_cannot_be_used_is_refused_in_one_line(
     assert 'pip install -e ".[cluster]"' in said
 
 
+class _KillsAndEnds(Watcher):
+    """Kills a worker when the first batch is done, and ends the campaign a few batches later."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        self.cluster, self.batches = cluster, 0
+
+    def cells_done(self, done: int, count: int, failed: int, worker: str) -> None:
+        self.batches += 1
+        if self.batches == 1:
+            self.cluster.workers[0].kill()
+        if self.batches == 4:
+            raise KeyboardInterrupt
+
+
 @pytest.mark.slow
-def test_a_sensitivity_on_a_cluster_has_the_bits_of_one_process(
-    cluster: Cluster, rides: Path, assert_same: Callable[[pd.DataFrame, pd.DataFrame], None]
+def test_a_sensitivity_on_a_cluster_killed_and_resumed_has_the_bits_of_one_process(
+    cluster: Cluster, rides: Path, tmp_path: Path, assert_same: Callable[[pd.DataFrame, pd.DataFrame], None]
 ) -> None:
     cluster.add_worker()
     cluster.add_worker()
     few = ["monte_carlo.samples=2", "ride.end_m=80.0", "ride.rest_s=1.0"]
     scenario = load_scenario("sensitivity", overrides=few)
     alone = run_campaign(scenario, workers=1)
-    found = run_campaign(scenario, cluster=cluster.address, batch_cells=3)
+    kept = Checkpoint(tmp_path / "kept")
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(
+            scenario,
+            cluster=cluster.address,
+            batch_cells=3,
+            checkpoint=kept,
+            watcher=_KillsAndEnds(cluster),
+        )
+    assert cluster.workers[0].poll() is not None
+    kept = Checkpoint(tmp_path / "kept")  # as the next start finds it
+    done = kept.cells()
+    assert 0 < len(done) < len(alone.cells)
+    found = run_campaign(scenario, cluster=cluster.address, batch_cells=3, checkpoint=kept)
+    assert found.failures == [] and len(found.cells) == len(alone.cells)
     assert_same(alone.scores, found.scores)
     tables = [
         sensitivity_table(sensitivities(scenario.spec, one.scores, one.cells, FigureName()))

@@ -67,3 +67,14 @@ def test_what_is_left_counts_what_a_stop_rule_may_still_ask_for(clock: list[floa
     assert second.startswith("cells: 30 of 30 (at most 60)") and "1 per second" in second
     assert "at most 0:00:30" in second
     assert "at most" not in other and "0.1 per second" in other
+
+
+def test_what_is_left_follows_the_pace_of_late(clock: list[float]) -> None:
+    """A hundred cells at a second each, then five minutes and more at eleven: ten more take 110 s."""
+    watcher, stream = watched()
+    with watcher:
+        watcher.cells_begin(0, 140)
+        for done in range(1, 131):
+            clock[0] += 1.0 if done <= 100 else 11.0
+            watcher.cells_done(done, 140, 0, "here")
+    assert "130 of 140, 0 failed, 0.302 per second, 0:01:50 left" in stream.getvalue().splitlines()[-1]

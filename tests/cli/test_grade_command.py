@@ -8,7 +8,7 @@ import pytest
 
 from simrail.cli.grade import device_settings, requirement_settings, scope_settings
 from simrail.cli.main import call
-from simrail.scenario.requirements import VerdictRule, looks_of, stop_rule_of
+from simrail.scenario.requirements import VerdictRule, judge_requirements, looks_of, stop_rule_of
 from simrail.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = """
@@ -168,15 +168,20 @@ def test_so_many_devices_are_drawn(devices: int | None, least: int) -> None:
     assert ("it cannot be the answer" in told) == (devices is not None) and "takes 59" in told
 
 
-def test_devices_on_shared_rides_stay_as_many_on_each(ladder: Path) -> None:
-    asked = load_scenario("own.toml", overrides=["monte_carlo={ track_draws = 9, sensor_draws = 4 }"])
-    settings = [*requirement_settings(["roll<0.1deg"]), *device_settings(asked, 10)]
-    read = load_scenario(
-        "own.toml", overrides=["monte_carlo={ track_draws = 9, sensor_draws = 4 }", *settings]
-    )
-    assert looks_of(read.spec) == (12,)
-    alone = load_scenario(
-        "own.toml",
-        overrides=[*requirement_settings(["roll<0.1deg"]), *device_settings(load_scenario("own.toml"), 7)],
-    )
-    assert looks_of(alone.spec) == (7,)
+@pytest.mark.parametrize(
+    "draws, devices, looks",
+    [
+        ("track_draws = 9, sensor_draws = 4", 10, (12,)),
+        ("track_draws = 9, sensor_draws = 4", None, (36,)),
+        ("sensor_draws = 60", 7, (7,)),
+    ],
+)
+def test_devices_on_shared_rides_stay_as_many_on_each(
+    draws: str, devices: int | None, looks: tuple[int, ...], ladder: Path
+) -> None:
+    """And the first look is at no more than there are."""
+    own = [f"monte_carlo={{ {draws} }}"]
+    settings = device_settings(load_scenario("own.toml", overrides=own), devices)
+    read = load_scenario("own.toml", overrides=[*own, *requirement_settings(["roll<0.1deg"]), *settings])
+    assert looks_of(read.spec) == looks
+    judge_requirements(read.spec, ["ekf"])

@@ -43,6 +43,9 @@ TOO_LONG = {
     "simrail sensitivity sensitivity --method morris --set engine=compiled --set "
     "'vehicle_factors.load={ uniform = [0.9, 1.3] }'": "minutes; tests/scenario have a short one",
     "simrail grade my_imu.toml --for 'roll<0.1deg in curves at 60km/h'": "likewise",
+    "simrail grade my_imu.toml,lord_3dm_gx4_25 --for 'roll<0.1deg in curves at 60km/h'": "likewise",
+    "simrail grade my_imu.toml --for 'roll<0.1deg' --mount axle --devices 20": "likewise",
+    "simrail grade my_imu.toml --for 'roll<0.1deg for 80%' --devices 20": "likewise",
     "simrail sensitivity sensitivity": "some minutes; tests/campaign runs small ones",
     "simrail spectra shaking": "a multibody ride with all waves; tests/cli runs a short one",
     "simrail tune metro_geometry --estimator TrajectorySmoother --method cml --ride go70": "minutes",

@@ -71,7 +71,7 @@ def track_frame(at_m: np.ndarray, *, places: bool = True) -> SimpleNamespace:
 
 @lru_cache
 def track_pieces() -> Pieces:
-    """TRACK by its Taylor polynomials at the places of the ride: exact there, as far as its curvatures ask."""
+    """TRACK by its Taylor polynomials at the places of the ride: exact there, as far as is asked."""
     of_roll, of_pitch, of_yaw = TRACK
     slope = -sp.tan(of_pitch)
     functions = [
