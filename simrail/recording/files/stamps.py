@@ -85,7 +85,10 @@ class RideClock:
             return count / float(part.tick_rate_hz or 1.0)
         multiply, divide = TIMES[unit]
         seconds = count if multiply == divide else count * multiply / divide
+        least, most = np.nanmin(seconds, initial=np.inf), np.nanmax(seconds, initial=-np.inf)
         for period, word in PERIODS_S.items():
+            if not 0.0 <= least <= most <= period:
+                continue
             whole = _over(period, seconds, table, notes, f"the seconds of the {word} begin anew")
             if whole is not seconds:
                 return whole
