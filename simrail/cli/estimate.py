@@ -55,6 +55,15 @@ def estimate(
             help="Option of the estimator; of several ESTIMATOR.OPTION=VALUE. Repeatable.",
         ),
     ] = None,
+    limits: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="QUANTITY.BAND=LIMIT",
+            help="What rails are held against, e.g. --limit vertical_profile.D1=6mm, in place of that of the "
+            "ride file. Repeatable.",
+        ),
+    ] = None,
     fused: Annotated[
         bool, typer.Option("--fuse", help="Fuse the rails of several rides over the same line.")
     ] = False,
@@ -71,6 +80,14 @@ def estimate(
 
     chosen, wanted, named = form_of(form), _units(units), list(estimators or [])
     if fused:
+        if limits:
+            raise InputError(
+                "is not asked of fused rails",
+                field="--limit",
+                value=limits[0],
+                limit="a single ride",
+                remedy="leave out --limit or --fuse",
+            )
         if len(named) > 1:
             raise InputError(
                 "fuses the rails of one method",
@@ -91,7 +108,7 @@ def estimate(
             remedy="give one, or add --fuse to fuse their rails",
         )
     ride, file = rides[0], ride_file(rides[0])
-    whole = ride_with_warnings(ride)
+    whole = ride_with_warnings(ride, limits or [])
     with blame(label(file)) if not named else blame(None):
         methods = chosen_methods(whole.spec.estimator, named, settings or [], file.parent)
     name = "_".join(method.name for method in methods[:3]) + "_and_more" * (len(methods) > 3)

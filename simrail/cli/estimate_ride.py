@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -180,12 +180,15 @@ def judge_needs(method: Method, recording: Recording, file: str) -> None:
         raise InputError(problem, file=file, field="encoder", limit=limit, remedy=remedy)
 
 
-def ride_with_warnings(ride: Path) -> RecordedRide:
-    """Read a ride, and tell what is likely wrong with it."""
+def ride_with_warnings(ride: Path, limits: Sequence[str] = ()) -> RecordedRide:
+    """Read a ride, and tell what is likely wrong with it; limits that a command names replace its own."""
     whole = whole_ride(ride)
     for line in warnings_of(whole.evidence):
         say(f"warning: {label(ride)}: {line}")
-    return whole
+    if not limits:
+        return whole
+    own = whole.spec.limits.replaced(limits, option="--limit")
+    return replace(whole, spec=whole.spec.model_copy(update={"limits": own}))
 
 
 def estimate_ride(

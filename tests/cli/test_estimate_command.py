@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from simrail.cli.estimate_ride import ride_with_warnings
 from simrail.cli.main import BAD_INPUT, DONE, call
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD, STANDSTILL
 from simrail.recording.files.ride_writer import write_ride
@@ -153,7 +155,26 @@ def test_one_of_the_file_is_chosen_by_its_name_and_options_say_whose_they_are(
         (["--estimator", "quick", "--estimator", "quick"], ["named twice"]),
         (["--estimator", "quick", "--set", "no=1"], ["no such option"]),
         (["--units", "inch"], ["--units", "deg, mm"]),
+        (["--limit", "twist=3mm"], ["--limit", "QUANTITY.BAND=LIMIT", "vertical_profile.D1=6mm"]),
+        (["--limit", "crosslevel.D1=3mm"], ["no such quantity", "cross_level"]),
+        (["--limit", "twist.D1=3mm"], ["no such band", "full"]),
+        (["--limit", "twist.full=3deg"], ["--limit", "3deg"]),
+        (["--limit", "twist.full=3mm", "--fuse"], ["fused rails"]),
     ):
         assert call([*command, *more]) == BAD_INPUT
         said = capsys.readouterr().err
         assert all(word in said for word in words) and len(said.splitlines()) == 1, said
+
+
+def test_limits_of_the_command_stand_in_place_of_those_of_the_file_or_beside_them(
+    with_reference: Path, tmp_path: Path
+) -> None:
+    ride = tmp_path / "ride"
+    shutil.copytree(with_reference, ride)
+    assert ride_with_warnings(ride).spec.limits.limits().is_example
+    with (ride / "ride.toml").open("a") as file:
+        file.write('\n[limits]\nsection_m = 100.0\ncross_level = { D1 = "4 mm", D1_sd = 1.0 }\n')
+    told = ["cross_level.D1 = 1.5mm", "twist.full=6"]
+    limits = ride_with_warnings(ride, told).spec.limits.limits()
+    assert limits.peaks == pytest.approx({("cross_level", "D1"): 1.5e-3, ("twist", "full"): 6e-3})
+    assert limits.sds == pytest.approx({("cross_level", "D1"): 1e-3}) and limits.section_m == 100.0

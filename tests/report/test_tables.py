@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgb
 
 from simrail.campaign.cell import CellResult
 from simrail.report.tables.methods import method_styles
@@ -37,6 +38,8 @@ def test_table_marks_the_best_method_and_every_loss(
     design = error_table(case_of(*tables(example())), styles, reference="design")
     assert design.rows[3].cells[column].text == "0.000"
     assert sum(span for _, span in table.groups) == len(table.columns) == len(table.rows[0].cells)
+    # A column beside rms stands below the quantity that it is of.
+    assert table.groups[0][0].startswith("roll error") and table.groups[0][0].endswith(": rms, max")
 
 
 def test_spread_over_draws_is_shown(scenario: Scenario, example: Rides, tables: Tables) -> None:
@@ -57,10 +60,21 @@ def test_cases_are_found_by_their_labels(example: Rides, tables: Tables) -> None
     assert all_cases[0].curves() == ["curve:curve 3 R300"]
 
 
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours by WCAG 2: (L1 + 0.05) / (L2 + 0.05) of their relative luminances."""
+    light = []
+    for colour in (one, other):
+        linear = [((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(colour)]
+        light.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05)
+    return max(light) / min(light)
+
+
 def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
     styles = method_styles(load_scenario("metro_geometry"))
     smoothers = [style.colour for name, style in styles.items() if name.startswith(("smoother", "filter"))]
     assert len(smoothers) > 3
     assert len(set(smoothers)) == len(smoothers)
+    # Each is seen on the ground of dark mode.
+    assert min(contrast(colour, "#12171d") for colour in smoothers) > 2.0
     few = method_styles(load_scenario("validation_quick"))
     assert few["ekf_compensated"].colour == "#0072B2"

@@ -3,6 +3,7 @@
 None of it is part of a `Recording`: no method sees a reference, and no signal is read otherwise for it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -10,8 +11,8 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from simrail.core.amounts import amount_in
-from simrail.core.errors import InputError
-from simrail.core.toml_files import Part, blame
+from simrail.core.errors import InputError, one_of
+from simrail.core.toml_files import Part, blame, judge
 from simrail.recording.files.signal_part import SignalPart
 from simrail.recording.signals import RAIL_REFERENCE_SIGNAL, REFERENCE_SIGNAL, Signal
 from simrail.track.bands import BANDS, TWIST_BASE_M
@@ -105,6 +106,37 @@ class LimitsPart(Part):
             base, section = self.twist_base_m, self.section_m
             return RailLimits(EXAMPLE_LIMITS.peaks, EXAMPLE_LIMITS.sds, section, base, is_example=True)
         return RailLimits(peaks, sds, self.section_m, self.twist_base_m)
+
+    def replaced(self, told: Sequence[str], *, option: str) -> "LimitsPart":
+        """The same with limits that a command names, in place of those here or beside them.
+
+        Parameters
+        ----------
+        told : sequence of str
+            ``quantity.band=limit``, e.g. ``vertical_profile.D1=6mm``.
+        option : str
+            What they are called on the command line, for messages.
+
+        Raises
+        ------
+        InputError
+            If one is not of that form, or there is no such quantity or band.
+        """
+        data = self.model_dump(exclude_unset=True)
+        for one in told:
+            key, _, value = one.partition("=")
+            quantity, _, band = (word.strip() for word in key.partition("."))
+            if not (band and value.strip()):
+                raise InputError(
+                    "is no limit",
+                    field=option,
+                    value=one,
+                    limit="QUANTITY.BAND=LIMIT",
+                    remedy=f"write e.g. {option} vertical_profile.D1=6mm",
+                )
+            one_of(quantity, QUANTITIES, "rails have no such quantity", field=option)
+            data[quantity] = {**data.get(quantity, {}), band: value.strip()}
+        return judge(LimitsPart, data, file=option)
 
 
 class MeasuredPart(SignalPart):

@@ -421,6 +421,14 @@ def _free_above(figure: Figure) -> float:
     return float((1.0 - top) * figure.get_size_inches()[1])
 
 
+def label_upright(axis: Axes, words: str, **how: Any) -> None:
+    """Label of a y axis, whose second line finds room beside the numbers, however wide these are."""
+    axis.set_ylabel(words, **how)
+    if "\n" in words:
+        wide, _ = axis.figure.get_size_inches()
+        axis.yaxis.set_label_coords(-0.52 / (axis.get_position().width * wide), 0.5)
+
+
 def legend_above(*axes: Axes) -> None:
     """Put the legend of some panels above the first, outside of the data; truth and design first."""
     by_label = {

@@ -133,7 +133,7 @@ def rails_figure(
                 axis.plot(place[at], found[at], label=style.label, zorder=9 - 0.1 * order, **look_of)
                 reach += [*found[at]]
             canvas.pad_limits(axis, min(reach), max(reach), top=0.16 if quantity == JUDGED[0] else 0.08)
-            axis.set_ylabel(f"{QUANTITIES[quantity]},\nmm")
+            canvas.label_upright(axis, f"{QUANTITIES[quantity]},\nmm")
         canvas.legend_above(axes[0])
         over_distance(axes, example, limits=limits)
         return canvas.to_svg(figure, description=what)

@@ -54,9 +54,7 @@ def panels_figure(
             _draw(axis, view, panel, looks, keys)
             parted = ",\n" if len(panel.title) > MOST_IN_LINE else ", "
             axis.tick_params(axis="y", labelsize=8.2)
-            axis.set_ylabel(f"{panel.title}{parted}{panel.unit}", fontsize=8.4)
-            if len(panel.title) > MOST_IN_LINE:
-                axis.yaxis.set_label_coords(-0.54 / (canvas.width_in() - canvas.LEFT_IN - 0.2), 0.5)
+            canvas.label_upright(axis, f"{panel.title}{parted}{panel.unit}", fontsize=8.4)
         canvas.legend_above(*axes)
         x = np.concatenate([view.axes[panel.axis][0] for panel in drawn])
         low, high = float(np.nanmin(x)), float(np.nanmax(x))

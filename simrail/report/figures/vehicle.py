@@ -49,8 +49,9 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
     with look():
         wide = width_in() - LEFT_IN - 0.2
         # To scale: on a phone all of the width, and as tall as that asks for.
-        across = 1.05 * np.ptp(np.concatenate([rail_y, wheel_y]))
-        tall = min(wide * (roof - floor) / across, _PAIR_IN)
+        ends = np.concatenate([rail_y, wheel_y])
+        tall = min(wide * (roof - floor) / (1.05 * float(np.ptp(ends))), _PAIR_IN)
+        centre, reach = 0.5 * (ends.min() + ends.max()), 0.5 * (roof - floor) * wide / tall
         figure = Figure(figsize=(width_in(), tall + 0.68))
         axis = add_panel(figure, LEFT_IN, 0.52, wide, tall)
         axis.fill_between(rail_y[::-1], rail_z[::-1], floor, color="#dfe4ea", lw=0)
@@ -62,9 +63,13 @@ def pair_figure(model: VehicleModel, contact: Conicity) -> str:
         axis.annotate(f"wheel {wheel.name}", place, va="top", ha="left", color=_LEFT)
         place = (float(rail_y.mean()), floor + 3.0 * size)
         axis.annotate(f"rail {rail.name}", place, va="bottom", ha="center", color=MUTED)
-        axis.set_aspect("equal", adjustable="datalim")
         below = "from the tape circle" + (", mm" if is_narrow() else " towards the middle of the track, mm")
-        axis.set(ylim=(floor, roof), xlabel=below, ylabel="height over the contact, mm")
+        axis.set(
+            xlim=(centre - reach, centre + reach),
+            ylim=(floor, roof),
+            xlabel=below,
+            ylabel="height, mm" if is_narrow() else "height over the contact, mm",
+        )
         return to_svg(figure, description=f"Wheel {wheel.name} in contact with rail {rail.name}")
 
 

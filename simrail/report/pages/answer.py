@@ -164,10 +164,7 @@ def answer_chart(question: Question, *, what: str) -> str:
         canvas.log_scale(panel.yaxis)
         words = question.words.replace(" in curves", "") if len(slots) > 1 else question.words
         label = textwrap.fill(f"{words}, {question.unit.strip()}", 34)
-        panel.set_ylabel(label, fontsize=8.4)
-        if "\n" in label:
-            # Beside numbers as usual there is no room for a second line.
-            panel.yaxis.set_label_coords(-0.5 / (panel.get_position().width * canvas.width_in()), 0.5)
+        canvas.label_upright(panel, label, fontsize=8.4)
         handles = [
             Line2D([], [], color=s.colour, marker="o", mfc="none" if s.baseline else s.colour, lw=0, ms=5.0)
             for s in styles

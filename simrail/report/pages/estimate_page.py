@@ -199,7 +199,7 @@ def _tiles(found: RideEstimates) -> list[tuple[str, str, str]]:
 
 def _rails_tile(result: MethodResult, limits: RailLimits) -> tuple[str, str, str]:
     places = exceedances(result.lines, limits)
-    whose = "example limits" if limits.is_example else "limits of the ride file"
+    whose = "example limits" if limits.is_example else "limits as given"
     if places["chance"].notna().any():
         sure = int((places["chance"] >= LIKELY).sum())
         return "places beyond a limit", str(len(places)), f"{sure} of them surely; {whose}"

@@ -11,6 +11,7 @@ from simrail.report.figures.vehicle import conicity_figure, locus_figure, pair_f
 from simrail.report.pages.frame import page_text, write_page
 from simrail.report.tables.tables import signed
 from simrail.report.tables.vehicle_text import body_rows, critical_words, listed
+from simrail.report.words.sentences import unbroken
 from simrail.vehicle.model import VehicleModel
 from simrail.vehicle.stability import Mode
 from simrail.vehicle.study import Conicity, VehicleStudy
@@ -66,7 +67,7 @@ def _turns(model: VehicleModel, spin: str) -> str:
 
 
 def _row(mode: Mode, frequency_hz: float) -> tuple[str, str, str]:
-    return f"{frequency_hz:.3f}", f"{100.0 * mode.damping:.1f}", mode.words()
+    return f"{frequency_hz:.3f}", f"{100.0 * mode.damping:.1f}", unbroken(mode.words())
 
 
 def _contact(model: VehicleModel, contact: Conicity) -> dict[str, Any]:

@@ -21,13 +21,13 @@ _COLOURS = {
     "Vqf": ("#AA4499", "#CC79A7"),
 }
 _NO_IMU = ("#6b7280", "#6b7280")
-_OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#332288", "#8f83cc"), ("#882255", "#c47f9f"))
+_OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#6350c4", "#a79ce0"), ("#a8326f", "#c47f9f"))
 _MOST_ALIKE = 3
 """So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
 shades of it, which stay beside those of their twins."""
 _SHADES = (-0.3, 0.65)
 """From the share of black to that of white: darker ones are not seen on the ground of dark mode."""
-_APART = ("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7", "#332288", "#882255", "#7b5e2a", "#999933")
+_APART = ("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7", "#6350c4", "#a8326f", "#7b5e2a", "#999933")
 """Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 _SPELLED = {word.lower(): word for word in ("Sabatini", "Yuan", "EKF", "GDA", "VQF", "AHRS", "KF", "IMU")}

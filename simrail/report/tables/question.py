@@ -142,7 +142,7 @@ def question_of(
 def _odometries(scores: pd.DataFrame) -> list[MethodStyle]:
     """Looks of the odometries that were scored; the true one is an ablation."""
     names = [str(name) for name in scores["estimator"].unique()]
-    colours = ("#0072B2", "#D55E00", "#009E73", "#332288", "#882255")
+    colours = ("#0072B2", "#D55E00", "#009E73", "#6350c4", "#a8326f")
     named = [name for name in names if name.startswith(_ODOMETRY) and name != f"{_ODOMETRY}truth"]
     return [
         MethodStyle(name, readable(name.removeprefix(_ODOMETRY)), "", True, "", None, colour, "-")

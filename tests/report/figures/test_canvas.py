@@ -31,3 +31,42 @@ def test_a_narrow_range_has_few_marks(low, high):
     labels, _ = labels_of(low, high)
     assert 2 <= len(labels) <= 4
     assert all(low <= value <= high for value in labels)
+
+
+def test_a_label_of_two_lines_is_not_cut_off_beside_wide_numbers():
+    """It was: by the width of the numbers it stood farther to the left than the figure reaches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with canvas.look():
+        figure, (panel,) = canvas.panels([2.0])
+        panel.set_ylim(-0.025, 0.025)
+        canvas.label_upright(panel, "error of the vertical profile,\nmm")
+        pen = FigureCanvasAgg(figure).get_renderer()
+        figure.draw(pen)
+        box = panel.yaxis.label.get_window_extent(pen)
+    assert 0.0 <= box.x0 < box.x1
+    # And it keeps clear of numbers of three places.
+    assert box.x1 <= min(tick.get_window_extent(pen).x0 for tick in panel.get_yticklabels()) + 8.0
+
+
+@pytest.mark.parametrize("width", [canvas.WIDE_IN, canvas.NARROW_IN])
+def test_names_of_the_parts_of_an_error_are_not_cut_off(width, monkeypatch):
+    """On a phone they began outside of the figure."""
+    import pandas as pd
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from simrail.campaign.budget import FLOOR, TOGETHER
+    from simrail.report.campaign.verdicts import budget_chart
+
+    figures = []
+    monkeypatch.setattr(canvas, "to_svg", lambda figure, **more: figures.append(figure) or "")
+    monkeypatch.setattr(canvas, "width_in", lambda: width)
+    terms = ["accel_turn_on_bias", FLOOR, TOGETHER]
+    budget = pd.DataFrame({"term": terms, "share": 0.3, "low95": 0.2, "high95": 0.4})
+    budget_chart(budget, "shares")
+    (figure,) = figures
+    pen = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(pen)
+    names = figure.axes[0].get_yticklabels()
+    assert len(names) == 3
+    assert all(name.get_window_extent(pen).x0 >= 0.0 for name in names)

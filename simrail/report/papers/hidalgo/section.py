@@ -12,7 +12,7 @@ from simrail.report.papers.claim import judged
 from simrail.report.papers.hidalgo import judges
 from simrail.report.papers.hidalgo.places import BAND, PAPER, Places, places_of
 from simrail.report.tables.methods import MethodStyle
-from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
+from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell, signed
 from simrail.report.words.sentences import listed
 from simrail.scoring.bootstrap import Interval
 from simrail.track.bands import BANDS
@@ -67,7 +67,7 @@ def _table(places: Places) -> Table:
 def _with_interval(one: Interval) -> Cell:
     if not math.isfinite(one.value):
         return NONE
-    behind = f"{one.low:.2f} to {one.high:.2f}" if math.isfinite(one.low) else ""
+    behind = signed(f"{one.low:.2f} to {one.high:.2f}") if math.isfinite(one.low) else ""
     return Cell(f"{one.value:.3f}", behind)
 
 
