@@ -22,9 +22,9 @@ AT_MPS = 70.0 / 3.6
 
 
 SLOW_M = 150.0 / (2.0 * math.pi)
-"""Irregularities of rails are measured in waves of up to 150 m (EN 13848-1: D3 ends there): what is slower is a
-deviation from the map, of which the map's sheet speaks. Of a wave of that length half the power is left, of a
-kilometre two percent."""
+"""Irregularities of rails are measured in waves of up to 150 m (EN 13848-1: D3 ends there): what is slower is
+a deviation from the map, of which the map's sheet speaks. Of a wave of that length half the power is left, of
+a kilometre two percent."""
 
 
 @dataclass(frozen=True)
