@@ -31,7 +31,7 @@ VERTICAL_LENGTH_M = 7.0
 MOTION_RATE_HZ = 125.0
 """Rate to which `simrail.estimators.track_relative.noise.Motion` speaks of white motion."""
 
-LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 1e-5, 3e-3
+LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 5e-5, 3e-3
 """Noise that is always added: no mount is stiffer, and a filter of sensors without noise is singular."""
 
 LOST_M = 1.0
@@ -230,7 +230,9 @@ def _variances(course: Course, rows: slice) -> FloatArray:
     own = (motion.accel_x, motion.accel_y, motion.accel_z)
     rocks = motion.rocking**2
     rates = [gyro + rest + motion.gyro**2 * moves for rest in (rocks, rocks, 0.0)]
-    columns = [*rates, *(accel + sd**2 * moves for sd in own)]
+    rests = (0.0, 0.0, motion.heaving**2)
+    forces = [accel + rest + sd**2 * moves for sd, rest in zip(own, rests, strict=True)]
+    columns = [*rates, *forces]
     return np.ascontiguousarray(np.column_stack([*columns, course.aided.variances[rows]]))
 
 

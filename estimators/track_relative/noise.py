@@ -46,6 +46,8 @@ class Motion:
     rocking : float
         White rates of roll and pitch per step, rad/s: at a stop a body rocks on, where what goes by the
         distance cannot.
+    heaving : float
+        White force along Z per step, m/s2: at a stop passengers walk about.
     tilt, tilt_sd : float
         Roll flexibility: rad of roll per rad of cant deficiency, its mean and standard deviation.
     tilt_rate_sd : float
@@ -78,6 +80,7 @@ class Motion:
     accel_y: float = 0.11
     accel_z: float = 0.08
     rocking: float = 1e-4
+    heaving: float = 0.0
     tilt: float = 0.0
     tilt_sd: float = 0.1
     tilt_rate_sd: float = 0.0
@@ -134,6 +137,7 @@ WAGON = Motion(
     accel_y=0.15,
     accel_z=0.05,
     rocking=4e-4,
+    heaving=0.02,
     tilt=0.2,
     tilt_sd=0.3,
     tilt_rate_sd=0.05,

@@ -164,7 +164,8 @@ def test_white_motion_grows_with_the_speed(rough: Callable) -> None:
     """Variance by the third power of V; at 70 km/h and 125 Hz it is the class's own, beside the sensor's."""
     recording: Recording = rough()
     steps = steps_of(recording, 125.0)
-    course = course_of(recording, steps, AXLE, (WheelWay(),), ())
+    motion = replace(AXLE, heaving=0.03)
+    course = course_of(recording, steps, motion, (WheelWay(),), ())
     states = course.around.states.copy()
     states[:, at.V] = 70.0 / 3.6
     fast = linearised(about(course, states), slice(0, 1)).variances[0]
@@ -176,10 +177,10 @@ def test_white_motion_grows_with_the_speed(rough: Callable) -> None:
     np.testing.assert_allclose(fast[:6] - still[:6], np.square(own), rtol=1e-9)
     np.testing.assert_allclose(fast[:6] - still[:6], 8.0 * (slow[:6] - still[:6]), rtol=1e-9)
     sheet = recording.imu_sheet
-    # With what every mount does: 0.01 mrad/s and 3 mm/s2, and rolls and pitches at rest.
+    # With what every mount does: 0.05 mrad/s and 3 mm/s2, and rolls, pitches and heaves at rest.
     gyro, accel = sheet.gyro_noise_radpsqrts**2 * 125.0, sheet.accel_noise_mpsqrts**2 * 125.0
-    rates = [gyro + 1e-10 + AXLE.rocking**2] * 2 + [gyro + 1e-10]
-    np.testing.assert_allclose(still[:6], [*rates, *[accel + 9e-6] * 3], rtol=1e-12)
+    rates = [gyro + 25e-10 + AXLE.rocking**2] * 2 + [gyro + 25e-10]
+    np.testing.assert_allclose(still[:6], [*rates, *[accel + 9e-6] * 2, accel + 9e-6 + 9e-4], rtol=1e-12)
 
 
 def test_the_sense_of_travel_is_held_at_rest() -> None:

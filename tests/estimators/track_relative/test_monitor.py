@@ -13,6 +13,7 @@ from simrail.estimators.track_relative.monitor import (
     ALLOWED,
     BOUND_SDS,
     MOST_BENT,
+    MOST_SUM,
     PATIENCE,
     WINDOW_S,
     contradiction,
@@ -159,7 +160,7 @@ def test_contradiction_is_the_largest_of_states_and_sums(rough: Callable) -> Non
     biased = quiet.surprises.copy()
     biased[:, 2] = 0.5
     steps = round(WINDOW_S / trace.course.steps.dt)
-    wanted = 0.5 * np.sqrt(steps) / 5.5
+    wanted = 0.5 * np.sqrt(steps) / MOST_SUM[2]
     assert contradiction(quiet._replace(surprises=biased))[-1] == pytest.approx(wanted)
     faults, widening = faults_and_widening(quiet._replace(surprises=4.0 * biased))
     assert faults[-1] == 1.0
