@@ -250,9 +250,8 @@ def _so_far(table: pd.DataFrame, done: dict[str, int]) -> Iterator[str]:
             continue
         left += 1
         if left <= _MOST_TOLD:
-            passed = [
-                f"{row.estimator} {row.passed} of {row.devices}" for row in rows.itertuples() if row.devices
-            ]
+            judged = rows[rows["devices"] > 0].to_dict("records")
+            passed = [f"{row['estimator']} {row['passed']} of {row['devices']}" for row in judged]
             yield f"so far, {imu} on the {mount}: {', '.join(passed)} pass"
     if left > _MOST_TOLD:
         yield f"so far, and {left - _MOST_TOLD} more"

@@ -16,6 +16,7 @@ from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
 from simrail.campaign.worker import BatchResult
 from simrail.results import run
+from simrail.scenario import requirements
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.share import ENOUGH, NOT_ENOUGH, UNDECIDED
 
@@ -138,6 +139,21 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
     assert first["stop"] == second["stop"]
     for name in ("verdicts.csv", "scores.csv"):
         assert (here / "whole" / name).read_bytes() == (here / "parts" / name).read_bytes()
+
+
+def test_between_two_looks_it_is_said_how_many_have_passed_of_what_is_open() -> None:
+    rows = [("axle", "ekf", 17), ("axle", "vqf", 0), ("roof", "ekf", 20)]
+    table = pd.DataFrame(
+        [
+            {"vehicle": "car", "mount": mount, "imu": "lord", "estimator": name, "passed": passed}
+            | {"devices": 20}
+            for mount, name, passed in rows
+        ]
+    )
+    said = list(requirements._so_far(table, {"lord on roof of car": 20}))
+    assert said == ["so far, lord on the axle: ekf 17 of 20, vqf 0 of 20 pass"]
+    state = requirements.VerdictState(20, 60, "track_draw", 1, 3, so_far=tuple(said))
+    assert "so_far" not in state.record
 
 
 @pytest.mark.slow
