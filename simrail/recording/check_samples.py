@@ -178,9 +178,11 @@ def markers(
     ndarray (n,) of bool
     """
     none = np.zeros(len(values), dtype=np.bool_)
+    if len(values) < 3:
+        return none
     off = np.abs(values - np.median(values))
     most = max(1, int(MOST_MARKERS * len(values)))
-    if len(values) < 3 or off.max() <= APART_BEYOND * still:
+    if off.max() <= APART_BEYOND * still:
         return none
     top = np.sort(np.partition(off, len(off) - most - 1)[len(off) - most - 1 :])[::-1]
     steps = top[:-1] / np.maximum(top[1:], still)

@@ -125,7 +125,7 @@ def chosen_alignment(names: Sequence[str], wanted: str | None, *, kind: str) -> 
         raise InputError(f"has no {kind}", limit=f">= 1 {kind}")
     if wanted is None and len(names) == 1:
         return 0
-    if wanted not in names:
+    if wanted is None or wanted not in names:
         raise InputError(
             "has several alignments" if wanted is None else "has no alignment of this name",
             field="--alignment",

@@ -154,7 +154,10 @@ FAULTS: dict[str, tuple[Callable[[Path], None], list[str]]] = {
         text(('axes = ["x", "-y", "-z"]', 'axes = ["x", "z", "-y"]')),
         ["imu.axes", "gravity lies along -Y"],
     ),
-    "turns_the_other_way": (scaled(-1.0, "wz"), ["imu.gyro_z_radps", "against the curves", "reverse"]),
+    "turns_the_other_way": (
+        scaled(-1.0, "wz"),
+        ["imu.gyro_z_radps", "against the curves", "that column alone"],
+    ),
     "looks_backwards": (
         text(('axes = ["x", "-y", "-z"]', 'axes = ["-x", "y", "-z"]')),
         ["imu.yaw_deg", "backwards", "reverse"],

@@ -374,3 +374,20 @@ def test_a_row_of_units_that_the_ride_file_contradicts_is_noted(sound: Recording
     assert_as_sound(found, sound)
     odd = [note for note in found.notes if "by its row of units" in note]
     assert ["wx is in rad/s" in odd[0], "ay is in m/s2" in odd[1], len(odd)] == [True, True, 2]
+
+
+@pytest.mark.parametrize("hours", [2.0, -5.5])
+def test_a_file_of_another_time_zone_is_told_with_the_setting_that_mends_it(
+    hours: float, sound: Recording, tmp_path: Path
+) -> None:
+    frame = logged()
+    frame.assign(t=frame["t"] + 3600.0 * hours)[["t", "pulses"]].to_csv(tmp_path / "wheel.csv", index=False)
+    wheel = ('[encoder]\nfile = "ride.csv"', '[encoder]\nfile = "wheel.csv"')
+    folder = written(tmp_path, frame.to_csv(index=False), wheel)
+    with pytest.raises(InputError, match="another time zone") as refused:
+        read_signals(folder)
+    setting = re.search(r"set encoder\.(time_offset_s = \S+)$", str(refused.value))
+    assert setting is not None
+    ride = (folder / "ride.toml").read_text().replace("[encoder]\n", f"[encoder]\n{setting[1]}\n")
+    (folder / "ride.toml").write_text(ride)
+    assert_as_sound(read_signals(folder), sound)

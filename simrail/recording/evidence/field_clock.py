@@ -160,10 +160,11 @@ def _blocks(recording: Recording) -> _Blocks | None:
     # What a stamp of the gyro says is as old as its response.
     turned = np.vstack([np.zeros(3), np.cumsum(rates, axis=0) / rate])
     held = np.vstack([np.zeros(3), np.cumsum(0.5 * (turned[1:] + turned[:-1]), axis=0) / rate])
-    at = (np.arange(len(turned)) - 0.5) / rate - recording.imu_sheet.lag_s
+    at = np.asarray((np.arange(len(turned)) - 0.5) / rate - recording.imu_sheet.lag_s, dtype=np.float64)
+    begins = np.asarray((edges - 0.5) / rate, dtype=np.float64)
     inner = slice(margin, len(smooth) - margin)
     most = float(min(OFFSETS_S[-1], margin * block / rate - 0.5))
-    return _Blocks(smooth[inner], (edges[inner] - 0.5) / rate, block / rate, at, held, most)
+    return _Blocks(smooth[inner], begins[inner], block / rate, at, held, most)
 
 
 def _fitted(recording: Recording) -> tuple[float, float, float] | None:

@@ -13,10 +13,14 @@ import pandas as pd
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.resample import rate_of
+from simrail.recording.files.signal_part import LARGEST_OFFSET_S
 from simrail.recording.recording import AT_IMU_TIMES, Recording
 
 LEAST_COMMON = 0.5
 """Share of the IMU's time that the signals beside it must have."""
+
+ZONE_S = 900.0
+"""Time zones differ by quarters of an hour."""
 
 STILL_MPS = 0.2
 """An odometer's speed below which the train may stand."""
@@ -55,6 +59,16 @@ def common_time(imu: pd.DataFrame, signals: Mapping[str, pd.DataFrame], notes: l
     return cut
 
 
+def _zone(time: FloatArray, name: str, frame: pd.DataFrame) -> str | None:
+    """A remedy for a clock of another time zone, if by quarters of an hour it would share the IMU's time."""
+    offset = ZONE_S * round((time[0] - frame.index[0]) / ZONE_S)
+    first, last = max(time[0], frame.index[0] + offset), min(time[-1], frame.index[-1] + offset)
+    if not 0.0 < abs(offset) <= LARGEST_OFFSET_S or last - first < LEAST_COMMON * (time[-1] - time[0]):
+        return None
+    hours = f"{abs(offset) / 3600.0:g} h"
+    return f"its clock is of another time zone, by {hours}: set {name}.time_offset_s = {offset:g}"
+
+
 def refuse_little(time: FloatArray, within: np.ndarray, signals: Mapping[str, pd.DataFrame]) -> None:
     """Refuse a ride whose signals share too little time.
 
@@ -75,7 +89,7 @@ def refuse_little(time: FloatArray, within: np.ndarray, signals: Mapping[str, pd
     if within.mean() >= LEAST_COMMON and within.sum() >= 3:
         return
     name, frame = min(signals.items(), key=lambda item: item[1].index[-1] - item[1].index[0])
-    remedy = "mend the clocks: they share no time at all"
+    remedy = _zone(time, name, frame) or "mend the clocks: they share no time at all"
     if within.any():
         remedy = (
             f"cut the IMU's file to {time[within][0]:.9g} ... {time[within][-1]:.9g} s, or mend the clocks"

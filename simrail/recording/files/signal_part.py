@@ -21,6 +21,9 @@ TEXT_TIMES = "iso"
 EPOCHS = ("epoch_s", "epoch_ms", "epoch_us", "epoch_ns")
 """Time stamps that are a count since 1970."""
 
+LARGEST_OFFSET_S = 50_400.0
+"""Of a clock: of time zones the furthest are 14 hours from universal time."""
+
 TICKS = "ticks"
 """Time stamps that count the ticks of a clock, `SignalPart.tick_rate_hz` of them in a second."""
 
@@ -79,7 +82,7 @@ class SignalPart(DataPart):
     start_s: float = 0.0
     longest_gap_s: Annotated[float, Field(gt=0.0, le=600.0)] | None = None
     scale: dict[str, Positive] = Field(default_factory=dict)
-    time_offset_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
+    time_offset_s: Annotated[float, Field(ge=-LARGEST_OFFSET_S, le=LARGEST_OFFSET_S)] = 0.0
     time_drift_ppm: Annotated[float, Field(ge=-10_000.0, le=10_000.0)] = 0.0
 
     @model_validator(mode="after")

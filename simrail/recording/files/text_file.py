@@ -266,7 +266,14 @@ def open_text(path: Path) -> io.BufferedReader:
 
 
 def _wide_encoding(head: bytes) -> str | None:
-    """Encoding of a text whose letters take two bytes or four; None of any other."""
+    """Encoding of a text whose letters take two bytes or four; None of any other, also of what is no text."""
+    encoding = _marked(head)
+    words = head.decode(encoding or "latin-1", errors="replace")
+    return encoding if 2 * sum(letter.isascii() for letter in words) > len(words) else None
+
+
+def _marked(head: bytes) -> str | None:
+    """The wide encoding that a file's beginning looks like, by its mark or its zeros."""
     if head.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
