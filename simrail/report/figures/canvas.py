@@ -425,7 +425,9 @@ def label_upright(axis: Axes, words: str, **how: Any) -> None:
     """Label of a y axis, whose second line finds room beside the numbers, however wide these are."""
     axis.set_ylabel(words, **how)
     if "\n" in words:
-        wide, _ = axis.figure.get_size_inches()
+        figure = axis.get_figure(root=True)
+        assert figure is not None
+        wide, _ = figure.get_size_inches()
         axis.yaxis.set_label_coords(-0.52 / (axis.get_position().width * wide), 0.5)
 
 
