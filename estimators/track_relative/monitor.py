@@ -33,8 +33,8 @@ WINDOW_S = 5.0
 
 MOST_SUM = (8.0, 14.0, 6.0, 5.0, 9.5, 11.0)
 """Of innovations over their sds and the root of their number, of three gyros and three accelerometers:
-one and a half times the largest of sound rides of simrail's vehicles, with the best IMUs, behind which nothing
-hides; shaking is not white. Synthetic."""
+one and a half times the largest of sound rides of simrail's vehicles, with the best IMUs, behind which
+nothing hides; shaking is not white. Synthetic."""
 
 MOST_OTHER_SUM = 6.5
 """The same of every measurement beside the IMU's."""
