@@ -34,6 +34,9 @@ MOTION_RATE_HZ = 125.0
 LEAST_GYRO_RADPS, LEAST_ACCEL_MPS2 = 5e-5, 3e-3
 """Noise that is always added: no mount is stiffer, and a filter of sensors without noise is singular."""
 
+STANDS_MPS = 1.0
+"""Below it passengers shake a body more than its rails do."""
+
 LOST_M = 1.0
 """Of the wheel's way, per step in which it slips: it says nothing, and begins anew after that."""
 
@@ -230,7 +233,8 @@ def _variances(course: Course, rows: slice) -> FloatArray:
     own = (motion.accel_x, motion.accel_y, motion.accel_z)
     rocks = motion.rocking**2
     rates = [gyro + rest + motion.gyro**2 * moves for rest in (rocks, rocks, 0.0)]
-    rests = (0.0, 0.0, motion.heaving**2)
+    stands = np.abs(course.around.states[rows, at.V]) < STANDS_MPS
+    rests = (0.0, 0.0, np.where(stands, motion.heaving**2, 0.0))
     forces = [accel + rest + sd**2 * moves for sd, rest in zip(own, rests, strict=True)]
     columns = [*rates, *forces]
     return np.ascontiguousarray(np.column_stack([*columns, course.aided.variances[rows]]))

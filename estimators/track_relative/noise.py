@@ -47,7 +47,7 @@ class Motion:
         White rates of roll and pitch per step, rad/s: at a stop a body rocks on, where what goes by the
         distance cannot.
     heaving : float
-        White force along Z per step, m/s2: at a stop passengers walk about.
+        White force along Z per step where the train stands, m/s2: passengers walk about.
     tilt, tilt_sd : float
         Roll flexibility: rad of roll per rad of cant deficiency, its mean and standard deviation.
     tilt_rate_sd : float
