@@ -62,7 +62,8 @@ class TrackRelativeSmoother:
     Attributes
     ----------
     smoothed : bool
-        False stops after the filter, which is causal.
+        False stops after the filter, which is causal: but for the speed at which a ride begins that does not
+        begin at rest, which is taken from its first second.
     passes : int
         How often to linearise and smooth; the filter does it once.
     rate_hz : float
