@@ -160,7 +160,7 @@ def _check_standing(recording: Recording) -> None:
         return
     count, time = max(1, round(recording.imu_sheet.rate_hz)), recording.imu.index.to_numpy(dtype=np.float64)
     moves = means(np.abs(np.interp(time, way.time_s, way.speed_mps)), count) > STANDING_MPS
-    near = np.convolve(moves, np.ones(5), mode="same") > 0.5
+    near = np.convolve(moves, np.ones(min(5, len(moves))), mode="same") > 0.5
     turning = means(recording.imu[GYRO[2]].to_numpy(), count)[~near]
     if len(turning) < 2 * STANDING_S:
         return

@@ -84,6 +84,10 @@ AXES = {
 }
 """Which axes are judged, in the order in which they are told."""
 
+LEAST = dict.fromkeys((RX, RY, RZ), 2e-4) | dict.fromkeys((FX, FY), 0.02)
+"""Rms of what the line lets expect, in means over a second, rad/s and m/s2, below which it tells nothing of
+an axis: rails and bodies move as much by themselves, and a noiseless IMU would make a sure fault of it."""
+
 AS_A_WHOLE = (
     ((RX, RY, FX, FY), (RZ,)),
     ((RX, RY, RZ), (FX, FY)),
@@ -123,9 +127,9 @@ def weigh_axes(recording: Recording) -> tuple[Finding, ...]:
         FY: frame.k[:, 2] * speed**2 + gravity * level,
     }
     found = {name: means(recording.imu[name].to_numpy(), count) for name in AXES}
-    slopes = {name: slope(found[name], expected[name]) for name in AXES}
+    slopes = {name: slope(found[name], expected[name], LEAST[name]) for name in AXES}
     findings = [_judged(name, slopes[name]) for name in AXES]
-    across = slope(found[RY], expected[RX])
+    across = slope(found[RY], expected[RX], LEAST[RX])
     if findings[0].wrong and abs(across.value) > OTHER_SIGN and abs(across.value) > SURE * across.sd:
         findings[0] = _finding(
             RX,
@@ -203,11 +207,11 @@ def _finding(name: str, found: Slope, verdict: Verdict, why: str = "", remedy: s
     )
 
 
-def slope(measured: FloatArray, expected: FloatArray) -> Slope:
-    """Slope of the least-squares line measured = a + slope * expected."""
+def slope(measured: FloatArray, expected: FloatArray, least: float = 0.0) -> Slope:
+    """Slope of the least-squares line measured = a + slope * expected; unknown below a least rms of these."""
     x, y = expected - expected.mean(), measured - measured.mean()
     power = float(x @ x)
-    if power == 0.0:
+    if power <= len(x) * least**2:
         return Slope(1.0, math.inf)
     found = float(x @ y) / power
     rest = y - found * x

@@ -15,9 +15,10 @@ import pytest
 import sympy as sp
 from simrail.estimators.attitude.compensation import track_acceleration
 from simrail.estimators.attitude.kernel import attitude_ekf
+from taylor_pieces import taylor_pieces
 from turning import rotation, turning
 
-from simrail.track.frame_kernel import CANT_TERMS, HEIGHT_TERMS, Pieces
+from simrail.track.frame_kernel import Pieces
 
 t, s, r_y, r_z, g = sp.symbols("t s r_y r_z g", real=True)
 
@@ -71,20 +72,8 @@ def track_frame(at_m: np.ndarray, *, places: bool = True) -> SimpleNamespace:
 
 @lru_cache
 def track_pieces() -> Pieces:
-    """TRACK by its Taylor polynomials at the places of the ride: exact there, as far as is asked."""
-    of_roll, of_pitch, of_yaw = TRACK
-    slope = -sp.tan(of_pitch)
-    functions = [
-        *(of_yaw.diff(s, k) / sp.factorial(k) for k in range(3)),
-        *(sp.sin(of_roll).diff(s, k) / sp.factorial(k) for k in range(3)),
-        *[sp.Integer(0)] * (CANT_TERMS - 3),
-        sp.Integer(0),
-        *(slope.diff(s, k - 1) / sp.factorial(k) for k in range(1, 4)),
-        *[sp.Integer(0)] * (HEIGHT_TERMS - 4),
-    ]
-    places = np.array([float(RIDE.subs(t, time)) for time in TIMES])
-    rows = sp.lambdify(s, functions, "numpy", cse=True)
-    return Pieces(places, np.array([rows(place) for place in places], dtype=np.float64))
+    """TRACK at the places of the ride."""
+    return taylor_pieces(TRACK, s, np.array([float(RIDE.subs(t, time)) for time in TIMES]))
 
 
 class Line:

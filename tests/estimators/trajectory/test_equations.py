@@ -16,6 +16,7 @@ import pytest
 import sympy as sp
 from simrail.estimators.trajectory.kernel import TERMS, constant_rows, linearise
 from simrail.estimators.trajectory.model import beyond_first_order, jacobian_slips, track_terms
+from taylor_pieces import taylor_pieces
 from turning import rotation, turning
 from twins.trajectory import measured as measured_by_vectors
 
@@ -126,9 +127,11 @@ def frame() -> SimpleNamespace:
 def recording() -> SimpleNamespace:
     columns = [sp.lambdify(t, RIDE.diff(t, order), "numpy") for order in range(3)]
     data = np.array([[column(time) for column in columns] for time in TIMES])
-    return SimpleNamespace(
-        odometry=pd.DataFrame(data, columns=["position_m", "speed_mps", "acceleration_mps2"])
-    )
+    pieces = taylor_pieces(ANGLES, s, np.array([float(RIDE.subs(t, time)) for time in TIMES]))
+    data[:, 0] = pieces.starts  # to the last bit
+    track = SimpleNamespace(start_m=0.0, end_m=1e4, on_track=np.asarray, pieces=pieces)
+    odometry = pd.DataFrame(data, columns=["position_m", "speed_mps", "acceleration_mps2"])
+    return SimpleNamespace(track=track, odometry=odometry)
 
 
 def test_terms_of_the_track_give_the_acceleration_of_a_body_that_moves_in_it() -> None:
