@@ -234,7 +234,7 @@ def _variances(course: Course, rows: slice) -> FloatArray:
     rocks = motion.rocking**2
     rates = [gyro + rest + motion.gyro**2 * moves for rest in (rocks, rocks, 0.0)]
     stands = np.abs(course.around.states[rows, at.V]) < STANDS_MPS
-    rests = (0.0, 0.0, np.where(stands, motion.heaving**2, 0.0))
+    rests = np.outer((0.0, 0.0, motion.heaving**2), stands)
     forces = [accel + rest + sd**2 * moves for sd, rest in zip(own, rests, strict=True)]
     columns = [*rates, *forces]
     return np.ascontiguousarray(np.column_stack([*columns, course.aided.variances[rows]]))
