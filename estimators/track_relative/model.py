@@ -18,7 +18,7 @@ from simrail.estimators.track_relative.dual import table_of
 from simrail.estimators.track_relative.kernel import FLOWS, Model, Noise
 from simrail.estimators.track_relative.line import Ground, Lines, ground_at, lines_of, numbers_at
 from simrail.estimators.track_relative.measurement import Around, duals, shown, told
-from simrail.estimators.track_relative.noise import AT_MPS, SLOW_M, Motion, scale_of
+from simrail.estimators.track_relative.noise import AT_MPS, Motion, slow_m_of
 from simrail.estimators.track_relative.prior import first_state, noise_of, start_of
 
 from simrail.core.columns import ACCEL, GYRO, ODOMETRY, ODOMETRY_SD
@@ -168,7 +168,7 @@ def course_of(
         (lateral, height),
         recording.gravity_mps2,
         motion.sway_hz > 0.0,
-        SLOW_M * scale_of(recording),
+        slow_m_of(recording),
     )
     each = [kind.rows(recording, steps) for kind in aiding]
     none = np.empty((len(steps.time_s), 0))

@@ -193,6 +193,11 @@ def scale_of(recording: Recording) -> float:
     return 1.0 if abs(scale - 1.0) < SAME_SCALE else scale
 
 
+def slow_m_of(recording: Recording) -> float:
+    """Way in which ROLL_SLOW follows ROLL, m."""
+    return SLOW_M * scale_of(recording)
+
+
 def tuned_motions(sizes: Mapping[str, float]) -> dict[Motion, Motion]:
     """Motion of each of `CLASSES`, by that, with some sizes that differ.
 

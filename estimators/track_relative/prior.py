@@ -13,7 +13,7 @@ from simrail.estimators.odometry.moving_start import ACCELERATION_SD_MPS2
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of, pointing_of
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.kernel import Noise
-from simrail.estimators.track_relative.noise import SLOW_M, Motion, scale_of
+from simrail.estimators.track_relative.noise import Motion, slow_m_of
 
 from simrail.core.jit import FloatArray
 from simrail.recording.recording import ImuSheet, Recording
@@ -121,7 +121,7 @@ def start_of(
     p = np.zeros((at.STATES, at.WIDTH))
     p[np.arange(at.STATES), np.arange(at.STATES)] = sd**2
     if noise.sway_hz == 0.0:
-        _slow_roll(p, noise, SLOW_M * scale_of(recording))
+        _slow_roll(p, noise, slow_m_of(recording))
     for state in at.TRIPLES:
         # A Matern 5/2 process and its second derivative: minus the variance of the first.
         p[state, state + 2] = p[state + 2, state] = -(sd[state + 1] ** 2)

@@ -278,6 +278,12 @@ def _check_zeros(
         )
 
 
+def _rate_of(time: FloatArray) -> float:
+    """Samples per second; 0 of stamps that go back, or are none, which are refused elsewhere."""
+    span = float(time[-1] - time[0]) if len(time) else 0.0
+    return (len(time) - 1) / span if 0.0 < span < np.inf else 0.0
+
+
 def _check_stuck(
     channels: tuple[Channel, ...],
     bounds: Bounds,
@@ -290,10 +296,7 @@ def _check_stuck(
     The device must show noise otherwise, on another axis meanwhile or on both sides: a computed ride has
     none.
     """
-    span = float(time[-1] - time[0]) if len(time) else 0.0
-    if not 0.0 < span < np.inf:
-        return  # stamps that go back, or are none, are refused elsewhere
-    rate = (len(time) - 1) / span
+    rate = _rate_of(time)
     noise = bounds.noise * np.sqrt(rate)
     shortest = max(STUCK_SAMPLES, int(np.ceil(STUCK_S * rate)))
     if noise == 0.0 or len(time) <= shortest:
@@ -342,14 +345,13 @@ def _check_held(
 
     Only of a device that shows its noise, of several counts, in the other samples.
     """
-    span = float(time[-1] - time[0]) if len(time) else 0.0
-    if not 0.0 < span < np.inf or len(time) <= STUCK_SAMPLES:
-        return
-    rate = (len(time) - 1) / span
+    rate = _rate_of(time)
     noise = bounds.noise * np.sqrt(rate)
+    if noise == 0.0 or len(time) <= STUCK_SAMPLES:
+        return
     steps = np.array([np.abs(np.diff(channel.values)) for channel in channels])
     same = np.all(steps <= 1e-9 * noise, axis=0)
-    if noise == 0.0 or not same.any():
+    if not same.any():
         return
     new = np.concatenate([[True], ~same])
     if new.sum() < STUCK_SAMPLES:

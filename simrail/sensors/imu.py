@@ -10,10 +10,11 @@ A device that sends increments is recorded as rates again: the increment over an
 The angle increment is the plain sum of the internal samples times their interval, without a correction for
 coning (nor the velocity increment one for sculling), so it differs from rates only in how it is counted.
 
-The motion (rates and specific force at the mount) comes from the truth; this module knows neither
-vehicle nor track.
+The motion (rates and specific force at the mount) comes from the truth; nothing else of vehicle or track is
+known here.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,8 +23,10 @@ import pandas as pd
 
 from simrail.core.columns import ATTITUDE, IMU, VELOCITY
 from simrail.core.jit import FloatArray
+from simrail.core.resample import resample
 from simrail.core.seeds import stream
 from simrail.recording.sheets.grades import ImuGrade
+from simrail.ride.truth import Mount, Truth
 from simrail.sensors.clock import lost_samples, sample_by_clock
 from simrail.sensors.decimation import sample_on_time, sampling_of, second_order
 from simrail.sensors.imu_noise import Streams, add_noise
@@ -184,6 +187,53 @@ def arrived(imu: pd.DataFrame, grade: ImuGrade, *, seed: int, draw: int, name: s
     """The samples of `sample_imu` that reach the logger; the first and the last two always do."""
     lost = lost_samples(grade, len(imu), streams_of(seed, draw, name))
     return imu[~lost] if lost.any() else imu
+
+
+def log_imu(
+    truth: Truth,
+    mount: Mount,
+    grade: ImuGrade,
+    *,
+    seed: int,
+    draw: int,
+    earth: EarthRate | None = None,
+    temperature: Temperature | None = None,
+) -> tuple[pd.DataFrame, pd.DataFrame | None, float]:
+    """Sample a mount of a ride, and fill what gets lost on the way.
+
+    Parameters
+    ----------
+    truth : Truth
+        The ride.
+    mount : Mount
+        Where the IMU sits; its name names the random streams.
+    grade, seed, draw, earth, temperature
+        As of `sample_imu`.
+
+    Returns
+    -------
+    imu : pandas.DataFrame
+        Samples at all its stamps.
+    gaps : pandas.DataFrame or None
+        Those that were filled; None where nothing can get lost.
+    delay_s : float
+        As of `sample_imu`.
+    """
+    # Held by nobody else: of a long ride it is the largest array there is.
+    imu, delay_s = sample_imu(
+        truth.motion(mount, columns=IMU if earth is None else (*IMU, *ATTITUDE, *VELOCITY)),
+        grade,
+        seed=seed,
+        draw=draw,
+        name=mount.name,
+        earth=earth,
+        temperature=temperature,
+    )
+    if grade.dropped_fraction == 0.0:
+        return imu, None, delay_s
+    came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
+    filled, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
+    return filled, gaps, delay_s
 
 
 def _earth_terms(motion: pd.DataFrame, earth: EarthRate) -> FloatArray:

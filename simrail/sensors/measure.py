@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simrail.core.columns import ATTITUDE, IMU, ODOMETRY, ODOMETRY_SD, VELOCITY
+from simrail.core.columns import ODOMETRY, ODOMETRY_SD
 from simrail.core.errors import InputError
-from simrail.core.resample import interpolated, resample
+from simrail.core.resample import interpolated
 from simrail.recording.recording import EncoderSheet, MagnetometerSheet, RailSensorSheet, Recording
 from simrail.recording.sheets.grades import ImuGrade, imu_sheet
 from simrail.recording.sheets.vehicle_sheet import VehicleSheet
 from simrail.ride.truth import Mount, Truth
 from simrail.sensors.encoder import EncoderSpec, nominal_radius, sample_encoder
 from simrail.sensors.gnss import GnssSpec, sample_gnss
-from simrail.sensors.imu import EarthRate, arrived, sample_imu
+from simrail.sensors.imu import EarthRate, log_imu
 from simrail.sensors.imu_response import Temperature
 from simrail.sensors.magnetometer import MagnetometerSpec, sample_magnetometer
 from simrail.sensors.rail_sensor import RailSensorSpec, sample_rails
@@ -105,7 +105,7 @@ def measure(
         rail sensor has no rails to see; or if another odometry than the true one is asked for.
     """
     _judge(odometry, is_blind=rail_sensor is not None and rails is None)
-    imu, gaps, delay_s = _inertial(
+    imu, gaps, delay_s = log_imu(
         truth, mount, grade, seed=seed, draw=draw, earth=earth_rate, temperature=temperature
     )
     counts, sheet = None, None
@@ -175,34 +175,6 @@ def _judge(odometry: str | None, *, is_blind: bool) -> None:
             limit="truth",
             remedy=f'use simrail.with_odometry(recording, "{odometry}")',
         )
-
-
-def _inertial(
-    truth: Truth,
-    mount: Mount,
-    grade: ImuGrade,
-    *,
-    seed: int,
-    draw: int,
-    earth: EarthRate | None,
-    temperature: Temperature | None,
-) -> tuple[pd.DataFrame, pd.DataFrame | None, float]:
-    """Samples of an IMU at all its stamps, the gaps that were filled, and its delay, s."""
-    # Held by nobody else: of a long ride it is the largest array there is.
-    imu, delay_s = sample_imu(
-        truth.motion(mount, columns=IMU if earth is None else (*IMU, *ATTITUDE, *VELOCITY)),
-        grade,
-        seed=seed,
-        draw=draw,
-        name=mount.name,
-        earth=earth,
-        temperature=temperature,
-    )
-    if grade.dropped_fraction == 0.0:
-        return imu, None, delay_s
-    came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
-    filled, gaps = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
-    return filled, gaps, delay_s
 
 
 def _counted(

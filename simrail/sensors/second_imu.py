@@ -4,18 +4,15 @@ It samples as any IMU does (`simrail.sensors.imu`), and what it samples is stamp
 the first one's, or behind it, by a constant; a drift of that clock is an error of its grade.
 """
 
-import math
 from dataclasses import dataclass
 
 import pandas as pd
 
-from simrail.core.columns import ATTITUDE, IMU, VELOCITY
-from simrail.core.resample import resample
 from simrail.core.seeds import stream
 from simrail.recording.recording import SecondImuSheet
 from simrail.recording.sheets.grades import ImuGrade, imu_sheet
 from simrail.ride.truth import Mount, Truth
-from simrail.sensors.imu import EarthRate, arrived, sample_imu
+from simrail.sensors.imu import EarthRate, log_imu
 from simrail.sensors.imu_response import Temperature
 
 
@@ -110,18 +107,9 @@ def _felt(
 ) -> tuple[pd.DataFrame, float]:
     """What it recorded, by its own clock, and by how much that is late."""
     mount, grade = spec.mount, spec.grade
-    imu, delay_s = sample_imu(
-        truth.motion(mount, columns=IMU if earth_rate is None else (*IMU, *ATTITUDE, *VELOCITY)),
-        grade,
-        seed=seed,
-        draw=draw,
-        name=mount.name,
-        earth=earth_rate,
-        temperature=temperature,
+    imu, _, delay_s = log_imu(
+        truth, mount, grade, seed=seed, draw=draw, earth=earth_rate, temperature=temperature
     )
-    if grade.dropped_fraction > 0.0:
-        came = arrived(imu, grade, seed=seed, draw=draw, name=mount.name)
-        imu, _ = resample(came, imu.index.to_numpy(), longest_gap_s=math.inf)
     offset_s = spec.clock_offset_s
     if offset_s is None:
         drawn = stream(seed, "sensor", draw, "imu", mount.name, "clock_offset").standard_normal()

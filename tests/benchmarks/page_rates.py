@@ -8,7 +8,6 @@ Needs the extra ``test`` and a Chromium (``SIMRAIL_BROWSER`` names another than 
 import argparse
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import time
@@ -18,6 +17,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, sync_playwright
 
 from simrail.lessons import LESSONS
+from simrail.lessons.serve import free_port
 
 SIZES = ((1200, 700), (1400, 950), (390, 844))
 FIGURES = "[...document.querySelectorAll('svg')].map(svg => svg.outerHTML).filter(text => text.length > 4000)"
@@ -52,9 +52,7 @@ def film(browser: Browser, path: Path) -> None:
 
 def served(name: str) -> tuple[subprocess.Popen[bytes], str, float]:
     """A lesson's server, its address, and how long it took to answer."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = int(probe.getsockname()[1])
+    port = free_port()
     program = "from simrail.cli.main import main; main()"
     command = [sys.executable, "-c", program, "lesson", name, "--headless", "--port", str(port)]
     begun = time.perf_counter()

@@ -1,7 +1,6 @@
 """Each lesson served offline, opened in a real browser, one slider moved: its figure changes."""
 
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -11,16 +10,11 @@ from collections.abc import Iterator
 import pytest
 
 from simrail.lessons import LESSONS
+from simrail.lessons.serve import free_port
 
 NAMES = ["drift", *(pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift")]
 LONG_S = 120.0
 """On a machine that compiles kernels first, and has other things to do."""
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture

@@ -98,6 +98,13 @@ def swapped(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(wx=frame["wy"], wy=frame["wx"])
 
 
+def assert_told_in_a_line(folder: Path, said: str) -> None:
+    """A ride is refused, in one line that says so."""
+    with pytest.raises(InputError, match=said) as refused:
+        check_plausible(with_odometry(read_signals(folder), "encoder"))
+    assert "\n" not in str(refused.value)
+
+
 @pytest.mark.parametrize(
     ("plant", "said"),
     [
@@ -112,10 +119,7 @@ def swapped(frame: pd.DataFrame) -> pd.DataFrame:
 def test_single_axes_of_another_unit_sign_or_place_are_told(
     plant: Callable[[pd.DataFrame], pd.DataFrame], said: str, tmp_path: Path
 ) -> None:
-    folder = written(tmp_path, plant(logged()).to_csv(index=False))
-    with pytest.raises(InputError, match=said) as refused:
-        check_plausible(with_odometry(read_signals(folder), "encoder"))
-    assert "\n" not in str(refused.value)
+    assert_told_in_a_line(written(tmp_path, plant(logged()).to_csv(index=False)), said)
 
 
 def thousands(text: str) -> str:
@@ -293,10 +297,7 @@ def stopped(frame: pd.DataFrame, row: int) -> pd.DataFrame:
 def test_what_a_logger_held_and_what_has_stopped_is_told(
     plant: Callable[[pd.DataFrame], pd.DataFrame], said: str, tmp_path: Path
 ) -> None:
-    folder = written(tmp_path, plant(logged()).to_csv(index=False))
-    with pytest.raises(InputError, match=said) as refused:
-        check_plausible(with_odometry(read_signals(folder), "encoder"))
-    assert "\n" not in str(refused.value)
+    assert_told_in_a_line(written(tmp_path, plant(logged()).to_csv(index=False)), said)
 
 
 def test_a_lost_sample_now_and_then_and_a_slow_magnetometer_may_be_held(

@@ -264,7 +264,7 @@ def test_needs_no_exudyn():
 
 @pytest.mark.parametrize("stopped", [True, False])
 def test_a_ride_in_a_canted_curve_begins_at_rest(monkeypatch, stopped):
-    """The body leans further than the rails; of that lean 1/25 is left to sway, on either side of rest.
+    """The body leans further than the rails; less than 1/25 of that is left to sway, either side of rest.
 
     Settling that only waits leaves a half: the sway takes 2 s and is damped by a third in that.
     """
