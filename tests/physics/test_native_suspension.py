@@ -23,6 +23,8 @@ from simrail.vehicle.engines.records import ROD
 from simrail.vehicle.file import VehicleFile
 from simrail.vehicle.speed_profile import SpeedProfile
 
+pytestmark = pytest.mark.long
+
 ROUGH = Irregularity("erri_b176_low", (1.5, 100.0), 40.0)
 PROFILE = SpeedProfile(150.0, 180.0, 12.0, rest_s=0.2, acceleration_mps2=4.0, jerk_mps3=16.0)
 

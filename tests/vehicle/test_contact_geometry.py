@@ -142,6 +142,7 @@ def test_yaw_term_equals_the_silhouette_of_a_wheel_that_is_really_turned(u):
     assert radius[at[1]] * np.sin(angle[at[0], 0]) == pytest.approx(radius[at[1]] * psi * slope, rel=0.05)
 
 
+@pytest.mark.long
 def test_static_height_carries_the_load(kernel):
     for load in (10e3, 53e3, 110e3):
         contact = table(load)
@@ -190,6 +191,7 @@ def test_tables_of_a_scaled_pair_are_the_scaled_tables():
     assert np.allclose(column(small, 0, "f11", u * 0.1) * 0.1, 0.01 * column(full, 0, "f11", u), rtol=1e-3)
 
 
+@pytest.mark.long
 def test_conicity_in_the_rigid_limit():
     # FACTS: rigid search on the Manchester benchmark pair, 0.227, 0.180, 0.162 at 2, 3, 4 mm.
     rigid = table(10e3, smoothing=0.09)
@@ -207,6 +209,7 @@ def test_rolling_radii_of_the_manchester_benchmark():
     assert np.allclose(difference * 1e3, [0.6042, 0.7967, 0.9887, 1.2296], atol=0.013)
 
 
+@pytest.mark.long
 def test_cone_follows_wickens_conicity_and_gravitational_stiffness():
     # Wickens 2003, eqs 2.5 to 2.7: a cone g on a rail head of radius R, contacts at half distance b
     # (at rest): conicity g (b + R g)/(b - r0 g), roll per displacement g/(b - r0 g), and a lateral

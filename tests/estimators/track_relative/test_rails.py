@@ -66,7 +66,7 @@ def rms(line: FloatArray) -> float:
     return float(np.sqrt(np.nanmean(line**2)))
 
 
-@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("direction", [1, pytest.param(-1, marks=pytest.mark.long)])
 def test_waves_of_3_to_25_m_are_nearer_than_by_the_steps_of_the_smoother(
     rough: Callable, rails: Callable, kept: dict, direction: int
 ) -> None:
@@ -81,7 +81,7 @@ def test_waves_of_3_to_25_m_are_nearer_than_by_the_steps_of_the_smoother(
         assert fine < 0.35 * rms(in_band(truth[name], name)), name
 
 
-@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("direction", [1, pytest.param(-1, marks=pytest.mark.long)])
 def test_draws_are_as_large_as_the_error(
     rough: Callable, rails: Callable, kept: dict, direction: int
 ) -> None:

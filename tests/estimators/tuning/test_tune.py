@@ -248,6 +248,7 @@ def test_the_constraint_holds_and_does_what_it_is_for(ride: Recording, searched:
         tuning.search.space.check(tuning.hyperparameters)
 
 
+@pytest.mark.long
 def test_what_the_likelihood_does_not_identify(ride: Recording, searched: Callable) -> None:
     """The virtual positions are constants: ten times the confidence gains ln(10)/2 a sample, for nothing."""
     values = asdict(searched(ride, "paper").hyperparameters)
@@ -320,6 +321,7 @@ def test_kom_does_better_on_sensors_that_it_has_not_seen(
             assert reached == pytest.approx(tuning.search.objective[0], rel=1e-9)
 
 
+@pytest.mark.long
 def test_kom_counts_the_places_that_the_reference_knows(ride: Recording) -> None:
     """An error of the reference where no place is counted changes nothing, elsewhere it does."""
     rails, smoother = rails_of(ride), TrajectorySmoother()
@@ -359,6 +361,7 @@ def test_straights_and_curves_by_themselves(ride: Recording) -> None:
     assert log_likelihood(smoother.model(ride)) > log_likelihood(single.model(ride))
 
 
+@pytest.mark.long
 def test_threads_do_not_matter_and_interrupted_is_resumed(ride: Recording, tmp_path: Path) -> None:
     short = piece(ride, 0, 800)
     keep = tmp_path / "mine.unfinished.toml"
@@ -456,6 +459,7 @@ class Scale:
         return Gauss()
 
 
+@pytest.mark.long
 def test_any_tunable_is_searched_and_judged(ride: Recording) -> None:
     """The maximum likelihood of a Gaussian is known: mean and standard deviation, and how well."""
     gyro, tunables = ride.imu["gyro_x_radps"], tunables_of(Scale(), {}, method="cml")
