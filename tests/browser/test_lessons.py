@@ -12,7 +12,6 @@ import pytest
 from simrail.lessons import LESSONS
 from simrail.lessons.serve import free_port
 
-NAMES = ["drift", *(pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift")]
 LONG_S = 120.0
 """On a machine that compiles kernels first, and has other things to do."""
 
@@ -52,7 +51,8 @@ def served(request: pytest.FixtureRequest) -> Iterator[str]:
 FIGURES = "[...document.querySelectorAll('svg')].map(svg => svg.outerHTML).filter(text => text.length > 4000)"
 
 
-@pytest.mark.parametrize("served", NAMES, indirect=True)
+@pytest.mark.long
+@pytest.mark.parametrize("served", LESSONS, indirect=True)
 def test_a_slider_moves_a_figure(chromium, served):
     page = chromium.new_page(viewport={"width": 1200, "height": 1000})
     errors: list[str] = []

@@ -256,6 +256,7 @@ def test_a_scheduler_that_dies_is_told_in_one_line_and_the_run_goes_on_without_i
     assert "of 8 cells are done" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_cluster_that_cannot_be_used_is_refused_in_one_line(
     cluster: Cluster, noting_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -164,6 +164,7 @@ def test_truth_stands_beside_the_recording_and_is_no_part_of_it(here: Path) -> N
     assert 0.0 < np.abs(difference).median() < 0.1
 
 
+@pytest.mark.long
 def test_estimate_of_an_exported_ride_is_that_of_the_campaign(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -265,6 +266,7 @@ def test_interrupted_export_leaves_nothing(here: Path, monkeypatch: pytest.Monke
     assert not list(here.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_forces_are_written_for_each_wheel(here: Path, form: str, capsys: pytest.CaptureFixture[str]) -> None:
     """What a ride kept, number by number; and refused with the remedy where nothing is kept."""

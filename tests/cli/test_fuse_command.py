@@ -53,6 +53,7 @@ def rides(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return sorted(str(path.parent) for path in (folder / "rides").glob("*/ride.toml"))
 
 
+@pytest.mark.long
 def test_rails_of_both_ways_are_fused(
     rides: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

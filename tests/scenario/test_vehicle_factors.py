@@ -56,6 +56,7 @@ def scenario(text: str = TEXT) -> Scenario:
     return read_scenario(text, name="factors")
 
 
+@pytest.mark.long
 def test_each_sample_has_a_vehicle_of_its_own_and_the_drawing_stays() -> None:
     read = scenario()
     assert list(dimensions(read.spec)) == ["vehicle_factors.load", "vehicle_factors.stiffness"]

@@ -27,6 +27,8 @@ from simrail.sensors.measure import measure
 from simrail.track.file import track_by_name
 from simrail.vehicle.speed_profile import Run, SpeedProfile
 
+pytestmark = pytest.mark.long  # Its kernels take ten seconds to compile.
+
 SPACING_M = 15.0
 
 THERE_AND_BACK = SpeedProfile(

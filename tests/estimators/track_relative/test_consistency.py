@@ -219,6 +219,7 @@ def test_consistent_over_200_draws(
     judge(world_by(rough, worlds, motion), 200)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scale", [0.8, pytest.param(1.25, marks=pytest.mark.slow)])
 def test_a_noise_wrong_by_a_quarter_is_noticed(
     rough: Callable, worlds: dict[str, Callable[[], World]], scale: float

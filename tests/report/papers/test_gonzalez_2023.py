@@ -566,6 +566,7 @@ def test_the_page_shows_rails_and_the_section(ran: Ran) -> None:
     assert "What failed" not in page
 
 
+@pytest.mark.long
 def test_the_section_counts_coverage_as_the_paper_does(ran: Ran) -> None:
     _, result, _ = ran
     example = result.examples[0]
@@ -582,6 +583,7 @@ def test_the_section_counts_coverage_as_the_paper_does(ran: Ran) -> None:
     assert coverage_of(wrong, style("smoother"), FULL_SIZE)[:2] == pytest.approx([0.0, 0.0], abs=0.5)
 
 
+@pytest.mark.long
 def test_the_section_holds_printed_and_own_rows(ran: Ran) -> None:
     scenario, result, _ = ran
     scores, cell_table = result.scores, result.cells
@@ -603,6 +605,7 @@ def test_the_section_holds_printed_and_own_rows(ran: Ran) -> None:
     assert section(PageData(scenario, scores.iloc[:0], cell_table, [], {})) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("size_m", "held"), [(1e-9, "0"), (1.0, "100")])
 def test_the_interval_by_draws_is_of_the_filtered_rails_alone(ran: Ran, size_m: float, held: str) -> None:
     """Draws that are tiny, or huge, hold nothing or all of the filtered rails; others stay as they are."""
@@ -621,6 +624,7 @@ def test_the_interval_by_draws_is_of_the_filtered_rails_alone(ran: Ran, size_m: 
     assert len(rows) == 1 + 1 + len(["hand", "cml", "printed"])  # what has no draws has no row of them
 
 
+@pytest.mark.long
 def test_the_own_ride_is_told_by_the_scores_of_that_ride(ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     """One draw was run, so the scores are of the own ride; twice of them are planted as the mean of two."""
     scenario, result, _ = ran
