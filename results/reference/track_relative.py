@@ -1,13 +1,16 @@
-"""Make ``track_relative.csv`` of the results of ``simrail run track_relative``, and likewise of its parts.
+"""Make ``track_relative.csv`` of the results of ``simrail run track_relative``, and likewise of two others.
 
     simrail run track_relative --out DIR
     python results/reference/track_relative.py DIR
     simrail run track_relative_parts --out DIR
     python results/reference/track_relative.py DIR
+    simrail run coverage --out DIR
+    python results/reference/track_relative.py DIR
 
 One row per vehicle, mount, method and quantity: the root of the mean square error over all rides with its
 95 % interval (whole samples, which have rails, map and device of their own, are resampled), the 95th
-percentile of the rides' rms, how much of the time the method's own intervals hold, over how much of the way
+percentile of the rides' rms, how much of the time the method's own intervals hold (those of
+95 % with an interval, likewise), over how much of the way
 the error is beyond the method's bound, that bound's median, and the share of the way behind a fault.
 """
 
@@ -30,11 +33,27 @@ TOLD = (
 BY = ["vehicle", "mount", "estimator", "quantity"]
 
 
-def table_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
-    """Rows as the module says them, of score table and cells."""
+def whole_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
+    """Figures of whole rides against the truth, with their samples."""
     whole = scores[(scores["reference"] == "truth") & (scores["window"] == "whole")]
     whole = whole[whole["quantity"].isin(QUANTITIES)].drop(columns="sample", errors="ignore")
-    whole = whole.merge(cells[["cell", "sample"]], on="cell").astype({"estimator": str})
+    return whole.merge(cells[["cell", "sample"]], on="cell").astype({"estimator": str})
+
+
+def pooled(whole: pd.DataFrame) -> pd.DataFrame:
+    """How much of the time the intervals of 95 % hold, over all vehicles and mounts."""
+    rows = []
+    held = whole[(whole["metric"] == "coverage95") & whole["value"].notna()]
+    for key, group in held.groupby(["estimator", "quantity"], observed=True):
+        share = interval(group["value"], group["sample"])
+        low, high = max(share.low, 0.0), min(share.high, 1.0)
+        rows.append((*key, group["sample"].nunique(), len(group), share.value, low, high))
+    columns = ["estimator", "quantity", "samples", "recordings", "coverage95", "low", "high"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def table_of(whole: pd.DataFrame) -> pd.DataFrame:
+    """Rows as the module says them."""
     rows = []
     for key, group in whole.groupby(BY, observed=True):
         errors = group[group["metric"] == "rms"]
@@ -43,6 +62,8 @@ def table_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
         square = interval(errors["value"] ** 2, errors["sample"])
         low, high = np.sqrt(np.maximum([square.low, square.high], 0.0))
         told = group.groupby("metric", observed=True)["value"].mean()
+        held = group[group["metric"] == "coverage95"]
+        share = interval(held["value"], held["sample"])
         figures = {
             "rides": len(errors),
             "rms": np.sqrt(square.value),
@@ -50,6 +71,7 @@ def table_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
             "high": high,
             "p95": errors["value"].quantile(0.95),
         } | {name: told.get(name, np.nan) for name in TOLD}
+        figures |= {"coverage95_low": max(share.low, 0.0), "coverage95_high": min(share.high, 1.0)}
         rows.append(dict(zip(BY, key, strict=True)) | figures)
     return pd.DataFrame(rows)
 
@@ -57,10 +79,13 @@ def table_of(scores: pd.DataFrame, cells: pd.DataFrame) -> pd.DataFrame:
 def main() -> None:
     """Read the results named on the command line, and write the table."""
     folder = Path(sys.argv[1])
-    table = table_of(pd.read_parquet(folder / "scores.parquet"), pd.read_parquet(folder / "cells.parquet"))
+    scores, cells = (pd.read_parquet(folder / f"{name}.parquet") for name in ("scores", "cells"))
+    whole = whole_of(scores, cells)
+    table = table_of(whole)
     name = json.loads((folder / "manifest.json").read_text())["scenario"]
     path = Path(__file__).with_name(f"{name}.csv")
     table.to_csv(path, index=False, float_format="%.4g")
+    print(pooled(whole).to_string(index=False, float_format="%.3f"))
     print(f"wrote {path}: {len(table)} rows")
 
 

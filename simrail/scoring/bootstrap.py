@@ -28,6 +28,10 @@ RESAMPLES = 2000
 FEWEST = 5
 """Clusters below which nothing is resampled."""
 
+LEAST_SPREAD = 0.01
+"""Share of the standard error. A resample that has less of it has none of the clusters that differ, as of
+ninety shares of 1 and one of .9: like one without any, it says nothing."""
+
 SEED = 1
 """Of the resampling: an analysis has no draws of the scenario."""
 
@@ -105,9 +109,10 @@ def _means(total: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatAr
         shift = (weights @ d) / drawn
         square = weights @ d**2 - 2.0 * shift * (weights @ (d * m)) + shift**2 * (weights @ m**2)
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = shift * drawn / (scale * np.sqrt(np.maximum(square, 0.0)))
+            spread = scale * np.sqrt(np.maximum(square, 0.0)) / drawn
+            t = shift / spread
         # One cluster drawn k times has no spread: the resample says nothing.
-        t[~np.isfinite(t)] = np.nan
+        t[~np.isfinite(t) | (spread < LEAST_SPREAD * error[part])] = np.nan
         t[:, np.isnan(t).all(axis=0)] = 0.0
         upper, lower = np.nanquantile(t, [1.0 - tail, tail], axis=0)
         low[part] = mean[part] - upper * error[part]

@@ -64,16 +64,17 @@ def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) 
         "passes": "uncompensated lateral acceleration",
         "bounds": "uncompensated lateral acceleration",
         "bounds_multibody": "irw_car runs unstably above",
+        "coverage": "uncompensated lateral acceleration",
     }
     assert bool(plan.warnings) == (name in warned)
-    several = ("track_relative", "passes", "bounds", "bounds_multibody")
+    several = ("track_relative", "passes", "bounds", "bounds_multibody", "coverage")
     assert name in several or len(plan.warnings) <= 1
     assert all(warned[name] in warning for warning in plan.warnings)
     # Where rails are scored alone, the baseline is that of rails.
     rails_alone = ("passes", "vertical_profile")
     # An IMU without a map has no design angles to be held against; its page holds it against the paper.
     baseline = "zero_track" if name in rails_alone else "design_angles"
-    bounds_alone = ("bounds", "bounds_multibody")
+    bounds_alone = ("bounds", "bounds_multibody", "coverage", "scale_greatest")
     assert (baseline in plan.estimators) == (name not in ("imu_only", *bounds_alone))
     grades = {cell.imu.grade for cell in cells(load_scenario(name))}
     # The floor of every estimator is in every table; a table of odometries alone has none of an estimator,
@@ -86,7 +87,7 @@ def test_shipped_scenarios_are_good(name: str, monkeypatch: pytest.MonkeyPatch) 
 def test_a_train_knows_its_line_by_a_map_that_errs_and_a_laboratory_exactly(name: str) -> None:
     """Full-size scenarios have the default map; what shows an exact one beside it is told here."""
     spec = load_scenario(name).spec
-    if name in ("scale_ride", "scale_track"):
+    if name in ("scale_ride", "scale_track", "scale_greatest"):
         assert spec.map is None
         return
     assert spec.map is not None
@@ -107,7 +108,8 @@ def test_full_size_vehicles_shake_by_default_and_say_it(name: str) -> None:
     """
     scenario = load_scenario(name)
     part, first = scenario.spec.vibration, next(cells(scenario))
-    if name in ("scale_ride", "scale_track", "quick_kinematic", "standstill", "sensitivity", "bounds"):
+    laboratory = ("scale_ride", "scale_track", "scale_greatest")
+    if name in (*laboratory, "quick_kinematic", "standstill", "sensitivity", "bounds"):
         assert part is None and first.vibration_label == "off"
         assert "# Without [vibration]" in scenario.text or "Without\n# [vibration]" in scenario.text
         return

@@ -113,3 +113,12 @@ def test_the_order_of_the_rows_does_not_matter() -> None:
     scores, cells = table({"a": (6, 3), "b": (1, 9)})
     shuffled = scores.sample(frac=1.0, random_state=2).reset_index(drop=True)
     pd.testing.assert_frame_equal(aggregate(scores, cells), aggregate(shuffled, cells), check_exact=True)
+
+
+def test_the_interval_of_a_share_ends_at_one() -> None:
+    """Of six tracks one holds half of the time: twice the standard error above the mean would be 1.1."""
+    scores, cells = table({"one": (6, 1)})
+    scores["metric"] = "coverage95"
+    scores["value"] = [1.0, 0.999, 0.998, 0.997, 0.996, 0.5]
+    found = aggregate(scores, cells).iloc[0]
+    assert found["value"] < found["high95"] == 1.0 and 0.0 <= found["low95"] < found["value"]

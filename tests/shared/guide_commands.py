@@ -104,6 +104,7 @@ PARTS_ONLY = {"simrail new ride": "one of simrail new, whose NAME is not said"}
 LONG_RUNS = (
     *(
         "bounds_multibody",
+        "coverage",
         "bounds",
         "compensation",
         "go20a",
@@ -113,7 +114,7 @@ LONG_RUNS = (
         "metro_geometry",
         "metro_ride",
     ),
-    *("metro_table3", "odometry", "passes", "scale_track", "shaking", "track_relative"),
+    *("metro_table3", "odometry", "passes", "scale_greatest", "scale_track", "shaking", "track_relative"),
     *("track_relative_parts", "validation", "validation_quick", "vertical_profile", "which_imu"),
 )
 """Scenarios of minutes: they are read with their settings, nothing is simulated."""
