@@ -95,7 +95,7 @@ def test_equal_values_have_no_width() -> None:
 
 
 def test_shares_that_are_nearly_all_one_have_an_interval_among_shares() -> None:
-    """Of a hundred tracks all but one hold all the time, but for a sample; a third of the resamples has no other."""
+    """All but one of a hundred tracks hold all the time; a third of the resamples has none but these."""
     held = 1.0 - 1e-6 * np.arange(100) / 100.0
     held[7] = 0.93
     found = interval(held)
