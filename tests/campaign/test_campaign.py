@@ -266,6 +266,30 @@ def test_no_cell_of_a_lost_worker_is_dropped(by_one: bool, monkeypatch: pytest.M
     assert tried[0] == {0, 1, 2} and {1} in tried and {4} in tried
 
 
+def test_a_cell_does_not_fail_for_a_worker_that_died_once_while_it_was_run_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What kills for want of memory kills what is there: the batch twice, then one of its cells."""
+    tried = []
+
+    class Mortal(executors._Here):
+        def submit(self, function, packed, cells, *more):  # type: ignore[no-untyped-def]
+            if function is not worker.run_batch:
+                return super().submit(function, packed, cells, *more)
+            tried.append([cell.number for cell in cells])
+            if len(tried) > 3:
+                return super().submit(function, packed, cells, *more)
+            future: Future[object] = Future()
+            future.set_exception(BrokenExecutor())
+            return future
+
+    monkeypatch.setattr(executors, "_Here", Mortal)
+    settings = ["monte_carlo.sensor_draws=2", "ride.end_m=70.0", "score.windows=['whole']"]
+    found = run_campaign(short(*settings), workers=1, batch_cells=2)
+    assert tried == [[0, 1], [0, 1], [0], [1], [0]]
+    assert found.failures == []
+
+
 def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
