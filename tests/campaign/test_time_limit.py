@@ -176,13 +176,16 @@ class Nothing:
 
 from simrail.campaign import time_limit
 time_limit.handed = lambda one: one
-LimitedEstimator(Endless(), 1.0).estimate([Nothing()], at_least_s=0.1)
+LimitedEstimator(Endless(), LIMITS).estimate([Nothing()], at_least_s=0.1)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
-def test_it_does_not_outlive_a_campaign_that_was_killed() -> None:
-    parent = subprocess.Popen([sys.executable, "-c", ORPHAN], stderr=subprocess.PIPE, text=True)
+@pytest.mark.parametrize("limits", ["1.0", "None, 500.0"])
+def test_it_does_not_outlive_a_campaign_that_was_killed(limits: str) -> None:
+    """Nor does one without a limit of time, which no timer ends."""
+    program = ORPHAN.replace("LIMITS", limits)
+    parent = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True)
     assert parent.stderr is not None
     child = int(parent.stderr.readline())
     parent.kill()
