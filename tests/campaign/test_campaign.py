@@ -13,10 +13,13 @@ import pytest
 
 from simrail.campaign import executors, worker
 from simrail.campaign.campaign import run_campaign
+from simrail.campaign.cell import Failure
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.progress import Watcher
-from simrail.campaign.result import CampaignResult
+from simrail.campaign.result import CampaignResult, gather
 from simrail.core.toml_files import shipped
 from simrail.scenario.cells import cells
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.aggregate import aggregate
 from simrail.scoring.table import OK, SCORE_COLUMNS
@@ -346,3 +349,21 @@ def test_figures_are_averaged_over_samples_and_their_values_are_kept() -> None:
         row["sd_track"] == pytest.approx(rows.groupby("sample")["value"].mean().std()) and row["sd_track"] > 0
     )
     assert (row["track_draws"], row["draws"]) == (3, 6)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_ride_is_told_by_whoever_simulated_it_and_failures_by_cell(first: bool, tmp_path: Path) -> None:
+    """Of two batches of a ride one had it from the cache, whichever is the first; each has a failure."""
+    settings = ["monte_carlo.sensor_draws=2", "ride.end_m=70.0", "score.windows=['whole']"]
+    plan, kept, made = (
+        judge_scenario(short(*settings)),
+        Checkpoint(tmp_path / "a"),
+        Checkpoint(tmp_path / "b"),
+    )
+    run_campaign(plan, workers=1, batch_cells=1, checkpoint=kept)
+    for one, cached in zip(kept.results(), (first, not first), strict=True):
+        failures = tuple(Failure(one.cells[0], name, "why", "where") for name in ("ekf", "gda"))
+        made.add(replace(one, ride=one.ride | {"from_cache": cached}, failures=failures))
+    found = gather(plan, worker.pack(plan.parts), made)
+    assert [ride["from_cache"] for ride in found.rides] == [False]
+    assert [failure.cell for failure in found.failures] == [0, 0, 1, 1]
