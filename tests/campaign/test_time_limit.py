@@ -252,3 +252,25 @@ def test_a_limit_that_is_none(value: str, scenario: Path, capsys: pytest.Capture
         assert call(["check", "mine.toml", "--set", f"{key}={value}"]) == BAD_INPUT
         said = capsys.readouterr().err
         assert "time_limit_s" in said and "limit:" in said and "remedy:" in said
+
+
+@pytest.mark.parametrize(("at_least_s", "allowed_s"), [(0.0, 6.0), (20.0, 20.0)])
+def test_the_limit_is_of_each_recording(at_least_s: float, allowed_s: float) -> None:
+    """What a batch may take is as many times that of a recording, or what a first call may take."""
+    waited: list[float] = []
+
+    class Pipe:
+        def send(self, asked: tuple[list[object], float]) -> None:
+            waited.append(asked[1])
+
+        def poll(self, timeout: float) -> bool:
+            waited.append(timeout)
+            return True
+
+        def recv(self) -> tuple[bool, str]:
+            return True, "done"
+
+    limited = LimitedEstimator(object(), 2.0)  # type: ignore[arg-type]
+    limited._process, limited._pipe = object(), Pipe()
+    assert limited.estimate([object()] * 3, at_least_s=at_least_s) == "done"  # type: ignore[list-item, comparison-overlap]
+    assert waited == [allowed_s, allowed_s]
