@@ -92,3 +92,11 @@ def test_every_resample_draws_as_many_clusters_as_there_are() -> None:
 def test_equal_values_have_no_width() -> None:
     found = interval(np.full(20, 3.0))
     assert (found.value, found.low, found.high) == (3.0, 3.0, 3.0)
+
+
+def test_the_interval_of_what_is_skewed_reaches_to_the_side_of_its_tail() -> None:
+    """The mean of few draws misses a rare large one more often than not: a bootstrap-t knows it."""
+    skewed = np.array([0.9, 1.0, 1.1, 1.2, 1.3, 1.5, 2.0, 6.0])
+    one, turned = interval(skewed), interval(-skewed)
+    assert one.high - one.value > 2.0 * (one.value - one.low)
+    assert (-turned.high, -turned.low) == pytest.approx((one.low, one.high), rel=1e-12)
