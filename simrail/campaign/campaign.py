@@ -45,7 +45,7 @@ _MOST_CELLS, _MOST_SECONDS = 20, 600.0
 """Largest batch: cells, and seconds of recordings together, which are held in memory at once."""
 
 _MOST_TRIES = 3
-"""How often a cell is run whose worker dies each time; then it has failed."""
+"""After so many dead workers a cell that runs alone has failed; after one less, a batch is taken apart."""
 
 _LOOK_S = 5.0
 """How often the workers are looked after while nothing comes of them."""
@@ -308,8 +308,9 @@ class _Loop:
             self.tell(f"a worker died: {batch.words} run again")
             self.suspects.append(batch)
         elif not single:
-            # One of them is enough to kill a worker: the others shall not fail with it.
-            self.suspects.extend(_Batch(False, (cell,), _MOST_TRIES - 1) for cell in batch.cells)
+            # One of them is enough to kill a worker: the others shall not fail with it. Each has two tries
+            # more: the next worker may be killed by what is none of them, as a machine without memory does.
+            self.suspects.extend(_Batch(False, (cell,), max(1, _MOST_TRIES - 2)) for cell in batch.cells)
         else:
             reason = "the worker died, killed or out of memory, each time this was run"
             self._keep(fail_batch(self.packed, batch.cells, reason))

@@ -2,16 +2,18 @@
 
 A signal ends no compiled loop and a thread none at all: only a process can be ended for sure. It is a copy of
 this one (a fork, where the system has it), so that what is compiled is there, and takes one batch after the
-other; estimators without a limit have no such process. Where the one that waits is killed itself, a timer of
-the system ends the other one.
+other; estimators without a limit have no such process. Where the one that waits is killed itself, the system
+ends the other one: on Linux at once, elsewhere by a timer, if it has a limit of time.
 
 Memory is limited by the system (``RLIMIT_DATA`` of Linux: what a process has for itself, with what it has
 from its parent as the start). What asks for more gets a `MemoryError`, and its process is ended.
 """
 
 import contextlib
+import ctypes
 import multiprocessing
 import multiprocessing.connection
+import os
 import pickle
 import signal
 import time
@@ -133,7 +135,7 @@ class LimitedEstimator:
         context: Any = multiprocessing.get_context("fork" if "fork" in ways else "spawn")
         self._pipe, other = context.Pipe()
         self._process = context.Process(
-            target=_run, args=(other, self._pipe, self._estimator, self._memory_mb), daemon=True
+            target=_run, args=(other, self._pipe, self._estimator, self._memory_mb, os.getpid()), daemon=True
         )
         with _allowed_children():
             self._process.start()
@@ -180,9 +182,22 @@ def _limit_memory(more_mb: float) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
-def _run(pipe: Any, parents: Any, estimator: Estimator, memory_mb: float | None) -> None:
+_PDEATHSIG = 1
+"""Linux's ``PR_SET_PDEATHSIG`` (prctl(2)): the signal that a process gets when its parent dies."""
+
+
+def _end_with(parent: int) -> None:
+    """Let the system end this process with its parent, whatever it does; nothing where the system cannot."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before
+        os._exit(1)
+
+
+def _run(pipe: Any, parents: Any, estimator: Estimator, memory_mb: float | None, parent: int) -> None:
     """Run what is asked for, until nobody asks any more: the child's part."""
     parents.close()
+    _end_with(parent)
     if memory_mb is not None:
         _limit_memory(memory_mb)
     signal.signal(signal.SIGINT, signal.SIG_IGN)

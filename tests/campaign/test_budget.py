@@ -229,6 +229,7 @@ def test_a_budget_is_of_the_mount_that_is_asked_for(
 
     def taken_apart(draws: list[Cell], *_: object, **__: object) -> pd.DataFrame:
         asked.append((draws[0].imu.name, len(draws)))
+        assert [cell.sensor_draw for cell in draws] == [0, 1, 2]
         return pd.DataFrame({"term": ["floor"], "share": [1.0]})
 
     monkeypatch.setattr(budgets, "error_budget", taken_apart)

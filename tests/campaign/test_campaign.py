@@ -13,10 +13,13 @@ import pytest
 
 from simrail.campaign import executors, worker
 from simrail.campaign.campaign import run_campaign
+from simrail.campaign.cell import Failure
+from simrail.campaign.checkpoint import Checkpoint
 from simrail.campaign.progress import Watcher
-from simrail.campaign.result import CampaignResult
+from simrail.campaign.result import CampaignResult, gather
 from simrail.core.toml_files import shipped
 from simrail.scenario.cells import cells
+from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
 from simrail.scoring.aggregate import aggregate
 from simrail.scoring.table import OK, SCORE_COLUMNS
@@ -266,6 +269,30 @@ def test_no_cell_of_a_lost_worker_is_dropped(by_one: bool, monkeypatch: pytest.M
     assert tried[0] == {0, 1, 2} and {1} in tried and {4} in tried
 
 
+def test_a_cell_does_not_fail_for_a_worker_that_died_once_while_it_was_run_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What kills for want of memory kills what is there: the batch twice, then one of its cells."""
+    tried = []
+
+    class Mortal(executors._Here):
+        def submit(self, function, packed, cells, *more):  # type: ignore[no-untyped-def]
+            if function is not worker.run_batch:
+                return super().submit(function, packed, cells, *more)
+            tried.append([cell.number for cell in cells])
+            if len(tried) > 3:
+                return super().submit(function, packed, cells, *more)
+            future: Future[object] = Future()
+            future.set_exception(BrokenExecutor())
+            return future
+
+    monkeypatch.setattr(executors, "_Here", Mortal)
+    settings = ["monte_carlo.sensor_draws=2", "ride.end_m=70.0", "score.windows=['whole']"]
+    found = run_campaign(short(*settings), workers=1, batch_cells=2)
+    assert tried == [[0, 1], [0, 1], [0], [1], [0]]
+    assert found.failures == []
+
+
 def test_interrupt_ends_the_campaign_at_once_even_if_it_was_swallowed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -322,3 +349,21 @@ def test_figures_are_averaged_over_samples_and_their_values_are_kept() -> None:
         row["sd_track"] == pytest.approx(rows.groupby("sample")["value"].mean().std()) and row["sd_track"] > 0
     )
     assert (row["track_draws"], row["draws"]) == (3, 6)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_ride_is_told_by_whoever_simulated_it_and_failures_by_cell(first: bool, tmp_path: Path) -> None:
+    """Of two batches of a ride one had it from the cache, whichever is the first; each has a failure."""
+    settings = ["monte_carlo.sensor_draws=2", "ride.end_m=70.0", "score.windows=['whole']"]
+    plan, kept, made = (
+        judge_scenario(short(*settings)),
+        Checkpoint(tmp_path / "a"),
+        Checkpoint(tmp_path / "b"),
+    )
+    run_campaign(plan, workers=1, batch_cells=1, checkpoint=kept)
+    for one, cached in zip(kept.results(), (first, not first), strict=True):
+        failures = tuple(Failure(one.cells[0], name, "why", "where") for name in ("ekf", "gda"))
+        made.add(replace(one, ride=one.ride | {"from_cache": cached}, failures=failures))
+    found = gather(plan, worker.pack(plan.parts), made)
+    assert [ride["from_cache"] for ride in found.rides] == [False]
+    assert [failure.cell for failure in found.failures] == [0, 0, 1, 1]

@@ -205,8 +205,11 @@ def test_another_plan_or_other_code_is_not_gone_on_with(
     own.write_text(own.read_text() + "\n# another version\n")
     with_other_file = key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]])))
     assert with_other_file != key
-    monkeypatch.setattr("simrail.campaign.campaign.score_code_hash", lambda: "other code")
-    assert key_of(judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))) not in (key, with_other_file)
+    for what, other in (("score_code_hash", lambda: "other code"), ("version", lambda package: "another")):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"simrail.campaign.campaign.{what}", other)
+            plan = judge_scenario(load_scenario(mine[1], overrides=[mine[3]]))
+            assert key_of(plan) not in (key, with_other_file)
 
 
 def test_code_that_is_left_out_of_the_key_is_there_and_makes_no_score() -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from simrail.campaign.campaign import run_campaign
+from simrail.campaign.cell import BatchTally, _outcomes
+from simrail.campaign.time_limit import Outcome
 from simrail.scenario.scenario import load_scenario
 
 MANY = """
@@ -86,3 +89,16 @@ def test_estimates_that_are_missing_are_a_failure(
     scores, _, failed = run(MANY, "forgets=true")
     assert failed == {0, 1, 2, 3}
     assert scores["status"].astype(str).str.contains("gave 0 estimates of 1").any()
+
+
+def test_the_time_of_a_batch_is_over_all_its_samples() -> None:
+    """Three recordings of 100, 200 and 700 samples that take 2 s: 2 ms for each sample of each."""
+    recordings = [SimpleNamespace(imu=range(n)) for n in (100, 200, 700)]
+    method = SimpleNamespace(estimate_many=None)
+    tally = BatchTally("toy", {}, {}, warm={"many"})
+
+    def run(group: list[SimpleNamespace]) -> Outcome:
+        return Outcome([object()] * len(group), 2.0, 2.0, "")  # type: ignore[list-item]
+
+    found = list(_outcomes("many", method, recordings, run, tally, lambda: None))  # type: ignore[arg-type]
+    assert [one[1] for one in found if isinstance(one, tuple)] == [pytest.approx(2000.0)] * 3

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from simrail.campaign.campaign import CampaignResult, run_campaign
-from simrail.campaign.forecast import Forecast, forecast
+from simrail.campaign.forecast import Forecast, _time, forecast
 from simrail.cli.main import BAD_INPUT, DONE, call
 from simrail.core.toml_files import shipped
 from simrail.ride import cache as ride_cache
@@ -165,3 +165,10 @@ def test_a_yes_is_a_yes(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_plan_refuses_what_a_run_would_refuse(message_of: Callable[[list[str]], str]) -> None:
     text = message_of(["run", "quick_kinematic", "--plan", "--set", "ride.speed_kmh={ normal = [50, 5] }"])
     assert "without bounds" in text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(59.94, "59.9 s"), (150.0, "2 min"), (5400.0, "90 min"), (9000.0, "2.5 h")]
+)
+def test_a_time_is_told_in_its_unit(seconds: float, words: str) -> None:
+    assert _time(seconds) == words

@@ -176,13 +176,16 @@ class Nothing:
 
 from simrail.campaign import time_limit
 time_limit.handed = lambda one: one
-LimitedEstimator(Endless(), 1.0).estimate([Nothing()], at_least_s=0.1)
+LimitedEstimator(Endless(), LIMITS).estimate([Nothing()], at_least_s=0.1)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
-def test_it_does_not_outlive_a_campaign_that_was_killed() -> None:
-    parent = subprocess.Popen([sys.executable, "-c", ORPHAN], stderr=subprocess.PIPE, text=True)
+@pytest.mark.parametrize("limits", ["1.0", "None, 500.0"])
+def test_it_does_not_outlive_a_campaign_that_was_killed(limits: str) -> None:
+    """Nor does one without a limit of time, which no timer ends."""
+    program = ORPHAN.replace("LIMITS", limits)
+    parent = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True)
     assert parent.stderr is not None
     child = int(parent.stderr.readline())
     parent.kill()
@@ -249,3 +252,25 @@ def test_a_limit_that_is_none(value: str, scenario: Path, capsys: pytest.Capture
         assert call(["check", "mine.toml", "--set", f"{key}={value}"]) == BAD_INPUT
         said = capsys.readouterr().err
         assert "time_limit_s" in said and "limit:" in said and "remedy:" in said
+
+
+@pytest.mark.parametrize(("at_least_s", "allowed_s"), [(0.0, 6.0), (20.0, 20.0)])
+def test_the_limit_is_of_each_recording(at_least_s: float, allowed_s: float) -> None:
+    """What a batch may take is as many times that of a recording, or what a first call may take."""
+    waited: list[float] = []
+
+    class Pipe:
+        def send(self, asked: tuple[list[object], float]) -> None:
+            waited.append(asked[1])
+
+        def poll(self, timeout: float) -> bool:
+            waited.append(timeout)
+            return True
+
+        def recv(self) -> tuple[bool, str]:
+            return True, "done"
+
+    limited = LimitedEstimator(object(), 2.0)  # type: ignore[arg-type]
+    limited._process, limited._pipe = object(), Pipe()
+    assert limited.estimate([object()] * 3, at_least_s=at_least_s) == "done"  # type: ignore[list-item, comparison-overlap]
+    assert waited == [allowed_s, allowed_s]

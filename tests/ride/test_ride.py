@@ -1,7 +1,7 @@
 """Rides and their cache: simulated once, found again, never half there, never in the way of another."""
 
 import os
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -11,9 +11,10 @@ from simrail.core.errors import InputError
 from simrail.core.toml_files import load
 from simrail.ride import cache as ride_cache
 from simrail.ride import ride as ride_module
-from simrail.ride.ride import Ride, is_cached, simulate
+from simrail.ride.ride import Kept, Ride, is_cached, simulate
 from simrail.ride.truth import Mount
 from simrail.ride.truth_files import load_truth, save_truth
+from simrail.ride.vibration.sources import Vibration
 from simrail.track.file import TrackFile
 from simrail.track.irregularity import Irregularity
 from simrail.track.rail_condition import RailCondition
@@ -77,6 +78,8 @@ def test_simulated_once_then_found(ride, monkeypatch):
         {"drive": "wheels"},
         {"contact_rate_hz": 100.0},
         {"conditions": (RailCondition(40.0, 60.0, 0.2),)},
+        {"kept": Kept(("body",), ("front.left",))},
+        {"vibration": Vibration()},
     ],
     ids=lambda change: next(iter(change)),
 )
@@ -89,8 +92,22 @@ def test_key_covers_vehicle_and_sources(ride, monkeypatch):
     bodies = (replace(ride.vehicle.bodies[0], mass_kg=1051.0), *ride.vehicle.bodies[1:])
     heavier = replace(ride, vehicle=replace(ride.vehicle, bodies=bodies))
     assert ride_cache.key_of(heavier.describe()) != key
-    monkeypatch.setattr(ride_module, "source_hash", lambda *names: "other code")
-    assert ride_cache.key_of(ride.describe()) != key
+    for what, other in (
+        ("source_hash", lambda *names: "other code"),
+        ("_versions", lambda: (("numpy", "another"),)),
+        ("profiles_digest", lambda wheel_rail: "another file of a profile"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(ride_module, what, other)
+            assert ride_cache.key_of(ride.describe()) != key
+    assert ride_cache.key_of(ride.describe()) == key
+
+
+def test_no_setting_of_a_ride_is_left_out_of_its_key(ride):
+    """Not the name, by which no wheel turns otherwise."""
+    shaken = replace(ride, vibration=Vibration()).describe()
+    assert {one.name for one in fields(Ride)} - {"name"} <= set(shaken)
+    assert "vibration_sources" in shaken
 
 
 def test_interrupted_simulation_leaves_no_ride(ride, own_cache, monkeypatch):
@@ -142,6 +159,18 @@ def test_oldest_rides_make_room(ride, own_cache, monkeypatch):
     monkeypatch.setenv("SIMRAIL_CACHE_GB", str(2.5 * size / 1e9))
     simulate(rides[2])
     assert [is_cached(one) for one in rides] == [False, True, True]
+
+
+def test_a_ride_that_is_found_again_is_not_the_one_to_go(ride, own_cache, monkeypatch):
+    rides = [replace(ride, track_seed=seed) for seed in range(3)]
+    for one in rides[:2]:
+        simulate(one)
+        os.utime(own_cache / ride_cache.key_of(one.describe()) / "truth.json", (1000.0, 1000.0))
+    simulate(rides[0])
+    size = ride_cache.rides()[0].size_bytes
+    monkeypatch.setenv("SIMRAIL_CACHE_GB", str(2.5 * size / 1e9))
+    simulate(rides[2])
+    assert [is_cached(one) for one in rides] == [True, False, True]
 
 
 def test_clear_frees_everything(ride):

@@ -55,13 +55,15 @@ def test_it_is_recorded_with_each_imu_and_changes_nothing_else() -> None:
 
 def test_the_spacing_that_is_told_errs_as_a_tape_does() -> None:
     """By a draw of what its sd says: 15 cm of a spacing that is known to nobody better."""
-    exact, vague = (
-        [one.second_imu_sheet.spacing_m for one in recordings(read(SECOND + f"spacing_sd_m = {sd}\n"))]  # type: ignore[union-attr]
-        for sd in (1e-9, 0.15)
-    )
+    told = SECOND + "clock_offset_sd_s = 0.05\nspacing_sd_m = "
+    made = [recordings(read(f"{told}{sd}\n")) for sd in (1e-9, 0.15)]
+    exact, vague = ([one.second_imu_sheet.spacing_m for one in of_sd] for of_sd in made)  # type: ignore[union-attr]
     off = np.array(vague) - np.array(exact)
     assert np.ptp(exact) < 1e-6 and (np.abs(off) > 1e-3).all() and (np.abs(off) < 0.6).all()
     assert off[0] != off[1]
+    # Not the draw of the clock.
+    ahead = np.array([one.second_imu.index[0] - one.imu.index[0] for one in made[1]])  # type: ignore[union-attr]
+    assert (np.abs(off / 0.15 - ahead / 0.05) > 1e-3).all()
 
 
 def test_the_clock_offset_is_drawn_or_told() -> None:

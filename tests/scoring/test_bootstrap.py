@@ -100,3 +100,11 @@ def test_shares_that_are_nearly_all_one_have_an_interval_among_shares() -> None:
     held[7] = 0.93
     found = interval(held)
     assert 0.9 < found.low < found.value < found.high < 1.1
+
+
+def test_the_interval_of_what_is_skewed_reaches_to_the_side_of_its_tail() -> None:
+    """The mean of few draws misses a rare large one more often than not: a bootstrap-t knows it."""
+    skewed = np.array([0.9, 1.0, 1.1, 1.2, 1.3, 1.5, 2.0, 6.0])
+    one, turned = interval(skewed), interval(-skewed)
+    assert one.high - one.value > 2.0 * (one.value - one.low)
+    assert (-turned.high, -turned.low) == pytest.approx((one.low, one.high), rel=1e-12)

@@ -127,6 +127,12 @@ def rough(rng, count):
     return 1e-3 * rng.standard_normal((count, len(S)))
 
 
+def test_twist_is_what_the_cross_level_gains_over_its_base():
+    """An error that grows by 1 mm with each metre is a twist of +3 mm over 3 m, whatever the rails are."""
+    table = score_geometry(estimate({"cross_level_m": 1e-3 * S}), LAID, RECORDING, windows=["whole"])
+    assert figure(table, "twist", "mean") == pytest.approx(3.0, abs=1e-9)
+
+
 def test_coverage_in_a_band_and_of_twist_is_by_draws_of_the_error():
     """Of draws as large as the error 95 % lie inside, within what 1000 m hold; of others Student's share."""
     rng = np.random.default_rng(4)

@@ -81,3 +81,21 @@ def test_lateral_motion_begins_when_all_axles_have_passed(places):
     assert table["unit"].tolist() == ["1/s"]
     late = score_kick(truth, after_m=350.0 if places[1] > places[0] else 50.0)
     assert late["status"].tolist() == ["no three seconds of small lateral motion after the kick"]
+
+
+@pytest.mark.parametrize("places", [(20.0, 380.0), (380.0, 20.0)])
+def test_the_last_axle_says_when_all_have_passed(places):
+    """Axles 9 m before and 6 m behind the middle: forward the one behind is the last, backward the other."""
+    track = TrackDesign(name="straight", start_m=0.0, elements=(Straight(400.0),))
+    profile = SpeedProfile(*places, 20.0, acceleration_mps2=3.0, jerk_mps3=10.0)
+    moved = kinematic_truth(track, profile, rate_hz=RATE_HZ)
+    axle, angle = moved.bodies["body"], moved.wheel_angles["wheel"]
+    truth = replace(
+        moved,
+        bodies={"front": replace(axle, offset_m=9.0), "rear": replace(axle, offset_m=-6.0)},
+        wheel_angles={f"{name}.{side}": angle for name in ("front", "rear") for side in ("left", "right")},
+    )
+    at = truth.reference_position_m
+    fast = np.abs(np.gradient(at, truth.time_s)) >= 0.999 * 20.0
+    beyond = (at - 6.0 > 200.0) if places[1] > places[0] else (at + 9.0 < 200.0)
+    assert len(lateral_motion(truth, after_m=200.0)) == np.count_nonzero(fast & beyond)

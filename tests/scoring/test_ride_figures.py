@@ -124,6 +124,21 @@ def test_the_worst_wheel_in_each_window(wagon, reverse):
     assert frame["sum_y_n"].iloc[2] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_force_counts_by_its_size_whichever_way_it_pushes(wagon, side):
+    """A wheel pressed to either side by half its load in the curve, and all others by nothing."""
+    model, static = wagon
+    name = model.wheels[0].name.replace(".", "_")
+    pressed = {name: (lambda s: 1.0 + 0.0 * s, lambda s: side * 0.5 * ((s > 195.0) & (s < 285.0)))}
+    table = score_running_safety(ride(wagon, **pressed), model, windows=["curve"])
+    for quantity, unit in (
+        ("guiding_force", static / 1e3),
+        ("sum_y", static / 1e3),
+        ("derailment_quotient", 1.0),
+    ):
+        assert 0.5 <= value(table, quantity, window="curve") / unit * (1.0 + 1e-3) < 0.5 + 0.04
+
+
 def test_the_percentile_leaves_the_rarest_out(wagon):
     """A blow over 0.6 m in 560 m: the greatest window has it, the percentile of 99.85 % nearly not."""
     model, _ = wagon

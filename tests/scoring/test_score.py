@@ -30,6 +30,7 @@ from simrail.scoring.table import (
     as_score_table,
     concat_scores,
     failed_figures,
+    in_order,
     labelled,
 )
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION
@@ -381,6 +382,12 @@ def test_bounds_are_judged_by_the_way_and_until_a_fault() -> None:
     assert kept["outside"] == pytest.approx(0.1, abs=3.0 / n)
     assert kept["fault"] == pytest.approx(0.2, abs=3.0 / n)
     assert not set(score(found, motion, recorded(motion))["metric"]) & {"bound", "outside", "fault"}
+    # However long it stands: no way is run then. 0.6 of the way is more than half of it.
+    moves = np.abs(motion["speed_mps"].to_numpy()) >= 0.01
+    bound = np.where(moves, np.where(run < 0.6, 2.0, 4.0), 9.0)
+    assert np.median(bound) > 2.0
+    found = estimated(motion, {}, position_m=place, position_bound_m=bound, fault=fault)
+    assert value(score(found, motion, recorded(motion), metrics=["bound"]), quantity="position") == 2.0
 
 
 def test_consistency_stands_only_beside_the_truth_and_only_with_a_standard_deviation() -> None:
@@ -562,6 +569,14 @@ def test_columns_and_vocabulary_are_those_of_the_design() -> None:
     )
     assert " ".join(QUANTITY_UNITS) == quantities
     assert " ".join(METRICS) == "rms mean sd p95 p9985 max final nees nis coverage95 us_per_sample"
+
+
+def test_rows_of_a_cell_stay_in_their_order() -> None:
+    """However many there are, and whichever cell was ready first."""
+    cell = np.random.default_rng(1).permutation(np.repeat(np.arange(5), 400))
+    sorted_rows = in_order(pd.DataFrame({"cell": cell, "value": np.arange(2000.0)}))
+    assert sorted_rows["cell"].is_monotonic_increasing
+    assert sorted_rows.groupby("cell")["value"].is_monotonic_increasing.all()
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,12 @@ def test_rides_are_no_devices() -> None:
     assert (row["verdict"], row["devices"], row["tracks"]) == (UNDECIDED, 30, 1)
 
 
+def test_a_device_that_is_just_at_the_limit_meets_it() -> None:
+    values = np.array([[0.1], [np.nextafter(0.1, 1.0)], [0.05]])
+    (row,) = verdict_table(*campaign({"a": values}), [WANTED]).to_dict("records")
+    assert (row["devices"], row["passed"]) == (3, 2)
+
+
 def test_a_failure_is_no_pass() -> None:
     values = np.full((60, 1), 0.05)
     values[:10] = np.nan

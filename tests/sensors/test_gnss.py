@@ -35,6 +35,18 @@ def test_noise_is_that_of_the_sheet() -> None:
     assert abs(np.corrcoef(seen["speed_mps"], again["speed_mps"])[0, 1]) < 4.0 / np.sqrt(n)
 
 
+def test_no_two_of_its_errors_share_a_draw() -> None:
+    """White noise and wander of the place, and the speed: each alone, a wander too quick to hang together."""
+    nothing, motion = 1e-12, line(5000.0, 10.0)
+    white = sample_gnss(motion, GnssSpec(position_sd_m=0.0, latency_s=0.0), seed=1, draw=0)
+    quick = GnssSpec(position_noise_m=nothing, correlation_s=0.05, latency_s=0.0)
+    wander = sample_gnss(motion, quick, seed=1, draw=0)
+    way = 5.0 + 10.0 * white.index.to_numpy()
+    errors = [white["position_m"] - way, wander["position_m"] - way, white["speed_mps"]]
+    shared = np.corrcoef(errors) - np.eye(3)
+    assert np.abs(shared).max() < 4.0 / np.sqrt(len(white))
+
+
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_it_comes_late_and_a_tunnel_hides_the_antenna(way: float) -> None:
     tunnel = Outage(min(105.0 * way, 155.0 * way), max(105.0 * way, 155.0 * way))

@@ -87,7 +87,7 @@ import sys
 from simrail import results
 from simrail.campaign import campaign
 
-campaign._MOST_CELLS = 5  # more batches, so more moments
+campaign._MOST_CELLS = {batch}  # more batches, so more moments
 # The figures of the page take longer than the campaign.
 results.write_report = lambda path, **keywords: path.write_text("<html></html>")
 if __name__ == "__main__":
@@ -96,8 +96,15 @@ if __name__ == "__main__":
 """
 
 WORKERS = 2
+GROWN_S = 10.0
+"""After so long a worker has loaded what it needs; before, its memory says nothing."""
 DONE = (0, 1)
 """Exit codes of a run that has ended by itself; 1 is also that of one with failed rows, as here."""
+
+
+def batch_of(cells: int) -> int:
+    """Cells of a batch: few enough that all events of a short campaign find a moment of their own."""
+    return min(5, max(1, cells // 60))
 
 
 def children(pid: int) -> list[int]:
@@ -146,7 +153,9 @@ class Soak:
     chance: random.Random
     happened: Counter[str] = field(default_factory=Counter)
     memory: list[tuple[int, int, float, float]] = field(default_factory=list)
-    """Of each second: pid of the run, batches kept, memory of the run and of its largest worker, MB."""
+    """Of each look: pid of the run, batches kept, memory of the run and of its largest worker, MB."""
+    born: dict[int, float] = field(default_factory=dict)
+    """When a worker was seen first."""
     problems: list[str] = field(default_factory=list)
 
     @property
@@ -188,13 +197,14 @@ class Soak:
         """A session on a cluster of our own, which loses its scheduler."""
         log = self.folder / "scheduler.txt"
         dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
-        where = {"cwd": self.folder / "tmp", "env": self.environment, "stdout": subprocess.DEVNULL}
+        # Killed, dask leaves what it has: scheduler and workers have a folder of their own for it.
+        environment = self.environment | {"DASK_TEMPORARY_DIRECTORY": str(self.folder / "dask")}
+        where = {"cwd": self.folder / "tmp", "env": environment, "stdout": subprocess.DEVNULL}
         with log.open("w") as said:
             scheduler = subprocess.Popen([*dask, "--host", "127.0.0.1", "--port", "0"], stderr=said, **where)
         while not (found := re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())):
             time.sleep(0.1)
         dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--no-dashboard", found[0]]
-        dask += ["--local-directory", str(self.folder / "dask")]  # killed, dask leaves what it has there
         workers = [
             subprocess.Popen([*dask, "--nthreads", "1", "--no-nanny"], stderr=subprocess.DEVNULL, **where)
             for _ in range(WORKERS)
@@ -208,23 +218,30 @@ class Soak:
 
     def session(self, run: subprocess.Popen[str], scheduler: subprocess.Popen[bytes] | None) -> None:
         """Watch a session, and let happen what is due."""
-        due = self.kept() + self.gap()
+        due, in_a_row = self.kept() + self.gap(least=1), 0
         while run.poll() is None:
             time.sleep(0.5)
             kept = self.kept()
             # Neither the tracker of shared resources, nor the processes of estimators with a limit.
             workers = [pid for pid in children(run.pid) if "popen_loky" in command_of(pid)]
-            self.memory.append((run.pid, kept, rss_mb(run.pid), max(map(rss_mb, workers), default=0.0)))
+            now = time.monotonic()
+            grown = [pid for pid in workers if now - self.born.setdefault(pid, now) > GROWN_S]
+            self.memory.append((run.pid, kept, rss_mb(run.pid), max(map(rss_mb, grown), default=0.0)))
             if not self.events or kept < due:
                 continue
             event = self.events[0]
             if event == "scheduler" and scheduler is None:
                 event = "run"  # on to the cluster, by a kill more
             if self.happen(event, run, workers, scheduler):
-                due = self.kept() + self.gap()
                 self.happened[event] += 1
                 if event == self.events[0]:
                     self.events.pop(0)
+                in_a_row = in_a_row + 1 if event == "worker" else 0
+                least = int(in_a_row > 0 and self.events[:1] == ["worker"])
+                if in_a_row == 2 and least:
+                    # A cell whose worker is killed time after time fails, as it should: let these be done.
+                    least, in_a_row = WORKERS * batch_of(self.cells), 0
+                due = self.kept() + self.gap(least=least)
                 print(f"{event}, at {self.kept()} batches; left {len(self.events)}", flush=True)
         said = (self.folder / "said.txt").read_text()
         if "Traceback" in said:
@@ -233,11 +250,12 @@ class Soak:
             self.problems.append(f"exit code {run.returncode}: {said[-500:]}")
         (self.disk / "filler").unlink(missing_ok=True)
 
-    def gap(self) -> int:
-        """Batches until the next event: all of them within the first nine tenths."""
-        batches = max(2, self.cells // 5)
+    def gap(self, *, least: int = 0) -> int:
+        """Batches until the next event: all of them within the first nine tenths, however few there are."""
+        batches = max(2, self.cells // batch_of(self.cells))
         left = max(0.0, 0.9 * batches - self.kept())
-        return self.chance.randint(1, max(1, int(2.0 * left / max(1, len(self.events)))))
+        most = int(2.0 * left / max(1, len(self.events)))
+        return self.chance.randint(max(least, min(1, most)), max(least, most))
 
     def happen(
         self,
@@ -287,6 +305,9 @@ class Soak:
         """In the longest session neither the run nor a worker grows from the second third to the last."""
         frame = pd.DataFrame(self.memory, columns=["run", "kept", "run_mb", "worker_mb"])
         frame = frame[(frame["worker_mb"] > 0.0) & (frame["kept"] < frame["kept"].max())]  # not as it ends
+        if frame.empty:
+            print("no session was long enough to judge its memory")
+            return
         longest = frame[
             frame["run"] == frame.groupby("run")["kept"].agg(lambda kept: kept.max() - kept.min()).idxmax()
         ]
@@ -382,7 +403,7 @@ def main() -> int:
         folder = Path(place)
         (folder / "tmp").mkdir()
         (folder / "rogue.py").write_text(ROGUE)
-        (folder / "program.py").write_text(PROGRAM)
+        (folder / "program.py").write_text(PROGRAM.format(batch=batch_of(given.cells)))
         (folder / "mine.toml").write_text(
             scenario(draws=given.cells // 2, limit_s=given.limit_s, often=given.often)
         )
@@ -394,11 +415,15 @@ def main() -> int:
                 return 1
             print(f"undisturbed: {time.monotonic() - begun:.0f} s", flush=True)
             soak.run()
-            print(f"disturbed {dict(soak.happened)}: {time.monotonic() - begun:.0f} s in all")
+            print(f"disturbed {dict(soak.happened)}: {time.monotonic() - begun:.0f} s in all", flush=True)
+            if soak.events:
+                soak.problems.append(f"done before these could happen: {soak.events}")
             soak.judge(pd.read_parquet(soak.disk / "whole" / "scores.parquet"))
+            if soak.problems:
+                print((soak.disk / "disturbed" / "run.log").read_text())
     for problem in soak.problems:
         print(f"PROBLEM: {problem}")
-    return int(bool(soak.problems or soak.events))
+    return int(bool(soak.problems))
 
 
 if __name__ == "__main__":

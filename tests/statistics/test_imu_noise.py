@@ -25,6 +25,7 @@ from simrail.recording.sheets.allan import (
 )
 from simrail.recording.sheets.grades import ImuGrade
 from simrail.sensors.imu import sample_imu
+from simrail.sensors.imu_noise import BLOCK
 
 pytestmark = pytest.mark.long
 
@@ -255,6 +256,9 @@ def test_random_walk_begins_at_zero_and_takes_independent_steps():
     steps = np.diff(walks, axis=0)
     assert steps.std() == pytest.approx(1e-4 / np.sqrt(1000.0), rel=0.01)
     assert abs(np.mean(steps[1:] * steps[:-1]) / np.mean(steps**2)) < 4.0 / np.sqrt(steps.size)
+    # None is left out where one block of draws ends and the next begins.
+    longer = np.diff(sampled(grade, 5.0)[COLUMNS["gyro"]].to_numpy(), axis=0)
+    assert len(longer) > 2 * BLOCK and (longer != 0.0).all()
 
 
 @pytest.mark.parametrize(
@@ -383,9 +387,9 @@ def test_axes_sensors_and_draws_are_uncorrelated(grade):
 
 
 def test_terms_and_seeds_are_uncorrelated_too():
-    found = correlations((replace(WHITE, rate_hz=10.0), WANDERING), (11, 12))
-    assert len(found) == 96 * 95 // 2
-    # Of 4560 pairs one exceeds 4 by chance every fourth time: judge the whole distribution, and 5.
+    found = correlations((replace(WHITE, rate_hz=10.0), WANDERING, WALKING), (11, 12))
+    assert len(found) == 144 * 143 // 2
+    # Of 10296 pairs one exceeds 4 by chance every other time: judge the whole distribution, and 5.
     assert np.abs(found).max() < 5.0
     assert stats.kstest(found, "norm").pvalue > 1e-3
 
