@@ -87,9 +87,9 @@ class BogieDelayOdometry:
         over.
 
     Floor, distance and lag are what delays between IMUs without errors had on five simulated rides of
-    ``metro_car_gz18``, whose true way is known: lags of 11.8 to 15.1 ms, 11.9 to 12.3 ms where no wheel is out
-    of round; beside that the distance seems another one by 14 to 18 mm, a third of which does not outlast a
-    window, and the rest fades within 5 to 7 s; over a whole ride 0 to 8 mm remain.
+    ``metro_car_gz18``, whose true way is known: lags of 11.8 to 15.1 ms, 11.9 to 12.3 ms where no wheel is
+    out of round; beside that the distance seems another one by 14 to 18 mm, a third of which does not outlast
+    a window, and the rest fades within 5 to 7 s; over a whole ride 0 to 8 mm remain.
     """
 
     smoothed: bool = False
