@@ -30,7 +30,7 @@ from simrail.estimators.kalman import History, fixed_interval, room_for_history
 from simrail.estimators.odometry.bogie_delay_kernel import Echo, Heard, room_to_hear
 from simrail.estimators.odometry.calm import ACCELERATION_SD_MPS2, calm, calm_so_far, power, unsteady
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of
-from simrail.estimators.odometry.standstill import require_rest_first, signs_of_rest
+from simrail.estimators.odometry.standstill import FORCE_S, REST_FORCE_MPS2, require_rest_first, signs_of_rest
 from simrail.estimators.odometry.vertical import vertical_force
 from simrail.estimators.odometry.zero_velocity_kernel import (
     ASKEW,
@@ -73,11 +73,16 @@ ASKEW_RAD = 5e-4
 """Yaw of a body in its track in a curve, at the middle of its chord: standard deviation."""
 
 REST_TURNING_RADPSQRTS = 5e-5
-"""Density of the angular rate that passengers give the body that they are in, at rest."""
+"""Density of the angular rate that passengers give the body that they are in, at rest, until its gyros have
+shown theirs."""
 
 REST_LEANING_RADPSQRTS = 3e-5
 """By this random walk it leans as they change their places: one in six seconds, of 75 kg, 6 m along a body of
-30 t on springs of .9 MN/m, is 7e-5 rad. What carries that body does not lean with it."""
+30 t on springs of .9 MN/m, is 7e-5 rad. What carries that body does not lean with it. Where they turn it
+less they lean it less by the same share."""
+
+REST_LATERAL_MPS2SQRTS = REST_FORCE_MPS2 * math.sqrt(FORCE_S)
+"""Density of the lateral force at rest: as of that along the track."""
 
 UNHEARD_M = 0.006
 """So far a train that leaves with the jerk of a gentle start, .2 m/s3, runs before it is heard: within
@@ -243,12 +248,13 @@ class ZeroVelocityOdometry:
         drift, push = wandering(sheet)
         process[DRIFT_X : DRIFT_Z + 1], process[[PUSH, SWAY]] = drift, push
         rest_process = process.copy()
-        leaning, turning = self._rocked(recording)
-        rest_process[[ROLL, PITCH]] = leaning**2
+        rocking, leaning = self._rocked(recording)
+        still = self.turn_density_radpsqrts**2
+        rest_process[[ROLL, PITCH]] = max(leaning * rocking, still)
         noise = np.empty(UPDATES)
         noise[LATERAL] = self.lateral_density_mps2sqrts**2 / step
         noise[REST] = self.rest_speed_mps**2
-        noise[REST_X:] = (rate_variance + turning**2) / step
+        noise[REST_X:] = (rate_variance + max(rocking, still)) / step
         chord = chord_of(recording)
         signs = signs_of_rest(recording, block)
         return Model(
@@ -262,6 +268,10 @@ class ZeroVelocityOdometry:
             process=process * step,
             rest_process=rest_process * step,
             noise=noise,
+            rest_lateral=(REST_LATERAL_MPS2SQRTS**2 + force_variance) / step,
+            rocking=rocking,
+            leaning=leaning,
+            still=still,
             rate_variance=rate_variance,
             force_variance=force_variance,
             scale_variance=sheet.gyro_scale_error**2 / 3.0,
@@ -270,15 +280,15 @@ class ZeroVelocityOdometry:
         )
 
     def _rocked(self, recording: Recording) -> tuple[float, float]:
-        """By how much an IMU leans and turns at rest: by what passengers do, or no more than in running.
+        """By how much passengers turn the IMU at rest, and its angles by which share of that; 0 by none.
 
-        Passengers rock the body that they are in; what carries another body, by the drawing, is none such.
+        They rock the body that they are in; what carries another body, by the drawing, is none such.
         """
         sheet = recording.vehicle_sheet
         below = set() if sheet is None else {s.on for body in sheet.bodies for s in body.supports}
         if recording.mount_body in below:
-            return self.turn_density_radpsqrts, self.turn_density_radpsqrts
-        return REST_LEANING_RADPSQRTS, REST_TURNING_RADPSQRTS
+            return 0.0, 0.0
+        return REST_TURNING_RADPSQRTS**2, (REST_LEANING_RADPSQRTS / REST_TURNING_RADPSQRTS) ** 2
 
     def start(self, recording: Recording, model: Model) -> tuple[FloatArray, FloatArray]:
         """State and covariance of a train that stands where it is known to stand, leaning as it seems to."""

@@ -14,7 +14,8 @@ body runs is pulled towards that middle in a curve (`simrail.recording.sheets.ve
 
 At rest the body turns no more than passengers turn it, and the rows are v = 0 and the gyro's biases. That
 gives the pitch less push / g anew at each stop, and the biases of the gyros, which the way in between lives
-on.
+on. How much passengers turn it differs from train to train, and the gyros show it: it is the mean square of
+what those rows leave, less what is expected without passengers, over the last half minute of rest.
 
 Whether the train stands is judged by `simrail.estimators.odometry.standstill`, from the signals and from
 what the filter knows. Odds from seconds that have nothing in common add up, and one second that speaks
@@ -68,6 +69,14 @@ ECHO, ECHO_UPDATES = UPDATES, UPDATES + 1
 ECHO_GATE = 4.0
 """Standard deviations from which on a delay is no echo."""
 
+ROCKED_ROWS, ROCKED_BEFORE = 600, 100
+"""Over so many rows, of two gyros ten times a second, is averaged by how much passengers turn a body; what is
+taken before any is heard counts as so many."""
+
+ROCKED_MOST = 9.0
+"""Of a row no more than so many times its variance counts: three standard deviations. A train that leaves
+turns by more."""
+
 UNKNOWN = 4.0
 """The clocks' offset is unknown while it adds so many times more to a delay's speed than bogies that are not
 alike do: then it is what is searched, and one delay alone is not believed."""
@@ -91,6 +100,12 @@ class Model(NamedTuple):
         Variances that a step adds while the train runs, and at rest.
     noise : ndarray (5,)
         Variances of the rows.
+    rest_lateral : float
+        Variance of the lateral row at rest.
+    rocking, leaning, still : float
+        Density squared by which passengers are taken to turn the body at rest, (rad/s)^2 s, until the gyros
+        have shown it, 0 where none turn it and nothing is learnt; the share of it by which the body's angles
+        wander; and what remains of both where nobody turns it.
     rate_variance, force_variance : float
         White noise of a gyro and of the accelerometer along X: variances of a mean over one second.
     scale_variance : float
@@ -114,6 +129,10 @@ class Model(NamedTuple):
     process: FloatArray
     rest_process: FloatArray
     noise: FloatArray
+    rest_lateral: float
+    rocking: float
+    leaning: float
+    still: float
     rate_variance: float
     force_variance: float
     scale_variance: float
@@ -178,6 +197,9 @@ def zero_velocity(
         fading = math.exp(-model.step_s / echo.unlike_s)
         f[OFFSET, CLOCK_DRIFT], f[UNLIKE, UNLIKE] = model.step_s, fading
     odds, rests = SUREST, True  # a train begins its ride at rest
+    rest_noise, rest_process = model.noise.copy(), model.rest_process.copy()
+    rest_noise[LATERAL] = model.rest_lateral
+    rocked = np.array([model.rocking, 0.0])
     for k in range(model.signals.shape[0]):
         signal = model.signals[k]
         now = _evidence(model, k, x, p, turn, variance)
@@ -191,26 +213,29 @@ def zero_velocity(
         if echo is not None:
             _predict_echo(model, signal, fading, x, f, scaled)
             signal = scaled
-        found.acceleration[k] = _predict(model, signal, rests, x, p, f, work)
+        if model.rocking > 0.0:
+            rest_process[ROLL : PITCH + 1] = model.step_s * max(model.leaning * rocked[0], model.still)
+        process = rest_process if rests else model.process
+        found.acceleration[k] = _predict(model, signal, rests, process, x, p, f, work)
         if past is not None:
             remember_prediction(past, k, x, p, f)
-        for m in range(UPDATES):
+        noise = rest_noise if rests else model.noise
+        for m in range(UPDATES if rests else LATERAL + 1):
             if m == LATERAL:
                 error = _lateral(model, signal, x, h[LATERAL])
             elif m == REST:
                 error = -x[V]
             else:
-                error = signal[m - REST_X] - x[DRIFT_X + m - REST_X]
-            if rests or m == LATERAL:
-                s = update(x, p, h[m], error, model.noise[m], gain, v)
-                if past is not None:
-                    remember(past, k, m, h[m], gain, error, s)
+                error = _turns(model, signal, m, x, p, rocked, rest_noise)
+            s = update(x, p, h[m], error, noise[m], gain, v)
+            if past is not None:
+                remember(past, k, m, h[m], gain, error, s)
         if rests:
             found.acceleration[k] = 0.0
         elif echo is not None and heard is not None and k % echo.every == 0:
-            error, noise = _echo(model, echo, heard, k, x, p, found.acceleration, h[ECHO])
-            if noise > 0.0:
-                s = update(x, p, h[ECHO], error, noise, gain, v)
+            error, by_delay = _echo(model, echo, heard, k, x, p, found.acceleration, h[ECHO])
+            if by_delay > 0.0:
+                s = update(x, p, h[ECHO], error, by_delay, gain, v)
                 if past is not None:
                     remember(past, k, ECHO, h[ECHO], gain, error, s)
         keep(found.states, found.covariances, k, x, p)
@@ -253,10 +278,37 @@ def _misled(model: Model, p: FloatArray, gain: FloatArray) -> None:
 
 
 @njit_borrowed
+def _turns(
+    model: Model,
+    signal: FloatArray,
+    m: int,
+    x: FloatArray,
+    p: FloatArray,
+    rocked: FloatArray,
+    rest_noise: FloatArray,
+) -> float:
+    """Innovation of a gyro's row m at rest, and what it tells of how much passengers turn the body.
+
+    ``rocked`` (2,) holds that as a density squared, and the rows that it is of; ``rest_noise`` follows it.
+    """
+    axis = DRIFT_X + m - REST_X
+    error, known = signal[m - REST_X] - x[axis], p[axis, axis]
+    # A bias that is hardly known yet would hide it; people who walk roll and pitch a body above all.
+    if model.rocking > 0.0 and m < REST_Z and known < rest_noise[m]:
+        square = min(error * error, ROCKED_MOST * (known + rest_noise[m])) - known
+        rocked[1] += 1.0
+        share = 1.0 / min(rocked[1] + ROCKED_BEFORE, ROCKED_ROWS)
+        rocked[0] += share * (square * model.step_s - model.rate_variance - rocked[0])
+        rest_noise[REST_X:] = (model.rate_variance + max(rocked[0], model.still)) / model.step_s
+    return float(error)
+
+
+@njit_borrowed
 def _predict(
     model: Model,
     signal: FloatArray,
     rests: bool,
+    process: FloatArray,
     x: FloatArray,
     p: FloatArray,
     f: FloatArray,
@@ -300,7 +352,6 @@ def _predict(
     x[ROLL] += dt * (turns * a + sp / cp * psd)
     x[PITCH] += dt * pitching
     congruence(f, p, work)
-    process = model.rest_process if rests else model.process
     for i in range(x.shape[0]):
         p[i, i] += process[i]
     scaled = turns * dt * SCALED_S * model.scale_variance

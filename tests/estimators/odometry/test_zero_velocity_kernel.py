@@ -9,7 +9,11 @@ import pytest
 from simrail.estimators.kalman import History, fixed_interval, room_for_history
 from simrail.estimators.odometry.standstill import PRIOR, SUREST, TURN_S
 from simrail.estimators.odometry.zero_velocity_kernel import (
+    DRIFT_X,
+    LATERAL,
+    PITCH,
     REST,
+    REST_X,
     STATES,
     UPDATES,
     Found,
@@ -52,6 +56,10 @@ def ride_of(steps: int, *, given: np.ndarray | None = None, scale_sd: float = 0.
         process=process,
         rest_process=0.5 * process,
         noise=np.array([0.2, 4e-4, 1e-7, 2e-7, 3e-7]),
+        rest_lateral=0.05,
+        rocking=0.0,
+        leaning=0.0,
+        still=0.0,
         rate_variance=1e-8,
         force_variance=1e-6,
         scale_variance=scale_sd**2,
@@ -114,7 +122,8 @@ def test_filter_and_smoother_equal_the_joint_gaussian() -> None:
                 row[k] = past.rows[k, m]
                 rows.append(row.ravel())
                 errors.append(e + row[k] @ (x - mean[k]))
-                noise.append(model.noise[m])
+                rests = model.given[k] > 0.0
+                noise.append(model.rest_lateral if rests and m == LATERAL else model.noise[m])
                 x += past.gains[k, m] * e
     h, sigma = np.array(rows), joint.reshape(n * STATES, n * STATES)
     gain = np.linalg.solve(h @ sigma @ h.T + np.diag(noise), h @ sigma).T
@@ -125,6 +134,33 @@ def test_filter_and_smoother_equal_the_joint_gaussian() -> None:
     for k in range(n):
         np.testing.assert_allclose(covariances[k] / scale, all_covariances[k, :, k] / scale, atol=1e-7)
     np.testing.assert_allclose(filtered.states[-1] / SDS, all_states[-1] / SDS, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("times", [0.0, 1.0, 4.0])
+def test_the_gyros_show_by_how_much_passengers_turn_a_body(times: float) -> None:
+    """After 150 s of rest the filter is as sure as one that is told; what it took before is forgotten.
+
+    Of 600 rows a variance is known to sqrt(2/600) = 6 %, and what the filter knows goes by its root: four
+    standard deviations are 12 %. What it took before would be wrong by a factor of sqrt(5) = 2.2 or more.
+    """
+    steps, rate_variance, before = 1500, 1e-8, 4e-8
+    noise = stream(5, "passengers").standard_normal((steps, 5))
+    turned = rate_variance + times * before
+    model = ride_of(steps, given=np.ones(steps))
+    model = model._replace(
+        signals=noise * [*[math.sqrt(turned / STEP_S)] * 3, 1e-3, 1e-3] + [0.0, 0.0, 0.0, G * 0.02, G * 0.03],
+        rate_variance=rate_variance,
+        leaning=0.36,
+        still=1e-12,
+    )
+    learnt = run(model._replace(rocking=before))
+    told_noise, told_process = model.noise.copy(), model.rest_process.copy()
+    told_noise[REST_X:] = turned / STEP_S
+    told_process[[PITCH - 1, PITCH]] = max(0.36 * times * before, 1e-12) * STEP_S
+    told = run(model._replace(rocking=0.0, noise=told_noise, rest_process=told_process))
+    for state in (DRIFT_X, PITCH):
+        found, right = (np.sqrt(one.covariances[-1, state, state]) for one in (learnt, told))
+        assert found == pytest.approx(right, rel=0.12)
 
 
 def judged(force: np.ndarray, steps: int = 200, **changes: np.ndarray) -> Found:

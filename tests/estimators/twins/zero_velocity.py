@@ -87,7 +87,8 @@ def filterpy_zero_velocity(model: Model, x: FloatArray, p: FloatArray, rests: np
         if rests[k]:
             rows.append((0.0, lambda state: state[1]))
             rows += [(model.signals[k, i], lambda state, i=i: state[4 + i]) for i in range(3)]
-        for (z, row), variance in zip(rows, model.noise, strict=False):
+        variances = [model.rest_lateral, *model.noise[1:]] if rests[k] else model.noise
+        for (z, row), variance in zip(rows, variances, strict=False):
             ekf.update(
                 np.array([z]),
                 lambda state, row=row: derived(row, state),
