@@ -305,7 +305,7 @@ def test_the_answer_is_of_the_rails_and_beside_no_imu(ran: Ran) -> None:
     assert answer_tiles(lost)[1].note == "zero track: beats it"
     # Without such a method nothing stands for it.
     alone = replace(question, methods=[one for one in question.methods if one.uses_imu])
-    assert answer_sentence(alone).endswith("whether that beats no IMU at all was not run.")
+    assert answer_sentence(alone).endswith("no method without an IMU was run beside it.")
 
 
 def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
@@ -484,7 +484,7 @@ def test_many_methods_are_told_together(scenario: Scenario, example: Rides, tabl
     assert "In roll, 'design angles only', which uses no IMU, beats m3 and m4 over the whole ride" in text
     assert "In pitch, 'design angles only', which uses no IMU, beats m1, m2, m3 and m4 over" in text
     assert "is too small with m2 (0 % inside), m3 (0 % inside) and m4 (0 % inside)." in text
-    assert "is larger than its errors with m1 (100 % inside)." in text
+    assert "is larger than need be with m1 (100 % inside)." in text
     assert text.count("95 % interval") == 2
 
 
