@@ -240,6 +240,11 @@ def test_an_interval_has_lines_for_clusters() -> None:
     assert Draws(line, line).mean() == pytest.approx(one)
 
 
+def test_the_interval_of_an_rms_does_not_go_below_zero() -> None:
+    line, values = np.array([0.0, 1.0]), np.array([0.1, 5.0])
+    assert Draws(values, line).mean()[1] < 0.0 == Draws(values, line, is_size=True).mean()[1]
+
+
 def test_an_ideal_imu_is_left_out() -> None:
     whole = planted()
     ideal = whole.table.assign(imu="ideal", value=99.0)

@@ -214,7 +214,7 @@ def beside_ours(seen: Evidence) -> list[str]:
 
 
 def _compared(seen: Evidence, part: str) -> dict[str, dict[str, list[float]]]:
-    """By mount, mean rms of the speed and middle size of the distance's error: of a part, and of the paper's."""
+    """By mount, mean rms of the speed and middle error of the distance: of a part, and of the paper's."""
     return {
         mount: {
             "speed": [seen.lines.draws(p, "speed", mount).mean()[0] for p in (part, "paper")],
