@@ -44,6 +44,9 @@ _WIDTH: ContextVar[float] = ContextVar("width", default=WIDE_IN)
 LEFT_IN = 0.84
 """Margin left of the axes: tick labels such as -0.25, then two lines of label."""
 
+PRINT_DPI = 220
+"""Dots per inch of a PNG: sharp on a slide, 2475 across."""
+
 MOST_UPRIGHT = 3
 """Words of slots on a phone that are written level; more stand upright."""
 
@@ -599,7 +602,8 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     order = _ORDER.get()
     if order is not None:
         form, picture = order.path.suffix.removeprefix("."), BytesIO()
-        figure.savefig(picture, format=form, metadata={"Title": description} if form != "png" else None)
+        metadata = {"Title": description} if form != "png" else None
+        figure.savefig(picture, format=form, metadata=metadata, dpi=PRINT_DPI)
         write_whole(order.path, picture.getvalue(), what="figure")
         return Markup(description)
     out = StringIO()
