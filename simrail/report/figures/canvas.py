@@ -635,5 +635,6 @@ def _of_both(style: re.Match[str]) -> str:
     """A style whose strokes, and marks of their colour, are seen by day and by night; areas stay."""
     text = style.group()
     for colour in dict.fromkeys(re.findall(r"stroke: (#[0-9a-f]{6})", text)):
-        text = re.sub(rf"(fill|stroke): {colour}", lambda part, c=colour: day_and_night(part[1], c), text)
+        for name in ("fill", "stroke"):
+            text = text.replace(f"{name}: {colour}", day_and_night(name, colour))
     return text
