@@ -88,7 +88,7 @@ def _say_usage(error: Any, arguments: list[str]) -> None:
         command = " ".join(["simrail", *arguments[:1]])
     remedy = f"see '{command} --help'"
     text = joined(error.format_message()).rstrip(".")
-    parameter = getattr(error, "param", None)
+    parameter: Any = getattr(error, "param", None)
     given = None if parameter is None else _given(parameter, arguments)
     if given is not None:
         # As typer says it: "Invalid value for '--seed': Input should be a valid integer, unable to parse ..."
