@@ -76,7 +76,8 @@ def options(name: str) -> str:
     items = []
     for field in fields(made):  # type: ignore[arg-type]
         kind, meaning = told[field.name]
-        items.append(f"`{field.name}` ({kind.removesuffix(', optional')}; {_default(field)})\n: {meaning}")
+        told_of = "; ".join(filter(None, (kind.removesuffix(", optional"), _default(field))))
+        items.append(f"`{field.name}` ({told_of})\n: {meaning}")
     return "\n\n".join(items) or "It has none."
 
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol
+from urllib.parse import urlsplit
 
 from simrail.core.errors import InputError
 from simrail.core.machine import differences, machine
@@ -192,6 +193,19 @@ class _Processes(Executor):
         self._pool.shutdown(wait=True, kill_workers=True)
 
 
+def _judge_address(address: str) -> None:
+    """Refuse what is no address, before a client of dask is half made, which tells of it at the end.
+
+    Raises
+    ------
+    ValueError
+        If it has no host or no port.
+    """
+    parts = urlsplit(address if "://" in address else f"tcp://{address}")
+    if not parts.hostname or parts.port is None:
+        raise ValueError(address)
+
+
 class _Cluster(Executor):
     """Workers of a dask scheduler, which replaces those that are lost, and runs again what they had."""
 
@@ -209,8 +223,9 @@ class _Cluster(Executor):
             ) from None
         self._address = address
         self._levels = _mute_dask()  # what goes wrong is told here, in one line
+        client: Any = distributed.Client  # its methods have no types
         try:
-            client: Any = distributed.Client  # its methods have no types
+            _judge_address(address)
             self._client = client(address, timeout=_WAIT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             _unmute(self._levels)

@@ -27,6 +27,14 @@ def figure(
 
     if out is not None and out.suffix not in FORMS:
         raise InputError("no such form of a figure", field="--out", value=str(out), limit=", ".join(FORMS))
+    if out is not None and name is None:
+        raise InputError(
+            "is for one figure, and none is named",
+            field="--out",
+            value=str(out),
+            limit="RESULTS NAME --out FILE",
+            remedy=f"name one of those that 'simrail figure {results}' lists, e.g. answer",
+        )
     path = out or Path(f"{name}.svg")
     with canvas.only(name or "", path) as order:
         _offer(results)

@@ -2,8 +2,10 @@
 
 import os
 import secrets
+import socket
 import subprocess
 import sys
+import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +17,9 @@ from simrail.core.atomic_files import write_whole
 from simrail.core.errors import InputError, did_you_mean, one_of
 from simrail.lessons import LESSONS, notebook, teacher_page
 from simrail.lessons.serve import free_port
+
+POLL_S = 0.1
+"""Between two looks whether a server answers."""
 
 
 def lesson(
@@ -76,12 +81,32 @@ def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
         password = secrets.token_urlsafe(12)
         command += ["--token-password", password]
         key = f"?access_token={password}"
-    if headless and port is not None:
-        print(f"serving {name} at http://127.0.0.1:{port}{key}", flush=True)
     # No question whether there is a newer marimo leaves the machine; and a folder `simrail` in this one, as
     # a checkout has it, is not what is imported.
     environment = {**os.environ, "MARIMO_SKIP_UPDATE_CHECK": "1", "PYTHONSAFEPATH": "1"}
-    return subprocess.call(command, env=environment) or DONE
+    with subprocess.Popen(command, env=environment) as server:
+        try:
+            if headless and port is not None and _answers(port, server):
+                print(f"serving {name} at http://127.0.0.1:{port}{key}", flush=True)
+            return server.wait() or DONE
+        except BaseException:
+            server.terminate()
+            raise
+
+
+def _answers(port: int, server: "subprocess.Popen[bytes]") -> bool:
+    """Wait until a server answers; whether it does, or has ended before.
+
+    An address that is told too soon is refused to who opens it at once.
+    """
+    while server.poll() is None:
+        try:
+            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+        except OSError:
+            time.sleep(POLL_S)
+        else:
+            return True
+    return False
 
 
 def own_copy(name: str) -> Path:

@@ -39,9 +39,10 @@ def list_parts(
 
     from simrail.core.errors import one_of
 
-    wanted = kind if kind in ("", *FOLDERS) or kind.endswith("s") else f"{kind}s"
+    kinds = (*FOLDERS, "estimators")
+    wanted = f"{kind}s" if f"{kind}s" in kinds else kind
     if wanted:
-        one_of(wanted, (*FOLDERS, "estimators"), "there is no such kind", field="KIND")
+        one_of(wanted, kinds, "there is no such kind", field="KIND")
     if bibtex:
         if wanted not in ("", "estimators"):
             raise InputError(
@@ -202,7 +203,7 @@ def imu(
             "--from-rest",
             metavar="RECORDING",
             help="Fit noise, bias instability, random walk and counts to your own recording at rest: a ride "
-            "file (its [imu] alone counts) or a CSV. With --out, the sheet is written there, too.",
+            "file (of which \\[imu] alone counts) or a CSV. With --out, the sheet is written there, too.",
         ),
     ] = None,
 ) -> int:
@@ -238,7 +239,7 @@ def imu(
 
 def new(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="estimator, track, vehicle, imu, scenario, ride.")
+        str, typer.Argument(metavar="KIND", help="estimator, odometry, track, vehicle, imu, scenario, ride.")
     ],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Its name, e.g. my_filter.")],
     folder: Annotated[Path, typer.Option("--in", metavar="DIR", help="Where to write it.")] = Path(),

@@ -62,7 +62,7 @@ def call(arguments: list[str]) -> int:
         say(f"simrail: {error}")
         return BAD_INPUT
     except UsageFault as error:
-        _say_usage(error)
+        _say_usage(error, arguments)
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED  # newer versions of typer return this code by themselves
@@ -76,15 +76,39 @@ def call(arguments: list[str]) -> int:
     return int(code or DONE)
 
 
-def _say_usage(error: Any) -> None:
+def _say_usage(error: Any, arguments: list[str]) -> None:
     """Tell of words that are no command line, in one line; without any word, the help."""
     context = getattr(error, "ctx", None)
-    if context is None or type(error).__name__ == "NoArgsIsHelpError":
+    if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         return
-    text = one_line(joined(error.format_message()).rstrip("."), 2 * MOST_SHOWN)
-    command = "simrail" if context.parent is None else f"simrail {context.info_name}"
-    say(f"simrail: {text}; limit: what the help lists; remedy: see '{command} --help'")
+    if context is not None:
+        command = "simrail" if context.parent is None else f"simrail {context.info_name}"
+    else:  # an option at the end of the line, without its value
+        command = " ".join(["simrail", *arguments[:1]])
+    remedy = f"see '{command} --help'"
+    text = joined(error.format_message()).rstrip(".")
+    parameter: Any = getattr(error, "param", None)
+    given = None if parameter is None else _given(parameter, arguments)
+    if given is not None:
+        # As typer says it: "Invalid value for '--seed': Input should be a valid integer, unable to parse ..."
+        limit = text.rpartition("': ")[2].removeprefix("Input should be ").partition(", unable")[0]
+        option, problem = parameter.opts[0], "takes no such value"
+        say(f"simrail: {InputError(problem, field=option, value=given, limit=limit, remedy=remedy)}")
+        return
+    say(f"simrail: {one_line(text, 2 * MOST_SHOWN)}; limit: what the help lists; remedy: {remedy}")
+
+
+def _given(parameter: Any, arguments: list[str]) -> str | None:
+    """What a command line has for an option, the last time; None if it has none."""
+    given = None
+    for place, word in enumerate(arguments):
+        for name in (*parameter.opts, *parameter.secondary_opts):
+            if word == name:
+                given = " ".join(arguments[place + 1 : place + 1 + parameter.nargs])
+            elif name.startswith("--") and word.startswith(f"{name}="):
+                given = word.partition("=")[2]
+    return given
 
 
 def _version(wanted: bool) -> None:

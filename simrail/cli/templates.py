@@ -10,6 +10,7 @@ milliseconds that jitter, and a few samples lost.
 from __future__ import annotations
 
 import json
+import keyword
 import re
 from dataclasses import replace
 from importlib.resources import files
@@ -92,12 +93,12 @@ def write_template(kind: str, name: str, *, folder: Path = Path()) -> tuple[Path
 
 def _place(name: str, folder: Path, ending: str) -> Path:
     """The file that a part of this name is written to; refuses names that are none, and files that exist."""
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or keyword.iskeyword(name):
         raise InputError(
             "is no name for a file",
             field="NAME",
             value=name,
-            limit="letters, digits and _, a letter first",
+            limit="letters, digits and _, a letter first, and no word of Python",
             remedy="e.g. my_filter",
         )
     if not folder.is_dir():

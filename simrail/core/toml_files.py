@@ -104,7 +104,7 @@ def existing_file(name: str, folder: Path | None, *, also: Path | None = None) -
         "no such file",
         value=name,
         limit="the path of a file that is there",
-        remedy="mend the path; it is seen from the scenario's folder"
+        remedy="mend the path; it is seen from the scenario's folder, and from here"
         + (f" (shipped: {near[0]})" if near else ""),
     )
 
@@ -153,6 +153,9 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
+        if isinstance(error, FileNotFoundError):
+            limit, remedy = "the path of a file that is there", "mend the path"
+            raise InputError("no such file", value=str(path), limit=limit, remedy=remedy) from None
         limit, remedy = "a file that may be read", "mend the path, or its rights"
         raise InputError(
             "cannot be read", file=label(path), value=error.strerror, limit=limit, remedy=remedy

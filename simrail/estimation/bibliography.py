@@ -193,14 +193,14 @@ OWN = "simrail itself: no publication stands behind this method"
 
 @dataclass(frozen=True)
 class Citation:
-    """What one method rests on.
+    """What one method rests on, or several that rest on the same.
 
     Attributes
     ----------
     method : str
-        Its name.
+        Its name, or theirs with commas between.
     words : str
-        Its sources in a line.
+        The sources in a line.
     bibtex : str
         Their entries; empty where there are none.
     """
@@ -211,18 +211,22 @@ class Citation:
 
 
 def citations(methods: Iterable[tuple[str, tuple[str, ...]]]) -> list[Citation]:
-    """What methods rest on.
+    """What methods rest on; those of the same sources stand together, at the place of the first.
 
     Parameters
     ----------
     methods : iterable of (str, tuple of str)
         Name of each method, and its `cites`.
     """
-    found = []
+    together: dict[tuple[str, ...], list[str]] = {}
     for name, cites in methods:
+        together.setdefault(tuple(cites), []).append(name)
+    found = []
+    for cites, names in together.items():
         known = [SOURCES[key] for key in cites if key in SOURCES]
         words = "; ".join(SOURCES[key].words if key in SOURCES else key for key in cites)
-        found.append(Citation(name, words or OWN, "\n\n".join(source.bibtex for source in known)))
+        bibtex = "\n\n".join(source.bibtex for source in known)
+        found.append(Citation(", ".join(names), words or OWN, bibtex))
     return found
 
 

@@ -184,7 +184,8 @@ def estimator_class(method: str) -> type[Estimator]:
         method,
         registered(),
         "no such estimator",
-        remedy="install the package that registers it under the entry-point group simrail.estimators",
+        remedy="choose one of them, write FILE.py:CLASS for one of your own, or install the package that "
+        "registers it under the entry-point group simrail.estimators",
     )
     loaded: type[Estimator] = registered()[method].load()
     return loaded

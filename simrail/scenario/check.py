@@ -266,6 +266,7 @@ def _judge_design(scenario: Scenario) -> None:
         raise InputError(
             "is a design over distributions, and no value is one",
             **here,
+            limit="a scenario with a range for one value or more",
             remedy='write a range, e.g. --set "imu.sheet.gyro_noise_degpsqrth={ log_uniform = [0.05, 1.0] }"',
         )
     # A requirement is judged over devices, and all samples of a design have the same.

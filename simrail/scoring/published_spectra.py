@@ -142,7 +142,7 @@ def known(spectra: Iterable[PublishedSpectrum]) -> dict[MountKind, str]:
         speeds = sorted({float(one.speed_mps or 0.0) for one in operating if one.mount == kind})
         at = ["at rest" if speed == 0.0 else f"at {speed:g} m/s" for speed in speeds]
         if not at:
-            said[kind] = f"{words} unverified: no spectrum of a named vehicle at a told speed was had"
+            said[kind] = f"{words} unverified, no spectrum of a named vehicle and speed being published"
         elif speeds == [0.0]:
             said[kind] = f"{words} beside a published spectrum at rest, unverified in motion"
         else:

@@ -85,6 +85,37 @@ def test_usage_errors_are_bad_input_too(capsys: pytest.CaptureFixture[str]) -> N
         assert "Traceback" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        (
+            ["run", "x", "--seed", "-1"],
+            "--seed: takes no such value; found '-1'; limit: ",
+        ),
+        (
+            ["run", "x", "--seed=2", "--seed=one"],
+            "--seed: takes no such value; found 'one'; limit: ",
+        ),
+        (
+            ["vehicle", "x", "--to", "5000"],
+            "--to: takes no such value; found '5000'; limit: ",
+        ),
+        (["vehicle", "x", "--to"], "'--to' requires an argument"),
+        (["tune", "x", "--evaluations", "0"], "--evaluations: takes no such value; found '0'"),
+        (["tune", "x", "--method", "both"], "--method: no such method; found 'both'; limit: one of cml, kom"),
+        (["list", "nothing"], "found 'nothing'"),
+        (["figure", "results", "--out", "a.pdf"], "--out: is for one figure, and none is named"),
+        (["new", "estimator", "class"], "is no name for a file; found 'class'"),
+        (["estimate", "nowhere.toml"], "no such file; found 'nowhere.toml'"),
+    ],
+)
+def test_a_value_that_is_refused_is_named(
+    arguments: list[str], found: str, place: Path, message_of: Callable[[list[str]], str]
+) -> None:
+    message = message_of(arguments)
+    assert found in message and "limit: " in message and "remedy: " in message
+
+
 def test_own_estimator_that_cannot_be_imported(place: Path, message_of: Callable[[list[str]], str]) -> None:
     (place / "mine.toml").write_text(GOOD.replace('"DesignAngles"', '"mine.py:Mine"'))
     (place / "mine.py").write_text("import no_such_package\n")

@@ -32,6 +32,8 @@ def test_strange_sources_stand_as_they_are_and_each_is_printed_once() -> None:
     told = citations([("mine", ("A thesis of 2024", "hidalgo")), ("none", ())])
     assert told[0].words == f"A thesis of 2024; {SOURCES['hidalgo'].words}"
     assert told[0].bibtex == SOURCES["hidalgo"].bibtex and told[1].words == OWN and told[1].bibtex == ""
+    shared = citations([("one", ("hidalgo",)), ("two", ("hidalgo", "briales_2021")), ("three", ("hidalgo",))])
+    assert [one.method for one in shared] == ["one, three", "two"]
     text = entries([("hidalgo", "briales_2021"), ("briales_2021",), ("A thesis",)])
     assert text.count("@") == 2 and text.index("briales_2021") < text.index("hidalgo")
 

@@ -71,7 +71,7 @@ def test_coverage_decides_what_is_said_of_the_standard_deviations(
     tables: Tables,
 ) -> None:
     one = example()
-    for sd_deg, verdict in ((0.1, "larger than its errors"), (0.04, "are too small")):
+    for sd_deg, verdict in ((0.1, "larger than need be"), (0.04, "are too small")):
         states = one.estimates["ekf_compensated"].states.assign(roll_sd_rad=np.deg2rad(sd_deg))
         estimates = dict(one.estimates, ekf_compensated=Estimate(states=states, mount="axle"))
         text = said(scenario, *tables(CellResult(one.cell, one.recording, one.motion, estimates)))

@@ -18,7 +18,7 @@ from simrail.estimation.estimate import Estimate
 from simrail.report.figures.canvas import fitting_columns, legend_above, look, panels
 from simrail.report.figures.geometry import lines_of, rails_figure, stretch_of, stretch_words
 from simrail.report.figures.track import profile_figure, profile_words
-from simrail.report.pages.answer import answer_sentence, answer_tiles
+from simrail.report.pages.answer import MOST_METHODS, answer_sentence, answer_tiles, drawn_methods
 from simrail.report.pages.explorer import stored_rides
 from simrail.report.pages.page import write_report
 from simrail.report.pages.rides import shown_styles
@@ -305,7 +305,25 @@ def test_the_answer_is_of_the_rails_and_beside_no_imu(ran: Ran) -> None:
     assert answer_tiles(lost)[1].note == "zero track: beats it"
     # Without such a method nothing stands for it.
     alone = replace(question, methods=[one for one in question.methods if one.uses_imu])
-    assert answer_sentence(alone).endswith("whether that beats no IMU at all was not run.")
+    assert answer_sentence(alone).endswith("no method without an IMU was run beside it.")
+
+
+def test_the_chart_of_the_answer_always_has_the_method_that_is_best(ran: Ran) -> None:
+    """It had the first six of a scenario's order: the one that its sentence named was not among them."""
+    question = ran.data.question
+    assert question is not None
+    best, place = question.ranked[0], question.methods.index(question.ranked[0])
+    worse = [replace(best, name=f"m{i}", label=f"method {i}") for i in range(MOST_METHODS)]
+    own = question.draws[question.draws["estimator"] == best.name]
+    more = [own.assign(estimator=one.name, value=own["value"] * (i + 2)) for i, one in enumerate(worse)]
+    many = replace(
+        question,
+        methods=[*question.methods[:place], *worse, *question.methods[place:]],
+        draws=pd.concat([*more, question.draws]),
+    )
+    drawn = drawn_methods(many)
+    assert len(drawn) == MOST_METHODS and best in drawn and worse[-1] not in drawn
+    assert drawn == [one for one in many.methods if one in drawn], "in the scenario's order"
 
 
 def test_rails_as_designed_have_no_attitude_of_their_own(ran: Ran) -> None:
@@ -484,7 +502,7 @@ def test_many_methods_are_told_together(scenario: Scenario, example: Rides, tabl
     assert "In roll, 'design angles only', which uses no IMU, beats m3 and m4 over the whole ride" in text
     assert "In pitch, 'design angles only', which uses no IMU, beats m1, m2, m3 and m4 over" in text
     assert "is too small with m2 (0 % inside), m3 (0 % inside) and m4 (0 % inside)." in text
-    assert "is larger than its errors with m1 (100 % inside)." in text
+    assert "is larger than need be with m1 (100 % inside)." in text
     assert text.count("95 % interval") == 2
 
 

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_rgb
 
 from simrail.campaign.cell import CellResult
+from simrail.report.figures import canvas
 from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import Case, cases, of_cell
-from simrail.report.tables.tables import error_table
+from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
 from simrail.scenario.scenario import Scenario, load_scenario
 
 Rides = Callable[..., CellResult]
@@ -60,21 +60,35 @@ def test_cases_are_found_by_their_labels(example: Rides, tables: Tables) -> None
     assert all_cases[0].curves() == ["curve:curve 3 R300"]
 
 
-def contrast(one: str, other: str) -> float:
-    """Contrast of two colours by WCAG 2: (L1 + 0.05) / (L2 + 0.05) of their relative luminances."""
-    light = []
-    for colour in (one, other):
-        linear = [((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(colour)]
-        light.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05)
-    return max(light) / min(light)
-
-
 def test_many_methods_of_one_class_have_shades_of_their_own() -> None:
     styles = method_styles(load_scenario("metro_geometry"))
     smoothers = [style.colour for name, style in styles.items() if name.startswith(("smoother", "filter"))]
     assert len(smoothers) > 3
     assert len(set(smoothers)) == len(smoothers)
-    # Each is seen on the ground of dark mode.
-    assert min(contrast(colour, "#12171d") for colour in smoothers) > 2.0
+    # Each is seen on the ground of dark mode, and still told from the others.
+    nights = [canvas.by_night(colour) for colour in smoothers]
+    assert min(canvas.contrast(colour, canvas.NIGHT) for colour in nights) > 3.0
+    assert len(set(nights)) == len(nights)
     few = method_styles(load_scenario("validation_quick"))
     assert few["ekf_compensated"].colour == "#0072B2"
+
+
+def test_two_or_three_methods_of_one_class_have_colours_of_their_own() -> None:
+    styles = method_styles(load_scenario("metro_table3"))
+    named = [style.colour for name, style in styles.items() if name.startswith(("gda", "vqf"))]
+    assert len(set(named)) == len(named) == 6
+    assert styles["gda_compensated"].colour == "#D55E00", "the first keeps that of its class"
+
+
+def test_contrast_is_that_of_wcag() -> None:
+    # Black and white are 21 to 1 by definition: (1 + 0.05) / (0 + 0.05).
+    assert canvas.contrast("#000000", "#ffffff") == pytest.approx(21.0)
+    assert canvas.by_night("#ffffff") == "#ffffff", "what is seen stays"
+
+
+def test_a_column_that_no_row_fills_is_left_out() -> None:
+    one = Cell("1.0")
+    rows = [Row("a", "", "", [NONE, one, NONE, one]), Row("b", "", "", [NONE, NONE, NONE, one])]
+    table = without_empty(Table([("x", 2), ("y", 1), ("z", 1)], ["p", "q", "r", "s"], rows))
+    assert table.groups == [("x", 1), ("z", 1)] and table.columns == ["q", "s"]
+    assert [row.cells for row in table.rows] == [[one, one], [NONE, one]]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell
+from simrail.report.tables.tables import NONE, Cell, Row, Table, number_cell, without_empty
 from simrail.report.words.ablations import value_words
 from simrail.scoring.ablations import MAP, without_ablations
 from simrail.scoring.bootstrap import interval
@@ -196,7 +196,8 @@ def page_tables(frames: Mapping[str, pd.DataFrame]) -> list[tuple[str, Table]]:
             Row(" \u00b7 ".join(row_words(n, row[n]) for n in one.names), "", "", _cells(row))
             for row in one.rows.to_dict("records")
         ]
-        shown.append((f"{one.odometry}, {one.what}", Table(list(GROUPS), list(COLUMNS), rows)))
+        table = without_empty(Table(list(GROUPS), list(COLUMNS), rows))
+        shown.append((f"{one.odometry}, {one.what}", table))
     return shown
 
 

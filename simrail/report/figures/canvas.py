@@ -7,10 +7,12 @@ twice, for a desk and for a phone, with the page's variables as its colours, so 
 """
 
 import re
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import cache
 from html import escape
 from io import BytesIO, StringIO
 from itertools import pairwise
@@ -23,13 +25,14 @@ from markupsafe import Markup
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from simrail.core.atomic_files import write_whole
 from simrail.core.jit import FloatArray
 from simrail.report.figures.decimate import Bins
-from simrail.report.tables.methods import MethodStyle
+from simrail.report.tables.methods import MethodStyle, mixed
 from simrail.report.tables.pivot import Mean
 from simrail.track.design import CURVE, TRANSITION, Curve, TrackDesign
 
@@ -40,6 +43,9 @@ _WIDTH: ContextVar[float] = ContextVar("width", default=WIDE_IN)
 
 LEFT_IN = 0.84
 """Margin left of the axes: tick labels such as -0.25, then two lines of label."""
+
+PRINT_DPI = 220
+"""Dots per inch of a PNG: sharp on a slide, 2475 across."""
 
 MOST_UPRIGHT = 3
 """Words of slots on a phone that are written level; more stand upright."""
@@ -74,8 +80,46 @@ LIGHT = {name: colour for colour, name in reversed(_VARIABLES.items())}
 """Colours of these variables by day, where no page gives them: without one, all is black."""
 
 
+NIGHT = "#12171d"
+"""The page's ground in dark mode."""
+
+ENOUGH = 5.0
+"""Contrast to a ground (WCAG 2) from which on a thin line is seen well; below it night has its own."""
+
+_LEAST = 3.3
+"""Contrast by night of what would have none; what is darker stays darker, so that shades stay apart."""
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours by WCAG 2: (L1 + 0.05) / (L2 + 0.05) of their relative luminances."""
+    light = []
+    for colour in (one, other):
+        linear = [((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(colour)]
+        light.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05)
+    return max(light) / min(light)
+
+
+@cache
+def by_night(colour: str) -> str:
+    """What a colour of a series is in dark mode: with white where it would hardly be seen."""
+    own = contrast(colour, NIGHT)
+    if own >= ENOUGH:
+        return colour
+    wanted = _LEAST + (own - 1.0) / (ENOUGH - 1.0) * (ENOUGH - _LEAST)
+    shares = (0.02 * step for step in range(51))
+    return next(seen for share in shares if contrast(seen := mixed(colour, share), NIGHT) >= wanted)
+
+
+def day_and_night(name: str, colour: str) -> str:
+    """A property of a style with a colour of a series; a browser without ``light-dark`` takes the first."""
+    night = by_night(colour.lower())
+    later = f"; {name}: light-dark({colour}, {night})" if night != colour.lower() else ""
+    return f"{name}: {colour}{later}"
+
+
 def by_itself(svg: str) -> str:
     """Inline SVG with colours and a font of its own: as a file, outside of a page."""
+    svg = re.sub(r"light-dark\((#\w+), #\w+\)", r"\1", svg)
     coloured = re.sub(r"var\(--(\w+)\)", lambda name: LIGHT[name[1]], svg)
     return coloured.replace("<svg ", '<svg font-family="sans-serif" ', 1)
 
@@ -397,6 +441,12 @@ def fitting_columns(labels: Sequence[str], width_in: float) -> int:
     return 1
 
 
+def fitting_words(labels: Sequence[str], width_in: float) -> list[str]:
+    """Labels of a legend of one column, in lines that fit into a width."""
+    letters = int((width_in * 72.0 / _RC["legend.fontsize"] - 4.2) / 0.6)
+    return [textwrap.fill(label, letters) for label in labels]
+
+
 LEGEND_ROW_IN = 0.184
 """Height of a row of a legend."""
 
@@ -440,12 +490,14 @@ def legend_above(*axes: Axes) -> None:
     }
     labels = sorted(by_label, key=lambda label: {"truth": 0, "design": 1}.get(label, 2))
     columns = fitting_columns(labels, width_in() - LEFT_IN)
+    words = fitting_words(labels, width_in() - LEFT_IN) if columns == 1 else labels
     figure = axes[0].get_figure(root=True)
     assert figure is not None
-    _make_room(figure, len(labels), columns, free_in=_free_above(figure))
+    lines = sum(label.count("\n") + 1 for label in words)
+    _make_room(figure, lines, columns, free_in=_free_above(figure))
     axes[0].legend(
         [by_label[label] for label in labels],
-        labels,
+        words,
         loc="lower left",
         bbox_to_anchor=(-0.005, 1.0),
         ncols=columns,
@@ -458,9 +510,12 @@ def figure_legend(
     figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left_in: float = LEFT_IN
 ) -> None:
     """Put a legend at the top of a figure."""
-    columns = fitting_columns(labels, width_in() - (0.0 if is_narrow() else left_in))
+    wide = width_in() - (0.0 if is_narrow() else left_in)
+    columns = fitting_columns(labels, wide)
+    labels = fitting_words(labels, wide) if columns == 1 else labels
     titles_in = 0.22 if any(axis.get_title(loc="left") for axis in figure.axes) else 0.0
-    _make_room(figure, len(labels), columns, free_in=_free_above(figure) - titles_in)
+    lines = sum(label.count("\n") + 1 for label in labels) if columns == 1 else len(labels)
+    _make_room(figure, lines, columns, free_in=_free_above(figure) - titles_in)
     figure.legend(
         handles,
         labels,
@@ -499,13 +554,17 @@ def shade_places(axes: Sequence[Axes], places: Sequence[Place], *, limits: tuple
     """Tint curves and transitions of a plot over distance, and name the curves in the first panel."""
     low, high = limits
     last_label, room = -np.inf, (0.3 if is_narrow() else 0.05) * (high - low)
+    # Half of a name, which must not reach over the numbers beside the panel.
+    half = (0.13 if is_narrow() else 0.035) * (high - low)
     for place in places:
         if place.end > low and place.start < high:
             tint = CURVE_TINT if place.kind == "curve" else TRANSITION_TINT
             for axis in axes:
                 axis.axvspan(max(place.start, low), min(place.end, high), color=tint, lw=0, zorder=-5)
             middle = 0.5 * (place.start + place.end)
-            if place.words and middle - last_label > room and low < middle < high:
+            inside = low < middle < high
+            middle = min(max(middle, low + half), high - half)
+            if place.words and middle - last_label > room and inside:
                 at_top = axes[0].get_xaxis_transform()
                 axes[0].annotate(place.words, (middle, 1.0), (0, -3), xycoords=at_top, **_CURVE_NAME)
                 last_label = middle
@@ -543,7 +602,8 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     order = _ORDER.get()
     if order is not None:
         form, picture = order.path.suffix.removeprefix("."), BytesIO()
-        figure.savefig(picture, format=form, metadata={"Title": description} if form != "png" else None)
+        metadata = {"Title": description} if form != "png" else None
+        figure.savefig(picture, format=form, metadata=metadata, dpi=PRINT_DPI)
         write_whole(order.path, picture.getvalue(), what="figure")
         return Markup(description)
     out = StringIO()
@@ -562,9 +622,19 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     text = re.sub(
         r"#[0-9a-f]{6}", lambda m: f"var(--{_VARIABLES[m[0]]})" if m[0] in _VARIABLES else m[0], text
     )
+    text = re.sub(r'style="[^"]*"', _of_both, text)
     view = re.search(r'viewBox="[^"]*"', text)
     assert view is not None
     link = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {view.group()} {link} role="img" aria-label="{escape(description, quote=True)}">'
     text = re.sub(r"\s*\n\s*", "\n", head + text[text.index(">") + 1 :])
     return Markup(re.sub(r"\n([MLz\"])", r"\1", text).strip())  # a path in one line
+
+
+def _of_both(style: re.Match[str]) -> str:
+    """A style whose strokes, and marks of their colour, are seen by day and by night; areas stay."""
+    text = style.group()
+    for colour in dict.fromkeys(re.findall(r"stroke: (#[0-9a-f]{6})", text)):
+        for name in ("fill", "stroke"):
+            text = text.replace(f"{name}: {colour}", day_and_night(name, colour))
+    return text

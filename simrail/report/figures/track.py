@@ -1,5 +1,7 @@
 """Figures of the track: its plan, profile, curvature and cant."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -20,8 +22,10 @@ from simrail.report.words.sentences import listed
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 
 _KIND_COLOUR = {STRAIGHT: "#98a1af", TRANSITION: "#56B4E9", CURVE: "#D55E00"}
-_ROOM = 0.05
-"""Share of the length of a plan that words need beside each other."""
+_ROOM_IN = (0.52, 0.34)
+"""Width and height that the words of a curve need for themselves."""
+_AWAY = 26.0
+"""Points from a curve to the middle of its words."""
 _KIND_WORD = {STRAIGHT: "straight", TRANSITION: "transition", CURVE: "curve"}
 
 
@@ -53,8 +57,10 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
             word = _KIND_WORD[k] if k not in named else None
             axis.plot(*turned[reach].T, color=_KIND_COLOUR[k], lw=3.0, solid_capstyle="butt", label=word)
             named.add(k)
-        _name_curves(axis, track, s, turned)
-        _mark_stops(axis, {label: _place(at, s, turned) for label, at in stops.items()}, span[0])
+        room = _ROOM_IN[0] / wide * span[0], _ROOM_IN[1] / wide * span[0]
+        marked = {label: _place(at, s, turned) for label, at in stops.items()}
+        _name_curves(axis, track, s, turned, room=room, marked=list(marked.values()))
+        _mark_stops(axis, marked, room[0])
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(x=0.03, y=0.22)
         axis.grid(False)
@@ -133,10 +139,10 @@ def _place(at_m: float, s: FloatArray, xy: FloatArray) -> tuple[float, float]:
     return float(np.interp(at_m, s, xy[:, 0])), float(np.interp(at_m, s, xy[:, 1]))
 
 
-def _mark_stops(axis: Axes, places: dict[str, tuple[float, float]], span_m: float) -> None:
+def _mark_stops(axis: Axes, places: dict[str, tuple[float, float]], room_m: float) -> None:
     """Circles with their words below them, or to the sides of circles that are close together."""
     left = min(places.values())
-    close = np.ptp([place[0] for place in places.values()]) < _ROOM * span_m
+    close = np.ptp([place[0] for place in places.values()]) < room_m
     for label, place in places.items():
         axis.plot(*place, marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=5)
         shift, side = (0, "center") if not close else (-7, "right") if place == left else (7, "left")
@@ -145,22 +151,36 @@ def _mark_stops(axis: Axes, places: dict[str, tuple[float, float]], span_m: floa
         )
 
 
-def _name_curves(axis: Axes, track: TrackDesign, s: FloatArray, xy: FloatArray) -> None:
+def _name_curves(
+    axis: Axes,
+    track: TrackDesign,
+    s: FloatArray,
+    xy: FloatArray,
+    *,
+    room: tuple[float, float],
+    marked: Sequence[tuple[float, float]],
+) -> None:
     """Radius and cant of each curve on its outer side, but of one whose words would lie on another's."""
-    start, named = track.start_m, np.zeros((0, 2))
-    room = _ROOM * np.ptp(xy, axis=0).max()
+    words_m = _AWAY / 72.0 / _ROOM_IN[0] * room[0]
+    # The word of a stop stands below its circle.
+    taken = [np.array([x, y - 0.5 * words_m]) for x, y in marked]
+    start = track.start_m
     for element in track.elements:
         middle = start + 0.5 * element.length_m
+        start += element.length_m
+        if not isinstance(element, Curve):
+            continue
         i = int(np.clip(np.searchsorted(s, middle), 1, len(s) - 2))
-        if isinstance(element, Curve) and (np.hypot(*(named - xy[i]).T) > room).all():
-            named = np.vstack([named, xy[i]])
-            tangent = xy[i + 1] - xy[i - 1]
-            outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
+        tangent = xy[i + 1] - xy[i - 1]
+        outside = -np.sign(element.radius_m) * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
+        place = xy[i] + words_m * outside
+        if all((np.abs(place - other) > room).any() for other in taken):
+            taken.append(place)
             axis.annotate(
                 f"R {abs(element.radius_m):.0f} m"
                 + (f"\ncant {1e3 * abs(element.cant_m):.0f} mm" if element.cant_m else ""),
                 (float(xy[i, 0]), float(xy[i, 1])),
-                (26.0 * outside[0], 26.0 * outside[1]),
+                (_AWAY * outside[0], _AWAY * outside[1]),
                 textcoords="offset points",
                 ha="center",
                 va="center",
@@ -168,7 +188,6 @@ def _name_curves(axis: Axes, track: TrackDesign, s: FloatArray, xy: FloatArray) 
                 color=MUTED,
                 linespacing=1.25,
             )
-        start += element.length_m
 
 
 def _scale_bar(axis: Axes, length_m: float) -> None:

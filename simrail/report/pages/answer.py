@@ -20,6 +20,9 @@ from simrail.report.words.sentences import listed, significant
 MOST_SLOTS = 12
 """IMUs and mounts that are drawn, and named in the sentence; ``scores.csv`` holds all."""
 
+MOST_METHODS = 6
+"""Methods that are drawn: the best of those under test, then baselines, in the scenario's order."""
+
 MOST_DOTS = 60
 """Recordings that are drawn of a method at an IMU, evenly by rank."""
 
@@ -52,10 +55,13 @@ def answer_section(data: PageData) -> list[Section]:
     recordings = question.judged["cell"].nunique()
     many = f"A dot for each of {recordings:,} recordings" if recordings > 1 else "One recording"
     ranked = ", at most 60 of a method by rank" if recordings > MOST_DOTS else ""
-    caption = (
-        f"{question.words[:1].upper()}{question.words[1:]}. {many}{ranked}; hollow or small: baselines; "
-    )
-    caption += "dashed: no IMU at all."
+    caption = f"{question.words[:1].upper()}{question.words[1:]}. {many}{ranked}"
+    methods = drawn_methods(question)
+    if len(methods) < len(question.ranked):
+        caption += f", by the best {len(methods)} of {len(question.ranked)} methods under test"
+    if any(style.baseline for style in methods):
+        caption += "; hollow or small: baselines"
+    caption += "; dashed: no IMU at all." if question.without else "."
     return [_section(sentence, answer_tiles(question), chart, caption)]
 
 
@@ -78,7 +84,7 @@ def answer_sentence(question: Question) -> str:
         head += f"to {question.said(medians[highest])} ({highest})"
     known = {slot: v for slot, v in medians.items() if slot in zero}
     if not known:
-        return f"{head}; whether that beats no IMU at all was not run."
+        return f"{head}; no method without an IMU was run beside it."
     beaten = [slot for slot, value in known.items() if zero[slot] < value]
     least, most = min(zero[s] for s in known), max(zero[s] for s in known)
     sizes = question.said(least)
@@ -124,6 +130,15 @@ def answer_tiles(question: Question) -> list[Tile]:
     return tiles
 
 
+def drawn_methods(question: Question) -> list[MethodStyle]:
+    """Methods of the chart, in the scenario's order: the one that the sentence names is always among them."""
+    there = set(question.judged["estimator"].unique())
+    users = [style for style in question.methods if style.uses_imu and style.name in there]
+    first = question.ranked
+    chosen = [*first, *(style for style in users if style not in first)][:MOST_METHODS]
+    return [style for style in users if style in chosen]
+
+
 def answer_chart(question: Question, *, what: str) -> str:
     """A dot for each recording by IMU and method; of one IMU, by the kind of track.
 
@@ -142,9 +157,7 @@ def answer_chart(question: Question, *, what: str) -> str:
         slots = {window: draws[draws["window"] == window] for window in found}
     slots = dict(list(slots.items())[:MOST_SLOTS])
     drawn = pd.concat(list(slots.values()))
-    users = [s for s in question.methods if s.uses_imu and (drawn["estimator"] == s.name).any()]
-    tested = set(question.tested)
-    styles = sorted(users, key=lambda style: style not in tested)[:6]
+    styles = [style for style in drawn_methods(question) if (drawn["estimator"] == style.name).any()]
     floor = question.without
     if not styles:
         return ""

@@ -65,7 +65,9 @@ def explorer_data(
     used = {one.key for view in views for panel in view.panels for one in panel.series}
     data = {
         "looks": {
-            key: {**vars(look), "dash": list(look.dash) or None} for key, look in looks.items() if key in used
+            key: {**vars(look), "dash": list(look.dash) or None, "night": _by_night(look.colour)}
+            for key, look in looks.items()
+            if key in used
         },
         "off": list(off),
         "open": opened,
@@ -74,6 +76,11 @@ def explorer_data(
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
     # Nothing in it may end the element that holds it.
     return {"data": Markup(text.replace("<", "\\u003c"))}
+
+
+def _by_night(colour: str) -> str:
+    """A colour of a series in dark mode; "" of what has one of the page's."""
+    return canvas.by_night(colour.lower()) if colour.startswith("#") else ""
 
 
 def stored_rides(page: str) -> tuple[list[View], dict[str, Look]]:

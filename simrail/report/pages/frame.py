@@ -1,6 +1,6 @@
 """The frame of every page: one self-contained HTML file, in which nothing is fetched when it is opened."""
 
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from simrail.core.atomic_files import write_whole
+from simrail.report.figures.canvas import day_and_night
 from simrail.report.words.sentences import FILTERS
 
 
@@ -21,7 +22,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= FILTERS
+    environment.filters |= FILTERS | {"swatch": partial(day_and_night, "background")}
     return environment
 
 

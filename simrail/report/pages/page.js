@@ -4,7 +4,8 @@
 (() => {
   const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   // Colours of series: their own, or the page's for the truth, the design and what uses no IMU.
-  const hue = look => look.colour.startsWith("#") ? look.colour : css(`--${look.colour || "ink"}`);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const hue = look => look.colour.startsWith("#") ? dark.matches && look.night || look.colour : css(`--${look.colour || "ink"}`);
   const make = (tag, settings = {}, ...children) => {
     const element = Object.assign(document.createElement(tag), settings);
     element.append(...children);
@@ -369,7 +370,7 @@
       if (act) { event.preventDefault(); zoomTo(...act); }
     });
     new ResizeObserver(paint).observe(box);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+    dark.addEventListener("change", fill);
     fill();
   };
 
@@ -385,7 +386,7 @@
         ink: "#1b2430", muted: "#667085", line: "#e4e7ec", axis: "#98a1af", page: "#ffffff",
         curve: "#eef1e6", transition: "#f6f8f2", tint: "#dbe9f4", good: "#15803d", bad: "#b42318",
       };
-      const text = svg.outerHTML.replace(/var\(--([\w-]+)\)/g, (_, name) => paper[name] || css(`--${name}`));
+      const text = svg.outerHTML.replace(/light-dark\((#\w+), #\w+\)/g, "$1").replace(/var\(--([\w-]+)\)/g, (_, name) => paper[name] || css(`--${name}`));
       download(`${figure.dataset.name}.svg`, text);
     });
     (figure.querySelector("figcaption") || figure).append(one);

@@ -307,10 +307,12 @@ def _case(data: PageData, case: Case) -> dict[str, Any]:
 
 
 def _odometry(data: PageData) -> list[Section]:
-    table = odometry_table(data.cases[:MOST_TABLES])
+    cases = data.shown_cases
+    table = odometry_table(cases[:MOST_ROWS])
     # A campaign has them in a section of its own.
     frames = {} if is_campaign(data.scenario) else odometry_frames(data.scores, data.cells)
-    shown = {"odometry": table, "over_all": page_tables(frames)}
+    left_out = max(len(cases) - MOST_ROWS, 0)
+    shown = {"odometry": table, "over_all": page_tables(frames), "cases_left_out": left_out}
     folded = len(table.rows) > 1
     return [_section("odometry", "Odometry", folded=folded, **shown)] if table.rows else []
 

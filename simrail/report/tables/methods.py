@@ -22,11 +22,10 @@ _COLOURS = {
 }
 _NO_IMU = ("#6b7280", "#6b7280")
 _OTHERS = (("#009E73", "#66c2a5"), ("#7b5e2a", "#c8a25c"), ("#6350c4", "#a79ce0"), ("#a8326f", "#c47f9f"))
-_MOST_ALIKE = 3
-"""So many methods that compensate, or do not, share the colour of their class and differ in stroke; more get
-shades of it, which stay beside those of their twins."""
+_FEW_SHADES = (0.0, 0.55, -0.35)
+"""Shares of white, or of black, of up to three methods that would have one colour: the first keeps it."""
 _SHADES = (-0.3, 0.65)
-"""From the share of black to that of white: darker ones are not seen on the ground of dark mode."""
+"""Of more, from the darkest to the lightest; they stay beside those of their twins."""
 _APART = ("#0072B2", "#D55E00", "#56B4E9", "#E69F00", "#CC79A7", "#6350c4", "#a8326f", "#7b5e2a", "#999933")
 """Colours of methods of one class that nothing but their options tells apart; the first keeps its own."""
 _STROKES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
@@ -137,13 +136,15 @@ def _shaded(styles: dict[str, MethodStyle]) -> dict[str, MethodStyle]:
         if fit:
             for name in names[1:]:
                 shaded[name] = replace(styles[name], colour=free.pop(0))
-        elif len(names) > _MOST_ALIKE:
-            for place, name in zip(np.linspace(*_SHADES, len(names)), names, strict=True):
-                shaded[name] = replace(styles[name], colour=_mixed(colour, float(place)))
+        elif len(names) > 1:
+            many = np.linspace(*_SHADES, len(names)).tolist()
+            shades = _FEW_SHADES[: len(names)] if len(names) <= len(_FEW_SHADES) else many
+            for share, name in zip(shades, names, strict=True):
+                shaded[name] = replace(styles[name], colour=mixed(colour, share) if share else colour)
     return shaded
 
 
-def _mixed(colour: str, share: float) -> str:
+def mixed(colour: str, share: float) -> str:
     """A colour with a share of white, or of black if it is negative."""
     red, green, blue = ((1.0 - abs(share)) * part + max(share, 0.0) for part in to_rgb(colour))
     return to_hex((red, green, blue))

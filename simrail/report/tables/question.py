@@ -167,7 +167,7 @@ def _question(rows: pd.DataFrame, words: str, unit: str, styles: Sequence[Method
     if not (rows["window"] == window).any():
         return None
     varying = [name for name in UNLIKE if name in rows and len(rows[name].unique()) > 1]
-    between = {"mount": "on ", "vehicle": "of "}
+    between = {"mount": "on ", "vehicle": "of ", "odometry": "by "}
     named = [name for name in ("imu", "mount", "vehicle", "odometry") if name in varying] or ["imu"]
     slot = rows[named[0]]
     for name in named[1:]:

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import groupby
+from dataclasses import dataclass, replace
+from itertools import compress, groupby
 
 from simrail.report.tables.methods import MethodStyle
 from simrail.report.tables.pivot import Case, Mean
@@ -88,6 +88,18 @@ def mean_cell(mean: Mean, *, decimals: int = DECIMALS, mark: str = "", scale: fl
     return number_cell(scale * mean.value, decimals=decimals, spread=spread, mark=mark)
 
 
+def without_empty(table: Table) -> Table:
+    """A table without columns in which no row has a figure: what a scenario does not score is not shown."""
+    filled = [any(row.cells[i] != NONE for row in table.rows) for i in range(len(table.columns))]
+    groups, start = [], 0
+    for text, span in table.groups:
+        left = sum(filled[start : start + span])
+        groups += [(text, left)] * (left > 0)
+        start += span
+    rows = [replace(row, cells=list(compress(row.cells, filled))) for row in table.rows]
+    return Table(groups, list(compress(table.columns, filled)), rows)
+
+
 def method_row(style: MethodStyle, cells: list[Cell]) -> Row:
     """The row of a method."""
     return Row(style.label, style.baseline, style.colour, cells)
@@ -128,9 +140,8 @@ def consistency_table(case: Case, styles: Sequence[MethodStyle]) -> Table:
         cells.append(mean_cell(case.metric_of_any(style.name, "us_per_sample")))
         rows.append(method_row(style, cells))
     groups = [("NEES (1 is right)", 3), ("inside the 95 % interval, %", 3), ("NIS", 1), ("time", 1)]
-    return Table(
-        groups, ["roll", "pitch", "yaw", "roll", "pitch", "yaw", "(1 is right)", "\u00b5s per sample"], rows
-    )
+    columns = [*("roll", "pitch", "yaw") * 2, "(1 is right)", "\u00b5s per sample"]
+    return without_empty(Table(groups, columns, rows))
 
 
 def odometry_table(all_cases: Sequence[Case]) -> Table:
@@ -155,8 +166,9 @@ def odometry_table(all_cases: Sequence[Case]) -> Table:
             if key not in seen:
                 seen.add(key)
                 rows.append(Row(label, "", "", cells))
-    groups = [("position error, m", 2), ("distance", 1), ("speed error, m/s", 1), ("inside its 95 %", 1)]
-    return Table(groups, ["rms", "max", "final, %", "rms, moving", "interval, %"], rows)
+    groups = [("position error, m", 2), ("distance", 1), ("speed error, m/s", 1), ("inside, %", 1)]
+    columns = ["rms", "max", "final, %", "rms, moving", "95 % interval"]
+    return without_empty(Table(groups, columns, rows))
 
 
 _WORDS = {

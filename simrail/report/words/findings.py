@@ -154,15 +154,20 @@ def _general_purpose(case: Case, styles: Sequence[MethodStyle]) -> Iterator[Find
         return
     best = min(tested, key=lambda style: _rms(case, style.name))
     own = _rms(case, best.name)
-    for style in styles:
-        other = _rms(case, style.name)
-        if style.baseline == "general purpose" and other > 0.0:
-            word, tone = ("worse", "good") if other > own else ("better", "bad")
-            yield Finding(
-                tone,
-                f"The general-purpose filter {style.label} is {word} than {best.label} in roll: "
-                f"{degrees(other)} against {degrees(own)} rms over the whole ride.",
-            )
+    others = {s: _rms(case, s.name) for s in styles if s.baseline == "general purpose"}
+    for word, tone, found in (
+        ("worse", "good", [s for s, other in others.items() if other > max(own, 0.0)]),
+        ("better", "bad", [s for s, other in others.items() if 0.0 < other <= own]),
+    ):
+        if found:
+            sizes = listed([f"{degrees(others[style])} by {style.label}" for style in found])
+            head = f"The general-purpose filter {found[0].label} is"
+            if len(found) == 1:
+                sizes = degrees(others[found[0]])
+            else:
+                head = f"{len(found)} general-purpose filters are"
+            text = f"{head} {word} than {best.label} in roll: {sizes} against {degrees(own)} rms"
+            yield Finding(tone, f"{text} over the whole ride.")
 
 
 _OF_THE_IMU = ("imu", "imu.grade", "mount", "case")

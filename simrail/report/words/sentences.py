@@ -48,12 +48,12 @@ def interval_verdict(share: float) -> tuple[str, str]:
     """Tone and words for a 95 % interval that holds a share of the truth."""
     if share < 0.9:
         return "bad", "too small"
-    return ("note", "larger than its errors") if share > 0.985 else ("good", "about right")
+    return ("note", "larger than need be") if share > 0.985 else ("good", "about right")
 
 
 def unbroken(text: str) -> str:
     """A text whose numbers and units are not parted at the end of a line."""
-    return re.sub(r"(?<=\d) (?=(?:mm|m|s|%)(?![a-z]))", "\u00a0", text)
+    return re.sub(r"(?<=\d) (?=(?:mm|m|s|km/h|Hz|kHz|%)(?![a-z]))", "\u00a0", text)
 
 
 def listed(words: Sequence[str]) -> str:

@@ -70,3 +70,17 @@ def test_names_of_the_parts_of_an_error_are_not_cut_off(width, monkeypatch):
     names = figure.axes[0].get_yticklabels()
     assert len(names) == 3
     assert all(name.get_window_extent(pen).x0 >= 0.0 for name in names)
+
+
+def test_a_dark_line_is_another_by_night_and_areas_stay_as_they_are():
+    with canvas.look():
+        figure, (panel,) = canvas.panels([1.0])
+        panel.plot([0, 1], [0, 1], color="#00507c")
+        panel.axvspan(0.2, 0.4, color="#00507c", lw=0)
+        text = canvas.to_svg(figure, description="line")
+    night = canvas.by_night("#00507c")
+    assert canvas.contrast(night, canvas.NIGHT) > 3.0 > canvas.contrast("#00507c", canvas.NIGHT)
+    assert f"stroke: #00507c; stroke: light-dark(#00507c, {night})" in text
+    assert "fill: light-dark" not in text
+    # As a file it has the colour of paper alone.
+    assert "light-dark" not in canvas.by_itself(text) and "stroke: #00507c" in canvas.by_itself(text)

@@ -42,7 +42,9 @@ def rides_figure(cases: Sequence[Case], styles: Sequence[MethodStyle]) -> str:
                 ]
                 marker = _MARKERS[colours[:order].count(style.colour) % len(_MARKERS)]
                 canvas.draw_marks(axis, scores, style, slot=(order, len(styles)), marker=marker)
-            canvas.categories(axis, [c.labels["ride"] for c in cases], size=8.0)
+            canvas.categories(
+                axis, [c.labels["ride"] for c in cases], size=6.6 if canvas.is_narrow() else 8.0
+            )
             canvas.log_scale(axis.yaxis)
             axis.set_title(quantity)
         axes[0].set_ylabel("rms difference to the design angles, \u00b0", loc="top")

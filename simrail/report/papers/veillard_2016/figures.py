@@ -40,6 +40,8 @@ PANELS = (
 MOUNT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#AA4499")
 
 _FRAMES, _MEANS, _LINE = "#b9c3d0", "#111111", "#D55E00"
+_MANY = 20
+"""More dots of a part at a mount are small."""
 _ROOM_M = 150.0
 """Beside a curve that is drawn."""
 
@@ -86,7 +88,8 @@ def _dots(axis: Axes, draws: Draws, slot: float, wide: float, colour: str, label
     """Dots of one part at one mount: lines side by side, the devices of each above each other."""
     order = np.unique(draws.lines, return_inverse=True)[1]
     places = slot + wide * ((order + 0.5) / max(draws.line_count, 1) - 0.5)
-    axis.plot(places, draws.values, "o", ms=2.6, color=colour, alpha=0.7, mew=0, label=label or None)
+    size = 2.6 if len(draws.values) > _MANY else 4.2
+    axis.plot(places, draws.values, "o", ms=size, color=colour, alpha=0.7, mew=0, label=label or None)
 
 
 def spectrum_figure(spectra: Mapping[str, SpectrumOverSpeed]) -> str:

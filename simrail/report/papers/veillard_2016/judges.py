@@ -205,22 +205,23 @@ OURS = ("track_relative", "curve_matched", "zero_velocity", "bogie_delay")
 """Parts that are methods of our own."""
 
 
-def beside_ours(seen: Evidence) -> str:
-    """How our own methods do with the same IMU and no wheel; "" if none was run."""
+def beside_ours(seen: Evidence) -> list[str]:
+    """How our own methods do with the same IMU and no wheel, a sentence each; none if none was run."""
     own = [part for part in OURS if seen.lines.has(part)]
-    if not own or not seen.lines.has("paper"):
-        return ""
-    compared = {
-        part: {
-            mount: {
-                "speed": [seen.lines.draws(p, "speed", mount).mean()[0] for p in (part, "paper")],
-                "distance": [
-                    float(np.median(np.abs(seen.lines.draws(p, "distance", mount).values)))
-                    for p in (part, "paper")
-                ],
-            }
-            for mount in seen.lines.mounts
+    if not seen.lines.has("paper"):
+        return []
+    return [PAPER.written(PAPER.words["ours"], part=part, mounts=_compared(seen, part)) for part in own]
+
+
+def _compared(seen: Evidence, part: str) -> dict[str, dict[str, list[float]]]:
+    """By mount, mean rms of the speed and middle error of the distance: of a part, and of the paper's."""
+    return {
+        mount: {
+            "speed": [seen.lines.draws(p, "speed", mount).mean()[0] for p in (part, "paper")],
+            "distance": [
+                float(np.median(np.abs(seen.lines.draws(p, "distance", mount).values)))
+                for p in (part, "paper")
+            ],
         }
-        for part in own
+        for mount in seen.lines.mounts
     }
-    return PAPER.written(PAPER.words["ours"], compared=compared)

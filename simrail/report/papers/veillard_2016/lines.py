@@ -56,10 +56,13 @@ class Draws(NamedTuple):
         One per recording.
     lines : ndarray (k,)
         Number of the line, a draw of the rails.
+    is_size : bool
+        Whether it cannot be negative, as an rms cannot.
     """
 
     values: FloatArray
     lines: FloatArray
+    is_size: bool = False
 
     @property
     def line_count(self) -> int:
@@ -69,7 +72,7 @@ class Draws(NamedTuple):
     def mean(self) -> tuple[float, float, float]:
         """Mean over lines and devices with the ends of its 95 % interval, of which lines are the clusters."""
         found = interval(self.values, self.lines)
-        return found.value, found.low, found.high
+        return found.value, max(found.low, 0.0) if self.is_size else found.low, found.high
 
     def by_line(self) -> FloatArray:
         """Mean over the devices, line by line."""
@@ -106,7 +109,8 @@ class Lines:
             & (table["window"] == wanted.window)
         )
         rows = table[chosen].sort_values(["track_draw", "sensor_draw"])
-        return Draws(wanted.scale * rows["value"].to_numpy(), rows["track_draw"].to_numpy(dtype=np.float64))
+        lines = rows["track_draw"].to_numpy(dtype=np.float64)
+        return Draws(wanted.scale * rows["value"].to_numpy(), lines, wanted.metric in ("rms", "max"))
 
     def has(self, *parts: str) -> bool:
         """Whether all parts were run and none of their recordings failed: only then they are judged."""

@@ -41,7 +41,6 @@ def section(data: PageData) -> list[Section]:
     led = {mount: distances_of(example, paper) for mount, example in drawn.items()}
     distances = {mount: one for mount, one in led.items() if one is not None}
     evidence = judges.Evidence(lines, spectra, distances)
-    ours = judges.beside_ours(evidence)
     first = lines.draws(next(iter(lines.names)), "speed", lines.mounts[0])
     shown = {
         "paper": PAPER,
@@ -50,7 +49,7 @@ def section(data: PageData) -> list[Section]:
         "mounts": lines.mounts,
         "tables": [(mount, table_of(lines, mount)) for mount in lines.mounts],
         "all_claims": judged(PAPER, evidence, judges, has=lines.has),
-        "notes": [ours] if ours else [],
+        "notes": judges.beside_ours(evidence),
         "errata": judges.errata(evidence),
         "distributions": canvas.drawn("paper-distributions", partial(distributions_figure, lines)),
         "spectrum": canvas.drawn("paper-spectrum", partial(spectrum_figure, spectra)),
