@@ -61,8 +61,11 @@ LEAN_SD = 0.3
 STOP_SD_RAD = 4e-3
 """Of roll and pitch where a train stands, beside the map's: 5 mm of level over two metres."""
 
-BEHIND_SD_M = 0.5
+BEHIND_SD_M = 1.0
 """How far from a body's reference point the place may be at which it turns, beside what is known of it."""
+
+SLUGGISH_SD_S = 0.5
+"""How late a body on springs may roll and pitch; it turns about Z with the track."""
 
 STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, "drift": 1e-6, "gyro_offset": 5e-3}
 """Steps of the differences for the slopes; 1e-5 for the others."""
@@ -266,6 +269,11 @@ def _nuisance(
         column[:, FORCE_X:] = 0.0
         columns.append(column)
         sds.append(np.hypot(recording.mount_position_m[0], BEHIND_SD_M))
+        for channel in (GYRO_X, GYRO_Y):
+            column = np.zeros((len(place), CHANNELS))
+            column[:, channel] = slopes[:, channel, INDEX["gyro_offset"]]
+            columns.append(column)
+            sds.append(SLUGGISH_SD_S)
     if not columns:
         return np.zeros((*slopes.shape[:2], 0)), np.zeros(0)
     return np.stack(columns, axis=2), np.array(sds, dtype=np.float64)

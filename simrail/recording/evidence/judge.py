@@ -158,7 +158,7 @@ def weigh(recording: Recording) -> Evidence:
         finding = _judged(key, told, slack[key], " and ".join(sources), ride)
         if is_accel and key == "gyro_offset":
             finding = _of_the_accelerometer(finding)
-        if best is one and key in ("gyro_offset", *ALIKE):
+        if best is one and key in ("gyro_offset", "offset", *ALIKE):
             finding = _beside_a_late_gyro(finding, two, slack[key])
         findings.append(finding)
     middle = ride.middle_s - float(ride.way.time_s[0])
@@ -234,6 +234,11 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
             verdict = "could not be judged"
         why = "" if verdict == "sound" else finding.why
         finding = replace(finding, value=value / kind.si, sd=sd / kind.si, verdict=verdict, why=why)
+    elif key == "offset":
+        apart, between = two.value("gyro_offset"), two.by_gyro().value("offset")
+        if finding.wrong and abs(apart) > LIKELY * two.sd("gyro_offset") and abs(between) < 0.5 * abs(apart):
+            other = f"{_late('accelerometer', -apart, 'gyro')}: set {OF_GYRO.replace('gyro', 'accel')}"
+            finding = replace(finding, remedy=other)
     elif finding.wrong and off < LIKELY:
         seconds = two.value("gyro_offset")
         other = f"{_late('gyro', seconds, 'accelerometer')} (this ride does not tell): set {OF_GYRO}"

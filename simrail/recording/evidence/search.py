@@ -40,9 +40,9 @@ _MUCH = {
 NO_DEARER = 1.2
 """So much of the other's price a fit with two clocks may have: it may blame one figure more."""
 
-CLOCK_SD_S = 0.03
-"""Of a sound IMU: responses of its gyro and its accelerometer, and what suspensions do to either; beside half
-an interval of its samples."""
+CLOCK_SD_S, CLOCK_SD_M = 0.1, 0.7
+"""Of a sound IMU, beside half an interval of its samples: what suspensions do to the turns of a body and to
+its push (bodies of six vehicles have up to 0.3 s), and a way, for the joints of a map and where it turns."""
 
 
 def best_fit(ride: Ride) -> Fit:
@@ -98,7 +98,8 @@ def apart_fit(ride: Ride, one: Fit) -> Fit:
 
 def clock_slack(ride: Ride) -> float:
     """How far the clocks of a sound IMU's sensors may be apart, s."""
-    return math.hypot(CLOCK_SD_S, 0.5 / ride.recording.imu_sheet.rate_hz)
+    fastest = max(float(np.abs(ride.way.speed_mps).max()), 0.1)
+    return math.hypot(CLOCK_SD_S, CLOCK_SD_M / fastest, 0.5 / ride.recording.imu_sheet.rate_hz)
 
 
 def are_apart(ride: Ride, one: Fit, two: Fit) -> bool:
@@ -112,4 +113,4 @@ def accel_is_apart(ride: Ride, two: Fit) -> bool:
     between = two.by_gyro().value("offset")
     sd = two.by_gyro().sd("offset")
     off = abs(two.value("offset")) / math.hypot(two.sd("offset"), clock_slack(ride))
-    return off > LIKELY and abs(between) < LIKELY * math.hypot(sd, clock_slack(ride), CLOCK_SD_S)
+    return off > LIKELY and abs(between) < LIKELY * math.hypot(sd, clock_slack(ride))
