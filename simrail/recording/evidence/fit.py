@@ -90,6 +90,8 @@ class Fit:
         Of each channel, the share of its variance while the train moves that the model explains.
     standing : ndarray (b,)
         Blocks at rest.
+    noise : ndarray (2, 5)
+        Noise of each channel, moving and at rest.
     """
 
     x: FloatArray
@@ -97,6 +99,7 @@ class Fit:
     cost: float
     explained: FloatArray
     standing: np.ndarray
+    noise: FloatArray
 
     def value(self, name: str) -> float:
         """A parameter."""
@@ -132,7 +135,7 @@ def prior_of(ride: Ride) -> FloatArray:
     return np.array([sds[name] for name in GLOBALS])
 
 
-def fit(ride: Ride, start: FloatArray, *, apart: bool = False) -> Fit:
+def fit(ride: Ride, start: FloatArray, *, apart: bool = False, noise: FloatArray | None = None) -> Fit:
     """Fit a ride from a start near by.
 
     Parameters
@@ -143,11 +146,14 @@ def fit(ride: Ride, start: FloatArray, *, apart: bool = False) -> Fit:
         First values.
     apart : bool
         Whether gyro and accelerometer may have clocks of their own; else their offset stays as it is.
+    noise : ndarray (2, 5), optional
+        That of the channels, to begin with.
     """
     nominal = np.array([1.0 if name in ("wheel", "gyro") else 0.0 for name in GLOBALS])
     prior = prior_of(ride)
     x = start.copy()
-    noise = np.array([0.01, 0.01, 0.01, 0.1, 0.1]) * np.ones((2, 1))
+    if noise is None:
+        noise = np.array([0.01, 0.01, 0.01, 0.1, 0.1]) * np.ones((2, 1))
     weights = np.ones_like(ride.measured)
     for round_ in range(ROUNDS):
         seen = inside(ride, x)
@@ -181,7 +187,7 @@ def fit(ride: Ride, start: FloatArray, *, apart: bool = False) -> Fit:
         total = ride.measured[moving] - ride.measured[moving].mean(axis=0)
         explained = 1.0 - (left[moving] ** 2).sum(axis=0) / np.maximum((total**2).sum(axis=0), 1e-30)
     sizes = np.where(seen[:, None], np.minimum(np.abs(left / _CLASS), OUTLIER), 0.5)
-    return Fit(x, covariance, float(np.mean(sizes**2)), explained, standing)
+    return Fit(x, covariance, float(np.mean(sizes**2)), explained, standing, noise)
 
 
 _CLASS = np.array([0.02, 0.02, 0.003, 0.05, 0.1])

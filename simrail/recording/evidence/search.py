@@ -37,8 +37,9 @@ _MUCH = {
 }
 """What counts as far."""
 
-NO_DEARER = 1.2
-"""So much of the other's price a fit with two clocks may have: it may blame one figure more."""
+NO_DEARER, NO_MORE = 1.2, 1.005
+"""So much of the other's price a fit with two clocks may have: it may blame one figure more, and leave no
+more, but for residuals that are weighed by others."""
 
 CLOCK_SD_S, CLOCK_SD_M = 0.1, 0.7
 """Of a sound IMU, beside half an interval of its samples: what suspensions do to the turns of a body and to
@@ -85,7 +86,7 @@ def apart_fit(ride: Ride, one: Fit) -> Fit:
     one : Fit
         The best one with one clock.
     """
-    first = fit(ride, one.x, apart=True)
+    first = fit(ride, one.x, apart=True, noise=one.noise)
     if _explains(ride, first) and not _blamed(first):
         return first
     fits = [first]
@@ -105,7 +106,8 @@ def clock_slack(ride: Ride) -> float:
 def are_apart(ride: Ride, one: Fit, two: Fit) -> bool:
     """Whether a fit with two clocks is to be believed, rather than that with one."""
     off = abs(two.value("gyro_offset")) / math.hypot(two.sd("gyro_offset"), clock_slack(ride))
-    return off > LIKELY and _price(two) <= NO_DEARER * _price(one)
+    leaves_more = two.cost + GOOD > NO_MORE * (one.cost + GOOD)
+    return off > LIKELY and not leaves_more and _price(two) <= NO_DEARER * _price(one)
 
 
 def accel_is_apart(ride: Ride, two: Fit) -> bool:
