@@ -39,6 +39,15 @@ from simrail.recording.recording import Recording
 FOLLOWED = 0.5
 """Share of the gyro's Z that it must explain at least, for the curves to say anything."""
 
+HINT = 2.0
+"""Standard deviations from which on another clock is named beside the one that is told."""
+
+SURE_TURN_RAD = 0.3
+"""Turn of the track from which on a gyro that follows none of it is surely wrong."""
+
+SPEEDS_TAKEN = {"km/h": 1.0 / 3.6, "miles an hour": 0.44704, "knots": 0.51444, "feet a second": 0.3048}
+"""Units that a speed in m/s may be in, in m/s, and how far a factor may be off one of them."""
+
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
 
@@ -152,6 +161,8 @@ def weigh(recording: Recording) -> Evidence:
             lacking = {"turn": "no curve that the gyro follows", "push": "no change of speed"}
             why = "the ride has " + " and ".join(lacking[by] for by in kind.by)
             findings.append(_unjudged(key, best.sd(key) / kind.si, "nothing", why))
+            if key == "gyro" and turn > LEAST_TURN_RAD and _turned(ride) > SURE_TURN_RAD:
+                findings[-1] = _follows_nothing(findings[-1], float(best.explained[GYRO_Z]), ride)
             continue
         if not kind.by:
             sources = ["gravity" + " and curves" * has["turn"]]
@@ -223,6 +234,30 @@ def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Fi
     )
 
 
+def _turned(ride: Ride) -> float:
+    """Turn of the track on a ride, there and back counted, by what the ride file says of the way."""
+    moved = motion(ride, start_values())
+    bend = ride.table.at(moved.place_m)[:, K3] * moved.speed_mps
+    return float(np.abs(bend).mean() * ride.block_s * len(ride.measured))
+
+
+def _follows_nothing(finding: Finding, explained: float, ride: Ride) -> Finding:
+    """That of a gyro which the curves do not explain by any place, factor or clock."""
+    return replace(
+        finding,
+        value=max(explained, 0.0),
+        name="share of the gyro's Z that the curves explain",
+        sd=1.0 / math.sqrt(len(ride.measured)),
+        rests_on=f"{_turned(ride) / _DEG:.0f} deg of curves",
+        verdict="surely wrong",
+        why=f"does not follow the curves of {ride.recording.track.name!r}, wherever they are begun",
+        setting="",
+        field="imu.gyro_z_radps",
+        remedy="mend columns.gyro (angles are no rates), the track, or start_position_m; else its gyro "
+        "drifts, or the file holds two rides",
+    )
+
+
 def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
     """A finding of the fit with one clock, beside what the fit with two leaves open."""
     key, kind = finding.key, KINDS[finding.key]
@@ -236,7 +271,8 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
         finding = replace(finding, value=value / kind.si, sd=sd / kind.si, verdict=verdict, why=why)
     elif key == "offset":
         apart, between = two.value("gyro_offset"), two.by_gyro().value("offset")
-        if finding.wrong and abs(apart) > LIKELY * two.sd("gyro_offset") and abs(between) < 0.5 * abs(apart):
+        is_known = abs(apart) > HINT * two.sd("gyro_offset")
+        if finding.wrong and is_known and abs(between) < 0.5 * abs(apart):
             other = f"{_late('accelerometer', -apart, 'gyro')}: set {OF_GYRO.replace('gyro', 'accel')}"
             finding = replace(finding, remedy=other)
     elif finding.wrong and off < LIKELY:
@@ -303,6 +339,14 @@ def _words(key: str, value: float, ride: Ride) -> tuple[str, str]:
             return f"turns many times as much as {curves}", remedy
         return f"turns {value:.3g} times as much as {curves}", ""
     if key == "wheel":
+        taken = [unit for unit, si in SPEEDS_TAKEN.items() if abs(value / si - 1.0) < 0.03]
+        if taken and device != "encoder":
+            set_it = ' (units.speed = "km/h")' * (taken == ["km/h"])
+            return (
+                f"went {value:.3g} times as far as the {device} says: its speeds look like "
+                f"{taken[0]}{set_it}",
+                "",
+            )
         if value < 0.0:
             return (
                 f"the train ran the other way than the {device} says, by {curves} and its push",
