@@ -69,7 +69,9 @@ def check_stamps(time: FloatArray, *, field: str) -> None:
             field=field,
             value=[float(time[i]), float(time[i + 1])],
             limit="strictly increasing",
-            remedy="sort the samples, and drop those that the logger wrote twice",
+            remedy="drop the lines without a time stamp"
+            if kind == "NaN"
+            else "sort the samples, and drop those that the logger wrote twice",
         )
 
 

@@ -42,9 +42,9 @@ class _Limit(NamedTuple):
 
 LIMITS = (
     _Limit("imu", GYRO, 20.0, "rad/s", "degrees"),
-    _Limit("imu", ACCEL, 500.0, "m/s2", "mg"),
+    _Limit("imu", ACCEL, 500.0, "m/s2", "mg, or raw counts (lsb_per_unit)"),
     _Limit("second_imu", GYRO, 20.0, "rad/s", "degrees"),
-    _Limit("second_imu", ACCEL, 500.0, "m/s2", "mg"),
+    _Limit("second_imu", ACCEL, 500.0, "m/s2", "mg, or raw counts (lsb_per_unit)"),
     # Two hundred times the Earth's field.
     _Limit("magnetometer", MAGNETIC, 1e-2, "T", "microtesla or gauss"),
     _Limit("rail_displacement", RAIL_DISPLACEMENT, 10.0, "m", "millimetres"),

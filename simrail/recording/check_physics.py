@@ -28,6 +28,9 @@ UPRIGHT = 0.9
 MEAN_RATE_RADPS, MEAN_OVER_S = 0.5, 10.0
 """No train turns by 290 deg in 10 s; in deg/s a curve of 500 m at 50 km/h already shows 1.6."""
 
+OFFSET_RADPS, OFFSET_SHEETS = 0.1, 3.0
+"""What a gyro shows at rest at most: 6 deg/s, beside so many turn-on biases of its sheet."""
+
 LEAST_TURN_RAD = 0.1
 """Turn of the track on a ride, there and back counted, from which on the gyro is held against it."""
 
@@ -72,6 +75,7 @@ def check_plausible(recording: Recording) -> Evidence:
     """
     for table, alone in imus(recording):
         _check_gravity(alone, table)
+        _check_offset(alone, table)
         _check_turning(alone, table)
     _check_counted(recording)
     _check_standing(recording)
@@ -101,7 +105,7 @@ def _check_gravity(recording: Recording, table: str) -> None:
         if size < slack:
             remedy = (
                 "gravity has been taken off (a phone's linear acceleration): log the accelerometer as it is, "
-                "with gravity"
+                "with gravity; or these are columns of another sensor"
             )
         # What the unit would have to be, from the size alone: every unit as read in every other.
         for unit, (multiply, divide) in FORCES.items():
@@ -133,6 +137,26 @@ def _check_gravity(recording: Recording, table: str) -> None:
             limit=f"> {UPRIGHT * gravity:.3g} m/s2 on Z {when}",
             remedy="name the axes of the device that point forward, left and up, or its mounting angles",
         )
+
+
+def _check_offset(recording: Recording, table: str) -> None:
+    """Refuse a gyro that shows at rest, or all the time about X and Y, what no gyro of its sheet does."""
+    resting = at_rest_initially(recording)
+    is_resting = resting >= recording.imu_sheet.rate_hz
+    limit = OFFSET_RADPS + OFFSET_SHEETS * recording.imu_sheet.gyro_turn_on_bias_radps
+    when = "at rest" if is_resting else "in the median of the ride"
+    for name in GYRO if is_resting else GYRO[:2]:
+        values = recording.imu[name].to_numpy()
+        found = float(values[:resting].mean() if is_resting else np.median(values))
+        if abs(found) > limit:
+            raise InputError(
+                f"shows a turn {when}: that is the column of another sensor, or an offset that was never "
+                "taken off",
+                field=f"{table}.{name}",
+                value=f"{found:.3g} rad/s",
+                limit=f"{limit:.2g} rad/s, by its sheet",
+                remedy="mend columns.gyro, or take the offset off; or give the turn-on bias in its sheet",
+            )
 
 
 def _check_turning(recording: Recording, table: str) -> None:

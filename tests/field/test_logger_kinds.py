@@ -18,6 +18,8 @@ from simrail.core.errors import InputError
 from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.evidence.axes import weigh_axes
+from simrail.recording.evidence.judge import weigh
+from simrail.recording.files.mend import write_mended
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
 from simrail.track.design import Straight
@@ -319,6 +321,120 @@ def test_a_clock_that_shows_a_part_of_the_time_goes_on(
     found = read_signals(written(tmp_path, frame.assign(t=shown).to_csv(index=False)))
     assert_as_sound(found, sound)
     assert any(f"the seconds of the {word} begin anew" in note for note in found.notes)
+
+
+def whole(values: np.ndarray) -> np.ndarray:
+    return np.rint(values).astype(np.int64)
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown", "word"),
+    [
+        ("us", lambda t: whole(1e6 * (t + 0.3)) % 1_000_000, "seconds of the second"),
+        ("ms", lambda t: whole(1e3 * (t + 86_385.0)) % 86_400_000, "seconds of the day"),
+        ("s", lambda t: ((t + 43_185.0) % 43_200.0).round(3), "seconds of the half day"),
+        ("us", lambda t: whole(1e6 * t + 2**32 - 15e6) % 2**32, r"2^32"),
+        ("s", lambda t: (whole(1e6 * t + 2**32 - 15e6) % 2**32 / 1e6).round(6), "2^32 x 1e-06"),
+        ("ms", lambda t: whole(1e3 * t + 2**24 - 15e3) % 2**24, "2^24"),
+        ("ns", lambda t: whole(1e9 * t + 2**48 - 15e9) % 2**48, "2^48"),
+        ("ms", lambda t: whole(1e3 * t) % 10_000, "10^4, 4 times"),
+    ],
+)
+def test_a_counter_of_time_goes_on_by_the_period_that_leaves_even_steps(
+    unit: str, shown: Callable[[np.ndarray], np.ndarray], word: str, sound: Recording, tmp_path: Path
+) -> None:
+    """Of 10^6 and 2^20 microseconds the first one leaves steps of 50 ms, the second one of 99."""
+    text = logged().assign(t=shown(logged()["t"].to_numpy())).to_csv(index=False)
+    found = read_signals(written(tmp_path, text, ('time = "s"', f'time = "{unit}"')))
+    assert_as_sound(found, sound)
+    assert any(word in note for note in found.notes)
+
+
+def as_numbers(form: str, digits: int) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    def plant(frame: pd.DataFrame) -> pd.DataFrame:
+        dates = pd.Timestamp("2024-01-01T23:59:45") + pd.to_timedelta(frame["t"], unit="s")
+        return frame.assign(t=dates.dt.strftime(form).str[:digits].astype(float))
+
+    return plant
+
+
+@pytest.mark.parametrize(
+    ("plant", "said"),
+    [
+        (as_numbers("%H%M%S.%f", 13), r"written as one number.*with colons"),
+        (as_numbers("%y%m%d%H%M%S.%f", 19), r"written as one number.*with colons"),
+        (
+            lambda frame: frame.assign(t=(frame["t"] % 17.3).round(3)),
+            r"begins anew after some 17\.3 s, 2 times",
+        ),
+        (lambda frame: frame.assign(t=(frame["t"] % 0.0655).round(6)), r"leave time out and give rate_hz"),
+        (lambda frame: frame[::-1], r"steps back.*sort the samples"),
+        (lambda frame: frame.assign(t=frame["t"].where(frame.index != 400)), "drop the lines without a time"),
+        (lambda frame: frame.assign(t=frame["t"] / 60.0), r"faster than any train.*units\.time"),
+        (
+            lambda frame: frame.assign(pulses=[f"{count:,}".replace(",", "'") for count in frame["pulses"]]),
+            "separators of thousands",
+        ),
+        (lambda frame: frame.assign(pulses=[f"'{count}'" for count in frame["pulses"]]), "without quotes"),
+    ],
+)
+def test_a_clock_or_a_count_that_is_none_is_told_with_its_own_remedy(
+    plant: Callable[[pd.DataFrame], pd.DataFrame], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=said) as refused:
+        read_signals(written(tmp_path, plant(logged()).to_csv(index=False)))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("plant", "said"),
+    [
+        (lambda frame: frame.assign(wy=25.0 + 0.01 * frame["t"]), r"gyro_y_radps: shows a turn at rest"),
+        (lambda frame: frame.assign(wy=1013.0 + 0.1 * frame["wx"]), r"gyro_y_radps: shows a turn at rest"),
+        (lambda frame: frame.assign(wz=0.05 * frame["wz"].cumsum()), r"does not follow the curves.*angles"),
+        (lambda frame: frame.assign(ax=frame["ax"].round(1)), r"ax: has steps of 0\.1 g"),
+        (lambda frame: frame.assign(wz=frame["wz"].round(0)), r"wz: has steps of 1 deg/s"),
+        (lambda frame: frame.assign(wy=1.0 * (frame["t"] > 10.0)), r"wy: has steps of 1 deg/s"),
+    ],
+)
+def test_a_column_of_another_sensor_and_numbers_without_decimals_are_told(
+    plant: Callable[[pd.DataFrame], pd.DataFrame], said: str, tmp_path: Path
+) -> None:
+    assert_told_in_a_line(written(tmp_path, plant(logged()).to_csv(index=False)), said)
+
+
+def test_two_decimals_of_g_are_enough(tmp_path: Path) -> None:
+    text = logged().assign(**{name: logged()[name].round(2) for name in TRIADS}).to_csv(index=False)
+    check_plausible(with_odometry(read_signals(written(tmp_path, text)), "encoder"))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(3.6, "km/h"), (2.236936, "miles an hour")])
+def test_a_speed_of_another_unit_is_named(factor: float, unit: str, sound: Recording, tmp_path: Path) -> None:
+    frame = logged()
+    speed = np.gradient(frame["pulses"], frame["t"]) * 2.0 * np.pi * 0.29 / 1024.0
+    smooth = np.convolve(speed, np.ones(9) / 9.0, mode="same")
+    ride = (BASE / "ride.toml").read_text().partition("[encoder.sheet]")[0]
+    ride = ride.replace("[encoder]", "[odometer]").replace('count = "pulses"', 'speed = "v"')
+    frame.assign(v=(factor * smooth).round(1)).to_csv(tmp_path / "ride.csv", index=False)
+    (tmp_path / "ride.toml").write_text(ride)
+    assert_told_in_a_line(tmp_path, f"its speeds look like {unit}")
+
+
+def test_a_late_gyro_is_refused_and_its_setting_mends_it(sound: Recording, tmp_path: Path) -> None:
+    """By two seconds: the accelerometer, the wheel and the place stay as they are."""
+    frame = logged()
+    # The first two seconds stand before themselves, in the other order: the train is at rest then.
+    late = {name: np.concatenate([frame[name][40:0:-1], frame[name][:-40]]) for name in ("wx", "wy", "wz")}
+    folder = written(tmp_path, frame.assign(**late).to_csv(index=False))
+    assert_told_in_a_line(folder, r"stamps of the gyro are (1\.9|2\.0)\d s late.*imu\.gyro\.time_offset_s")
+    out = tmp_path / "mended.toml"
+    (change,) = write_mended(folder, weigh(read_signals(folder)), out)
+    assert change.startswith("imu.gyro.time_offset_s = -")
+    found = read_signals(out)
+    time = found.imu.index.to_numpy()
+    rate = np.interp(time, sound.imu.index.to_numpy(), sound.imu["gyro_z_radps"])
+    assert np.sqrt(np.mean((found.imu["gyro_z_radps"] - rate) ** 2)) < 0.002
+    check_plausible(with_odometry(found, "encoder"))
 
 
 @pytest.mark.parametrize(("day", "goes_on"), [("2024-03-31", True), ("2024-04-02", False)])

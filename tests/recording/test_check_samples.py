@@ -134,9 +134,10 @@ def test_a_stuck_axis_is_named_with_its_time() -> None:
         judged(values)
     said = str(raised.value)
     assert "ay" in said and "line 1002 (time_s = 10) to time_s = 12.99" in said and "stuck" in said
-    # Without noise in the sheet nobody knows; and decimals coarser than the noise hide it.
+    # Without noise in the sheet nobody knows; and decimals coarser than the noise hide it, and are told.
     judged(values, Bounds(50.0, 0.0, "mine"))
-    judged(np.round(values, 0), SHEET)
+    with pytest.raises(InputError, match="has steps of 1 m/s2"):
+        judged(np.round(values, 0), SHEET)
 
 
 def test_a_computed_ride_without_noise_is_not_stuck() -> None:

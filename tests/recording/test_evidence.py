@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from simrail.core.columns import GYRO
 from simrail.core.errors import InputError
 from simrail.recording.evidence.judge import Evidence, refuse_wrong, warnings_of, weigh
 from simrail.recording.evidence.way import way_of
@@ -47,6 +49,9 @@ def tell(evidence: Evidence) -> list[str]:
         ("roll", -2.0, 0.3),
         ("offset", 0.3, 0.05),
         ("offset", -2.0, 0.1),
+        ("gyro_offset", 0.6, 0.1),
+        ("gyro_offset", -1.0, 0.1),
+        pytest.param("gyro_offset", -5.0, 0.1, marks=pytest.mark.long),
     ],
 )
 def test_a_planted_fault_is_found_with_its_size_and_alone(
@@ -59,6 +64,42 @@ def test_a_planted_fault_is_found_with_its_size_and_alone(
     assert abs(np.remainder(off + 180.0, 360.0) - 180.0 if key == "yaw" else off) < slack
     # Of a train that ran the other way, the place where it began is where it is said to be.
     assert tell(evidence) == [key]
+
+
+@pytest.mark.parametrize("size", [-0.6, pytest.param(1.0, marks=pytest.mark.long)])
+def test_of_three_clocks_the_accelerometers_is_told_where_the_others_agree(
+    size: float, sound: Recording
+) -> None:
+    evidence = weigh(PLANTS["accel_offset"](sound, size))
+    (found,) = evidence.wrong
+    assert found.setting == "imu.accel.time_offset_s" and "accelerometer are" in found.why
+    assert found.value == pytest.approx(size, abs=0.1)
+    assert evidence.of("offset").verdict == evidence.of("gyro").verdict == "sound"
+
+
+def test_a_late_gyro_and_a_late_encoder_are_told_apart(sound: Recording) -> None:
+    evidence = weigh(PLANTS["gyro_offset"](PLANTS["offset"](sound, -0.5), 1.0))
+    found = {finding.key: finding.value for finding in evidence.wrong}
+    assert found == {"offset": pytest.approx(-0.5, abs=0.05), "gyro_offset": pytest.approx(1.0, abs=0.1)}
+
+
+def test_where_speed_and_push_do_not_tell_a_late_gyro_from_another_place_both_are_said(
+    sound: Recording,
+) -> None:
+    """At one speed, and without the accelerometer's Y, a gyro 3 s late is like a train some 40 m behind."""
+    time = np.arange(0.0, 40.0, 0.05)
+    assert sound.encoder is not None and sound.encoder_sheet is not None
+    counts = np.rint(13.0 * time / sound.encoder_sheet.pulse_m).astype(np.int64)
+    encoder = pd.DataFrame({"pulse_count": counts}, index=pd.Index(time, name="time_s"))
+    frame = sound.track.frame_extended(0.0 + 13.0 * (time - 3.0))
+    noise = np.random.default_rng(1).normal(0.0, 1.0, (len(time), 6)) * [*3 * [1e-3], *3 * [10.0]]
+    imu = pd.DataFrame(noise, columns=sound.imu.columns, index=encoder.index)
+    imu[list(GYRO)] += 13.0 * frame.k
+    imu["accel_z_mps2"] += sound.gravity_mps2
+    evidence = weigh(replace(sound, imu=imu, encoder=encoder, start_position_m=0.0))
+    found = evidence.of("shift")
+    assert found.wrong and "imu.gyro.time_offset_s" in found.remedy
+    assert evidence.of("gyro_offset").verdict == "could not be judged"
 
 
 def test_nothing_is_said_of_the_sound_ride(sound: Recording) -> None:

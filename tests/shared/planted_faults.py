@@ -1,6 +1,6 @@
 """Faults of factors, place, mounting and clocks, planted in a recording that has been read."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,6 +54,18 @@ def drift(recording: Recording, ppm: float) -> Recording:
     return _stamped(recording, lambda time: time * (1.0 - 1e-6 * ppm))
 
 
+def late(columns: Sequence[str]) -> Callable[[Recording, float], Recording]:
+    """Samples of some columns of the IMU to whose stamps `seconds` have to be added."""
+
+    def plant(recording: Recording, seconds: float) -> Recording:
+        time, imu = recording.imu.index.to_numpy(), recording.imu.copy()
+        for name in columns:
+            imu[name] = np.interp(time + seconds, time, imu[name])
+        return replace(recording, imu=imu)
+
+    return plant
+
+
 def _stamped(recording: Recording, stamp: Callable[[np.ndarray], np.ndarray]) -> Recording:
     assert recording.encoder is not None
     counts = recording.encoder.copy()
@@ -70,5 +82,8 @@ PLANTS: dict[str, Callable[[Recording, float], Recording]] = {
     "roll": turned(0),
     "offset": clock,
     "drift": drift,
+    "gyro_offset": late(GYRO),
+    "accel_offset": late(ACCEL),
 }
-"""How each parameter of `simrail.recording.evidence.model` is made wrong; the size is what is to be found."""
+"""How each parameter of `simrail.recording.evidence.model` is made wrong, and the clock of the accelerometer;
+the size is what is to be found."""

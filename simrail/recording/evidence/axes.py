@@ -183,6 +183,8 @@ def _judged(name: str, found: Slope) -> Finding:
         return _finding(name, found, "surely wrong", f"is many times {of}", unit)
     if found.none:
         remedy = f"{unit}; or the order of the columns, or what it is measured by"
+        if name in (FX, FY):
+            remedy += ": a wheel that slid, counts without a sign, two rides in one file"
         return _finding(name, found, "surely wrong", f"has next to nothing of {of}", remedy)
     if found.sd > WANTED:
         return _finding(name, found, "could not be judged", f"the ride has {AXES[name].lacks}")

@@ -21,8 +21,8 @@ import numpy as np
 from simrail.core.columns import GYRO, MAGNETIC
 from simrail.core.jit import FloatArray
 from simrail.core.resample import rate_of
-from simrail.recording.evidence.finding import Finding, Verdict
-from simrail.recording.evidence.judge import KINDS, LIKELY, SURE
+from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
+from simrail.recording.evidence.judge import KINDS
 from simrail.recording.recording import Recording
 
 BLOCK_S = 0.5

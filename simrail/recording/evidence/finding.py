@@ -5,6 +5,9 @@ from typing import Literal
 
 Verdict = Literal["sound", "likely wrong", "surely wrong", "could not be judged"]
 
+LIKELY, SURE = 3.5, 8.0
+"""Standard deviations from which on a figure is likely wrong, and surely."""
+
 
 @dataclass(frozen=True)
 class Finding:

@@ -10,7 +10,8 @@ The residuals are no white noise. Each channel's noise is its variance times 1 +
 standard deviations weigh less (Huber).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from simrail.recording.evidence.model import (
     GYRO_Y,
     GYRO_Z,
     INDEX,
+    Motion,
     Ride,
     blocks_of,
     expected,
@@ -41,7 +43,7 @@ CORRELATED_S = 10.0
 OUTLIER = 3.0
 """Standard deviations from which on a residual weighs less."""
 
-FREE = {"wheel": 10.0, "shift": 3e3, "offset": 30.0, "drift": 1e-3, "gyro": 30.0}
+FREE = {"wheel": 10.0, "shift": 3e3, "offset": 30.0, "drift": 1e-3, "gyro_offset": 30.0, "gyro": 30.0}
 """Prior sds of faults: so wide that they say nothing."""
 
 MOUNT_SD_RAD = 3.0
@@ -59,7 +61,13 @@ LEAN_SD = 0.3
 STOP_SD_RAD = 4e-3
 """Of roll and pitch where a train stands, beside the map's: 5 mm of level over two metres."""
 
-STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, "drift": 1e-6}
+BEHIND_SD_M = 1.0
+"""How far from a body's reference point the place may be at which it turns, beside what is known of it."""
+
+SLUGGISH_SD_S = 0.5
+"""How late a body on springs may roll and pitch; it turns about Z with the track."""
+
+STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, "drift": 1e-6, "gyro_offset": 5e-3}
 """Steps of the differences for the slopes; 1e-5 for the others."""
 
 STILL_MPS = 0.05
@@ -82,6 +90,8 @@ class Fit:
         Of each channel, the share of its variance while the train moves that the model explains.
     standing : ndarray (b,)
         Blocks at rest.
+    noise : ndarray (2, 5)
+        Noise of each channel, moving and at rest.
     """
 
     x: FloatArray
@@ -89,6 +99,7 @@ class Fit:
     cost: float
     explained: FloatArray
     standing: np.ndarray
+    noise: FloatArray
 
     def value(self, name: str) -> float:
         """A parameter."""
@@ -97,6 +108,13 @@ class Fit:
     def sd(self, name: str) -> float:
         """Standard deviation of a parameter."""
         return float(np.sqrt(self.covariance[INDEX[name], INDEX[name]]))
+
+    def by_gyro(self) -> Self:
+        """The same with both offsets against the gyro's clock; its own is then the accelerometer's."""
+        turn = np.eye(len(GLOBALS))
+        offset, apart = INDEX["offset"], INDEX["gyro_offset"]
+        turn[offset, apart] = turn[apart, apart] = -1.0
+        return replace(self, x=turn @ self.x, covariance=turn @ self.covariance @ turn.T)
 
 
 def prior_of(ride: Ride) -> FloatArray:
@@ -117,7 +135,7 @@ def prior_of(ride: Ride) -> FloatArray:
     return np.array([sds[name] for name in GLOBALS])
 
 
-def fit(ride: Ride, start: FloatArray) -> Fit:
+def fit(ride: Ride, start: FloatArray, *, apart: bool = False, noise: FloatArray | None = None) -> Fit:
     """Fit a ride from a start near by.
 
     Parameters
@@ -126,20 +144,26 @@ def fit(ride: Ride, start: FloatArray) -> Fit:
         The blocks.
     start : ndarray (len(GLOBALS),)
         First values.
+    apart : bool
+        Whether gyro and accelerometer may have clocks of their own; else their offset stays as it is.
+    noise : ndarray (2, 5), optional
+        That of the channels, to begin with.
     """
     nominal = np.array([1.0 if name in ("wheel", "gyro") else 0.0 for name in GLOBALS])
     prior = prior_of(ride)
     x = start.copy()
-    noise = np.array([0.01, 0.01, 0.01, 0.1, 0.1]) * np.ones((2, 1))
+    if noise is None:
+        noise = np.array([0.01, 0.01, 0.01, 0.1, 0.1]) * np.ones((2, 1))
     weights = np.ones_like(ride.measured)
     for round_ in range(ROUNDS):
         seen = inside(ride, x)
         model = expected(ride, x)
         moved = motion(ride, x)
-        speed = blocks_of(moved.speed_mps)
         standing = np.abs(blocks_of(np.abs(moved.speed_mps))) < STILL_MPS
         slopes = _slopes(ride, x, model)
-        beside, beside_sd = _nuisance(ride, slopes, blocks_of(moved.place_m), speed, standing)
+        if not apart:
+            slopes[:, :, INDEX["gyro_offset"]] = 0.0
+        beside, beside_sd = _nuisance(ride, slopes, _places(ride, x, moved), standing, apart=apart)
         rest = ride.measured - model
         jacobian = np.concatenate([slopes, beside], axis=2)
         sds = np.concatenate([prior, beside_sd])
@@ -163,14 +187,17 @@ def fit(ride: Ride, start: FloatArray) -> Fit:
         total = ride.measured[moving] - ride.measured[moving].mean(axis=0)
         explained = 1.0 - (left[moving] ** 2).sum(axis=0) / np.maximum((total**2).sum(axis=0), 1e-30)
     sizes = np.where(seen[:, None], np.minimum(np.abs(left / _CLASS), OUTLIER), 0.5)
-    return Fit(x, covariance, float(np.mean(sizes**2)), explained, standing)
+    return Fit(x, covariance, float(np.mean(sizes**2)), explained, standing, noise)
 
 
 _CLASS = np.array([0.02, 0.02, 0.003, 0.05, 0.1])
 """Sizes of residuals by which two fits of one ride are compared."""
 
 _LONGEST = np.array(
-    [{"wheel": 0.2, "shift": 60.0, "offset": 1.0, "drift": 2e-3}.get(n, 1.0) for n in GLOBALS]
+    [
+        {"wheel": 0.2, "shift": 60.0, "offset": 1.0, "drift": 2e-3, "gyro_offset": 1.0}.get(n, 1.0)
+        for n in GLOBALS
+    ]
 )
 """Longest step of a round: a long one leaves where the model is nearly linear."""
 
@@ -188,29 +215,52 @@ def _slopes(ride: Ride, x: FloatArray, model: FloatArray) -> FloatArray:
     return slopes
 
 
+class _Places(NamedTuple):
+    """Where a sensor is at its stamps, how fast, and how the line bends there (b,)."""
+
+    place: FloatArray
+    speed: FloatArray
+    bend: FloatArray
+    twist: FloatArray
+
+
+def _places(ride: Ride, x: FloatArray, moved: Motion) -> tuple[_Places, _Places]:
+    """Those of the accelerometer and of the gyro."""
+    found = []
+    for one in (moved, motion(ride, x, turns=True)) if x[INDEX["gyro_offset"]] else (moved,):
+        place = blocks_of(one.place_m)
+        line = ride.table.at(place)
+        found.append(_Places(place, blocks_of(one.speed_mps), line[:, K3], line[:, K3 - 1]))
+    return found[0], found[-1]
+
+
 def _nuisance(
-    ride: Ride, slopes: FloatArray, place: FloatArray, speed: FloatArray, standing: np.ndarray
+    ride: Ride, slopes: FloatArray, places: tuple[_Places, _Places], standing: np.ndarray, *, apart: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Slopes (b, 5, m) by what the map and the rails may be wrong, and its sds (m,)."""
     errors, table, recording = ride.recording.map_errors, ride.table, ride.recording
     gravity, base = recording.gravity_mps2, recording.track.rail_base_m
+    felt, turned = places
+    place = felt.place
     low, high = float(place.min()) - 30.0, float(place.max()) + 30.0
     columns, sds = [], []
     for joint in table.joints(low, high):
-        columns.append(-table.moved(joint, place)[:, None] * slopes[:, :, INDEX["shift"]])
+        share = np.empty((len(place), CHANNELS))
+        share[:, :FORCE_X] = table.moved(joint, turned.place)[:, None]
+        share[:, FORCE_X:] = table.moved(joint, place)[:, None]
+        columns.append(-share * slopes[:, :, INDEX["shift"]])
         sds.append(max(errors.place_sd_m, 0.3))
-    line = table.at(place)
-    bend, twist = line[:, K3], line[:, K3 - 1]
     for curve in table.curves_in(low, high):
-        share = table.in_curve(int(curve), place)
+        share, share_turned = (table.in_curve(int(curve), one.place) for one in places)
         column = np.zeros((len(place), CHANNELS))
-        column[:, GYRO_Z], column[:, FORCE_Y] = speed * bend * share, speed**2 * bend * share
-        column[:, GYRO_Y] = speed * twist * share
+        column[:, GYRO_Z] = turned.speed * turned.bend * share_turned
+        column[:, FORCE_Y] = felt.speed**2 * felt.bend * share
+        column[:, GYRO_Y] = turned.speed * turned.twist * share_turned
         columns.append(column)
         sds.append(errors.radius_relative_sd + 1e-3)
         column = np.zeros((len(place), CHANNELS))
-        column[:, FORCE_Y], column[:, GYRO_Y] = gravity * share, speed * bend * share
-        column[:, GYRO_X] = np.gradient(share, ride.block_s)
+        column[:, FORCE_Y], column[:, GYRO_Y] = gravity * share, turned.speed * turned.bend * share_turned
+        column[:, GYRO_X] = np.gradient(share_turned, ride.block_s)
         columns.append(column)
         sds.append(np.hypot(np.hypot(errors.cant_sd_m, errors.cant_along_sd_m), 0.003) / base)
     for first, last in _runs(standing):
@@ -219,6 +269,17 @@ def _nuisance(
             column[first:last, channel] = gravity
             columns.append(column)
             sds.append(np.hypot(STOP_SD_RAD, errors.cant_along_sd_m / base))
+    if apart:
+        # A body turns as at its middle, and pushes as at the device: that is a place, and no time.
+        column = slopes[:, :, INDEX["shift"]].copy()
+        column[:, FORCE_X:] = 0.0
+        columns.append(column)
+        sds.append(np.hypot(recording.mount_position_m[0], BEHIND_SD_M))
+        for channel in (GYRO_X, GYRO_Y):
+            column = np.zeros((len(place), CHANNELS))
+            column[:, channel] = slopes[:, channel, INDEX["gyro_offset"]]
+            columns.append(column)
+            sds.append(SLUGGISH_SD_S)
     if not columns:
         return np.zeros((*slopes.shape[:2], 0)), np.zeros(0)
     return np.stack(columns, axis=2), np.array(sds, dtype=np.float64)

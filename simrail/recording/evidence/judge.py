@@ -8,18 +8,17 @@ not be judged.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from simrail.core.errors import InputError
-from simrail.recording.evidence.finding import Finding, Verdict
-from simrail.recording.evidence.fit import Fit, fit
+from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
+from simrail.recording.evidence.fit import Fit
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
-    FORCE_X,
     GYRO_Z,
     INDEX,
     Ride,
@@ -27,20 +26,27 @@ from simrail.recording.evidence.model import (
     ride_of,
     start_values,
 )
-from simrail.recording.evidence.start import scan
+from simrail.recording.evidence.search import (
+    LEAST_TURN_RAD,
+    accel_is_apart,
+    apart_fit,
+    are_apart,
+    best_fit,
+    clock_slack,
+)
 from simrail.recording.recording import Recording
-
-LIKELY, SURE = 3.5, 8.0
-"""Standard deviations from which on a figure is likely wrong, and surely."""
-
-EXPLAINED = 0.9
-"""Share of the gyro's Z, and of the push along X, that a fit explains: else other starts are tried."""
 
 FOLLOWED = 0.5
 """Share of the gyro's Z that it must explain at least, for the curves to say anything."""
 
-LEAST_TURN_RAD = 0.1
-"""Turn of the track on a ride, there and back counted, from which on its curves say something."""
+HINT = 2.0
+"""Standard deviations from which on another clock is named beside the one that is told."""
+
+SURE_TURN_RAD = 0.3
+"""Turn of the track from which on a gyro that follows none of it is surely wrong."""
+
+SPEEDS_TAKEN = {"km/h": 1.0 / 3.6, "miles an hour": 0.44704, "knots": 0.51444, "feet a second": 0.3048}
+"""Units that a speed in m/s may be in, in m/s, and how far a factor may be off one of them."""
 
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
@@ -67,18 +73,16 @@ KINDS = {
     "roll": Kind("roll of the mounting", "deg", _DEG, 3.0, ()),
     "offset": Kind("offset of the clock", "s", 1.0, 0.3, ("push",)),
     "drift": Kind("drift of the clock", "ppm", 1e-6, 500.0, ("push",)),
+    "gyro_offset": Kind("offset of the gyro's clock", "s", 1.0, 0.3, ("turn",)),
 }
 """What is judged, in the order in which it is told; ``by`` is what it needs, one of them at least."""
 
 
-DEARER = 0.15
-"""Share by which a fit has to be better for each figure that it blames."""
+OF_GYRO = "imu.gyro.time_offset_s"
+"""Where the clock of a gyro is set right."""
 
-GOOD = 0.05
-"""Cost of a fit that is as good as any: what is better differs by what no part of the model holds."""
-
-_MUCH = {"gyro": 0.05, "wheel": 0.05, "shift": 10.0, "yaw": 0.05, "offset": 0.2, "drift": 3e-4}
-"""What counts as far."""
+ALIKE = ("gyro", "shift")
+"""What a gyro that is late may look like on a ride that tells little."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,12 @@ def weigh(recording: Recording) -> Evidence:
         return Evidence(tuple(_unjudged(key, math.inf, "nothing", why) for key in KINDS))
     # The matrices are small: threads of BLAS cost more than they bring.
     with threadpool_limits(1):
-        best = best_fit(ride)
+        one = best_fit(ride)
+        two = apart_fit(ride, one)
+    best = two if are_apart(ride, one, two) else one
+    # Of three clocks that one is wrong that agrees with neither of the others.
+    is_accel = best is two and accel_is_apart(ride, two)
+    told = two.by_gyro() if is_accel else best
     moved = motion(ride, best.x)
     turn = (
         np.abs(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps).mean()
@@ -152,37 +161,19 @@ def weigh(recording: Recording) -> Evidence:
             lacking = {"turn": "no curve that the gyro follows", "push": "no change of speed"}
             why = "the ride has " + " and ".join(lacking[by] for by in kind.by)
             findings.append(_unjudged(key, best.sd(key) / kind.si, "nothing", why))
+            if key == "gyro" and turn > LEAST_TURN_RAD and _turned(ride) > SURE_TURN_RAD:
+                findings[-1] = _follows_nothing(findings[-1], float(best.explained[GYRO_Z]), ride)
             continue
         if not kind.by:
             sources = ["gravity" + " and curves" * has["turn"]]
-        findings.append(_judged(key, best, slack[key], " and ".join(sources), ride))
+        finding = _judged(key, told, slack[key], " and ".join(sources), ride)
+        if is_accel and key == "gyro_offset":
+            finding = _of_the_accelerometer(finding)
+        if best is one and key in ("gyro_offset", "offset", *ALIKE):
+            finding = _beside_a_late_gyro(finding, two, slack[key])
+        findings.append(finding)
     middle = ride.middle_s - float(ride.way.time_s[0])
     return Evidence(tuple(findings), float(turn), float(push), middle)
-
-
-def best_fit(ride: Ride) -> Fit:
-    """The fit from the sound ride's values; from others too where it blames or leaves much."""
-    first = fit(ride, start_values())
-    if _explains(ride, first) and not _blamed(first):
-        return first
-    fits = [first, *(fit(ride, x) for x in scan(ride))]
-    # Whatever a fit blames has to pay for itself: a ride on other rails, the other way, may look much like
-    # one whose gyro has the other sign.
-    return min(fits, key=lambda other: (other.cost + GOOD) * (1.0 + DEARER * _blamed(other)))
-
-
-def _blamed(found: Fit) -> int:
-    """How many figures a fit has far from those of a sound ride."""
-    nominal = start_values()
-    return sum(
-        abs(found.value(key) - nominal[INDEX[key]]) > SURE * found.sd(key) + _MUCH[key] for key in _MUCH
-    )
-
-
-def _explains(ride: Ride, found: Fit) -> bool:
-    turning = float(np.abs(ride.measured[:, GYRO_Z]).mean() * ride.block_s * len(ride.measured))
-    turns = turning < LEAST_TURN_RAD or found.explained[GYRO_Z] > EXPLAINED
-    return bool(turns and found.explained[FORCE_X] > EXPLAINED)
 
 
 def _slack(ride: Ride, found: Fit) -> dict[str, float]:
@@ -204,6 +195,7 @@ def _slack(ride: Ride, found: Fit) -> dict[str, float]:
         "pitch": math.hypot(package, errors.gradient_sd, 0.2 * _DEG),
         "roll": math.hypot(package, errors.cant_along_sd_m / recording.track.rail_base_m, 0.2 * _DEG),
         "offset": clock,
+        "gyro_offset": clock_slack(ride),
         "drift": math.hypot(sheet.clock_drift, 0.03 / seconds, 3e-5),
     }
 
@@ -242,6 +234,62 @@ def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Fi
     )
 
 
+def _turned(ride: Ride) -> float:
+    """Turn of the track on a ride, there and back counted, by what the ride file says of the way."""
+    moved = motion(ride, start_values())
+    bend = ride.table.at(moved.place_m)[:, K3] * moved.speed_mps
+    return float(np.abs(bend).mean() * ride.block_s * len(ride.measured))
+
+
+def _follows_nothing(finding: Finding, explained: float, ride: Ride) -> Finding:
+    """That of a gyro which the curves do not explain by any place, factor or clock."""
+    return replace(
+        finding,
+        value=max(explained, 0.0),
+        name="share of the gyro's Z that the curves explain",
+        sd=1.0 / math.sqrt(len(ride.measured)),
+        rests_on=f"{_turned(ride) / _DEG:.0f} deg of curves",
+        verdict="surely wrong",
+        why=f"does not follow the curves of {ride.recording.track.name!r}, wherever they are begun",
+        setting="",
+        field="imu.gyro_z_radps",
+        remedy="mend columns.gyro (angles are no rates), the track, or start_position_m; else its gyro "
+        "drifts, or the file holds two rides",
+    )
+
+
+def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
+    """A finding of the fit with one clock, beside what the fit with two leaves open."""
+    key, kind = finding.key, KINDS[finding.key]
+    value, sd = two.value(key), two.sd(key)
+    off = abs(value - start_values()[INDEX[key]]) / math.hypot(sd, slack)
+    if key == "gyro_offset":
+        verdict: Verdict = "sound"
+        if off > LIKELY or sd / kind.si > kind.wanted:
+            verdict = "could not be judged"
+        why = "" if verdict == "sound" else finding.why
+        finding = replace(finding, value=value / kind.si, sd=sd / kind.si, verdict=verdict, why=why)
+    elif key == "offset":
+        apart, between = two.value("gyro_offset"), two.by_gyro().value("offset")
+        is_known = abs(apart) > HINT * two.sd("gyro_offset")
+        if finding.wrong and is_known and abs(between) < 0.5 * abs(apart):
+            other = f"{_late('accelerometer', -apart, 'gyro')}: set {OF_GYRO.replace('gyro', 'accel')}"
+            finding = replace(finding, remedy=other)
+    elif finding.wrong and off < LIKELY:
+        seconds = two.value("gyro_offset")
+        other = f"{_late('gyro', seconds, 'accelerometer')} (this ride does not tell): set {OF_GYRO}"
+        finding = replace(finding, remedy="; or ".join(part for part in (finding.remedy, other) if part))
+    return finding
+
+
+def _of_the_accelerometer(finding: Finding) -> Finding:
+    """The finding of the gyro's clock as one of the accelerometer's, with which no other clock agrees."""
+    setting = OF_GYRO.replace("gyro", "accel")
+    why = _late("accelerometer", finding.value, "gyro") if finding.wrong else ""
+    name = "offset of the accelerometer's clock"
+    return replace(finding, name=name, why=why, setting=setting, field=setting)
+
+
 def _unjudged(key: str, sd: float, rests_on: str, why: str) -> Finding:
     kind = KINDS[key]
     nominal = float(start_values()[INDEX[key]])
@@ -266,6 +314,8 @@ def setting_of(key: str, recording: Recording, device: str) -> tuple[str, str]:
         return at, at
     if key == "gyro":
         return "imu.scale.gyro", "imu.gyro_z_radps"
+    if key == "gyro_offset":
+        return OF_GYRO, OF_GYRO
     return f"imu.{key}_deg", f"imu.{key}_deg"
 
 
@@ -289,6 +339,14 @@ def _words(key: str, value: float, ride: Ride) -> tuple[str, str]:
             return f"turns many times as much as {curves}", remedy
         return f"turns {value:.3g} times as much as {curves}", ""
     if key == "wheel":
+        taken = [unit for unit, si in SPEEDS_TAKEN.items() if abs(value / si - 1.0) < 0.03]
+        if taken and device != "encoder":
+            set_it = ' (units.speed = "km/h")' * (taken == ["km/h"])
+            return (
+                f"went {value:.3g} times as far as the {device} says: its speeds look like "
+                f"{taken[0]}{set_it}",
+                "",
+            )
         if value < 0.0:
             return (
                 f"the train ran the other way than the {device} says, by {curves} and its push",
@@ -315,9 +373,16 @@ def _words(key: str, value: float, ride: Ride) -> tuple[str, str]:
             "",
         )
     if key == "offset":
-        side = "late" if value < 0.0 else "early"
-        return f"the stamps of the {device} are {abs(value):.2f} s {side} against the IMU's", ""
+        return _late(device, value, "IMU"), ""
+    if key == "gyro_offset":
+        return _late("gyro", value, "accelerometer"), ""
     return f"the clock of the {device} drifts by {value * 1e6:+.0f} ppm against the IMU's", ""
+
+
+def _late(sensor: str, value: float, other: str) -> str:
+    """A clause on stamps to which `value` has to be added."""
+    side = "late" if value < 0.0 else "early"
+    return f"the stamps of the {sensor} are {abs(value):.2f} s {side} against the {other}'s"
 
 
 def refuse_wrong(evidence: Evidence) -> None:

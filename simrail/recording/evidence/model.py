@@ -13,11 +13,14 @@ its body, on springs in the track frame (roll phi, pitch theta, Darboux curvatur
 
 and the device, whose axes are turned against those that were claimed by R(roll, pitch, yaw), reads
 
-    gyro (R' rate) + bias,   R' force + bias.
+    gyro (R' rate) + bias,   R' force + bias,
+
+the turns of the time t + gyro_offset where the clock of the gyro is another than the accelerometer's.
 
 Not here: motion of the body in the track, which averages out or is noise, and the height of the mount.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +46,7 @@ GLOBALS = (
     "shift",
     "offset",
     "drift",
+    "gyro_offset",
     "gyro",
     "roll",
     "pitch",
@@ -148,11 +152,12 @@ def start_values() -> FloatArray:
     return np.array([NOMINAL.get(name, 0.0) for name in GLOBALS])
 
 
-def motion(ride: Ride, x: FloatArray) -> Motion:
-    """How the train moved, for parameters (len(GLOBALS),)."""
+def motion(ride: Ride, x: FloatArray, *, turns: bool = False) -> Motion:
+    """How the train moved, for parameters (len(GLOBALS),), at the stamps of the accelerometer or the gyro."""
     wheel, shift, offset, drift = x[:4]
     way = ride.way
-    times = ride.fine_s - offset - drift * (ride.fine_s - ride.middle_s)
+    when = ride.fine_s + x[INDEX["gyro_offset"]] if turns else ride.fine_s
+    times = when - offset - drift * (when - ride.middle_s)
     # Uniform times: the cell of each is found without a search.
     at = np.clip((times - way.time_s[0]) / way.step_s, 0.0, len(way.time_s) - 1.000001)
     cell = at.astype(np.int64)
@@ -169,8 +174,10 @@ def motion(ride: Ride, x: FloatArray) -> Motion:
 def inside(ride: Ride, x: FloatArray) -> np.ndarray:
     """Blocks (b,) of which the device of the way tells, for a clock of that offset."""
     times = ride.fine_s[::FINE] - x[INDEX["offset"]]
-    time = ride.way.time_s
-    seen: np.ndarray = (times >= time[0]) & (times + ride.block_s <= time[-1])
+    time, apart = ride.way.time_s, x[INDEX["gyro_offset"]]
+    seen: np.ndarray = (times + min(apart, 0.0) >= time[0]) & (
+        times + max(apart, 0.0) + ride.block_s <= time[-1]
+    )
     return seen
 
 
@@ -180,12 +187,12 @@ def expected(ride: Ride, x: FloatArray) -> FloatArray:
     moved, gravity = motion(ride, x), ride.recording.gravity_mps2
     line = ride.table.at(moved.place_m)
     speed, push = moved.speed_mps, moved.acceleration_mps2
-    step, level = ride.block_s / FINE, np.cos(line[:, PITCH])
-    beside = speed**2 * line[:, K3] + gravity * level * np.sin(line[:, ROLL])
-    roll, pitch = by["lean"] * beside / gravity, -by["squat"] * push / gravity
-    rate = speed[:, None] * line[:, K1 : K3 + 1]
-    rate[:, 1] += roll * rate[:, 2] + np.gradient(pitch, step)
-    rate[:, 0] += np.gradient(roll, step)
+    level = np.cos(line[:, PITCH])
+    beside = _beside(line, speed, gravity)
+    rate = _rates(ride, by, moved, line)
+    if by["gyro_offset"]:
+        turned = motion(ride, x, turns=True)
+        rate = _rates(ride, by, turned, ride.table.at(turned.place_m))
     along = push * (1.0 + by["squat"] + by["stretch"]) - gravity * np.sin(line[:, PITCH])
     up = gravity * level * np.cos(line[:, ROLL]) - speed**2 * line[:, K1 + 1]
     force = np.column_stack([along, beside * (1.0 + by["lean"]), up])
@@ -195,6 +202,23 @@ def expected(ride: Ride, x: FloatArray) -> FloatArray:
     read[:, 3:] = (force @ turn)[:, :2]
     means: FloatArray = read.reshape(-1, FINE, CHANNELS).mean(axis=1)
     return means + x[-CHANNELS:]
+
+
+def _beside(line: FloatArray, speed: FloatArray, gravity: float) -> FloatArray:
+    """What curve and cant leave across the track (n,)."""
+    left: FloatArray = speed**2 * line[:, K3] + gravity * np.cos(line[:, PITCH]) * np.sin(line[:, ROLL])
+    return left
+
+
+def _rates(ride: Ride, by: Mapping[str, float], moved: Motion, line: FloatArray) -> FloatArray:
+    """Rates (n, 3) of the body at the times of a motion."""
+    gravity, step, speed = ride.recording.gravity_mps2, ride.block_s / FINE, moved.speed_mps
+    roll = by["lean"] * _beside(line, speed, gravity) / gravity
+    pitch = -by["squat"] * moved.acceleration_mps2 / gravity
+    rate: FloatArray = speed[:, None] * line[:, K1 : K3 + 1]
+    rate[:, 1] += roll * rate[:, 2] + np.gradient(pitch, step)
+    rate[:, 0] += np.gradient(roll, step)
+    return rate
 
 
 def blocks_of(values: FloatArray) -> FloatArray:

@@ -8,11 +8,11 @@ second one's tells what those two are off against each other.
 import math
 from dataclasses import replace
 
-from simrail.recording.evidence.finding import Finding, Verdict
-from simrail.recording.evidence.judge import KINDS, LIKELY, SURE, Evidence, Kind, weigh
+from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
+from simrail.recording.evidence.judge import KINDS, Evidence, Kind, weigh
 from simrail.recording.recording import Recording, SecondImuSheet, second_alone
 
-OWN = ("gyro", "yaw", "pitch", "roll")
+OWN = ("gyro", "yaw", "pitch", "roll", "gyro_offset")
 """What is judged of the device alone, by the map."""
 
 PLACE_SD_M = 3.0

@@ -21,6 +21,7 @@ from simrail.recording.evidence.model import (
 )
 
 OFFSETS_S = np.arange(-6.0, 6.01, 0.1)
+TURN_OFFSETS_S = np.arange(-30.0, 30.01, 0.25)
 SHIFTS_M, SHIFT_STEP_M = 500.0, 5.0
 FACTORS = (1.0, -1.0, 0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.318, 3.14, 0.667, 1.5, 0.8, 1.25)
 
@@ -54,6 +55,26 @@ def scan(ride: Ride) -> list[FloatArray]:
         turned[INDEX["yaw"]] = angle
         starts.append(turned)
     return starts + likely[1:]
+
+
+def scan_turns(ride: Ride, x: FloatArray) -> FloatArray | None:
+    """Start with the offset of the gyro's clock by which its Z fits the curves best; None without any."""
+    measured = ride.measured[:, GYRO_Z]
+    best, found = 0.0, None
+    for offset in TURN_OFFSETS_S:
+        trial = x.copy()
+        trial[INDEX["gyro_offset"]] = offset
+        moved = motion(ride, trial, turns=True)
+        bend = blocks_of(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps)
+        off = bend - bend.mean()
+        power = float(off @ off)
+        if power < 1e-6:
+            continue
+        slope = float(off @ measured) / power
+        if slope > 0.0 and slope * slope * power > best:
+            best, found = slope * slope * power, trial
+            found[INDEX["gyro"]] = slope
+    return found
 
 
 def _by_push(ride: Ride) -> FloatArray | None:

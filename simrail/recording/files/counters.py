@@ -16,6 +16,9 @@ from simrail.core.resample import rate_of
 WHEEL_JUMP_MPS = 60.0
 """From one reading to the next no wheel's speed changes by more, be it that it locks or spins."""
 
+FASTEST_MPS = 170.0
+"""Of all trains on rails the fastest ran at 160 m/s."""
+
 LEAST_JUMP = 4
 """Pulses below which a step is no jump: a late stamp may move a few from one step to the next."""
 
@@ -82,6 +85,7 @@ def unwrap(
         return _followed(
             Unwrapped(_without(counts, turns * modulus), modulus, int(np.count_nonzero(turns))), field
         )
+    _refuse_fast(step, time, m_per_pulse, field)
     jumps = _jumps(counts, step, time, m_per_pulse)
     if not len(jumps):
         return Unwrapped(counts)
@@ -104,6 +108,20 @@ def unwrap(
     turns = np.zeros(len(step), dtype=np.int64)
     turns[jumps] = -np.sign(size).astype(np.int64)
     return _followed(Unwrapped(_without(counts, turns * found), found, len(jumps)), field)
+
+
+def _refuse_fast(step: np.ndarray, time: FloatArray, m_per_pulse: float, field: str) -> None:
+    """Refuse counts that are those of no train nearly all the time: a unit or a figure is wrong."""
+    speed = np.abs(step) * m_per_pulse / np.diff(time)
+    usual = float(np.median(speed[step != 0])) if step.any() else 0.0
+    if usual > FASTEST_MPS and np.count_nonzero(step) > 0.2 * len(step):
+        raise InputError(
+            "the counter runs faster than any train",
+            field=field,
+            value=f"{usual:.4g} m/s in the median",
+            limit=f"{FASTEST_MPS:g} m/s",
+            remedy="mend units.time, pulses_per_revolution or wheel_radius_m",
+        )
 
 
 def _followed(found: Unwrapped, field: str) -> Unwrapped:

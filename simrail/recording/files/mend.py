@@ -104,6 +104,11 @@ def mended(data: dict[str, Any], evidence: Evidence) -> list[str]:
             offset = evidence.of(f"{mark}offset").value - 1e-6 * slow.value * evidence.middle_s
         if offset:
             _add(data, evidence.of(f"{mark}offset").setting, offset, changes)
+        if f"{mark}gyro_offset" in wrong:
+            apart = wrong[f"{mark}gyro_offset"]
+            whole = _table(data, apart.setting.rpartition(".")[0].rpartition(".")[0] + ".time_offset_s")
+            _table(data, apart.setting).setdefault("time_offset_s", whole.get("time_offset_s", 0.0))
+            _add(data, apart.setting, apart.value, changes)
     if "magnetometer_offset" in wrong:
         found_offset = wrong["magnetometer_offset"]
         _add(data, found_offset.setting, found_offset.value, changes)

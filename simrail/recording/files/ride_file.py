@@ -14,7 +14,7 @@ from simrail.core.errors import InputError
 from simrail.core.resample import LONGEST_GAP_S
 from simrail.core.toml_files import Part, blame, judge
 from simrail.recording.files.asked import LimitsPart, MethodPart, RailReferencePart, ReferencePart
-from simrail.recording.files.signal_part import TICKS, SignalPart, VectorPart
+from simrail.recording.files.signal_part import LARGEST_OFFSET_S, TICKS, SignalPart, VectorPart
 from simrail.recording.recording import (
     EncoderSheet,
     GnssSheet,
@@ -48,7 +48,7 @@ class SensorPart(Part):
     ----------
     file, separator, decimal, skip_lines, units_row
         As `DataPart`.
-    columns, units, lsb_per_unit, tick_rate_hz, rate_hz, start_s
+    columns, units, lsb_per_unit, tick_rate_hz, rate_hz, start_s, time_offset_s
         As `SignalPart`.
     axes, roll_deg, pitch_deg, yaw_deg
         As `VectorPart`.
@@ -65,6 +65,7 @@ class SensorPart(Part):
     tick_rate_hz: float | None = None
     rate_hz: float | None = None
     start_s: float | None = None
+    time_offset_s: Annotated[float, Field(ge=-LARGEST_OFFSET_S, le=LARGEST_OFFSET_S)] | None = None
     axes: tuple[str, str, str] | None = None
     roll_deg: float | None = None
     pitch_deg: float | None = None

@@ -6,6 +6,9 @@ time of their arrival (`simrail.core.packets`). What cannot is refused, with tim
 set back, stamps that several samples share.
 """
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 import pandas as pd
 
@@ -18,10 +21,21 @@ from simrail.recording.files.clock_times import EMPTY, continued, read_times
 from simrail.recording.files.signal_part import EPOCHS, TEXT_TIMES, TICKS, SignalPart
 from simrail.recording.signals import TIMES
 
-COUNTER_BITS = (8, 12, 15, 16, 20, 24, 31, 32)
+COUNTER_BITS = (8, 12, 15, 16, 20, 24, 31, 32, 40, 48)
+COUNTER_DIGITS = range(3, 13)
 """Widths of counters of time: where one begins anew, it falls by all but a step of its range."""
 
-PERIODS_S = {604_800.0: "week", 86_400.0: "day", 3600.0: "hour", 60.0: "minute", 1.0: "second"}
+DECIMALS = (1e-3, 1e-6)
+"""What a counter's count may have been multiplied by, to be a number with decimals."""
+
+PERIODS_S = {
+    604_800.0: "week",
+    86_400.0: "day",
+    43_200.0: "half day",
+    3600.0: "hour",
+    60.0: "minute",
+    1.0: "second",
+}
 """Clocks that show a part of the time begin anew with the next: of receivers the week, of loggers others."""
 
 SUMMER_S = 3600.0
@@ -80,19 +94,11 @@ class RideClock:
         self._same_kind(unit in EPOCHS, unit, table)
         if unit in EPOCHS:
             return self._since(np.asarray(raw), int(TIMES[unit.removeprefix("epoch_")][1]))
-        count = _counted_on(np.asarray(raw, dtype=np.float64), table, name, notes)
-        if unit == TICKS:
-            return count / float(part.tick_rate_hz or 1.0)
-        multiply, divide = TIMES[unit]
-        seconds = count if multiply == divide else count * multiply / divide
-        least, most = np.nanmin(seconds, initial=np.inf), np.nanmax(seconds, initial=-np.inf)
-        for period, word in PERIODS_S.items():
-            if not 0.0 <= least <= most <= period:
-                continue
-            whole = _over(period, seconds, table, notes, f"the seconds of the {word} begin anew")
-            if whole is not seconds:
-                return whole
-        return seconds
+        count = np.asarray(raw, dtype=np.float64)
+        multiply, divide = (1.0, float(part.tick_rate_hz or 1.0)) if unit == TICKS else TIMES[unit]
+        count = _counted_on(count, divide / multiply, table, name, notes)
+        _refuse_written_clock(count, file, f"{table}.{name}")
+        return count if multiply == divide else count * multiply / divide
 
     def _same_kind(self, dated: bool, unit: str, table: str) -> None:
         self._dated = dated if self._dated is None else self._dated
@@ -175,23 +181,88 @@ def _summer_begins(seconds: FloatArray, zero_s: float, table: str, notes: list[s
     return whole
 
 
-def _counted_on(count: FloatArray, table: str, name: str, notes: list[str]) -> FloatArray:
-    """A counter of time that goes on where it began anew; as it is, if it did not."""
-    step = np.diff(count)
+class _Period(NamedTuple):
+    """After how many counts a clock may begin anew, how it is told, and how many steps it may lose."""
+
+    size: float
+    words: str
+    lost: float
+
+
+def _periods(per_second: float, *, is_whole: bool) -> Iterator[_Period]:
+    """Periods of clocks that count so many in a second."""
+    for period, word in PERIODS_S.items():
+        yield _Period(period * per_second, f"the seconds of the {word} begin anew", 3.0)
+    scales = (1.0,) if is_whole else DECIMALS
+    for scale in scales:
+        for bits in COUNTER_BITS:
+            told = f"2^{bits}" if is_whole else f"2^{bits} x {scale:g}"
+            yield _Period(scale * 2.0**bits, f"begins anew after {told}", 20.0 if is_whole else 3.0)
+    for digits in COUNTER_DIGITS if is_whole else ():
+        yield _Period(10.0**digits, f"begins anew after 10^{digits}", 3.0)
+
+
+def _counted_on(count: FloatArray, per_second: float, table: str, name: str, notes: list[str]) -> FloatArray:
+    """A clock that goes on where it began anew: by that period that leaves the most even steps.
+
+    As it is, if it did not, or if it is that of no clock.
+    """
+    known = np.flatnonzero(np.isfinite(count))
+    values = count[known]
+    step = np.diff(values)
     back = np.flatnonzero(step < 0.0)
     if not len(back) or 3 * len(back) > len(step):
         return count
     usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
-    scales = (1.0,) if np.array_equal(count, np.rint(count)) else ()
-    for bits in COUNTER_BITS if scales else ():
-        modulus = float(2**bits)
-        after = step[back] + modulus
-        if count.max() < modulus and (after >= 0.0).all() and (after <= max(20.0 * usual, 1.0)).all():
-            whole = count.copy()
-            whole[1:] += modulus * np.cumsum(step < 0.0)
-            notes.append(f"{table}: {name} begins anew after 2^{bits}, {_times(len(back))}; its times go on")
-            return whole
-    return count
+    least, most = float(values.min()), float(values.max())
+    found: tuple[float, _Period] | None = None
+    for period in _periods(per_second, is_whole=bool(np.array_equal(values, np.rint(values)))):
+        if not (most <= period.size and least >= (-0.5 * period.size if "anew after" in period.words else 0)):
+            continue
+        after = step[back] + period.size
+        if (after < 0.0).any() or (after > max(period.lost * usual, 1.0 if period.lost > 3.0 else 0.0)).any():
+            continue
+        uneven = float(np.median(np.abs(after - usual)))
+        if found is None or uneven < 0.5 * found[0]:
+            found = uneven, period
+    if found is None:
+        return count
+    period = found[1]
+    whole = count.copy()
+    whole[known[1:]] += period.size * np.cumsum(step < 0.0)
+    if "anew after" in period.words:
+        notes.append(f"{table}: {name} {period.words}, {_times(len(back))}; its times go on")
+    else:
+        more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
+        when = f"{values[back[0]] / per_second:.6g} s"
+        notes.append(f"{table}: {period.words} at {when}{more}; its times go on")
+    return whole
+
+
+def _refuse_written_clock(count: FloatArray, file: str, field: str) -> None:
+    """Refuse clock times written as one number: from 115959 to 120000 is a second."""
+    values = count[np.isfinite(count)]
+    step = np.diff(values)
+    if len(step) < 3:
+        return
+    usual = float(np.median(step))
+    for unit in (1.0, 1e3, 1e6):
+        two = [np.floor(values / (unit * 100.0**place)) % 100.0 for place in range(2)]
+        if usual <= 0.0 or not all((part < 60.0).all() for part in two):
+            continue
+        odd = step[np.abs(step) > 3.0 * usual]
+        written = np.array([40.0, 4040.0, 764_040.0, -235_959.0]) * unit
+        near = np.abs(odd[:, None] - written).min(axis=1, initial=np.inf) <= unit + 3.0 * usual
+        if len(odd) and near.all() and usual <= 2.0 * unit:
+            raise InputError(
+                "holds clock times written as one number, whose minutes have 60 seconds and no hundred",
+                file=file,
+                field=field,
+                value=f"{float(values[0]):.12g}, as hours, minutes, seconds",
+                limit="a count that rises evenly",
+                remedy='write them with colons, e.g. 12:59:45.05, and set units.time = "iso"; or leave time '
+                "out and give rate_hz",
+            )
 
 
 def mended(
@@ -293,6 +364,18 @@ def _refuse_back(time: FloatArray, step: FloatArray, file: str, field: str) -> N
     back = np.flatnonzero(step < 0.0)
     first, size = int(back[0]), float(step[back[0]])
     usual = float(np.median(np.abs(step)))
+    again = time[back + 1]
+    if len(back) > 1 and 3 * len(back) <= len(step) and np.ptp(again) <= 2.0 * usual:
+        raise InputError(
+            f"has reversed time stamps at sample {first + 1}: the clock begins anew after some "
+            f"{usual - size:.6g} s, {len(back)} times, a period of no clock that is known",
+            file=file,
+            field=field,
+            value=f"{size:.9g} s after {time[first]:.9g} s",
+            limit="strictly increasing",
+            remedy="add that to all later stamps each time; or, if no samples are lost, leave time out and "
+            "give rate_hz",
+        )
     if len(back) <= 1 + FEW_STEPS_BACK * len(step) and -size > 5.0 * usual:
         more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
         raise InputError(
@@ -303,13 +386,20 @@ def _refuse_back(time: FloatArray, step: FloatArray, file: str, field: str) -> N
             limit="strictly increasing",
             remedy="cut the recording there; or, if no samples are lost, leave time out and give rate_hz",
         )
+    in_order = np.diff(np.sort(time))
+    remedy = "sort the samples by time"
+    if float(np.quantile(in_order, 0.9)) > 3.0 * float(np.median(in_order)):
+        remedy = (
+            "a counter that begins anew between two samples tells no time: leave time out and give rate_hz; "
+            "samples in disorder are to be sorted"
+        )
     raise InputError(
         f"has reversed time stamps at sample {first + 1} ({len(back)} steps back)",
         file=file,
         field=field,
         value=[float(time[first]), float(time[first + 1])],
         limit="strictly increasing",
-        remedy="sort the samples by time",
+        remedy=remedy,
     )
 
 

@@ -492,6 +492,10 @@ def _is_last(path: Path, layout: Layout, row: int) -> bool:
 
 
 def _remedy_of_word(word: str, decimal: str, in_first_line: bool) -> str:
+    if re.fullmatch(r"-?[1-9]\d{0,2}(['\u2019\u00a0\u202f ]\d{3})+([.,]\d*)?", word):
+        return "write numbers without separators of thousands"
+    if re.fullmatch(r"'.*'", word):
+        return "write numbers without quotes, or in double ones"
     if re.fullmatch(r"-?[1-9]\d{0,2}(,\d{3})+", word) and decimal == ".":
         return "write numbers without separators of thousands; or, if the comma is a decimal one, set decimal"
     if "," in word and decimal == ".":
