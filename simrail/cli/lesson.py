@@ -2,10 +2,9 @@
 
 import os
 import secrets
-import socket
 import subprocess
 import sys
-import time
+import threading
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +15,7 @@ from simrail.cli.options import DONE
 from simrail.core.atomic_files import write_whole
 from simrail.core.errors import InputError, did_you_mean, one_of
 from simrail.lessons import LESSONS, notebook, teacher_page
-from simrail.lessons.serve import free_port
+from simrail.lessons.serve import answers, free_port
 
 POLL_S = 0.1
 """Between two looks whether a server answers."""
@@ -84,29 +83,22 @@ def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
     # No question whether there is a newer marimo leaves the machine; and a folder `simrail` in this one, as
     # a checkout has it, is not what is imported.
     environment = {**os.environ, "MARIMO_SKIP_UPDATE_CHECK": "1", "PYTHONSAFEPATH": "1"}
-    with subprocess.Popen(command, env=environment) as server:
-        try:
-            if headless and port is not None and _answers(port, server):
-                print(f"serving {name} at http://127.0.0.1:{port}{key}", flush=True)
-            return server.wait() or DONE
-        except BaseException:
-            server.terminate()
-            raise
+    ended = threading.Event()
+    if headless and port is not None:
+        told = f"serving {name} at http://127.0.0.1:{port}{key}"
+        threading.Thread(target=_tell_once_served, args=(told, port, ended), daemon=True).start()
+    try:
+        return subprocess.call(command, env=environment) or DONE
+    finally:
+        ended.set()
 
 
-def _answers(port: int, server: "subprocess.Popen[bytes]") -> bool:
-    """Wait until a server answers; whether it does, or has ended before.
-
-    An address that is told too soon is refused to who opens it at once.
-    """
-    while server.poll() is None:
-        try:
-            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
-        except OSError:
-            time.sleep(POLL_S)
-        else:
-            return True
-    return False
+def _tell_once_served(told: str, port: int, ended: threading.Event) -> None:
+    """Print an address when its server answers: told too soon, it is refused to who opens it at once."""
+    while not answers(port):
+        if ended.wait(POLL_S):
+            return
+    print(told, flush=True)
 
 
 def own_copy(name: str) -> Path:

@@ -1,27 +1,30 @@
-"""What is told of a lesson's server, and when."""
+"""When a lesson's address is told."""
 
-import subprocess
-import sys
+import socket
+import threading
+import time
 
-from simrail.cli.lesson import _answers
+import pytest
+
+from simrail.cli.lesson import _tell_once_served
 from simrail.lessons.serve import free_port
 
-_LATE = """
-import socket, sys, time
-time.sleep(0.4)
-print("listens", flush=True)
-with socket.create_server(("127.0.0.1", int(sys.argv[1]))) as server:
-    server.accept()
-"""
+
+def test_an_address_is_told_when_the_server_answers_and_not_before(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    port, ended = free_port(), threading.Event()
+    teller = threading.Thread(target=_tell_once_served, args=("here", port, ended))
+    teller.start()
+    time.sleep(0.3)
+    assert capsys.readouterr().out == ""
+    with socket.create_server(("127.0.0.1", port)):
+        teller.join()
+    assert capsys.readouterr().out == "here\n"
 
 
-def test_an_address_is_told_only_when_the_server_answers() -> None:
-    port = free_port()
-    with subprocess.Popen([sys.executable, "-c", _LATE, str(port)], stdout=subprocess.PIPE) as server:
-        assert _answers(port, server)
-        assert server.stdout is not None and server.stdout.read() == b"listens\n"
-
-
-def test_a_server_that_ends_at_once_is_not_waited_for() -> None:
-    with subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"]) as server:
-        assert not _answers(free_port(), server)
+def test_a_server_that_ends_is_not_waited_for(capsys: pytest.CaptureFixture[str]) -> None:
+    ended = threading.Event()
+    ended.set()
+    _tell_once_served("here", free_port(), ended)
+    assert capsys.readouterr().out == ""

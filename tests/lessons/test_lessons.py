@@ -1,8 +1,10 @@
 """Lessons as scripts: their claims hold, and do not where what they speak of is made wrong."""
 
 import importlib.util
+import socket
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from types import ModuleType
 
@@ -12,6 +14,7 @@ import pytest
 from simrail.cli.main import call
 from simrail.lessons import LESSONS, notebook, teacher_page
 from simrail.lessons.claims import Claim, ClaimError, about, conclusion, insist, table
+from simrail.lessons.serve import free_port
 
 OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in LESSONS if name != "drift"]
 
@@ -131,10 +134,21 @@ def test_a_folder_of_the_same_name_is_not_what_a_lesson_imports(here, monkeypatc
     assert call(["lesson", "drift"]) == 0
 
 
-def test_an_edited_lesson_without_a_browser_asks_for_the_key_that_is_told(here, served, capsys):
-    assert call(["lesson", "slip", "--edit", "--headless", "--port", "8000"]) == 0
+def test_an_edited_lesson_without_a_browser_asks_for_the_key_that_is_told(here, monkeypatch, capsys):
+    served: list[list[str]] = []
+
+    def serves(command: list[str], **more: object) -> int:
+        served.append(command)
+        with socket.create_server(("127.0.0.1", port)) as server:
+            server.accept()
+            time.sleep(0.2)
+        return 0
+
+    port = free_port()
+    monkeypatch.setattr(subprocess, "call", serves)
+    assert call(["lesson", "slip", "--edit", "--headless", "--port", str(port)]) == 0
     key = served[-1][served[-1].index("--token-password") + 1]
-    assert f"http://127.0.0.1:8000?access_token={key}" in capsys.readouterr().out
+    assert f"http://127.0.0.1:{port}?access_token={key}" in capsys.readouterr().out
     assert len(key) > 10
 
 
