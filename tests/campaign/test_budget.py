@@ -117,6 +117,7 @@ def test_the_train_still_believes_its_sheets() -> None:
             assert not spared.imu.equals(whole.imu), term.name
 
 
+@pytest.mark.long
 def test_an_ekf_that_cannot_see_the_bias_errs_by_it() -> None:
     listed, parts = some_cells()
     budget = error_budget(listed[:4], parts, AttitudeEkf(), WANTED)

@@ -386,6 +386,7 @@ def test_a_clock_or_a_count_that_is_none_is_told_with_its_own_remedy(
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("plant", "said"),
     [
@@ -408,6 +409,7 @@ def test_two_decimals_of_g_are_enough(tmp_path: Path) -> None:
     check_plausible(with_odometry(read_signals(written(tmp_path, text)), "encoder"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "unit"), [(3.6, "km/h"), (2.236936, "miles an hour")])
 def test_a_speed_of_another_unit_is_named(factor: float, unit: str, sound: Recording, tmp_path: Path) -> None:
     frame = logged()

@@ -83,6 +83,7 @@ def test_a_late_gyro_and_a_late_encoder_are_told_apart(sound: Recording) -> None
     assert found == {"offset": pytest.approx(-0.5, abs=0.05), "gyro_offset": pytest.approx(1.0, abs=0.1)}
 
 
+@pytest.mark.long
 def test_where_speed_and_push_do_not_tell_a_late_gyro_from_another_place_both_are_said(
     sound: Recording,
 ) -> None:

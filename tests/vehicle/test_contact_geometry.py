@@ -202,6 +202,7 @@ def test_conicity_in_the_rigid_limit():
     assert conicity(table(53e3), 1e-3) < conicity(table(10e3), 1e-3) - 0.05
 
 
+@pytest.mark.long
 def test_rolling_radii_of_the_manchester_benchmark():
     # CONTACT case, zcp_w right minus left (mm) at lateral shifts of 1, 2, 3, 4 mm. CONTACT
     # reads the radius inside the deformed contact, which differs by some um between the sides.

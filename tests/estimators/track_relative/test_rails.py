@@ -25,6 +25,8 @@ from simrail.track.bands import BANDS, band_pass, sd_of_draws
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import LaidTrack, lay
 
+pytestmark = pytest.mark.long  # Its kernels take ten seconds to compile.
+
 SEEN = ("vertical_profile_m", "cross_level_m")
 
 
@@ -66,7 +68,7 @@ def rms(line: FloatArray) -> float:
     return float(np.sqrt(np.nanmean(line**2)))
 
 
-@pytest.mark.parametrize("direction", [1, pytest.param(-1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("direction", [1, -1])
 def test_waves_of_3_to_25_m_are_nearer_than_by_the_steps_of_the_smoother(
     rough: Callable, rails: Callable, kept: dict, direction: int
 ) -> None:
@@ -81,7 +83,7 @@ def test_waves_of_3_to_25_m_are_nearer_than_by_the_steps_of_the_smoother(
         assert fine < 0.35 * rms(in_band(truth[name], name)), name
 
 
-@pytest.mark.parametrize("direction", [1, pytest.param(-1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("direction", [1, -1])
 def test_draws_are_as_large_as_the_error(
     rough: Callable, rails: Callable, kept: dict, direction: int
 ) -> None:
@@ -103,7 +105,6 @@ def test_draws_are_as_large_as_the_error(
     assert (geometry[list(IRREGULARITY_SD[:3])] > 0.0).all().all()
 
 
-@pytest.mark.long
 def test_noise_that_the_sheet_does_not_have_shows(rough: Callable, rails: Callable) -> None:
     """Gyro x four times as noisy: the cross-level errs by more than the draws say."""
     recording = drawn(rough(0, 1))
@@ -139,7 +140,6 @@ def test_the_noise_is_that_of_the_sheet(rough: Callable) -> None:
         assert (one.waves.shaking == 0.0).all()
 
 
-@pytest.mark.long
 def test_draws_are_displaced_as_the_place_is_uncertain(rough: Callable, kept: dict) -> None:
     """By 5 cm against not at all: the slope of the rails times that, a normal number for each of 24 draws."""
     recording, estimate, _ = of(kept, rough, 1)

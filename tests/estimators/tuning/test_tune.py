@@ -155,6 +155,7 @@ def test_cml_recovers_the_noise_of_its_own_model() -> None:
     assert 0.0 < gain == pytest.approx(0.5 * squares, rel=0.2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", ["no_log", "sign", "no_rows"])
 def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without ln s, with its sign turned, or of the errors' number only, the optimum runs away."""
@@ -186,6 +187,7 @@ def test_the_true_noise_is_a_minimum_along_every_axis() -> None:
             assert goal.samples * (at(goal, other) - at_truth) > 0.5 * chi2.ppf(0.999, 1), name
 
 
+@pytest.mark.long
 def test_likelihoods_add_up(line_recording: Callable[..., Recording]) -> None:
     recording = line_recording(70.0, 1, 0)
     smoother = TrajectorySmoother()
@@ -392,6 +394,7 @@ def test_threads_do_not_matter_and_interrupted_is_resumed(ride: Recording, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
@@ -409,6 +412,7 @@ def test_bad_references(spoil: Callable, words: Sequence[str], ride: Recording) 
         assert word in str(caught.value)
 
 
+@pytest.mark.long
 def test_requests_that_mean_nothing(ride: Recording) -> None:
     smoother, straight = TrajectorySmoother(), piece(ride, 0, 100)
     with pytest.raises(InputError, match="nothing to tune on"):
