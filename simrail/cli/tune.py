@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from simrail.estimators.tuning.file import TuningResult
 
 
-METHODS = ("cml", "kom")
-"""By likelihood, and against known rails."""
-
 CONSTRAINED = {"y": ("y",), "z": ("z",), "yz": ("y", "z"), "none": ()}
 """Axes that are constrained, by the words of ``--constrain``."""
 
@@ -61,8 +58,7 @@ def tune(
         ),
     ] = None,
     draws: Annotated[
-        int,
-        typer.Option("--draws", metavar="N", min=1, help="Draws of each ride to fit on, new tracks first."),
+        int, typer.Option("--draws", metavar="N", help="Draws of each ride to fit on, new tracks first.")
     ] = 1,
     imu: Annotated[
         str | None, typer.Option("--imu", metavar="NAME", help="IMU of the scenario; the first if not given.")
@@ -118,14 +114,11 @@ def tune(
         ),
     ] = None,
     evaluations: Annotated[
-        int,
-        typer.Option("--evaluations", metavar="N", min=1, help="Of CMA-ES, before L-BFGS-B takes over."),
+        int, typer.Option("--evaluations", metavar="N", help="Of CMA-ES, before L-BFGS-B takes over.")
     ] = 480,
     at_most: Annotated[
         int | None,
-        typer.Option(
-            "--at-most", metavar="N", min=1, help="Evaluations after which the search ends as it is."
-        ),
+        typer.Option("--at-most", metavar="N", help="Evaluations after which the search ends as it is."),
     ] = None,
     seed: Seed = None,
     rides: Annotated[
@@ -143,10 +136,6 @@ def tune(
     ] = False,
 ) -> int:
     """Search an estimator's parameters, on a scenario's or recorded rides; the same command goes on."""
-    if constrain is not None:
-        one_of(constrain, CONSTRAINED, "no such constraint", field="--constrain")
-    if method is not None:
-        one_of(method, METHODS, "no such method", field="--method")
     from rich.console import Console
 
     from simrail.campaign.progress import ProgressWatcher
@@ -154,10 +143,12 @@ def tune(
     from simrail.cli.check_ride import is_ride
     from simrail.scenario.scenario import load_scenario
 
+    if constrain is not None:
+        one_of(constrain, CONSTRAINED, "no such constraint", field="--constrain")
     recorded = is_ride(scenario)
     if not recorded:
-        read = load_scenario(scenario, overrides=settings or [], seed=seed)
         estimator, method = _required("--estimator", estimator), _required("--method", method)
+        read = load_scenario(scenario, overrides=settings or [], seed=seed)
         file = out or Path(f"{read.name}_{method}.toml")
     else:
         method = "cml" if method is None else method

@@ -101,8 +101,6 @@ def test_usage_errors_are_bad_input_too(capsys: pytest.CaptureFixture[str]) -> N
             "--to: takes no such value; found '5000'; limit: ",
         ),
         (["vehicle", "x", "--to"], "'--to' requires an argument"),
-        (["tune", "x", "--evaluations", "0"], "--evaluations: takes no such value; found '0'"),
-        (["tune", "x", "--method", "both"], "--method: no such method; found 'both'; limit: one of cml, kom"),
         (["list", "nothing"], "found 'nothing'"),
         (["figure", "results", "--out", "a.pdf"], "--out: is for one figure, and none is named"),
         (["new", "estimator", "class"], "is no name for a file; found 'class'"),

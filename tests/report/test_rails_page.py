@@ -530,7 +530,7 @@ def test_the_first_metres_grow_with_the_track(ran: Ran, band: Band, first_m: flo
 
 
 def test_the_claim_names_the_first_metres_of_the_model(ran: Ran) -> None:
-    assert "over the first 2 m, against an sd of" in ran.page
+    assert "over the first 2\u00a0m, against an sd of" in ran.page
 
 
 def test_a_twin_without_figures_is_left_out(ran: Ran) -> None:

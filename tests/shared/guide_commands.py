@@ -89,6 +89,7 @@ ELSEWHERE = {
     "python -m simrail.lessons.notebooks.drift": "by tests/lessons",
     "python results/reference/make.py": "an hour",
     "python results/reference/track_relative.py results/track_relative": "of half an hour's results",
+    "python results/reference/track_relative.py DIR": "of half an hour's results",
     "python results/reference/track_relative_faults.py": "minutes",
     "python tests/statistics/across_machines.py": "minutes; tests/statistics run it",
     "python tests/statistics/soak.py": "an hour",
