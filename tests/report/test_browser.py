@@ -164,6 +164,8 @@ def test_an_estimate_is_explored(opened: Callable[..., Any], tmp_path: Path, exa
     assert len(set(zooms(page))) == 1 and zooms(page)[0][1] < 300.0
     page.locator("details.bibtex summary").first.click()
     page.get_by_role("button", name="copy").first.click()
+    # The page is told only later whether it may write to the clipboard.
+    page.wait_for_function("document.querySelector('details.bibtex button').textContent !== 'copy'")
     selected = page.evaluate("getSelection().toString()")
     copied = page.locator("details.bibtex button").first.inner_text()
     assert copied == "copied" or "@article{briales_2021," in selected
