@@ -45,9 +45,8 @@ def pooled(whole: pd.DataFrame) -> pd.DataFrame:
     rows = []
     held = whole[(whole["metric"] == "coverage95") & whole["value"].notna()]
     for key, group in held.groupby(["estimator", "quantity"], observed=True):
-        share = interval(group["value"], group["sample"])
-        low, high = max(share.low, 0.0), min(share.high, 1.0)
-        rows.append((*key, group["sample"].nunique(), len(group), share.value, low, high))
+        share = interval(group["value"], group["sample"]).within(0.0, 1.0)
+        rows.append((*key, group["sample"].nunique(), len(group), share.value, share.low, share.high))
     columns = ["estimator", "quantity", "samples", "recordings", "coverage95", "low", "high"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -59,11 +58,11 @@ def table_of(whole: pd.DataFrame) -> pd.DataFrame:
         errors = group[group["metric"] == "rms"]
         if errors.empty:
             continue
-        square = interval(errors["value"] ** 2, errors["sample"])
-        low, high = np.sqrt(np.maximum([square.low, square.high], 0.0))
+        square = interval(errors["value"] ** 2, errors["sample"]).within(0.0)
+        low, high = np.sqrt([square.low, square.high])
         told = group.groupby("metric", observed=True)["value"].mean()
         held = group[group["metric"] == "coverage95"]
-        share = interval(held["value"], held["sample"])
+        share = interval(held["value"], held["sample"]).within(0.0, 1.0)
         figures = {
             "rides": len(errors),
             "rms": np.sqrt(square.value),
@@ -71,7 +70,7 @@ def table_of(whole: pd.DataFrame) -> pd.DataFrame:
             "high": high,
             "p95": errors["value"].quantile(0.95),
         } | {name: told.get(name, np.nan) for name in TOLD}
-        figures |= {"coverage95_low": max(share.low, 0.0), "coverage95_high": min(share.high, 1.0)}
+        figures |= {"coverage95_low": share.low, "coverage95_high": share.high}
         rows.append(dict(zip(BY, key, strict=True)) | figures)
     return pd.DataFrame(rows)
 

@@ -310,7 +310,7 @@ class _Loop:
         elif not single:
             # One of them is enough to kill a worker: the others shall not fail with it. Each has two tries
             # more: the next worker may be killed by what is none of them, as a machine without memory does.
-            self.suspects.extend(_Batch(False, (cell,), max(1, _MOST_TRIES - 2)) for cell in batch.cells)
+            self.suspects.extend(_Batch(False, (cell,), _MOST_TRIES - 2) for cell in batch.cells)
         else:
             reason = "the worker died, killed or out of memory, each time this was run"
             self._keep(fail_batch(self.packed, batch.cells, reason))

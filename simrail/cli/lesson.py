@@ -15,10 +15,7 @@ from simrail.cli.options import DONE
 from simrail.core.atomic_files import write_whole
 from simrail.core.errors import InputError, did_you_mean, one_of
 from simrail.lessons import LESSONS, notebook, teacher_page
-from simrail.lessons.serve import answers, free_port
-
-POLL_S = 0.1
-"""Between two looks whether a server answers."""
+from simrail.lessons.serve import free_port, wait_for
 
 
 def lesson(
@@ -95,10 +92,8 @@ def serve(name: str, *, edit: bool, headless: bool, port: int | None) -> int:
 
 def _tell_once_served(told: str, port: int, ended: threading.Event) -> None:
     """Print an address when its server answers: told too soon, it is refused to who opens it at once."""
-    while not answers(port):
-        if ended.wait(POLL_S):
-            return
-    print(told, flush=True)
+    if wait_for(port, ended.is_set):
+        print(told, flush=True)
 
 
 def own_copy(name: str) -> Path:

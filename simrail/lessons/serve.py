@@ -13,8 +13,12 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+
+POLL_S = 0.02
+"""Between two looks whether a server answers."""
 
 LONGEST_WAIT_S = 60.0
 """For the server to answer; one that has not by then has nothing to be made ready for."""
@@ -28,6 +32,15 @@ def answers(port: int) -> bool:
     with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
         return True
     return False
+
+
+def wait_for(port: int, gives_up: Callable[[], bool]) -> bool:
+    """Wait until a server answers; whether it does, before ``gives_up`` says to wait no longer."""
+    while not answers(port):
+        if gives_up():
+            return False
+        time.sleep(POLL_S)
+    return True
 
 
 def load(notebook: Path) -> None:
@@ -45,10 +58,8 @@ def load(notebook: Path) -> None:
 def load_once_served(notebook: Path, port: int) -> None:
     """Wait for the server, then `load`: before, it would only make the server late."""
     until = time.monotonic() + LONGEST_WAIT_S
-    while not answers(port):
-        if time.monotonic() > until:
-            return
-        time.sleep(0.02)
+    if not wait_for(port, lambda: time.monotonic() > until):
+        return
     usual = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_S)
     gc.disable()  # of modules that stay nothing is garbage: to search them takes a tenth of the time

@@ -5,6 +5,7 @@ import pandas as pd
 
 from simrail.scoring import table
 from simrail.scoring.bootstrap import mean_interval
+from simrail.scoring.metrics import SHARES
 
 AGGREGATE_COLUMNS = ("value", "low95", "high95", "sd_sensor", "sd_track", "track_draws", "draws", "failed")
 """What `aggregate` says of a figure."""
@@ -12,9 +13,6 @@ AGGREGATE_COLUMNS = ("value", "low95", "high95", "sd_sensor", "sd_track", "track
 
 _SIGNED = ("mean", "final")
 """Metrics that may be negative; the interval of any other ends at 0."""
-
-_SHARES = (*(f"coverage{name}" for name in ("50", "90", "95", "99", "999")), "outside", "fault")
-"""Metrics whose interval ends at 1."""
 
 
 def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.DataFrame:
@@ -87,9 +85,7 @@ def aggregate(scores: pd.DataFrame, cells: pd.DataFrame | None = None) -> pd.Dat
     )
     result = result.reset_index()
     result["low95"] = result["low95"].clip(lower=0.0).where(~result["metric"].isin(_SIGNED), result["low95"])
-    result["high95"] = (
-        result["high95"].clip(upper=1.0).where(result["metric"].isin(_SHARES), result["high95"])
-    )
+    result["high95"] = result["high95"].clip(upper=1.0).where(result["metric"].isin(SHARES), result["high95"])
     return result
 
 

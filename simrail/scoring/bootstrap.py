@@ -14,7 +14,9 @@ Intervals are those of means; for other statistics of independent draws see `sci
 Resamples come from streams of their own names, so the same table gives the same intervals.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +45,12 @@ class Interval:
     value: float
     low: float
     high: float
+
+    def within(self, least: float = -math.inf, most: float = math.inf) -> Self:
+        """The same of what cannot be less or more, as an rms or a share."""
+        return replace(
+            self, low=float(np.clip(self.low, least, most)), high=float(np.clip(self.high, least, most))
+        )
 
 
 def resampled(clusters: int, *, resamples: int = RESAMPLES) -> FloatArray:

@@ -39,6 +39,9 @@ _QUANTILES = {
 _CONSISTENCY_METRICS = ("nees", *_QUANTILES)
 _BOUND_METRICS = ("bound", "outside", "fault")
 
+SHARES = (*_QUANTILES, "outside", "fault")
+"""Metrics between 0 and 1."""
+
 
 @dataclass(frozen=True)
 class Bounds:

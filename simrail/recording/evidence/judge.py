@@ -21,6 +21,7 @@ from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
     GYRO_Z,
     INDEX,
+    Motion,
     Ride,
     motion,
     ride_of,
@@ -78,8 +79,8 @@ KINDS = {
 """What is judged, in the order in which it is told; ``by`` is what it needs, one of them at least."""
 
 
-OF_GYRO = "imu.gyro.time_offset_s"
-"""Where the clock of a gyro is set right."""
+OF_GYRO, OF_ACCEL = "imu.gyro.time_offset_s", "imu.accel.time_offset_s"
+"""Where the clock of a gyro is set right, and that of an accelerometer."""
 
 ALIKE = ("gyro", "shift")
 """What a gyro that is late may look like on a ride that tells little."""
@@ -142,11 +143,7 @@ def weigh(recording: Recording) -> Evidence:
     is_accel = best is two and accel_is_apart(ride, two)
     told = two.by_gyro() if is_accel else best
     moved = motion(ride, best.x)
-    turn = (
-        np.abs(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps).mean()
-        * ride.block_s
-        * len(ride.measured)
-    )
+    turn, told_turn = _turn_of(ride, moved), _turn_of(ride, motion(ride, start_values()))
     push = np.abs(moved.acceleration_mps2).mean() * ride.block_s * len(ride.measured)
     has = {
         "turn": bool(turn > LEAST_TURN_RAD and best.explained[GYRO_Z] > FOLLOWED),
@@ -161,8 +158,8 @@ def weigh(recording: Recording) -> Evidence:
             lacking = {"turn": "no curve that the gyro follows", "push": "no change of speed"}
             why = "the ride has " + " and ".join(lacking[by] for by in kind.by)
             findings.append(_unjudged(key, best.sd(key) / kind.si, "nothing", why))
-            if key == "gyro" and turn > LEAST_TURN_RAD and _turned(ride) > SURE_TURN_RAD:
-                findings[-1] = _follows_nothing(findings[-1], float(best.explained[GYRO_Z]), ride)
+            if key == "gyro" and turn > LEAST_TURN_RAD and told_turn > SURE_TURN_RAD:
+                findings[-1] = _follows_nothing(findings[-1], best, told_turn, ride)
             continue
         if not kind.by:
             sources = ["gravity" + " and curves" * has["turn"]]
@@ -173,7 +170,7 @@ def weigh(recording: Recording) -> Evidence:
             finding = _beside_a_late_gyro(finding, two, slack[key])
         findings.append(finding)
     middle = ride.middle_s - float(ride.way.time_s[0])
-    return Evidence(tuple(findings), float(turn), float(push), middle)
+    return Evidence(tuple(findings), turn, float(push), middle)
 
 
 def _slack(ride: Ride, found: Fit) -> dict[str, float]:
@@ -234,21 +231,23 @@ def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Fi
     )
 
 
-def _turned(ride: Ride) -> float:
-    """Turn of the track on a ride, there and back counted, by what the ride file says of the way."""
-    moved = motion(ride, start_values())
+def _turn_of(ride: Ride, moved: Motion) -> float:
+    """Turn of the track on a ride that moved so, there and back counted, rad."""
     bend = ride.table.at(moved.place_m)[:, K3] * moved.speed_mps
     return float(np.abs(bend).mean() * ride.block_s * len(ride.measured))
 
 
-def _follows_nothing(finding: Finding, explained: float, ride: Ride) -> Finding:
-    """That of a gyro which the curves do not explain by any place, factor or clock."""
+def _follows_nothing(finding: Finding, best: Fit, told_turn: float, ride: Ride) -> Finding:
+    """That of a gyro which the curves do not explain by any place, factor or clock.
+
+    ``told_turn`` is that of the track by what the ride file says of the way, rad.
+    """
     return replace(
         finding,
-        value=max(explained, 0.0),
+        value=max(float(best.explained[GYRO_Z]), 0.0),
         name="share of the gyro's Z that the curves explain",
         sd=1.0 / math.sqrt(len(ride.measured)),
-        rests_on=f"{_turned(ride) / _DEG:.0f} deg of curves",
+        rests_on=f"{told_turn / _DEG:.0f} deg of curves",
         verdict="surely wrong",
         why=f"does not follow the curves of {ride.recording.track.name!r}, wherever they are begun",
         setting="",
@@ -273,7 +272,7 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
         apart, between = two.value("gyro_offset"), two.by_gyro().value("offset")
         is_known = abs(apart) > HINT * two.sd("gyro_offset")
         if finding.wrong and is_known and abs(between) < 0.5 * abs(apart):
-            other = f"{_late('accelerometer', -apart, 'gyro')}: set {OF_GYRO.replace('gyro', 'accel')}"
+            other = f"{_late('accelerometer', -apart, 'gyro')}: set {OF_ACCEL}"
             finding = replace(finding, remedy=other)
     elif finding.wrong and off < LIKELY:
         seconds = two.value("gyro_offset")
@@ -284,10 +283,9 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
 
 def _of_the_accelerometer(finding: Finding) -> Finding:
     """The finding of the gyro's clock as one of the accelerometer's, with which no other clock agrees."""
-    setting = OF_GYRO.replace("gyro", "accel")
     why = _late("accelerometer", finding.value, "gyro") if finding.wrong else ""
     name = "offset of the accelerometer's clock"
-    return replace(finding, name=name, why=why, setting=setting, field=setting)
+    return replace(finding, name=name, why=why, setting=OF_ACCEL, field=OF_ACCEL)
 
 
 def _unjudged(key: str, sd: float, rests_on: str, why: str) -> Finding:

@@ -112,7 +112,8 @@ def are_apart(ride: Ride, one: Fit, two: Fit) -> bool:
 
 def accel_is_apart(ride: Ride, two: Fit) -> bool:
     """Whether it is the accelerometer whose clock is apart: gyro and the device of the way have one."""
-    between = two.by_gyro().value("offset")
-    sd = two.by_gyro().sd("offset")
-    off = abs(two.value("offset")) / math.hypot(two.sd("offset"), clock_slack(ride))
-    return off > LIKELY and abs(between) < LIKELY * math.hypot(sd, clock_slack(ride))
+    off, between = (
+        abs(seen.value("offset")) / math.hypot(seen.sd("offset"), clock_slack(ride))
+        for seen in (two, two.by_gyro())
+    )
+    return off > LIKELY > between

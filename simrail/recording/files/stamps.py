@@ -150,11 +150,19 @@ def _over(period_s: float, seconds: FloatArray, table: str, notes: list[str], wh
     after = step[back] + period_s
     if not (usual > 0.0 and (after >= 0.0).all() and (after <= 3.0 * usual).all()):
         return seconds
-    whole = seconds.copy()
-    whole[known[1:]] += period_s * np.cumsum(step < 0.0)
-    more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
-    notes.append(f"{table}: {what} at {seconds[known[back[0]]]:.6g} s{more}; its times go on")
+    notes.append(f"{table}: {what} at {seconds[known[back[0]]]:.6g} s{_more(back)}; its times go on")
+    return _joined(seconds, known, period_s)
+
+
+def _joined(time: FloatArray, known: np.ndarray, size: float) -> FloatArray:
+    """Times that go on: by so much more after each of the known ones that is before the last."""
+    whole = time.copy()
+    whole[known[1:]] += size * np.cumsum(np.diff(time[known]) < 0.0)
     return whole
+
+
+def _more(back: np.ndarray) -> str:
+    return f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
 
 
 def _summer_begins(seconds: FloatArray, zero_s: float, table: str, notes: list[str]) -> FloatArray:
@@ -182,24 +190,49 @@ def _summer_begins(seconds: FloatArray, zero_s: float, table: str, notes: list[s
 
 
 class _Period(NamedTuple):
-    """After how many counts a clock may begin anew, how it is told, and how many steps it may lose."""
+    """What a clock or a counter begins anew after.
+
+    Attributes
+    ----------
+    size : float
+        So many counts.
+    words : str
+        How it is told.
+    is_clock : bool
+        Whether a part of the time begins anew, which is never below 0; else a counter does.
+    lost, slack : float
+        So many steps may be lost there, or so many counts.
+    """
 
     size: float
     words: str
-    lost: float
+    is_clock: bool = False
+    lost: float = 3.0
+    slack: float = 0.0
+
+    def has(self, least: float, most: float) -> bool:
+        """Whether it counts from the least to the most; a counter with a sign goes from minus a half."""
+        return most <= self.size and least >= (0.0 if self.is_clock else -0.5 * self.size)
+
+    def explains(self, back: FloatArray, usual: float) -> bool:
+        """Whether steps back are usual ones, but for what may be lost."""
+        after = back + self.size
+        return bool((after >= 0.0).all() and (after <= max(self.lost * usual, self.slack)).all())
 
 
 def _periods(per_second: float, *, is_whole: bool) -> Iterator[_Period]:
     """Periods of clocks that count so many in a second."""
     for period, word in PERIODS_S.items():
-        yield _Period(period * per_second, f"the seconds of the {word} begin anew", 3.0)
-    scales = (1.0,) if is_whole else DECIMALS
-    for scale in scales:
-        for bits in COUNTER_BITS:
-            told = f"2^{bits}" if is_whole else f"2^{bits} x {scale:g}"
-            yield _Period(scale * 2.0**bits, f"begins anew after {told}", 20.0 if is_whole else 3.0)
-    for digits in COUNTER_DIGITS if is_whole else ():
-        yield _Period(10.0**digits, f"begins anew after 10^{digits}", 3.0)
+        yield _Period(period * per_second, f"the seconds of the {word} begin anew", is_clock=True)
+    if not is_whole:
+        for scale in DECIMALS:
+            for bits in COUNTER_BITS:
+                yield _Period(scale * 2.0**bits, f"begins anew after 2^{bits} x {scale:g}")
+        return
+    for bits in COUNTER_BITS:
+        yield _Period(2.0**bits, f"begins anew after 2^{bits}", lost=20.0, slack=1.0)
+    for digits in COUNTER_DIGITS:
+        yield _Period(10.0**digits, f"begins anew after 10^{digits}")
 
 
 def _counted_on(count: FloatArray, per_second: float, table: str, name: str, notes: list[str]) -> FloatArray:
@@ -217,26 +250,20 @@ def _counted_on(count: FloatArray, per_second: float, table: str, name: str, not
     least, most = float(values.min()), float(values.max())
     found: tuple[float, _Period] | None = None
     for period in _periods(per_second, is_whole=bool(np.array_equal(values, np.rint(values)))):
-        if not (most <= period.size and least >= (-0.5 * period.size if "anew after" in period.words else 0)):
+        if not (period.has(least, most) and period.explains(step[back], usual)):
             continue
-        after = step[back] + period.size
-        if (after < 0.0).any() or (after > max(period.lost * usual, 1.0 if period.lost > 3.0 else 0.0)).any():
-            continue
-        uneven = float(np.median(np.abs(after - usual)))
+        uneven = float(np.median(np.abs(step[back] + period.size - usual)))
         if found is None or uneven < 0.5 * found[0]:
             found = uneven, period
     if found is None:
         return count
     period = found[1]
-    whole = count.copy()
-    whole[known[1:]] += period.size * np.cumsum(step < 0.0)
-    if "anew after" in period.words:
-        notes.append(f"{table}: {name} {period.words}, {_times(len(back))}; its times go on")
-    else:
-        more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
+    if period.is_clock:
         when = f"{values[back[0]] / per_second:.6g} s"
-        notes.append(f"{table}: {period.words} at {when}{more}; its times go on")
-    return whole
+        notes.append(f"{table}: {period.words} at {when}{_more(back)}; its times go on")
+    else:
+        notes.append(f"{table}: {name} {period.words}, {_times(len(back))}; its times go on")
+    return _joined(count, known, period.size)
 
 
 def _refuse_written_clock(count: FloatArray, file: str, field: str) -> None:
@@ -377,9 +404,8 @@ def _refuse_back(time: FloatArray, step: FloatArray, file: str, field: str) -> N
             "give rate_hz",
         )
     if len(back) <= 1 + FEW_STEPS_BACK * len(step) and -size > 5.0 * usual:
-        more = f" (and {len(back) - 1} more times)" if len(back) > 1 else ""
         raise InputError(
-            f"has reversed time stamps at sample {first + 1}: the clock jumps back{more}",
+            f"has reversed time stamps at sample {first + 1}: the clock jumps back{_more(back)}",
             file=file,
             field=field,
             value=f"{size:.9g} s after {time[first]:.9g} s",

@@ -441,10 +441,16 @@ def fitting_columns(labels: Sequence[str], width_in: float) -> int:
     return 1
 
 
-def fitting_words(labels: Sequence[str], width_in: float) -> list[str]:
-    """Labels of a legend of one column, in lines that fit into a width."""
-    letters = int((width_in * 72.0 / _RC["legend.fontsize"] - 4.2) / 0.6)
-    return [textwrap.fill(label, letters) for label in labels]
+def fitting_words(labels: Sequence[str], width_in: float) -> tuple[list[str], int, int]:
+    """Labels of a legend as they fit into a width, its columns, and its lines if it had one column.
+
+    Where there is room for one column only, long labels are broken.
+    """
+    columns, words = fitting_columns(labels, width_in), list(labels)
+    if columns == 1:
+        letters = int((width_in * 72.0 / _RC["legend.fontsize"] - 4.2) / 0.6)
+        words = [textwrap.fill(label, letters) for label in labels]
+    return words, columns, sum(label.count("\n") + 1 for label in words)
 
 
 LEGEND_ROW_IN = 0.184
@@ -489,11 +495,9 @@ def legend_above(*axes: Axes) -> None:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
     labels = sorted(by_label, key=lambda label: {"truth": 0, "design": 1}.get(label, 2))
-    columns = fitting_columns(labels, width_in() - LEFT_IN)
-    words = fitting_words(labels, width_in() - LEFT_IN) if columns == 1 else labels
+    words, columns, lines = fitting_words(labels, width_in() - LEFT_IN)
     figure = axes[0].get_figure(root=True)
     assert figure is not None
-    lines = sum(label.count("\n") + 1 for label in words)
     _make_room(figure, lines, columns, free_in=_free_above(figure))
     axes[0].legend(
         [by_label[label] for label in labels],
@@ -510,15 +514,12 @@ def figure_legend(
     figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left_in: float = LEFT_IN
 ) -> None:
     """Put a legend at the top of a figure."""
-    wide = width_in() - (0.0 if is_narrow() else left_in)
-    columns = fitting_columns(labels, wide)
-    labels = fitting_words(labels, wide) if columns == 1 else labels
+    words, columns, lines = fitting_words(labels, width_in() - (0.0 if is_narrow() else left_in))
     titles_in = 0.22 if any(axis.get_title(loc="left") for axis in figure.axes) else 0.0
-    lines = sum(label.count("\n") + 1 for label in labels) if columns == 1 else len(labels)
     _make_room(figure, lines, columns, free_in=_free_above(figure) - titles_in)
     figure.legend(
         handles,
-        labels,
+        words,
         loc="upper left",
         bbox_to_anchor=((0.0 if is_narrow() else left_in / WIDE_IN - 0.01), 1.0),
         ncols=columns,

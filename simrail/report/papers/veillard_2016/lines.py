@@ -72,7 +72,8 @@ class Draws(NamedTuple):
     def mean(self) -> tuple[float, float, float]:
         """Mean over lines and devices with the ends of its 95 % interval, of which lines are the clusters."""
         found = interval(self.values, self.lines)
-        return found.value, max(found.low, 0.0) if self.is_size else found.low, found.high
+        found = found.within(0.0) if self.is_size else found
+        return found.value, found.low, found.high
 
     def by_line(self) -> FloatArray:
         """Mean over the devices, line by line."""
