@@ -117,9 +117,9 @@ HOLD_S = 2.0
 """After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
 
 
-WHEELSET_TREAD = 0.6
-"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: its taper steers it back
-to the middle of the track."""
+WHEELSET_SHARE = 0.35
+"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: what one of its wheels gains
+by a shift to the side the other loses, and its taper steers it back."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -138,7 +138,7 @@ class CurveMatchedOdometry:
     tread_sd, tread_length_m : float
         Relative standard deviation of the rolling radius about its mean, and over what distance it
         changes: 0.1 to 0.35 % are the taper's share on 5 mm of lateral play. Of a free wheel, or where no
-        drawing says; on a wheelset less (`WHEELSET_TREAD`).
+        drawing says; on a wheelset less (`WHEELSET_SHARE`).
     flange_sd : float
         Standard deviation of `left` and `right`. In a curve a wheel rolls on its flange root, some 4 mm
         further out than at its tape circle, or not: 1.5 % of a wheel of 0.29 m, 0.9 % of one of 0.46 m.
@@ -364,7 +364,7 @@ class CurveMatchedOdometry:
             # Of a Markov process that wanders by its bias instability within some 300 s.
             "drift_walk_rad2ps3": 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 1e-16,
             "gyro_scale": sheet.gyro_scale_error / math.sqrt(3.0),
-            "tread_sd": self.tread_sd * tread_share(recording),
+            "tread_sd": self.tread_sd * rolling_share(recording),
             "sway_sd_rad": sway_sd_of(yaw, turn),
             "sway_length_m": yaw.sway_length_m,
             "turn_rad": turn,
@@ -400,8 +400,8 @@ class CurveMatchedOdometry:
         sd[V] = speed_sd
         sd[WAY] = pulse / math.sqrt(12.0)
         sd[SCALE] = 0.0 if wheel is None else wheel.radius_relative_sd
-        sd[TREAD] = self.tread_sd * tread_share(recording)
-        sd[LEFT] = sd[RIGHT] = self.flange_sd
+        sd[TREAD] = self.tread_sd * rolling_share(recording)
+        sd[LEFT] = sd[RIGHT] = self.flange_sd * rolling_share(recording)
         sd[PUSH] = math.hypot(sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0), self.push_sd_mps2)
         sd[SQUAT] = self.squat_sd
         sd[LEAD] = yaw.lead_sd_m
@@ -474,11 +474,11 @@ def wheel_ahead(recording: Recording) -> float:
     return at[axle] - at[recording.mount_body] - recording.mount_position_m[0]
 
 
-def tread_share(recording: Recording) -> float:
-    """How much the encoder's wheel wanders off its tape circle, of what a free wheel does."""
+def rolling_share(recording: Recording) -> float:
+    """How much the encoder's rolling radius wanders, of what that of a free wheel does."""
     sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
     axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
-    return WHEELSET_TREAD if axle is not None and axle.wheelset else 1.0
+    return WHEELSET_SHARE if axle is not None and axle.wheelset else 1.0
 
 
 def _acceleration_of(

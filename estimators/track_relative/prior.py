@@ -8,7 +8,7 @@ import math
 from collections.abc import Collection
 
 import numpy as np
-from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, first_speed
+from simrail.estimators.odometry.curve_matched import CurveMatchedOdometry, first_speed, rolling_share
 from simrail.estimators.odometry.moving_start import ACCELERATION_SD_MPS2
 from simrail.estimators.odometry.pointing import chainage_sd, chord_of, lag_of, pointing_of
 from simrail.estimators.track_relative import states as at
@@ -87,7 +87,7 @@ def noise_of(recording: Recording, motion: Motion, without: Collection[str] = ()
         sway_hz=motion.sway_hz,
         damping=motion.damping,
         jerk=JERK_M2PS5,
-        tread_sd=method.tread_sd,
+        tread_sd=method.tread_sd * rolling_share(recording),
         tread_length=method.tread_length_m,
         lag_walk=0.0 if "lag" in without else pointing_of(recording, chord_of(recording)).lag_walk_m,
         gyro_walk=0.0 if "gyro_bias" in without else _walk(sheet, "gyro"),
@@ -177,7 +177,9 @@ def _train_sds(sd: FloatArray, recording: Recording, motion: Motion) -> None:
     scaled = recording.odometer_sheet if wheel is None else wheel
     if wheel is not None:
         sd[at.WAY] = wheel.pulse_m
-        sd[at.TREAD], sd[at.LEFT], sd[at.RIGHT] = method.tread_sd, method.flange_sd, method.flange_sd
+        share = rolling_share(recording)
+        sd[at.TREAD] = share * method.tread_sd
+        sd[at.LEFT] = sd[at.RIGHT] = share * method.flange_sd
     if scaled is not None:
         sd[at.SCALE] = math.hypot(scaled.radius_relative_sd, errors.chainage_scale_sd)
     sd[at.HEADING] = heading_sd(recording)
