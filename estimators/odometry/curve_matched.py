@@ -117,9 +117,9 @@ HOLD_S = 2.0
 """After a slip the acceleration of the wheel is not believed for so long: its filter still remembers it."""
 
 
-WHEELSET_SHARE = 0.35
-"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: what one of its wheels gains
-by a shift to the side the other loses, and its taper steers it back."""
+WHEELSET_SHARE = 0.4
+"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: what one of its wheels
+gains by a shift to the side the other loses, and its taper steers it back."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""

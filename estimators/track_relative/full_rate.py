@@ -161,6 +161,18 @@ def found_before(recording: Recording, trace: Trace) -> FloatArray:
     return _at_samples(recording, trace, found)
 
 
+def beside_rails(recording: Recording, trace: Trace) -> FloatArray:
+    """Roll at the samples (n,), rad, that is not the rails' (all but `Pose.level`).
+
+    Cant that the map has not is no irregularity. What of it the smoother finds is taken off, and how sure it
+    is of the rest is in the last of its outputs.
+    """
+    course, x = trace.course, [Dual(column) for column in trace.states.T]
+    ground = ground_at(recording, course.lines, trace.states[:, at.S])
+    pose = pose_of(x, ground, course.around, deviation_of(x, ground, course.around))
+    return _at_samples(recording, trace, (pose.rho[0] - pose.level).value)
+
+
 def _at_samples(recording: Recording, trace: Trace, values: FloatArray) -> FloatArray:
     """Values at the smoother's steps, at the IMU's samples; beyond the ends as there."""
     known = trace.course.steps.time_s

@@ -61,8 +61,8 @@ from simrail.core.jit import FloatArray, IntArray, njit, njit_borrowed
 SEGMENT = 256
 """Steps between two that the filter keeps."""
 
-OUTPUTS = 7
-"""Roll, pitch, yaw, place, speed, y, z."""
+OUTPUTS = 8
+"""Roll, pitch, yaw, place, speed, y, z; and the roll that is the rails'."""
 
 INTO = (WAY, WAY, WAY, WAY, WAY, WAY, HEADING, HEADING, HEADING, S, S, V, ROLL_SLOW)
 ORIGIN = (V, A, SCALE, TREAD, LEFT, RIGHT, CURVE, EVEN, ODD, V, A, A, ROLL)
@@ -453,7 +453,7 @@ def run_segment(
 
 @njit_borrowed
 def say(p: FloatArray, columns: IntArray, rows: FloatArray, out: FloatArray) -> None:
-    """Covariance (7, 7) of the outputs of which the rows are sparse."""
+    """Covariance (8, 8) of the outputs of which the rows are sparse."""
     for a in range(OUTPUTS):
         for b in range(a, OUTPUTS):
             total = 0.0

@@ -85,15 +85,16 @@ def lines_of(recording: Recording) -> Lines:
     places = np.minimum(track.start_m + np.arange(len(table)) / PLACES_PER_M, track.end_m)
     under = track.frame(places)
     borne = _roll_over_chord(recording, places)
+    askew = _turns(under, np.column_stack([borne - under.roll_rad, pitch - under.pitch_rad, heading_askew]))
     ramp = even + odd
     in_transition = np.abs(even) + np.abs(odd) > NO_RAMP_1PM2
     share = np.where(in_transition, even / np.where(ramp == 0.0, 1.0, ramp), 0.0)
     roll_slope = np.where(in_transition, under.rates[:, 0], 0.0)
     return Lines(
         places=places,
-        askew_roll=borne - under.roll_rad,
-        askew_pitch=pitch - under.pitch_rad,
-        askew_yaw=heading_askew,
+        askew_roll=askew[:, 0],
+        askew_pitch=askew[:, 1],
+        askew_yaw=askew[:, 2],
         bend=_eased(table[:, 1]),
         lean=_eased(borne),
         dip=_eased(np.gradient(pitch, places)),
@@ -107,6 +108,17 @@ def lines_of(recording: Recording) -> Lines:
         curve=curve,
         vertical=(np.abs(under.rates[:, 1]) > LEVEL_1PM).astype(np.float64),
     )
+
+
+def _turns(frame: TrackFrame, angles: FloatArray) -> FloatArray:
+    """Small turns (m, 3) about the axes of the track, of small differences of roll, pitch and yaw.
+
+    A body that lies along a chord of canted track is level, where the track beside its middle is not: it is
+    pitched in it by the yaw between them times the roll.
+    """
+    sr, cr, sp, cp = (f(a) for a in (frame.roll_rad, frame.pitch_rad) for f in (np.sin, np.cos))
+    roll, pitch, yaw = angles.T
+    return np.column_stack([roll - sp * yaw, cr * pitch + cp * sr * yaw, cp * cr * yaw - sr * pitch])
 
 
 def _eased(values: FloatArray) -> FloatArray:

@@ -46,6 +46,8 @@ class Around(NamedTuple):
         The derivative of the roll is by time, not by distance: a body that sways.
     slow_m : float
         Way in which ROLL_SLOW follows ROLL.
+    sees_rails : bool
+        There is a rail sensor.
     """
 
     states: FloatArray
@@ -55,6 +57,7 @@ class Around(NamedTuple):
     gravity: float
     in_time: bool
     slow_m: float
+    sees_rails: bool
 
 
 class Deviation(NamedTuple):
@@ -85,12 +88,16 @@ class Pose(NamedTuple):
     ----------
     rho, rho_rate : Vector
         Small turn out of the map's track, and its rate.
+    level : Dual
+        Its roll by the rails: without the cant that the map has not, and without what it leans on springs and
+        in a chord, unless it sees the rails, which leans with it.
     y, y_rate, y_rate_2, z, z_rate, z_rate_2 : Dual
         Place of the mount in the track, and its derivatives by time.
     """
 
     rho: Vector
     rho_rate: Vector
+    level: Dual
     y: Dual
     y_rate: Dual
     y_rate_2: Dual
@@ -137,8 +144,9 @@ def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> 
         rolls = (rolls - roll * (1.0 / around.slow_m)) * run
     tilt = x[at.TILT] * track.q + x[at.TILT_RATE] * track.q_rate
     tilt_rate = x[at.TILT] * track.q_rate + x[at.TILT_RATE] * track.q_rate_2
+    beside = tilt + x[at.TORSION] * ground.torsion[0] + ground.askew[0]
     rho = (
-        roll + tilt + track.cant + x[at.TORSION] * ground.torsion[0] + ground.askew[0],
+        roll + beside + track.cant,
         x[at.PITCH] + x[at.SQUAT] * a * (1.0 / g) + lead * ground.dip[0] + x[at.SLOPE] + ground.askew[1],
         x[at.YAW] + lag * ground.bend[0] + ground.askew[2],
     )
@@ -159,6 +167,7 @@ def pose_of(x: list[Dual], ground: Ground, around: Around, track: Deviation) -> 
     return Pose(
         rho=rho,
         rho_rate=rho_rate,
+        level=roll + beside if around.sees_rails else roll,
         y=around.nominal[0] + x[at.Y] + x[at.Y_TILT] * track.q + x[at.Y_BEND] * ground.bend[0],
         y_rate=x[at.Y_1] * run + x[at.Y_TILT] * track.q_rate + x[at.Y_BEND] * v * ground.bend[1],
         y_rate_2=x[at.Y_2] * own
@@ -223,10 +232,11 @@ def _felt(
 
 
 def told(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
-    """What the estimate says: turn of the body out of the map's track (three), S, V, y and z.
+    """What the estimate says: turn of the body out of the map's track (three), S, V, y, z, and roll.
 
     The slopes are those of roll, pitch and yaw of the body, in which the map is read at S and turned by
-    HEADING.
+    HEADING. The last is the roll that is the rails' (`Pose.level`): the track is taken off where the train
+    is, so that the place has no share in it.
     """
     pose = pose_of(x, ground, around, deviation_of(x, ground, around))
     here = x[at.S] - around.states[:, at.S]
@@ -239,4 +249,5 @@ def told(x: list[Dual], ground: Ground, around: Around) -> list[Dual]:
         x[at.V],
         pose.y,
         pose.z,
+        pose.level,
     ]

@@ -169,6 +169,7 @@ def course_of(
         recording.gravity_mps2,
         motion.sway_hz > 0.0,
         slow_m_of(recording),
+        recording.rail_displacement is not None,
     )
     each = [kind.rows(recording, steps) for kind in aiding]
     none = np.empty((len(steps.time_s), 0))

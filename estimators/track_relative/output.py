@@ -33,7 +33,7 @@ from simrail.core.jit import FloatArray, IntArray
 from simrail.core.rotation import euler_angles, rotation_matrix
 
 SD_COLUMNS = (*ATTITUDE_SD, "position_sd_m", "speed_sd_mps", *RELATIVE_POSITION_SD)
-"""Standard deviations, in the order of the kernel's outputs."""
+"""Standard deviations, in the order of the kernel's outputs: the first of them."""
 
 MOST_STEPS_AHEAD = 2.0
 """The filter does not go on from a step for longer than this: the last one of a ride may be a gap ago."""
@@ -51,8 +51,8 @@ class Trace(NamedTuple):
     course : Course
         About which the last pass was linearised.
     states : ndarray (n, 52)
-    covariance : ndarray (n, 7, 7)
-        Of roll, pitch, yaw, S, V, y and z.
+    covariance : ndarray (n, 8, 8)
+        Of roll, pitch, yaw, S, V, y, z, and the roll that is the rails'.
     surprises : ndarray (n, m)
         Innovations of the filter over their standard deviations, the IMU's six first;
         NaN for a measurement that was not made.
@@ -131,8 +131,9 @@ def _between_steps(trace: Trace) -> Look:
 
 
 def _sds(trace: Trace) -> FloatArray:
-    """Standard deviations (n, 7) of the outputs."""
-    return np.asarray(np.sqrt(np.maximum(np.diagonal(trace.covariance, axis1=1, axis2=2), 0.0)))
+    """Standard deviations (n, 7) of what is in `SD_COLUMNS`."""
+    variances = np.diagonal(trace.covariance, axis1=1, axis2=2)[:, : len(SD_COLUMNS)]
+    return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 def innovations_of(trace: Trace) -> pd.DataFrame:
@@ -162,7 +163,7 @@ def _found(course: Course, states: FloatArray, around: Around) -> tuple[FloatArr
 
 
 def _before(course: Course) -> tuple[FloatArray, FloatArray]:
-    """What is known before the ride, (1, 9), and the standard deviations of the outputs, (1, 7)."""
+    """What is known before the ride, (1, 9), and the standard deviations of `SD_COLUMNS`, (1, 7)."""
     states = course.start[None, :]
     around = course.around._replace(states=states, jerk=np.zeros(1), sense=np.ones(1))
     values, _ = _found(course, states, around)
@@ -171,7 +172,7 @@ def _before(course: Course) -> tuple[FloatArray, FloatArray]:
     outputs = np.zeros((len(columns), at.STATES))
     np.add.at(outputs, (np.arange(len(columns))[:, None], columns), rows[0])
     covariance = outputs @ course.start_covariance[:, : at.STATES] @ outputs.T
-    return values, np.sqrt(np.diagonal(covariance))[None, :]
+    return values, np.sqrt(np.diagonal(covariance))[None, : len(SD_COLUMNS)]
 
 
 def _attitude(course: Course, values: FloatArray) -> FloatArray:

@@ -8,6 +8,9 @@ rails are:
   (`simrail.estimators.track_relative.under_frame`);
 * with a rail sensor, and on a mount of any other kind: as by the body itself.
 
+The map errs in its cant. What of that the smoother finds is no irregularity and is taken off, as is what a
+body leans on cant deficiency; how sure it is of the rest is its sd of the roll by the rails.
+
 The alignment is that of the mount, which a wheelset's play between the rails keeps from being theirs: white
 motion to the side (`ASIDE_MPS2`) stands for it.
 """
@@ -23,6 +26,7 @@ from simrail.estimators.track_relative.full_rate import (
     Chain,
     Held,
     Waviness,
+    beside_rails,
     error_of,
     found,
     found_before,
@@ -31,9 +35,11 @@ from simrail.estimators.track_relative.full_rate import (
     nod_of,
     side_of,
 )
+from simrail.estimators.track_relative.kernel import OUTPUTS
 from simrail.estimators.track_relative.line import Lines
 from simrail.estimators.track_relative.noise import AXLE, FRAME, class_of, scale_of
 from simrail.estimators.track_relative.output import Trace
+from simrail.estimators.track_relative.states import ROLL, ROLL_SLOW
 from simrail.estimators.track_relative.suspension import bogie_of
 from simrail.estimators.track_relative.under_frame import Under, draw_under, rails_under
 from simrail.estimators.trajectory.draws import stream_of
@@ -66,6 +72,9 @@ the order of the irregularities; what simulated ones leave of waves of 3 to 25 m
 
 ASIDE_MPS2 = {AXLE: 0.18, FRAME: 0.22}
 """Motion to the side that is none of the rails, as in `side_of`; synthetic, of a metro's simulated bogies."""
+
+LEVEL = OUTPUTS - 1
+"""Of the outputs, the roll that is the rails'."""
 
 SLOW_LENGTH_M = 15.0
 """Of the two filters through which white noise becomes the error of a roll that is held."""
@@ -118,8 +127,11 @@ def rails_of(
         own states have it, and no draws.
     """
     kind, scale = class_of(recording), scale_of(recording)
-    if kind not in (AXLE, FRAME) or len(trace.states) < LEAST_STEPS:
+    if len(trace.states) < LEAST_STEPS:
         return replace(estimate, geometry=geometry_of(sight_of(estimate, recording), step_m=step_m))
+    if kind not in (AXLE, FRAME):
+        seen = sight_of(replace(estimate, states=_on_springs(recording, trace, estimate)), recording)
+        return replace(estimate, geometry=geometry_of(seen, step_m=step_m))
     sheet, bogie = recording.vehicle_sheet, None
     if kind is FRAME and scale == 1.0 and sheet is not None and recording.rail_displacement is None:
         bogie = bogie_of(sheet, recording.mount_body)
@@ -173,8 +185,7 @@ def _seen_from(
     recording: Recording, trace: Trace, estimate: Estimate, motions: Motions
 ) -> tuple[Sight, FloatArray]:
     """Rails by the body as it moves at full rate, and the variance (n,) of the roll that is held."""
-    names = [*ATTITUDE, *RELATIVE_POSITION, "position_m", "position_sd_m", "roll_sd_rad"]
-    states, before = estimate.states[names].copy(), found_before(recording, trace)
+    states, before = _by_rails(recording, trace, estimate), found_before(recording, trace)
     for name, values, old in (
         ("roll_rad", motions.values["side"][:, 0], before[:, 0]),
         ("lateral_m", motions.values["across"][:, 1], before[:, 1]),
@@ -187,6 +198,29 @@ def _seen_from(
     states["roll_sd_rad"] = np.sqrt(fast + slow)
     states[list(RELATIVE_POSITION_SD)] = np.sqrt(np.column_stack(variances))
     return sight_of(replace(estimate, states=states), recording), slow
+
+
+def _by_rails(recording: Recording, trace: Trace, estimate: Estimate) -> pd.DataFrame:
+    """States of which the roll is that of the rails, and its sd."""
+    names = [*ATTITUDE, *RELATIVE_POSITION, *RELATIVE_POSITION_SD, "position_m", "position_sd_m"]
+    states = estimate.states[names].copy()
+    states["roll_rad"] -= beside_rails(recording, trace)
+    time, at_s = recording.imu.index.to_numpy(dtype=np.float64), trace.course.steps.time_s
+    states["roll_sd_rad"] = np.sqrt(np.interp(time, at_s, np.maximum(trace.covariance[:, LEVEL, LEVEL], 0.0)))
+    return states
+
+
+def _on_springs(recording: Recording, trace: Trace, estimate: Estimate) -> pd.DataFrame:
+    """States of a body that passes for its rails.
+
+    How it rolls on its springs is all that it shows, and the rails under it may do something else.
+    """
+    states = _by_rails(recording, trace, estimate)
+    if recording.rail_displacement is None:
+        steady = 0.0 if trace.course.around.in_time else trace.states[:, ROLL_SLOW]
+        sways = float(np.square(trace.states[:, ROLL] - steady).mean())
+        states["roll_sd_rad"] = np.sqrt(np.square(states["roll_sd_rad"]) + sways + AXLE.roll_sd**2)
+    return states
 
 
 def _frame_motion(values: dict[str, FloatArray]) -> FloatArray:

@@ -164,7 +164,7 @@ def rails_under(
     others = [changed(bogie, names, CHANGE) for names in UNCERTAIN]
     table = _axles(ride, [bogie, *others], whole, forced)
     slopes = (table[1:] - table[0]) / CHANGE
-    mean = table[0, :, 2] + ride.base * _over_places(ride, ride.place, held.cant[:, None])[:, 0]
+    mean = table[0, :, 2]
     k = 2.0 * np.pi * rfftfreq(_periodic_length(ride), ride.step)
     passed, rails = _passed(bogie, k), _spectrum_of_rails(ride, bogie, mean)
     seen = np.abs(passed) ** 2 * rails + MEAN_LEVEL_M3
