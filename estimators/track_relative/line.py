@@ -86,6 +86,8 @@ def lines_of(recording: Recording) -> Lines:
     under = track.frame(places)
     borne = _roll_over_chord(recording, places)
     askew = _turns(under, np.column_stack([borne - under.roll_rad, pitch - under.pitch_rad, heading_askew]))
+    if not _is_borne(recording):
+        askew[:, 0] = 0.0  # an axle lies across both rails, however it is yawed on them
     ramp = even + odd
     in_transition = np.abs(even) + np.abs(odd) > NO_RAMP_1PM2
     share = np.where(in_transition, even / np.where(ramp == 0.0, 1.0, ramp), 0.0)
@@ -125,14 +127,20 @@ def _eased(values: FloatArray) -> FloatArray:
     return np.asarray(ndimage.gaussian_filter1d(values, EASE_M * PLACES_PER_M, mode="nearest"))
 
 
+def _is_borne(recording: Recording) -> bool:
+    """Whether other bodies bear the mount's, by the drawing."""
+    sheet = recording.vehicle_sheet
+    here = None if sheet is None else sheet.body(recording.mount_body)
+    return here is not None and len(here.supports) > 0
+
+
 def _roll_over_chord(recording: Recording, places: FloatArray) -> FloatArray:
     """Roll of the track under a body: the mean of those under the two ends of its chord.
 
     An axle rolls with the track where it is, though its frame points it along a chord.
     """
-    chord, sheet = chord_of(recording), recording.vehicle_sheet
-    here = None if sheet is None else sheet.body(recording.mount_body)
-    if chord is None or here is None or not here.supports:
+    chord = chord_of(recording)
+    if chord is None or not _is_borne(recording):
         return recording.track.frame(places).roll_rad
     return _mean_roll(recording, places, chord, recording.mount_position_m[0])
 

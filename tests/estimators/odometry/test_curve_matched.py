@@ -18,6 +18,7 @@ from simrail.estimators.odometry.kernel import (
     LEAD,
     LEFT,
     ODD,
+    RIGHT,
     SCALE,
     STATES,
     SWAY,
@@ -651,13 +652,15 @@ def test_where_the_wheel_is():
     assert wheel_ahead(replace(recording, vehicle_sheet=None)) == 0.0
 
 
-@pytest.mark.parametrize(("wheelset", "share"), [(True, 0.6), (False, 1.0), (None, 1.0)])
+@pytest.mark.parametrize(("wheelset", "share"), [(True, 0.4), (False, 1.0), (None, 1.0)])
 def test_a_wheelset_wanders_less(wheelset: bool | None, share: float):
     """By the drawing's word on the encoder's axle; unknown, it may be free."""
     recording = record_fast(0, 0)
     sheet = recording.vehicle_sheet
     bodies = tuple(replace(b, wheelset=wheelset) if b.name == "rear" else b for b in sheet.bodies)
     told = replace(recording, vehicle_sheet=replace(sheet, bodies=bodies))
-    method, chord = CurveMatchedOdometry(tread_sd=0.001), sheet.chord("front")
+    method, chord = CurveMatchedOdometry(tread_sd=0.001, flange_sd=0.002), sheet.chord("front")
     assert method._model(told, 2e-3, YAW_OF_AXLE).tread_sd == pytest.approx(0.001 * share)
-    assert method._start(told, 2e-3, chord, YAW_OF_AXLE)[1][TREAD, TREAD] == pytest.approx(1e-6 * share**2)
+    covariance = method._start(told, 2e-3, chord, YAW_OF_AXLE)[1]
+    assert covariance[TREAD, TREAD] == pytest.approx(1e-6 * share**2)
+    assert covariance[LEFT, LEFT] == covariance[RIGHT, RIGHT] == pytest.approx(4e-6 * share**2)

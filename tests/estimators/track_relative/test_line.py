@@ -9,6 +9,7 @@ import pytest
 from simrail.estimators.track_relative.line import ground_at, lines_of, numbers_at
 
 from simrail.core.jit import FloatArray
+from simrail.core.rotation import rotation_matrix
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.vehicle_sheet import SheetBody, Support, VehicleSheet
 from simrail.track.alignment import element_starts
@@ -62,20 +63,35 @@ def test_a_body_on_two_axles_is_askew_as_its_chord_says(exact_bend: Recording) -
     lines, track = lines_of(recording), recording.track
     middle = 0.5 - 2.5
     here = at(recording, 130.0)
-    assert lines.askew_yaw[here] == pytest.approx(middle / 250.0, rel=1e-3)
+    assert lines.askew_yaw[here] == pytest.approx(middle / 250.0, rel=1e-2)
     assert lines.bend[here] == pytest.approx(1.0 / 250.0, rel=1e-9)
     # It rolls with the mean of the track under its axles.
     for place in (65.0, 80.0, 130.0):
-        ends = track.frame(np.array([place + middle - 4.5, place, place + middle + 4.5])).roll_rad
+        under = track.frame(np.array([place + middle - 4.5, place, place + middle + 4.5]))
+        ends, turned = under.roll_rad, lines.askew_yaw[at(recording, place)] * np.sin(under.pitch_rad[1])
         roll = lines.askew_roll[at(recording, place)]
-        assert roll == pytest.approx(0.5 * (ends[0] + ends[2]) - ends[1], abs=1e-12)
+        assert roll == pytest.approx(0.5 * (ends[0] + ends[2]) - ends[1] - turned, abs=5e-7)
     # On a slope that changes by 1/R its pitch is that of its middle.
     here = at(recording, 180.0)
-    assert lines.askew_pitch[here] == pytest.approx(middle * lines.dip[here], rel=0.02)
+    level = lines.askew_yaw[here] * np.sin(track.frame(np.array([180.0])).roll_rad[0])
+    assert lines.askew_pitch[here] - level == pytest.approx(middle * lines.dip[here], rel=0.02)
+    # Between level axles it is level itself, which the canted track beside its middle is not.
+    there = at(recording, 130.0)
+    track_there = track.frame(np.array([130.0, 130.0 + middle]))
+    axes = [
+        rotation_matrix(np.array([[roll, pitch, yaw]]))[0]
+        for roll, pitch, yaw in zip(
+            track_there.roll_rad, track_there.pitch_rad, track_there.yaw_rad, strict=True
+        )
+    ]
+    turn = (axes[0].T @ axes[1] - (axes[0].T @ axes[1]).T)[[2, 0, 1], [1, 2, 0]] / 2.0
+    assert abs(turn[1]) > 1e-4
+    found = [lines.askew_roll[there], lines.askew_pitch[there], lines.askew_yaw[there]]
+    np.testing.assert_allclose(found, turn, atol=2e-6)
     # An axle rolls with the track that it stands on, though a body points it.
     axle = lines_of(replace(recording, mount_body="front axle", mount_position_m=(0.0, 0.0, 0.5)))
     np.testing.assert_allclose(axle.askew_roll, 0.0, atol=1e-15)
-    assert axle.askew_yaw[at(recording, 130.0)] == pytest.approx((0.5 - 5.0) / 250.0, rel=1e-3)
+    assert axle.askew_yaw[at(recording, 130.0)] == pytest.approx((0.5 - 5.0) / 250.0, rel=2e-3)
 
 
 def test_a_frame_is_twisted_by_what_rests_on_it(exact_bend: Recording) -> None:

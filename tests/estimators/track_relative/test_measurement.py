@@ -72,7 +72,9 @@ def random_states(place: FloatArray, speed: FloatArray, name: str) -> FloatArray
     return states
 
 
-def around_of(states: FloatArray, *, in_time: bool = False, jerk: float = 0.1) -> Around:
+def around_of(
+    states: FloatArray, *, in_time: bool = False, jerk: float = 0.1, sees_rails: bool = False
+) -> Around:
     sense = np.where(states[:, at.V].real < 0.0, -1.0, 1.0)
     return Around(states, np.full(len(states), jerk), sense, NOMINAL, GRAVITY, in_time, SLOW, sees_rails)
 
