@@ -189,15 +189,29 @@ def test_what_is_held_leaves_the_noise_and_the_motion(rough: Callable, rough_mot
         assert true.std() > 3.0 * noise * np.sqrt(15.0), name
 
 
-def test_a_body_and_a_filter_keep_to_their_own_states(rough: Callable) -> None:
-    """No drawing, or causal: as by the states themselves."""
-    for smoother in (TrackRelativeSmoother(passes=1), TrackRelativeSmoother(smoothed=False)):
-        recording = rough() if smoother.smoothed else drawn(rough())
-        estimate = smoother.estimate(recording)
-        pd.testing.assert_frame_equal(
-            estimate.geometry, geometry_of(sight_of(estimate, recording), step_m=0.25)
-        )
-        assert estimate.geometry_draws is None
+def test_a_filter_keeps_to_its_own_states(rough: Callable) -> None:
+    recording = drawn(rough())
+    estimate = TrackRelativeSmoother(smoothed=False).estimate(recording)
+    pd.testing.assert_frame_equal(estimate.geometry, geometry_of(sight_of(estimate, recording), step_m=0.25))
+    assert estimate.geometry_draws is None
+
+
+@pytest.mark.parametrize("drawing", [drawn, lambda recording: recording], ids=["axle", "unknown"])
+def test_cant_that_the_map_errs_in_is_no_irregularity(
+    rough: Callable, rails: Callable, drawing: Callable
+) -> None:
+    """The map's curve has millimetres of cant too much; the ride tells them from the rails' own waves."""
+    recording = drawing(rough(0))
+    estimate = TrackRelativeSmoother(passes=1).estimate(recording)
+    geometry, laid = estimate.geometry, rails(0)
+    assert geometry is not None
+    place = geometry.index.to_numpy(dtype=np.float64)
+    base = recording.track.rail_base_m
+    errs = base * (recording.track.frame(place).roll_rad - laid.design.frame(place).roll_rad)
+    error = geometry["cross_level_m"] - laid.irregularities(place)["cross_level_m"]
+    assert rms(errs) > 1e-3
+    assert rms(error) < 0.6 * rms(errs)
+    assert (error.abs() < 1.96 * geometry["cross_level_sd_m"]).mean() > 0.9
 
 
 @pytest.mark.parametrize(
