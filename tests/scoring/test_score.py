@@ -19,6 +19,8 @@ from simrail.core.errors import InputError
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, Recording
 from simrail.scoring.aggregate import aggregate
+from simrail.scoring.metrics import Series
+from simrail.scoring.metrics import figures as figures_of
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import (
     FIGURE_COLUMNS,
@@ -343,6 +345,13 @@ def test_consistent_errors_are_inside_both_intervals() -> None:
 )
 def test_planted_inconsistency_is_outside_both_intervals(fault: dict[str, float]) -> None:
     assert is_consistent(*consistency(**fault)) == (False, False)
+
+
+def test_each_error_is_held_against_its_own_standard_deviation() -> None:
+    """(1/1)^2, (3/1.5)^2 and (2/4)^2: not the sum of squares over that of the variances."""
+    series = Series("roll", "truth", np.array([1.0, -3.0, 2.0]), np.array([1.0, 1.5, 4.0]))
+    ((*_, nees, unit, n, status),) = figures_of(series, {"whole": np.arange(3)}, ["nees"])
+    assert (nees, unit, n, status) == (pytest.approx((1.0 + 4.0 + 0.25) / 3.0), "1", 3, OK)
 
 
 def test_halved_standard_deviation_quadruples_nees() -> None:

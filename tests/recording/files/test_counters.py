@@ -79,3 +79,14 @@ def test_late_readings_and_single_pulses_are_no_jumps() -> None:
     assert undone(counts).times == 0
     few = (TIME > 5.0).astype(np.int64) + (TIME > 20.0)
     assert undone(few).times == 0
+
+
+def test_a_counter_that_has_counted_further_has_no_such_modulus() -> None:
+    """1004 counts were seen: the jump of some 1000 is none of a counter that begins anew after 1000."""
+    counts = 4 * np.arange(len(TIME))
+    counts[252:] -= 1000
+    assert counts[251] == 1004
+    with pytest.raises(InputError, match="the counter jumps"):
+        undone(counts)
+    counts[252:] += 1000
+    assert undone(np.mod(counts, 1024)).modulus == 1024
