@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -105,3 +106,12 @@ def test_beside_the_ride_there_is_nothing():
     assert far.rails is not None
     far.rails.index += 5000.0
     assert not list(rail_errors(rails(np.zeros(len(S))), far, twist_base_m=3.0))
+
+
+def test_two_places_of_a_reference_err_apart_where_twist_is_between_them():
+    """A method without any error of its own: what is left is the reference's, once or twice."""
+    sure = replace(rails(np.zeros(len(S))), geometry_draws=np.zeros((20, len(S), 4)))
+    reference = trolley(rail_sds={"cross_level_m": 0.5e-3})
+    sds = {(s.quantity, s.band): s.sd for s, _ in rail_errors(sure, reference, twist_base_m=3.0)}
+    assert np.nanmax(sds["cross_level", "D1"]) == pytest.approx(0.5, rel=1e-12)
+    assert np.nanmax(sds["twist", "full"]) == pytest.approx(0.5 * np.sqrt(2.0), rel=1e-12)

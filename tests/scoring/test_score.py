@@ -523,6 +523,15 @@ def test_odometry_is_scored_over_the_distance_run() -> None:
     assert set(table[table["metric"] == "coverage95"]["quantity"]) == {"position", "speed"}
 
 
+def test_relative_distance_is_over_the_way_there_and_back() -> None:
+    motion = ride(6000, rest=0)
+    motion["position_m"] = 300.0 - np.abs(motion["position_m"] - 300.0)  # 300 m there, 299.9 m back
+    recording = recorded(motion)
+    odometry = recording.odometry.assign(position_m=motion["position_m"] + np.linspace(0.0, 6.0, 6000))
+    table = score_odometry(recording.with_odometry(odometry, "encoder"), motion)
+    assert value(table, quantity="distance_relative", metric="final") == pytest.approx(6.0 / 599.9, rel=1e-9)
+
+
 def test_relative_distance_of_a_train_that_stands_has_no_value() -> None:
     motion = ride(500, rest=500)
     row = pick(score_odometry(recorded(motion), motion), quantity="distance_relative", metric="final")

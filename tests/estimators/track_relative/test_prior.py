@@ -19,6 +19,7 @@ from simrail.estimators.track_relative.noise import (
     SLOW_M,
     WAGON,
     Motion,
+    at_scale,
     motion_of,
 )
 from simrail.estimators.track_relative.prior import PARTS, first_state, heading_sd, noise_of, start_of
@@ -195,3 +196,17 @@ def test_a_mount_is_carried_inside_a_curve_by_the_versine(rough: Callable) -> No
     arc = lambda u: radius - math.sqrt(radius**2 - u**2)  # noqa: E731
     assert x[at.Y_BEND] / radius == pytest.approx(arc(half) - arc(0.5), rel=1e-3)
     assert x[at.S] == drawn.start_position_m
+
+
+def test_a_model_of_a_scale_keeps_angles_and_its_own_metres() -> None:
+    """By their units: metres by the scale, square metres by its square, angles and times not at all."""
+    whole, model = JOINTED, at_scale(JOINTED, 0.1)
+    of_metres = {
+        "y_sd",
+        "z_sd",
+        "y_tilt_sd",
+        *(f"{one}_length" for one in ("roll", "pitch", "yaw", "y", "z")),
+    }
+    for name, value in vars(whole).items():
+        power = 1 if name in of_metres else 2 if name == "y_bend_sd" else 0
+        assert getattr(model, name) == pytest.approx(0.1**power * value, rel=1e-12), name
