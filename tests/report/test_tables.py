@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,7 @@ import pytest
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
 from simrail.report.tables.methods import method_styles
-from simrail.report.tables.pivot import Case, cases, of_cell
+from simrail.report.tables.pivot import Case, Mean, cases, of_cell
 from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
 from simrail.scenario.scenario import Scenario, load_scenario
 
@@ -92,3 +93,18 @@ def test_a_column_that_no_row_fills_is_left_out() -> None:
     table = without_empty(Table([("x", 2), ("y", 1), ("z", 1)], ["p", "q", "r", "s"], rows))
     assert table.groups == [("x", 1), ("z", 1)] and table.columns == ["q", "s"]
     assert [row.cells for row in table.rows] == [[one, one], [NONE, one]]
+
+
+def test_a_loss_to_the_design_angles_is_one_of_sizes(
+    scenario: Scenario, example: Rides, tables: Tables
+) -> None:
+    """A final error of -0.5 degrees is larger than one of 0.3."""
+    case = case_of(*tables(example()))
+    at = ("yaw_debiased", "full", "truth", "whole", "final")
+    finals = {"ekf_compensated": 0.3, "plain_filter": -0.6, "vqf": 0.4, "design_angles": -0.5}
+    figures = {(name, *at): Mean(value, np.nan, 1) for name, value in finals.items()}
+    styles = list(method_styles(scenario).values())
+    table = error_table(replace(case, scores=case.scores | figures), styles, reference="truth")
+    column = table.columns.index("final")
+    marks = {row.label: row.cells[column].mark for row in table.rows}
+    assert marks == {"EKF compensated": "best", "plain filter": "worse", "VQF": "", "design angles": ""}

@@ -130,9 +130,9 @@ def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:
     of 1.5 sqrt(3) p at zero. Local gravity is known to 1 mm/s2.
     """
     recording = rough()
-    recording = replace(
-        recording, imu_sheet=replace(recording.imu_sheet, gyro_nonlinearity=1e-3, accel_nonlinearity=2e-3)
-    )
+    more = {"gyro_nonlinearity": 1e-3, "accel_nonlinearity": 2e-3}
+    more |= {"gyro_random_walk_radpspsqrts": 3e-6, "accel_random_walk_mps2psqrts": 2e-4}
+    recording = replace(recording, imu_sheet=replace(recording.imu_sheet, **more))
     sheet, base = recording.imu_sheet, recording.track.rail_base_m
     noise = noise_of(recording, AXLE)
     sd = np.sqrt(np.diag(start_of(recording, AXLE, noise)[1]))
@@ -154,8 +154,8 @@ def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:
     assert sd[at.EVEN] == sd[at.ODD] == 0.3
     assert sd[at.SLOPE] == recording.map_errors.gradient_sd
     assert sd[at.SCALE] == pytest.approx(recording.encoder_sheet.radius_relative_sd)
-    walk = 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + sheet.gyro_random_walk_radpspsqrts**2
-    assert noise.gyro_walk == pytest.approx(walk)
+    assert noise.gyro_walk == pytest.approx(2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 9e-12)
+    assert noise.accel_walk == pytest.approx(2.0 * sheet.accel_bias_instability_mps2**2 / 300.0 + 4e-8)
 
 
 @pytest.mark.parametrize("part", PARTS)
