@@ -23,6 +23,7 @@ from simrail.estimators.track_relative.monitor import (
     in_curves,
 )
 from simrail.estimators.track_relative.noise import AT_MPS
+from simrail.estimators.track_relative.output import with_bounds
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
 from simrail.core.columns import ACCEL, BOUND, FAULT, GYRO
@@ -189,3 +190,15 @@ def test_a_curve_is_judged_by_where_the_train_runs_through_it() -> None:
     bent = in_curves(SimpleNamespace(course=course, surprises=surprises))  # type: ignore[arg-type]
     assert not bent[:60].any()
     np.testing.assert_allclose(bent[60:], 20.0**2 / 20.0 * 5.0 / AT_MPS / (1 + PATIENCE), rtol=1e-12)
+
+
+def test_bounds_of_a_sample_are_those_of_the_last_step_that_is_over() -> None:
+    """Row 0 is of before the first step; nothing is a step late."""
+    time = np.array([0.00, 0.01, 0.02, 0.03, 0.04, 0.05])
+    steps = SimpleNamespace(end_s=np.array([0.01, 0.03, 0.05]))
+    trace = SimpleNamespace(course=SimpleNamespace(steps=steps))
+    states = pd.DataFrame({"roll_sd_rad": 2.0, "position_sd_m": 3.0}, index=pd.Index(time, name="time_s"))
+    widened = with_bounds(states, trace, np.array([0.0, 0.0, 1.0, 1.0]), np.array([1.0, 2.0, 4.0, 8.0]))  # type: ignore[arg-type]
+    assert widened[BOUND[0]].tolist() == [2.0, 4.0, 4.0, 8.0, 8.0, 16.0]
+    assert widened[BOUND[1]].tolist() == [3.0, 6.0, 6.0, 12.0, 12.0, 24.0]
+    assert widened[FAULT].tolist() == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
