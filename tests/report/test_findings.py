@@ -164,3 +164,22 @@ def test_a_general_purpose_filter_is_held_against_the_best_of_the_methods(
     for order in ([*styles, second], [second, *styles]):
         text = "\n".join(finding.text for finding in findings(two, order))
         assert "VQF is worse than EKF compensated in roll: 0.400\u00b0 against 0.100\u00b0 rms" in text
+
+
+def test_of_many_methods_each_is_told_with_the_worse_of_roll_and_pitch(
+    scenario: Scenario, example: Rides, tables: Tables
+) -> None:
+    (case, *_) = cases(*tables(example()))
+    styles = list(method_styles(scenario).values())
+    tested = next(style for style in styles if style.name == "ekf_compensated")
+    more = [replace(tested, name=f"method {i}", label=f"method {i}", twin="") for i in range(4)]
+    figures = {}
+    for i, style in enumerate(more):
+        for angle, share in (("roll", 0.94), ("pitch", 0.6 - 0.01 * i)):
+            figures[style.name, angle, "full", "truth", "whole", "coverage95"] = Mean(share, float("nan"), 1)
+            error = Mean(0.1 + 0.1 * i, float("nan"), 1)
+            figures[style.name, angle, "full", "truth", "whole", "rms"] = error
+    many = replace(case, scores=case.scores | figures)
+    text = "\n".join(finding.text for finding in findings(many, [*styles, *more]))
+    for i in range(4):
+        assert f"method {i} ({60 - i} % inside)" in text

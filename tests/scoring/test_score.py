@@ -354,6 +354,18 @@ def test_each_error_is_held_against_its_own_standard_deviation() -> None:
     assert (nees, unit, n, status) == (pytest.approx((1.0 + 4.0 + 0.25) / 3.0), "1", 3, OK)
 
 
+@pytest.mark.parametrize(
+    ("name", "share"), [("50", 0.5), ("90", 0.9), ("95", 0.95), ("99", 0.99), ("999", 0.999)]
+)
+def test_an_interval_ends_at_its_quantile(name: str, share: float) -> None:
+    """Errors a ten-thousandth inside and outside, above and below: half of them are held."""
+    end = stats.norm.ppf(0.5 + 0.5 * share)
+    error = end * np.array([1.0 - 1e-4, 1.0 + 1e-4, -1.0 + 1e-4, -1.0 - 1e-4])
+    series = Series("roll", "truth", 0.2 * error, np.full(4, 0.2))
+    ((*_, held, unit, _, _),) = figures_of(series, {"whole": np.arange(4)}, [f"coverage{name}"])
+    assert (held, unit) == (0.5, "1")
+
+
 def test_halved_standard_deviation_quadruples_nees() -> None:
     nees, coverage, n = consistency(sd_claimed=0.5)
     assert nees == pytest.approx(4.0 * consistency()[0], rel=1e-9)
