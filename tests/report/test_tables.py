@@ -12,7 +12,7 @@ import pytest
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
 from simrail.report.tables.methods import method_styles
-from simrail.report.tables.pivot import Case, Mean, cases, of_cell
+from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
 from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
 from simrail.scenario.scenario import Scenario, load_scenario
 
@@ -108,3 +108,11 @@ def test_a_loss_to_the_design_angles_is_one_of_sizes(
     column = table.columns.index("final")
     marks = {row.label: row.cells[column].mark for row in table.rows}
     assert marks == {"EKF compensated": "best", "plain filter": "worse", "VQF": "", "design angles": ""}
+
+
+def test_chance_of_tracks_and_of_sensors_add_up(example: Rides, tables: Tables) -> None:
+    (case, *_) = cases(*tables(example()))
+    row = case.table.iloc[:1].assign(sd_sensor=0.3, sd_track=0.4, draws=5)
+    alone = row.assign(draws=1)
+    assert [mean.sd for mean in _index(row).values()] == pytest.approx([0.5])
+    assert np.isnan([mean.sd for mean in _index(alone).values()]).all()

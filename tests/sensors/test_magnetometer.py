@@ -128,6 +128,11 @@ def test_noise_and_bias_have_the_size_they_are_given():
 def test_range_and_resolution():
     coarse = sample(motion(), replace(QUIET, resolution_t=1e-7)).to_numpy() / 1e-7
     np.testing.assert_allclose(coarse, np.rint(coarse), rtol=0, atol=1e-9)
+    # To the nearest count, what is measured with its noise.
+    noisy = [
+        sample(motion(), replace(QUIET, noise_tpsqrthz=1e-8, resolution_t=t)).to_numpy() for t in (0.0, 1e-7)
+    ]
+    assert np.abs(noisy[1] - noisy[0]).max() <= 0.5e-7 * (1.0 + 1e-9)
     clipped = sample(motion(), replace(QUIET, range_t=10e-6)).to_numpy()
     assert np.abs(clipped).max() == 10e-6
 

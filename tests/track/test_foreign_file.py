@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from pathlib import Path
@@ -236,6 +237,24 @@ def test_straights_and_arcs_may_be_told_by_their_points_alone(tmp_path: Path) ->
     assert lengths[1] == pytest.approx(lengths[0], abs=1e-5)
     radii = [[e.radius_m for e in design.elements if isinstance(e, Curve)] for design in (told, found)]
     assert radii[1] == pytest.approx(radii[0], rel=1e-6)
+
+
+def test_a_circular_vertical_curve_is_as_long_as_its_radius_turns(tmp_path: Path) -> None:
+    """Its length is its radius times the change of the slope."""
+    text = landxml()
+    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(PVI)]
+    for (s, length), before, after in zip(VERTICAL_M.items(), slopes, slopes[1:], strict=False):
+        old, new = (
+            f'<ParaCurve length="{length:.10f}">',
+            f'<CircCurve radius="{length / abs(after - before):.10f}">',
+        )
+        assert text.count(old) == 1, s
+        text = text.replace(old, new)
+    text = text.replace("</ParaCurve>", "</CircCurve>")
+    parabolas, circles = (
+        design_from_file(written(tmp_path, "line.xml", one))[0] for one in (landxml(), text)
+    )
+    assert circles.vertical_radius_m == pytest.approx(parabolas.vertical_radius_m, rel=1e-9)
 
 
 def test_chainage_breaks_are_mapped(tmp_path: Path) -> None:
