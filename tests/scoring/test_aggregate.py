@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
+from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate, axis_columns
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.table import NO_SAMPLES, UNOBSERVABLE, as_score_table, concat_scores, labelled
 
@@ -135,3 +135,13 @@ def test_the_two_levels_of_chance_are_pooled_from_tracks_of_unlike_many_draws() 
     assert row["sd_sensor"] == pytest.approx(np.sqrt(10.0 / 3.0), rel=1e-12)
     assert row["sd_track"] == pytest.approx(np.sqrt(2.0), rel=1e-12)
     assert (row["value"], row["draws"], row["track_draws"], row["failed"]) == (16.0 / 5.0, 5, 2, 1)
+
+
+def test_what_differs_within_a_case_is_drawn_and_no_axis() -> None:
+    """By two values already; a case that has none is alike throughout, too."""
+    cells = pd.DataFrame({"cell": range(4), "case": [0, 0, 1, 1], "sample": [0, 1, 0, 1]})
+    cells["speed_kmh"] = [20.0, 20.0, 40.0, 40.0]
+    cells["irregularity.scale"] = [0.9, 1.1, 1.0, 1.0]
+    cells["rail.friction"] = [np.nan, np.nan, 0.3, 0.3]
+    cells["noise"] = [np.nan, 0.1, 0.1, 0.1]
+    assert axis_columns(cells) == ["case", "speed_kmh", "rail.friction"]

@@ -123,6 +123,8 @@ def test_noise_and_bias_have_the_size_they_are_given():
     means = np.array([sample(short, replace(QUIET, bias_t=300e-9), draw=d).iloc[0] for d in range(300)])
     uniform = (means - QUIET.field.vector_t).ravel() / 300e-9
     assert stats.kstest(uniform, stats.uniform(-1.0, 2.0).cdf).pvalue > 0.001
+    # Each axis has its own.
+    assert np.abs(np.corrcoef(means.T)[np.triu_indices(3, 1)]).max() < 4.0 / np.sqrt(300)
 
 
 def test_range_and_resolution():

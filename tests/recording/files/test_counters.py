@@ -90,3 +90,11 @@ def test_a_counter_that_has_counted_further_has_no_such_modulus() -> None:
         undone(counts)
     counts[252:] += 1000
     assert undone(np.mod(counts, 1024)).modulus == 1024
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_up_to_nearly_half_a_modulus_a_step_tells_its_direction(sign: int) -> None:
+    counts = sign * np.arange(len(TIME))
+    np.testing.assert_array_equal(undone(np.mod(440 * counts, 1000), 1000).counts, 440 * counts)
+    with pytest.raises(InputError, match=r"too few to tell.*480 pulses between two readings"):
+        undone(np.mod(480 * counts, 1000), 1000)
