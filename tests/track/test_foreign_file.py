@@ -257,6 +257,14 @@ def test_a_circular_vertical_curve_is_as_long_as_its_radius_turns(tmp_path: Path
     assert circles.vertical_radius_m == pytest.approx(parabolas.vertical_radius_m, rel=1e-9)
 
 
+def test_a_profile_that_begins_before_the_plan_has_its_height_where_the_plan_begins(tmp_path: Path) -> None:
+    before = f"<ProfAlign><PVI>{STA - 100.0} 390</PVI><PVI>{STA - 50.0} 396</PVI>"
+    design, _ = design_from_file(written(tmp_path, "line.xml", changed("<ProfAlign>", before)))
+    plain, _ = design_from_file(written(tmp_path, "plain.xml", landxml()))
+    s = design.start_m + np.array([0.0, 100.0, 300.0, 900.0])
+    np.testing.assert_allclose(design.frame(s).position[:, 2], plain.frame(s).position[:, 2], atol=1e-6)
+
+
 def test_chainage_breaks_are_mapped(tmp_path: Path) -> None:
     text = changed(
         "</CoordGeom>", '</CoordGeom><StaEquation staInternal="1500" staBack="1500" staAhead="2000"/>'

@@ -69,6 +69,15 @@ def test_a_section_counts_once_half_of_it_is_known_and_a_stretch_over_a_border_i
     assert rows["defects"].to_dict() == {0.0: 0, 200.0: 1, 400.0: 1, 600.0: 0, 800.0: 0}
 
 
+def test_a_place_at_a_border_but_for_rounding_is_of_the_section_that_begins_there():
+    place = S.copy()
+    place[800] = np.nextafter(200.0, 0.0)
+    frame = geometry(alignment_m=np.where(np.arange(len(S)) == 800, 5e-3, 0.0))
+    found = section_indicators(frame.set_index(pd.Index(place, name="position_m")))
+    peaks = found[found["quantity"] == "alignment"].set_index("start_m")["peak_m"]
+    assert peaks[200.0] > 4e-3 and peaks[0.0] == 0.0
+
+
 def test_too_short_a_line_or_a_wrong_name_is_told():
     with pytest.raises(InputError, match="line too short for the band"):
         section_indicators(geometry().iloc[:400], band=BANDS["D2"])

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from simrail.estimators.odometry.line_table import PLACES_PER_M
 from simrail.estimators.track_relative.line import ground_at, lines_of, numbers_at
 from simrail.estimators.track_relative.states import S
 
@@ -160,3 +162,12 @@ def test_gravity_on_the_tracks_axes_turns_with_its_cant_and_its_slope(exact_bend
     frame = line.frame(place)
     tilts = np.sin(frame.pitch_rad) * np.sin(frame.roll_rad) * frame.rates[:, 1]
     assert np.abs(tilts).max() > 1e-7
+
+
+def test_an_element_is_that_of_the_nearest_place_of_the_grid() -> None:
+    row = np.arange(8.0)
+    lines = SimpleNamespace(places=10.0 + row / PLACES_PER_M, element=row, curve=row, vertical=row)
+    step = 1.0 / PLACES_PER_M
+    place = 10.0 + step * np.array([-3.0, 0.4, 0.6, 3.4, 3.6, 20.0])
+    for numbers in numbers_at(lines, place):  # type: ignore[arg-type]
+        assert numbers.tolist() == [0, 0, 1, 3, 4, 7]

@@ -84,3 +84,18 @@ units = {{ gyro = "{gyro_unit}", accel = "{accel_unit}" }}
     part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
     found = SignalReader(folder).frame(part, "imu").to_numpy()
     np.testing.assert_allclose(found, body, rtol=0.0, atol=1e-14 if any(angles) else 2e-15)
+
+
+def test_samples_without_stamps_are_counted_from_where_they_begin(tmp_path):
+    """Sample k of a file of 50 Hz that begins at 12.5 s is of 12.5 s + k / 50 Hz."""
+    pd.DataFrame({name: np.arange(4.0) for name in "pqruvw"}).to_csv(tmp_path / "a.csv", index=False)
+    text = """file = "a.csv"
+body = "b"
+position_m = [0, 0, 0]
+grade = "x"
+rate_hz = 50.0
+start_s = 12.5
+columns = { gyro = ["p", "q", "r"], accel = ["u", "v", "w"] }
+"""
+    part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
+    assert SignalReader(tmp_path).frame(part, "imu").index.tolist() == [12.5, 12.52, 12.54, 12.56]
