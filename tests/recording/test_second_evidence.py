@@ -15,6 +15,7 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.check_sheet import check_ranges, noise_warnings
 from simrail.recording.evidence.devices import weigh_all
+from simrail.recording.evidence.field_clock import weigh_field_clock
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, weigh
 from simrail.recording.evidence.second import _clock, _spacing
@@ -171,6 +172,13 @@ def test_a_magnetometer_whose_clock_is_off_is_told_by_the_gyro(size: float, soun
         (found,) = evidence.wrong
         assert found.key == "magnetometer_offset" and found.value == pytest.approx(size, abs=0.04)
         assert found.sd < 0.02 and found.setting == "magnetometer.time_offset_s"
+
+
+def test_what_a_gyro_is_late_by_its_response_is_none_of_the_magnetometers_clock(sound: Recording) -> None:
+    """The same samples of a gyro whose sheet has them .3 s late: the field is that much late against them."""
+    late = replace(sound, imu_sheet=replace(sound.imu_sheet, lag_s=sound.imu_sheet.lag_s + 0.3))
+    own, moved = (weigh_field_clock(one)[0] for one in (sound, late))
+    assert moved.value - own.value == pytest.approx(-0.3, abs=0.04)
 
 
 def test_on_the_straight_a_magnetometer_tells_nothing_of_its_clock(sound: Recording) -> None:
