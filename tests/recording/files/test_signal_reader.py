@@ -99,3 +99,8 @@ columns = { gyro = ["p", "q", "r"], accel = ["u", "v", "w"] }
 """
     part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
     assert SignalReader(tmp_path).frame(part, "imu").index.tolist() == [12.5, 12.52, 12.54, 12.56]
+    # A clock that is slow by 5000 ppm and 2 s behind.
+    told = "time_offset_s = 2.0\ntime_drift_ppm = 5000.0\n" + text
+    clock = judge(ImuSignalPart, parse_toml(told, file="t"), file="t")
+    times = SignalReader(tmp_path).frame(clock, "imu").index
+    np.testing.assert_allclose(times, 14.5 + 1.005 * np.arange(4) / 50.0, rtol=0.0, atol=1e-12)
