@@ -271,7 +271,9 @@ def _on_track(drawn: Drawn, end_m: float) -> tuple[float, list[Turn]]:
     slope, kept, left = drawn.slope, [], []
     for turn in drawn.turns:
         first, last = turn.at_m - 0.5 * turn.length_m, turn.at_m + 0.5 * turn.length_m
-        if first >= drawn.start_m - 1e-6 and last <= end_m + 1e-6 and turn.at_m < end_m:
+        within = first >= drawn.start_m - 1e-6 and last <= end_m + 1e-6
+        # A bend without length at the very start is the slope that the line begins with.
+        if within and drawn.start_m < turn.at_m < end_m:
             kept.append(turn)
         elif turn.at_m <= drawn.start_m:
             slope = turn.slope

@@ -84,12 +84,12 @@ SMALL = [0, -1, 1e-12, 5e-324, -0.0]
 
 @dataclass
 class Case:
-    """One mutated input: what was done to it, and whether it must be refused."""
+    """One mutated input: what was done to it, and the places for which it must be refused."""
 
     number: int
     kind: str
     deeds: list[str] = field(default_factory=list)
-    must_refuse: bool = False
+    wrong: list[tuple[Any, ...]] = field(default_factory=list)
 
 
 @dataclass
@@ -131,28 +131,31 @@ def mutate(data: dict[str, Any], random: np.random.Generator, case: Case) -> dic
     ] * is_number
     deed = str(random.choice(deeds))
     chosen: Any = None
+    place = (*way, last)
+    if deed != "unknown":  # what was wrong before is gone with what is put in its place
+        case.wrong = [one for one in case.wrong if one[: len(place)] != place]
     if deed == "drop":
         del holder[last]
-        case.must_refuse = False  # what was wrong before may be what is dropped
+        case.wrong = []  # places of a list move up
     elif deed == "type":
         chosen = [{"a": 1}, "12 km/h", True, 3][int(random.integers(4))] if not is_number else "12 km/h"
-        case.must_refuse |= is_number
+        case.wrong += [place] * is_number
     elif deed == "text":
         chosen = str(ODD_TEXTS[int(random.integers(len(ODD_TEXTS)))])
     elif deed == "list":
         chosen = [[], [1.0] * 3000, ["a"] * 3000, [[1]]][int(random.integers(4))]
     elif deed == "extreme":
         chosen = EXTREMES[int(random.integers(len(EXTREMES)))]
-        case.must_refuse |= last not in ("seed",)
+        case.wrong += [place] * (last not in ("seed",))
     elif deed == "not finite":
         chosen = float(random.choice([np.nan, np.inf, -np.inf]))
-        case.must_refuse = True
+        case.wrong.append(place)
     elif deed == "small":
         chosen = SMALL[int(random.integers(len(SMALL)))]
     else:
-        target = value if isinstance(value, dict) else data
+        target, within = (value, place) if isinstance(value, dict) else (data, ())
         target["unknown_key_of_a_fuzzer"] = 1
-        case.must_refuse = True
+        case.wrong.append((*within, "unknown_key_of_a_fuzzer"))
     if chosen is not None:
         holder[last] = chosen
     case.deeds.append(f"{deed} {name}" + (f" = {chosen!r}"[:60] if chosen is not None else ""))
@@ -321,7 +324,7 @@ def judge(answer: Answer) -> str:
     if answer.code not in (0, 2):
         return f"exit code {answer.code}"
     if answer.code == 0:
-        return "is silently accepted" if answer.case.must_refuse else ""
+        return "is silently accepted" if answer.case.wrong else ""
     if not lines or not lines[0].startswith("simrail: "):
         return "says something else first"
     if any(len(line) > 4000 for line in lines):

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 
@@ -30,7 +31,7 @@ def test_every_mutated_input_is_answered_in_one_line(count: int, fuzzer: ModuleT
 
 def test_the_fuzzer_sees_what_is_wrong(fuzzer: ModuleType) -> None:
     """Planted answers of every wrong kind."""
-    case = fuzzer.Case(0, "scenario", must_refuse=True)
+    case = fuzzer.Case(0, "scenario", wrong=[("seed",)])
     good = "simrail: a.toml: key: is wrong; found 3; limit: 4; remedy: mend it\n"
     for code, said, words in (
         (0, "", "silently accepted"),
@@ -46,3 +47,18 @@ def test_the_fuzzer_sees_what_is_wrong(fuzzer: ModuleType) -> None:
     ):
         told = fuzzer.judge(fuzzer.Answer(case, code, said, 0.0))
         assert words in told and bool(words) == bool(told)
+
+
+def test_what_is_put_in_the_place_of_a_wrong_value_need_not_be_refused(fuzzer: ModuleType) -> None:
+    """A number of 1e300 that a later deed makes 0 is gone; one beside it, or within a table, is not."""
+    for wrong, left in ((("a",), []), (("a", "b"), []), (("c",), [("c",)])):
+        judged = 0
+        for seed in range(200):
+            case = fuzzer.Case(0, "imu", wrong=[wrong])
+            data = {"a": 1.0} if wrong == ("a",) else {"a": 1.0, "c": 1.0}
+            fuzzer.mutate(data, np.random.default_rng(seed), case)
+            ((deed, name, *_),) = (done.split() for done in case.deeds)
+            if name == "a" and deed == "small":
+                assert case.wrong == left
+                judged += 1
+        assert judged

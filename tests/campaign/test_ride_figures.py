@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from simrail.campaign import cell as cells_of_a_ride
 from simrail.cli.score_tables import print_scores
 from simrail.report.pages.answer import answer_section
 from simrail.report.pages.explorer import stored_rides
@@ -159,3 +160,14 @@ def test_aggregates_say_that_growth_may_be_negative(results):
     rows = table[table["quantity"] == "lateral_growth"]
     assert (rows["value"] < 0.0).all()
     assert (rows["draws"] == 1).all()
+
+
+def test_a_ride_is_scored_once_whatever_is_drawn_of_sensors_and_map(monkeypatch):
+    """Else its figures would count as many draws as there are maps, of which none changes it."""
+    scored = []
+    monkeypatch.setattr(cells_of_a_ride, "_record", lambda cell, *_: cell)
+    monkeypatch.setattr(cells_of_a_ride, "_score_ride", lambda cell, *_: scored.append(cell.number))
+    draws = [(map_draw, sensor_draw) for map_draw in range(3) for sensor_draw in range(2)]
+    drawn = [SimpleNamespace(number=i, map_draw=m, sensor_draw=s) for i, (m, s) in enumerate(draws)]
+    cells_of_a_ride.run_cells(drawn, None, None, cells_of_a_ride.BatchTally("mine", {}, {}), lambda: None)
+    assert scored == [0]

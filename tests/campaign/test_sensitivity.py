@@ -11,7 +11,14 @@ import pytest
 
 from simrail.campaign.campaign import run_campaign
 from simrail.campaign.result import CampaignResult
-from simrail.campaign.sensitivity import FigureName, Sensitivity, indices_of, sensitivities, sensitivity_table
+from simrail.campaign.sensitivity import (
+    INDEX_COLUMNS,
+    FigureName,
+    Sensitivity,
+    indices_of,
+    sensitivities,
+    sensitivity_table,
+)
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, call
 from simrail.cli.sensitivity import _designed
 from simrail.core.errors import InputError
@@ -454,3 +461,14 @@ def test_the_command_writes_tables_and_figures_and_does_not_run_twice(
     assert "of the finished results" in again.err and again.out == said.out
     assert call([*arguments, "--of", "rol"]) == BAD_INPUT
     assert "--of" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("method", "by"), [("saltelli", "total"), ("morris", "mu_star")])
+def test_the_most_influential_is_first_by_the_total_effect_or_the_mean_size(method: str, by: str) -> None:
+    """What acts together with others alone has no first-order effect; what has no index is last."""
+    rising = np.arange(12.0).reshape(3, 4)
+    table = pd.DataFrame(-rising, index=["a", "b", "c"], columns=list(INDEX_COLUMNS[method]))
+    table[by] = [0.2, np.nan, 0.7]
+    shares, values = np.zeros((0, 3)), np.zeros(0)
+    found = Sensitivity("", "ekf", FigureName(), "deg", method, table, shares, values, 2, 0)
+    assert found.order == ["c", "a", "b"]

@@ -185,3 +185,8 @@ def test_devices_on_shared_rides_stay_as_many_on_each(
     read = load_scenario("own.toml", overrides=[*own, *requirement_settings(["roll<0.1deg"]), *settings])
     assert looks_of(read.spec) == looks
     judge_requirements(read.spec, ["ekf"])
+
+
+def test_a_speed_is_that_of_the_line_to_the_last_digit() -> None:
+    *_, speed = requirement_settings(["roll<0.1deg at 62.5km/h", "pitch<0.1deg at 62.5 km/h"])
+    assert speed == "ride.speed_kmh=62.5"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,10 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.check_sheet import check_ranges, noise_warnings
 from simrail.recording.evidence.devices import weigh_all
-from simrail.recording.evidence.judge import weigh
+from simrail.recording.evidence.field_clock import weigh_field_clock
+from simrail.recording.evidence.finding import Finding
+from simrail.recording.evidence.judge import Evidence, weigh
+from simrail.recording.evidence.second import _clock, _spacing
 from simrail.recording.files.mend import mended
 from simrail.recording.recording import Recording, second_alone
 from simrail.recording.sheets.imu_file import load_grade
@@ -170,9 +174,39 @@ def test_a_magnetometer_whose_clock_is_off_is_told_by_the_gyro(size: float, soun
         assert found.sd < 0.02 and found.setting == "magnetometer.time_offset_s"
 
 
+def test_what_a_gyro_is_late_by_its_response_is_none_of_the_magnetometers_clock(sound: Recording) -> None:
+    """The same samples of a gyro whose sheet has them .3 s late: the field is that much late against them."""
+    late = replace(sound, imu_sheet=replace(sound.imu_sheet, lag_s=sound.imu_sheet.lag_s + 0.3))
+    own, moved = (weigh_field_clock(one)[0] for one in (sound, late))
+    assert moved.value - own.value == pytest.approx(-0.3, abs=0.04)
+
+
 def test_on_the_straight_a_magnetometer_tells_nothing_of_its_clock(sound: Recording) -> None:
     quiet = sound.imu * [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
     assert sound.magnetometer is not None
     still = sound.magnetometer - sound.magnetometer + sound.magnetometer.iloc[0]
     found = weigh_all(replace(sound, imu=quiet, magnetometer=still)).of("magnetometer_offset")
     assert found.verdict == "could not be judged" and not found.wrong
+
+
+def test_clocks_and_distances_of_two_fits() -> None:
+    """By their differences: of clocks in ppm as told, of places less what both mounts are apart already."""
+    findings = {"drift": (130.0, 20.0, "ppm"), "offset": (0.5, 0.01, "s"), "shift": (2.0, 0.5, "m")}
+    theirs = {"drift": (-70.0, 20.0, "ppm"), "offset": (0.2, 0.01, "s"), "shift": (5.0, 0.5, "m")}
+    first, second = (
+        Evidence(
+            tuple(Finding(k, k, v, sd, 0.0, unit, "curves", "sound") for k, (v, sd, unit) in own.items())
+        )
+        for own in (findings, theirs)
+    )
+    # 200 ppm are 2.6 of what two fits (20 each) and two clocks (50 by the fits, 50 by the sheet) leave.
+    drift = _clock("drift", first, second, 5e-5)
+    assert (drift.value, drift.verdict) == (200.0, "sound") and drift.sd == pytest.approx(20.0 * np.sqrt(2.0))
+    offset = _clock("offset", first, second, 0.01)
+    assert offset.value == pytest.approx(0.3) and offset.verdict == "surely wrong"
+    recording = SimpleNamespace(mount_body="front", mount_position_m=(1.0, 0.0, 0.0))
+    sheet = SimpleNamespace(
+        mount_body="rear", mount_position_m=(-0.5, 0.0, 0.0), spacing_m=15.0, spacing_sd_m=0.01
+    )
+    spacing = _spacing(first, second, recording, sheet)  # type: ignore[arg-type]
+    assert spacing.value == pytest.approx(15.0 - (5.0 - 2.0) + 1.5) and spacing.verdict == "sound"

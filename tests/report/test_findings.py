@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from simrail.campaign.cell import CellResult
 from simrail.core.columns import ATTITUDE
 from simrail.estimation.estimate import Estimate
 from simrail.report.tables.methods import method_styles
-from simrail.report.tables.pivot import cases
+from simrail.report.tables.pivot import Mean, cases
 from simrail.report.words.findings import findings
 from simrail.report.words.sentences import significant
 from simrail.scenario.scenario import Scenario
@@ -149,3 +150,36 @@ def test_the_floor_is_that_of_the_same_speed(scenario: Scenario, example: Rides,
 
     assert "With an ideal IMU" in floor_with([20.0, 20.0])
     assert "No ideal IMU was run" in floor_with([20.0, 70.0])
+
+
+def test_a_general_purpose_filter_is_held_against_the_best_of_the_methods(
+    scenario: Scenario, example: Rides, tables: Tables
+) -> None:
+    (case, *_) = cases(*tables(example()))
+    styles = list(method_styles(scenario).values())
+    tested = next(style for style in styles if style.name == "ekf_compensated")
+    second = replace(tested, name="second", label="second EKF", twin="")
+    figure = {("second", "roll", "full", "truth", "whole", "rms"): Mean(0.3, float("nan"), 1)}
+    two = replace(case, scores=case.scores | figure)
+    for order in ([*styles, second], [second, *styles]):
+        text = "\n".join(finding.text for finding in findings(two, order))
+        assert "VQF is worse than EKF compensated in roll: 0.400\u00b0 against 0.100\u00b0 rms" in text
+
+
+def test_of_many_methods_each_is_told_with_the_worse_of_roll_and_pitch(
+    scenario: Scenario, example: Rides, tables: Tables
+) -> None:
+    (case, *_) = cases(*tables(example()))
+    styles = list(method_styles(scenario).values())
+    tested = next(style for style in styles if style.name == "ekf_compensated")
+    more = [replace(tested, name=f"method {i}", label=f"method {i}", twin="") for i in range(4)]
+    figures = {}
+    for i, style in enumerate(more):
+        for angle, share in (("roll", 0.94), ("pitch", 0.6 - 0.01 * i)):
+            figures[style.name, angle, "full", "truth", "whole", "coverage95"] = Mean(share, float("nan"), 1)
+            error = Mean(0.1 + 0.1 * i, float("nan"), 1)
+            figures[style.name, angle, "full", "truth", "whole", "rms"] = error
+    many = replace(case, scores=case.scores | figures)
+    text = "\n".join(finding.text for finding in findings(many, [*styles, *more]))
+    for i in range(4):
+        assert f"method {i} ({60 - i} % inside)" in text

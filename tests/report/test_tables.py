@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,9 +12,11 @@ import pytest
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
 from simrail.report.tables.methods import method_styles
-from simrail.report.tables.pivot import Case, cases, of_cell
+from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
+from simrail.report.tables.running import running_table
 from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
 from simrail.scenario.scenario import Scenario, load_scenario
+from simrail.scoring.ride_figures import RIDE
 
 Rides = Callable[..., CellResult]
 Tables = Callable[..., tuple[pd.DataFrame, pd.DataFrame]]
@@ -92,3 +95,52 @@ def test_a_column_that_no_row_fills_is_left_out() -> None:
     table = without_empty(Table([("x", 2), ("y", 1), ("z", 1)], ["p", "q", "r", "s"], rows))
     assert table.groups == [("x", 1), ("z", 1)] and table.columns == ["q", "s"]
     assert [row.cells for row in table.rows] == [[one, one], [NONE, one]]
+
+
+def test_a_loss_to_the_design_angles_is_one_of_sizes(
+    scenario: Scenario, example: Rides, tables: Tables
+) -> None:
+    """A final error of -0.5 degrees is larger than one of 0.3."""
+    case = case_of(*tables(example()))
+    at = ("yaw_debiased", "full", "truth", "whole", "final")
+    finals = {"ekf_compensated": 0.3, "plain_filter": -0.6, "vqf": 0.4, "design_angles": -0.5}
+    figures = {(name, *at): Mean(value, np.nan, 1) for name, value in finals.items()}
+    styles = list(method_styles(scenario).values())
+    table = error_table(replace(case, scores=case.scores | figures), styles, reference="truth")
+    column = table.columns.index("final")
+    marks = {row.label: row.cells[column].mark for row in table.rows}
+    assert marks == {"EKF compensated": "best", "plain filter": "worse", "VQF": "", "design angles": ""}
+
+
+def test_chance_of_tracks_and_of_sensors_add_up(example: Rides, tables: Tables) -> None:
+    (case, *_) = cases(*tables(example()))
+    row = case.table.iloc[:1].assign(sd_sensor=0.3, sd_track=0.4, draws=5)
+    alone = row.assign(draws=1)
+    assert [mean.sd for mean in _index(row).values()] == pytest.approx([0.5])
+    assert np.isnan([mean.sd for mean in _index(alone).values()]).all()
+
+
+def test_running_safety_is_told_by_what_is_left_and_by_shares_of_its_own_limits(
+    example: Rides, tables: Tables
+) -> None:
+    """A wheel that is unloaded by .4 keeps .6; Y/Q of .2 is a quarter of .8, and the sum of Y has its own."""
+    (case, *_) = cases(*tables(example()))
+    figures = {
+        ("wheel_unloading", "max"): 0.4,
+        ("derailment_quotient", "max"): 0.2,
+        ("sum_y", "max"): 12.34,
+        ("sum_y_relative", "max"): 0.7,
+    }
+    ride = replace(
+        case,
+        table=case.table.assign(estimator=RIDE),
+        scores={
+            (RIDE, quantity, "full", "truth", "whole", metric): Mean(value, np.nan, 1)
+            for (quantity, metric), value in figures.items()
+        },
+    )
+    table = running_table([ride], derailment_limit=0.8)
+    assert table is not None
+    cells = [cell.text for cell in table.rows[0].cells]
+    assert dict(zip(table.columns, cells, strict=True))["\u03a3Y max, kN"] == "12.3"
+    assert [text for text in cells if text != "12.3"] == ["0.600", "0.200", "25", "70"]

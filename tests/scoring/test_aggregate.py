@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate
+from simrail.scoring.aggregate import AGGREGATE_COLUMNS, aggregate, axis_columns
 from simrail.scoring.bootstrap import interval
 from simrail.scoring.table import NO_SAMPLES, UNOBSERVABLE, as_score_table, concat_scores, labelled
 
@@ -122,3 +122,26 @@ def test_the_interval_of_a_share_ends_at_one() -> None:
     scores["value"] = [1.0, 0.999, 0.998, 0.997, 0.996, 0.5]
     found = aggregate(scores, cells).iloc[0]
     assert found["value"] < found["high95"] == 1.0 and 0.0 <= found["low95"] < found["value"]
+
+
+def test_the_two_levels_of_chance_are_pooled_from_tracks_of_unlike_many_draws() -> None:
+    """Of 1, 3 and 2, 4, 6: squares of 2 and 8 over one and two degrees of freedom; means 2 and 4."""
+    scores, cells = table({"one": (2, 3)})
+    values = pd.Series([1.0, 3.0, np.nan, 2.0, 4.0, 6.0])
+    scores["value"] = scores["cell"].map(values)
+    scores["status"] = scores["status"].cat.add_categories("broken")
+    scores.loc[scores["value"].isna(), "status"] = "broken"
+    row = aggregate(scores, cells).iloc[0]
+    assert row["sd_sensor"] == pytest.approx(np.sqrt(10.0 / 3.0), rel=1e-12)
+    assert row["sd_track"] == pytest.approx(np.sqrt(2.0), rel=1e-12)
+    assert (row["value"], row["draws"], row["track_draws"], row["failed"]) == (16.0 / 5.0, 5, 2, 1)
+
+
+def test_what_differs_within_a_case_is_drawn_and_no_axis() -> None:
+    """By two values already; a case that has none is alike throughout, too."""
+    cells = pd.DataFrame({"cell": range(4), "case": [0, 0, 1, 1], "sample": [0, 1, 0, 1]})
+    cells["speed_kmh"] = [20.0, 20.0, 40.0, 40.0]
+    cells["irregularity.scale"] = [0.9, 1.1, 1.0, 1.0]
+    cells["rail.friction"] = [np.nan, np.nan, 0.3, 0.3]
+    cells["noise"] = [np.nan, 0.1, 0.1, 0.1]
+    assert axis_columns(cells) == ["case", "speed_kmh", "rail.friction"]

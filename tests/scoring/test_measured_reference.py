@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,17 @@ def test_angles_are_compared_over_the_turn_and_blanks_are_none():
     np.testing.assert_allclose(series["yaw_debiased"].error, 0.0, atol=1e-9)
 
 
+def test_an_estimate_that_is_counted_from_minus_to_plus_pi_has_no_turn_between_two_samples():
+    """At half a sample beside the jump from pi to -pi a mean of both would be 0, off by half a turn."""
+    yaw = np.pi + 1e-3 * (np.arange(len(TIME)) - 5000.5)
+    times = TIME.to_numpy()[:-1:100] + 0.005
+    motion = pd.DataFrame({"yaw_rad": np.interp(times, TIME, yaw)}, index=pd.Index(times, name="time_s"))
+    motion.loc[TIME[5000] + 0.005] = np.pi
+    wrapped = estimate(yaw_rad=(yaw + np.pi) % (2.0 * np.pi) - np.pi)
+    (series, *_) = (one for one, _ in motion_errors(wrapped, RideReference(motion.sort_index())))
+    np.testing.assert_allclose(series.error, 0.0, atol=1e-9)
+
+
 def rails(error: np.ndarray) -> Estimate:
     geometry = pd.DataFrame(np.nan, index=S, columns=list(IRREGULARITY))
     geometry["cross_level_m"] = 4e-3 * np.sin(2.0 * np.pi * S / 10.0) + error
@@ -105,3 +117,12 @@ def test_beside_the_ride_there_is_nothing():
     assert far.rails is not None
     far.rails.index += 5000.0
     assert not list(rail_errors(rails(np.zeros(len(S))), far, twist_base_m=3.0))
+
+
+def test_two_places_of_a_reference_err_apart_where_twist_is_between_them():
+    """A method without any error of its own: what is left is the reference's, once or twice."""
+    sure = replace(rails(np.zeros(len(S))), geometry_draws=np.zeros((20, len(S), 4)))
+    reference = trolley(rail_sds={"cross_level_m": 0.5e-3})
+    sds = {(s.quantity, s.band): s.sd for s, _ in rail_errors(sure, reference, twist_base_m=3.0)}
+    assert np.nanmax(sds["cross_level", "D1"]) == pytest.approx(0.5, rel=1e-12)
+    assert np.nanmax(sds["twist", "full"]) == pytest.approx(0.5 * np.sqrt(2.0), rel=1e-12)

@@ -163,6 +163,8 @@ def test_only_periods_count_in_which_the_vehicle_runs():
     runs = np.arange(len(wave)) >= 20_000
     acceleration = np.column_stack([wave, wave, wave])
     assert mean_comfort(acceleration, RATE_HZ, counts=runs).periods == 4
+    # It begins to run in the middle of a period.
+    assert mean_comfort(acceleration, RATE_HZ, counts=np.arange(len(wave)) >= 22_000).periods == 3
     with pytest.raises(InputError, match="does not run for one period"):
         mean_comfort(acceleration, RATE_HZ, counts=np.zeros(len(wave), dtype=bool))
 

@@ -19,6 +19,8 @@ from simrail.core.errors import InputError
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import ImuSheet, Recording
 from simrail.scoring.aggregate import aggregate
+from simrail.scoring.metrics import Series
+from simrail.scoring.metrics import figures as figures_of
 from simrail.scoring.score import Reference, reference_of, score, score_odometry, truth_at_imu
 from simrail.scoring.table import (
     FIGURE_COLUMNS,
@@ -345,6 +347,25 @@ def test_planted_inconsistency_is_outside_both_intervals(fault: dict[str, float]
     assert is_consistent(*consistency(**fault)) == (False, False)
 
 
+def test_each_error_is_held_against_its_own_standard_deviation() -> None:
+    """(1/1)^2, (3/1.5)^2 and (2/4)^2: not the sum of squares over that of the variances."""
+    series = Series("roll", "truth", np.array([1.0, -3.0, 2.0]), np.array([1.0, 1.5, 4.0]))
+    ((*_, nees, unit, n, status),) = figures_of(series, {"whole": np.arange(3)}, ["nees"])
+    assert (nees, unit, n, status) == (pytest.approx((1.0 + 4.0 + 0.25) / 3.0), "1", 3, OK)
+
+
+@pytest.mark.parametrize(
+    ("name", "share"), [("50", 0.5), ("90", 0.9), ("95", 0.95), ("99", 0.99), ("999", 0.999)]
+)
+def test_an_interval_ends_at_its_quantile(name: str, share: float) -> None:
+    """Errors a ten-thousandth inside and outside, above and below: half of them are held."""
+    end = stats.norm.ppf(0.5 + 0.5 * share)
+    error = end * np.array([1.0 - 1e-4, 1.0 + 1e-4, -1.0 + 1e-4, -1.0 - 1e-4])
+    series = Series("roll", "truth", 0.2 * error, np.full(4, 0.2))
+    ((*_, held, unit, _, _),) = figures_of(series, {"whole": np.arange(4)}, [f"coverage{name}"])
+    assert (held, unit) == (0.5, "1")
+
+
 def test_halved_standard_deviation_quadruples_nees() -> None:
     nees, coverage, n = consistency(sd_claimed=0.5)
     assert nees == pytest.approx(4.0 * consistency()[0], rel=1e-9)
@@ -512,6 +533,15 @@ def test_odometry_is_scored_over_the_distance_run() -> None:
     assert value(table, quantity="position", metric="final") == pytest.approx(5.0 + 0.01 * run, rel=1e-9)
     assert value(table, quantity="speed", metric="mean", window="moving") == pytest.approx(0.1, rel=1e-9)
     assert set(table[table["metric"] == "coverage95"]["quantity"]) == {"position", "speed"}
+
+
+def test_relative_distance_is_over_the_way_there_and_back() -> None:
+    motion = ride(6000, rest=0)
+    motion["position_m"] = 300.0 - np.abs(motion["position_m"] - 300.0)  # 300 m there, 299.9 m back
+    recording = recorded(motion)
+    odometry = recording.odometry.assign(position_m=motion["position_m"] + np.linspace(0.0, 6.0, 6000))
+    table = score_odometry(recording.with_odometry(odometry, "encoder"), motion)
+    assert value(table, quantity="distance_relative", metric="final") == pytest.approx(6.0 / 599.9, rel=1e-9)
 
 
 def test_relative_distance_of_a_train_that_stands_has_no_value() -> None:

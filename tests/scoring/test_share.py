@@ -96,3 +96,10 @@ def test_devices_on_tracks_that_decide_count_as_tracks() -> None:
     # The share between tracks of nothing is estimated to some 1/40; times 9 more devices a track.
     assert effective(alone, tracks) > 400 / (1.0 + 9 * 0.1)
     assert effective(alone, np.zeros(400)) == effective(alone, np.arange(400)) == 400
+
+
+def test_a_look_at_just_as_many_devices_as_can_be_enough_has_its_part_of_the_chance() -> None:
+    """59 that all pass are enough at 5 %, since .95^59 is .0485; at 2.5 % it takes 72."""
+    assert decide(59, 59, 0.95, chance=0.05, looks=(58, 59)) == ENOUGH
+    assert decide(59, 59, 0.95, chance=0.05, looks=(59, 118)) == UNDECIDED
+    assert decide(72, 72, 0.95, chance=0.05, looks=(59, 118)) == ENOUGH

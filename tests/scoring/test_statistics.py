@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from simrail.scoring.share import wilson
 from simrail.scoring.statistics import anees_bounds, compare, coverage_bounds, levels
 
 TRIALS = 2000
@@ -128,3 +129,11 @@ def test_pairs_need_both() -> None:
     found = compare([1.0, np.nan, 3.0, 4.0], [2.0, 2.0, np.nan, 5.0])
     assert found.pairs == 2 and found.difference.value == -1.0
     assert compare([np.nan], [1.0]).pairs == 0
+
+
+def test_draws_of_one_track_are_one_trial_of_the_win_rate() -> None:
+    rng = np.random.default_rng(4)
+    first, labels = rng.normal(size=40), np.repeat(np.arange(8), 5)
+    found = compare(first, np.zeros(40), labels).win_rate
+    low, high = wilson(8.0 * np.mean(first < 0.0), 8.0)
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)

@@ -72,6 +72,15 @@ def test_what_has_no_samples_is_not_judged() -> None:
     assert (row["verdict"], row["reason"]) == (NOT_JUDGED, "no samples")
 
 
+def test_the_figure_at_a_share_is_that_of_a_device() -> None:
+    """Where the share ends between two of them it is the larger one's: none lies between."""
+    values = np.arange(1.0, 11.0)[::-1, None]
+    (row,) = verdict_table(*campaign({"a": values}), [Requirement("roll", 20.0, share=0.9)]).to_dict(
+        "records"
+    )
+    assert (row["at_share"], row["median"]) == (10.0, 5.5)
+
+
 def test_below_at_share_are_so_many_devices() -> None:
     values = np.linspace(0.001, 0.1, 100)[:, None]
     scores, cells = campaign({"a": values})

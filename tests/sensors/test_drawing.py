@@ -200,6 +200,43 @@ def test_what_hangs_is_carried_like_what_stands(rods: bool) -> None:
     assert box.supports == (Support("body", 0.0),)
 
 
+def test_a_slanted_rod_pushes_along_each_axis_by_the_square_of_its_cosine() -> None:
+    """Hangers that lean by 3 : 4 : 5: .36 of their stiffness aside and .64 up; level springs push, too."""
+    model = carried(rods=True)
+    leaning = tuple(
+        replace(
+            rod,
+            outer_position_m=(rod.inner_position_m[0], 1.75 * rod.inner_position_m[1], 3.5),
+            damping_nspm=1e3,
+        )
+        for rod in model.rods
+    )
+    (springs,) = drawing(replace(model, rods=leaning)).body("box").springs
+    side, up, level = 4 * 0.36e6, 4 * 0.64e6, 4 * 1e5
+    assert (springs.lateral_npm, springs.vertical_npm) == pytest.approx((side + level, up))
+    assert (springs.lateral_nspm, springs.vertical_nspm) == pytest.approx((1.44e3, 2.56e3))
+    height = (3.0 * side + 2.5 * level) / (side + level)
+    assert springs.height_m == pytest.approx(height)
+    roll = up * 0.5**2 + side * (3.0 - height) ** 2 + level * (2.5 - height) ** 2
+    assert springs.roll_nmprad == pytest.approx(roll)
+    assert springs.roll_nmsprad == pytest.approx(2.56e3 * 0.5**2 + 1.44e3 * (3.0 - height) ** 2)
+
+
+def test_an_axle_that_carries_two_bodies_has_the_springs_of_both() -> None:
+    model = model_of("metro_irw_bogie")
+    box = Body("box", 600.0, (200.0, 200.0, 200.0), (0.9, 0.0, 1.0))
+    springs = tuple(
+        Suspension(f"box {x} {y}", "front", "box", (0.9 + x, y, 0.6), (1e5, 1e5, 1e5), (1e3, 1e3, 1e3))
+        for x in (0.2, -0.2)
+        for y in (0.5, -0.5)
+    )
+    both = replace(model, bodies=(*model.bodies, box), suspensions=(*model.suspensions, *springs))
+    front, rear = (drawing(both).body(name) for name in ("front", "rear"))
+    assert (rear.primary_stiffness_npm, rear.primary_damping_nspm) == PRIMARY["metro_irw_bogie"]
+    assert front.primary_stiffness_npm == pytest.approx(PRIMARY["metro_irw_bogie"][0] + 4e5)
+    assert front.primary_damping_nspm == pytest.approx(PRIMARY["metro_irw_bogie"][1] + 4e3)
+
+
 def test_a_body_on_its_own_bogie_and_on_its_neighbour() -> None:
     """Two car bodies in a row, the second with one bogie and its front end on the first one's rear end."""
     model = model_of("manchester_1")

@@ -146,6 +146,13 @@ def test_the_pattern_of_the_disc_repeats_every_turn(sign, quadrature):
     assert np.abs(errors[0] - edge_errors(edge_pattern_sd=0.04, draw=1)[0][0]).max() > 0.01
 
 
+def test_the_disc_is_the_same_forward_and_backward():
+    """From half a pulse past edge 0 a wheel meets the edges 1, 2, ... or 0, -1, ... of one disc."""
+    there, back = (edge_errors(sign=sign, edge_pattern_sd=0.04)[0] for sign in (1.0, -1.0))
+    number = np.arange(PULSES)
+    np.testing.assert_allclose(there[number - 1], -back[-number % PULSES], atol=2.02 / PER_COUNT)
+
+
 @pytest.mark.parametrize("sign", (1.0, -1.0))
 @pytest.mark.parametrize("quadrature", (False, True))
 def test_jitter_is_new_at_every_edge_of_every_turn(sign, quadrature):
@@ -189,6 +196,15 @@ def test_missed_pulses_come_at_their_rate_and_are_never_made_up(sign, quadrature
     # The gaps between them are geometric: their mean is 1/rate and so is their sd.
     gaps = np.diff(np.flatnonzero(np.diff(lost))) * 30.0 / 1000.0 * 1024 / TURN
     assert gaps.std() / gaps.mean() == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_missed_pulse_is_missed_when_it_passes():
+    """In quadrature with all four edges: between two pulses whole pulses have been counted."""
+    settings = {"quadrature": True, "phase": 0.0} | FAST
+    angle = 2.0 * TIME
+    full, holed = counts_of(angle, **settings), counts_of(angle, missed_rate=0.2, **settings)
+    assert (np.diff(full) <= 2).all() and holed[-1] < 0.85 * full[-1]
+    assert not (holed[full % 4 == 0] % 4).any()
 
 
 def test_missed_pulses_are_lost_both_ways():

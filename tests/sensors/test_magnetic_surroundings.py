@@ -90,3 +90,11 @@ def test_far_structures_are_left_out_only_where_they_are_nothing():
     for s, y, z, *moment in structures(steel, (0.0, 500.0)):
         whole += dipole_field(np.column_stack([position - s, place - [y, z]]), np.array(moment))
     assert np.abs(steel_field(position, place, steel, (0.0, 500.0)) - whole).max() < 20e-9
+
+
+def test_structures_stand_on_both_sides_alike():
+    _, y, z, *_ = structures(Steel(track_seed=3), (100.0, 40_100.0)).T
+    n = len(y)
+    assert np.mean(y > 0.0) == pytest.approx(0.5, abs=4.0 * 0.5 / np.sqrt(n))
+    for values, (low, high) in ((np.abs(y), (1.8, 4.0)), (z, (-0.5, 5.0))):
+        assert values.mean() == pytest.approx(0.5 * (low + high), abs=4.0 * (high - low) / np.sqrt(12.0 * n))

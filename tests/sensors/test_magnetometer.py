@@ -123,11 +123,18 @@ def test_noise_and_bias_have_the_size_they_are_given():
     means = np.array([sample(short, replace(QUIET, bias_t=300e-9), draw=d).iloc[0] for d in range(300)])
     uniform = (means - QUIET.field.vector_t).ravel() / 300e-9
     assert stats.kstest(uniform, stats.uniform(-1.0, 2.0).cdf).pvalue > 0.001
+    # Each axis has its own.
+    assert np.abs(np.corrcoef(means.T)[np.triu_indices(3, 1)]).max() < 4.0 / np.sqrt(300)
 
 
 def test_range_and_resolution():
     coarse = sample(motion(), replace(QUIET, resolution_t=1e-7)).to_numpy() / 1e-7
     np.testing.assert_allclose(coarse, np.rint(coarse), rtol=0, atol=1e-9)
+    # To the nearest count, what is measured with its noise.
+    noisy = [
+        sample(motion(), replace(QUIET, noise_tpsqrthz=1e-8, resolution_t=t)).to_numpy() for t in (0.0, 1e-7)
+    ]
+    assert np.abs(noisy[1] - noisy[0]).max() <= 0.5e-7 * (1.0 + 1e-9)
     clipped = sample(motion(), replace(QUIET, range_t=10e-6)).to_numpy()
     assert np.abs(clipped).max() == 10e-6
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simrail.core.errors import InputError
-from simrail.track.defects import FORMS, Defect
+from simrail.track.defects import FORMS, Defect, shortest_wave_m
 from simrail.track.design import Straight, TrackDesign
 from simrail.track.irregularity import Irregularity
 from simrail.track.laid_track import knot_step_m, lay
@@ -160,3 +160,11 @@ def test_what_cannot_be_is_refused(form: str, options: dict[str, object], field:
     with pytest.raises(InputError) as caught:
         laid(defect("dip"), defect(form, **options))
     assert caught.value.field == f"defect[1].{field}"
+
+
+def test_rails_are_as_fine_as_the_sharpest_of_their_defects_asks_for() -> None:
+    """A ramp of 10 m bends over 4 m, the point of a joint of 1 m over a fifth of one."""
+    ramp, joint = Defect("ramp", 100.0, 10.0, 0.01), Defect("joint", 300.0, 1.0, 0.002)
+    assert [shortest_wave_m(pair) for pair in ((ramp, joint), (joint, ramp), (ramp,))] == [0.2, 0.2, 4.0]
+    fine, coarse = (knot_step_m(Irregularity(defects=d)) for d in ((ramp, joint), (ramp,)))
+    assert fine <= 0.2 / 8.0 < coarse

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from simrail.cli.main import call
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.track.curvature_csv import read_curvature_csv
-from simrail.track.design import TrackDesign, Transition
+from simrail.track.design import Curve, TrackDesign, Transition
 from simrail.track.file import track_by_name
 from simrail.track.foreign_file import design_from_file
 
@@ -225,6 +227,44 @@ def test_the_other_side_and_the_other_curvature_word_make_the_mirrored_line(tmp_
     np.testing.assert_allclose(mirror.frame(s).roll_rad, -plain.frame(s).roll_rad, atol=1e-9)
 
 
+def test_straights_and_arcs_may_be_told_by_their_points_alone(tmp_path: Path) -> None:
+    """An arc to the right turns clockwise from its start to its end, by less than a whole turn."""
+    text = re.sub(r'(<(?:Line|Curve)) length="[^"]*"', r"\1", landxml())
+    bare = re.sub(r'(<Curve rot="\w+") radius="[^"]*"', r"\1", text)
+    assert bare.count("<Curve rot=") == 3 and "<Line>" in bare
+    told, found = (design_from_file(written(tmp_path, "line.xml", one))[0] for one in (landxml(), bare))
+    lengths = [[element.length_m for element in design.elements] for design in (told, found)]
+    assert lengths[1] == pytest.approx(lengths[0], abs=1e-5)
+    radii = [[e.radius_m for e in design.elements if isinstance(e, Curve)] for design in (told, found)]
+    assert radii[1] == pytest.approx(radii[0], rel=1e-6)
+
+
+def test_a_circular_vertical_curve_is_as_long_as_its_radius_turns(tmp_path: Path) -> None:
+    """Its length is its radius times the change of the slope."""
+    text = landxml()
+    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(PVI)]
+    for (s, length), before, after in zip(VERTICAL_M.items(), slopes, slopes[1:], strict=False):
+        old, new = (
+            f'<ParaCurve length="{length:.10f}">',
+            f'<CircCurve radius="{length / abs(after - before):.10f}">',
+        )
+        assert text.count(old) == 1, s
+        text = text.replace(old, new)
+    text = text.replace("</ParaCurve>", "</CircCurve>")
+    parabolas, circles = (
+        design_from_file(written(tmp_path, "line.xml", one))[0] for one in (landxml(), text)
+    )
+    assert circles.vertical_radius_m == pytest.approx(parabolas.vertical_radius_m, rel=1e-9)
+
+
+def test_a_profile_that_begins_before_the_plan_has_its_height_where_the_plan_begins(tmp_path: Path) -> None:
+    before = f"<ProfAlign><PVI>{STA - 100.0} 390</PVI><PVI>{STA - 50.0} 396</PVI>"
+    design, _ = design_from_file(written(tmp_path, "line.xml", changed("<ProfAlign>", before)))
+    plain, _ = design_from_file(written(tmp_path, "plain.xml", landxml()))
+    s = design.start_m + np.array([0.0, 100.0, 300.0, 900.0])
+    np.testing.assert_allclose(design.frame(s).position[:, 2], plain.frame(s).position[:, 2], atol=1e-6)
+
+
 def test_chainage_breaks_are_mapped(tmp_path: Path) -> None:
     text = changed(
         "</CoordGeom>", '</CoordGeom><StaEquation staInternal="1500" staBack="1500" staAhead="2000"/>'
@@ -239,6 +279,12 @@ def test_steps_are_smoothed_and_told(tmp_path: Path) -> None:
     design, notes = design_from_file(written(tmp_path, "tram.csv", text), step_smoothing_m=6.0)
     assert design.frame(300.0).yaw_rad == pytest.approx(50.0 / 300.0, rel=1e-9)
     assert any("steps at 2 places, by 1/300 m at most" in note and "6 m" in note for note in notes)
+
+
+def test_a_negative_radius_in_a_table_is_a_curve_to_the_right(tmp_path: Path) -> None:
+    text = "s_m,radius_m\n0,0\n100,0\n100,-300\n150,-300\n150,0\n300,0\n"
+    design, _ = design_from_file(written(tmp_path, "tram.csv", text), step_smoothing_m=6.0)
+    assert design.frame(300.0).yaw_rad == pytest.approx(-50.0 / 300.0, rel=1e-9)
 
 
 def test_signs_of_cant_in_a_table(tmp_path: Path) -> None:

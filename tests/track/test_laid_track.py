@@ -16,6 +16,7 @@ from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transit
 from simrail.track.irregularity import PERIOD_M, Irregularity, fade, realise_all
 from simrail.track.laid_track import CHANNELS, LaidTrack, lay
 from simrail.track.rail_condition import RailCondition
+from simrail.track.sections import SectionGain, section_gain
 from simrail.track.spectra import SPECTRA
 
 ROUGH = Irregularity("erri_b176_high", (1.5, 100.0), fade_m=40.0)
@@ -211,3 +212,14 @@ def test_stretches_that_cannot_be_are_refused(changes: dict[str, float], field: 
     with pytest.raises(InputError) as caught:
         lay(track, replace(ROUGH, **changes), seed=4)  # type: ignore[arg-type]
     assert caught.value.field == f"irregularity.{field}"
+
+
+def test_sections_count_from_the_start_of_the_track_wherever_irregularities_begin() -> None:
+    within = replace(ROUGH, start_m=0.0, end_m=400.0)
+    gain = SectionGain(0.35, (50.0, 80.0))
+    plain, gained = (lay(CURVED, one, seed=11) for one in (within, replace(within, section_gain=gain)))
+    s = np.arange(60.0, 340.0, 0.125)  # knots, which the splines go through
+    expected = section_gain(s, gain, start_m=CURVED.start_m, seed=11)
+    for column in ("alignment_m", "vertical_profile_m", "cross_level_m"):
+        ours, before = (track.irregularities(s)[column].to_numpy() for track in (gained, plain))
+        np.testing.assert_allclose(ours, expected * before, atol=1e-12)

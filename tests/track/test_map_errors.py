@@ -7,7 +7,7 @@ import pytest
 
 from simrail.core.errors import InputError
 from simrail.core.toml_files import judge, parse_toml
-from simrail.track.design import Curve, Gradient, Straight, TrackDesign, Transition
+from simrail.track.design import CantStation, Curve, Gradient, Straight, TrackDesign, Transition
 from simrail.track.file import TrackFile, track_text
 from simrail.track.map_errors import EXACT, MapDefect, MapErrors, draw_map
 
@@ -62,6 +62,35 @@ def test_cant_of_curves() -> None:
 def test_radius_of_curves() -> None:
     bend = np.array([[1.0 / c.radius_m for c in curves(m)] for m in maps(only(radius_relative_sd=0.01))])
     assert_sd(bend / [1.0 / 400.0, -1.0 / 600.0] - 1.0, 0.01, bend.size)
+
+
+def test_the_error_of_a_curve_is_one_of_its_curvature_and_apart_from_that_of_its_cant() -> None:
+    """Twice the size is twice the error, to the bit of rounding: of a radius it would not be."""
+    small, large = (
+        np.array(
+            [1.0 / c.radius_m for c in curves(draw_map(LINE, only(radius_relative_sd=sd), seed=3, draw=0))]
+        )
+        for sd in (0.1, 0.2)
+    )
+    right = np.array([1.0 / 400.0, -1.0 / 600.0])
+    np.testing.assert_allclose(large - right, 2.0 * (small - right), rtol=1e-12)
+    both = [curves(m) for m in maps(only(radius_relative_sd=0.01, cant_sd_m=0.003))]
+    bend = np.array([[1.0 / c.radius_m for c in own] for own in both]) / right - 1.0
+    cant = np.array([[c.cant_m for c in own] for own in both]) - [0.08, 0.05]
+    assert abs(np.corrcoef(bend.ravel(), cant.ravel())[0, 1]) < 4.0 / np.sqrt(bend.size)
+
+
+def test_cant_that_stands_beside_the_plan_errs_as_that_of_its_curve_does() -> None:
+    """More cant raises the right rail in a curve to the left, the left rail in one to the right."""
+    level = [(300.0, 0.0), (360.0, -0.08), (560.0, -0.08), (620.0, 0.0)]
+    level += [(850.0, 0.05), (1000.0, 0.05), (1080.0, 0.0)]
+    plan = tuple(replace(e, cant_m=0.0) if isinstance(e, Curve) else e for e in LINE.elements)
+    beside = replace(LINE, elements=plan, cant_stations=tuple(CantStation(*station) for station in level))
+    errors = only(cant_sd_m=0.003)
+    found = np.array([s.cross_slope_m for s in draw_map(beside, errors, seed=3, draw=0).cant_stations])
+    left, right = np.array([c.cant_m for c in curves(draw_map(LINE, errors, seed=3, draw=0))]) - [0.08, 0.05]
+    off = found - [cross for _, cross in level]
+    np.testing.assert_allclose(off, [0.0, -left, -left, 0.0, right, right, 0.0], atol=1.1e-6)
 
 
 def test_places_of_joints() -> None:

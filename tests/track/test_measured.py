@@ -12,7 +12,7 @@ from simrail.core.errors import InputError
 from simrail.track.bands import BANDS, band_pass
 from simrail.track.defects import Defect
 from simrail.track.design import Curve, Straight, TrackDesign, Transition
-from simrail.track.irregularity import Irregularity
+from simrail.track.irregularity import Irregularity, fade
 from simrail.track.laid_track import LaidTrack, lay
 from simrail.track.measured import FINEST_STEP_M, MeasuredRails, chord_offset, measured_rails
 
@@ -108,6 +108,16 @@ def test_beside_or_instead_of_a_spectrum() -> None:
     for track in (added, instead):
         assert np.abs(track.rails(outside) - drawn.rails(outside)).max() < 1e-6
     assert np.abs(alone.rails(outside)).max() < 1e-6
+
+
+def test_a_spectrum_passes_over_into_the_file_that_takes_its_place() -> None:
+    part, where = np.arange(200.0, 401.0, 0.25), np.arange(195.0, 225.0, 0.125)
+    drawn = lay(TRACK, Irregularity("erri_b176_low", (1.5, 100.0), fade_m=20.0), seed=5)
+    alone = laid(measured(part))
+    instead = laid(measured(part, replaces_spectrum=True), spectrum="erri_b176_low")
+    left = 1.0 - fade(where, 200.0, end_m=400.75, length_m=20.0)[:, None]
+    expected = left * drawn.rails(where) + alone.rails(where)
+    np.testing.assert_allclose(instead.rails(where), expected, atol=1e-12)
 
 
 def test_defects_add_to_a_file() -> None:

@@ -58,6 +58,26 @@ def test_band_and_twist_and_what_is_not_known():
     assert middle.loc["twist", "sd_m"] == pytest.approx(np.hypot(short, long) / np.sqrt(2.0), rel=0.01)
 
 
+def test_a_section_counts_once_half_of_it_is_known_and_a_stretch_over_a_border_in_both():
+    wave = geometry(alignment_m=3e-3 * np.sin(2 * np.pi * S / 10.0))
+    for length_m, last_m in ((690.0, 400.0), (710.0, 600.0)):
+        found = section_indicators(wave.iloc[: round(length_m / 0.25)])
+        assert found[found["quantity"] == "alignment"]["start_m"].max() == last_m
+    bump = geometry(alignment_m=np.where(np.abs(S - 400.0) < 5.0, 8e-3, 0.0))
+    found = section_indicators(bump, limits={"alignment": Limits(None, 5e-3)})
+    rows = found[found["quantity"] == "alignment"].set_index("start_m")
+    assert rows["defects"].to_dict() == {0.0: 0, 200.0: 1, 400.0: 1, 600.0: 0, 800.0: 0}
+
+
+def test_a_place_at_a_border_but_for_rounding_is_of_the_section_that_begins_there():
+    place = S.copy()
+    place[800] = np.nextafter(200.0, 0.0)
+    frame = geometry(alignment_m=np.where(np.arange(len(S)) == 800, 5e-3, 0.0))
+    found = section_indicators(frame.set_index(pd.Index(place, name="position_m")))
+    peaks = found[found["quantity"] == "alignment"].set_index("start_m")["peak_m"]
+    assert peaks[200.0] > 4e-3 and peaks[0.0] == 0.0
+
+
 def test_too_short_a_line_or_a_wrong_name_is_told():
     with pytest.raises(InputError, match="line too short for the band"):
         section_indicators(geometry().iloc[:400], band=BANDS["D2"])

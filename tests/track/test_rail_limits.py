@@ -83,6 +83,21 @@ def test_draws_give_the_sd_of_a_band_and_what_is_left_open():
     assert row["open_m"] == pytest.approx(0.25 * open_places.sum()) and 100.0 < row["open_m"] < 350.0
 
 
+def test_what_is_beyond_is_not_left_open_and_a_section_has_its_root_mean_square():
+    """A way that is surely, perhaps and surely not beyond 4 mm; what is told of a peak is of its place."""
+    place = 0.25 * np.arange(400)
+    value = np.repeat([5e-3, 3.9e-3, 1e-3], [120, 80, 200])
+    sd = np.repeat([0.1e-3, 0.3e-3, 0.1e-3], [120, 80, 200])
+    value[60], sd[60] = 6e-3, 0.2e-3
+    line = RailLine("alignment", "D1", place, value, sd)
+    limits = RailLimits(peaks={("alignment", "D1"): 4e-3}, section_m=100.0)
+    row = rail_summary([line], limits).iloc[0]
+    assert (row["exceedances"], row["open_m"]) == (1, 80 * 0.25)
+    mean_square = (119 * 0.1**2 + 0.2**2 + 80 * 0.3**2 + 200 * 0.1**2) / 400.0
+    assert rail_sections([line], limits)["error_sd_m"].tolist() == pytest.approx([1e-3 * mean_square**0.5])
+    assert exceedances([line], limits)[["peak_position_m", "sd_m"]].iloc[0].tolist() == [15.0, 0.2e-3]
+
+
 def test_twist_is_unfiltered_and_needs_a_base_of_whole_steps():
     ramp = np.clip(S - 400.0, 0.0, 3.0) * 2e-3
     lines = rail_lines(geometry(cross_level_m=ramp), bands=[BANDS["D1"]])

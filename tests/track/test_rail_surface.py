@@ -107,6 +107,12 @@ def test_depths_of_welds(line):
     assert depths.std() == pytest.approx(1e-4, rel=4.0 / np.sqrt(2 * 999))
 
 
+def test_welds_of_both_rails_are_drawn_apart(line):
+    surface = lay_surface(RailSources(welds=Dips(2.0, 0.0, 1e-4, 0.12, 0.8)), line, seed=1)
+    left, right = (surface.height(side, 1.0 + 2.0 * np.arange(999)) for side in (0, 1))
+    assert abs(np.corrcoef(left, right)[0, 1]) < 4.0 / np.sqrt(999)
+
+
 def test_even_sleepers_are_one_wave(line):
     surface = lay_surface(RailSources(sleepers=SleeperPassing(0.6, 0.0, 10e-6, 0.0)), line, seed=1)
     s = np.arange(0.0, 1200.0, 0.01)

@@ -121,6 +121,19 @@ def test_a_rail_keeps_its_sides_and_a_wheel_its_tape_circle(tmp_path):
     assert float(wheel_depth(wheel_profile("w.prw", tmp_path))(0.0)) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_miniprofs_rail_is_a_height_and_its_wheel_a_depth(tmp_path):
+    rail, wheel = every_third(rail_60e1()), every_third(s1002())
+    header = "ProgramName=own\nColumnDef=X,Y\n\n"
+    (tmp_path / "r.ban").write_text(header + rows(1e3 * rail[0], 20.0 - 1e3 * rail[1]))
+    (tmp_path / "r.txt").write_text(rows(1e3 * rail[0], 1e3 * rail[1]))
+    (tmp_path / "w.whl").write_text(header + rows(1e3 * wheel[0] + 70.0, 1e3 * wheel[1]))
+    (tmp_path / "w.txt").write_text(rows(1e3 * wheel[0], 1e3 * wheel[1]))
+    told, text = (rail_profile(tmp_path / name) for name in ("r.ban", "r.txt"))
+    np.testing.assert_allclose([told.lateral_m, told.depth_m], [text.lateral_m, text.depth_m], atol=1e-11)
+    told, text = wheel_profile(tmp_path / "w.whl", tape_circle_m=0.07), wheel_profile(tmp_path / "w.txt")
+    np.testing.assert_allclose([told.lateral_m, told.depth_m], [text.lateral_m, text.depth_m], atol=1e-11)
+
+
 def test_two_columns_of_text_give_the_same_profile_and_the_same_contact(tmp_path):
     y, z = every_third(s1002())
     (tmp_path / "w.csv").write_text(

@@ -157,3 +157,12 @@ def test_a_force_that_is_not_gravitys_size_is_doubted(noisy: Recording) -> None:
 def test_bad_options_are_refused_by_name(options: dict, named: str) -> None:
     with pytest.raises(InputError, match=named):
         AttitudeEkf(**options)
+
+
+def test_a_heading_is_as_sure_at_first_as_it_is_told_and_so_are_roll_and_pitch(noisy: Recording) -> None:
+    """Gravity says nothing of heading: its first standard deviation is what it began with."""
+    method = AttitudeEkf(start_sd_rad=0.04, start_yaw_sd_rad=0.007)
+    arrays, considered = method._arrays(beginning(noisy, samples=10))
+    np.testing.assert_allclose(np.sqrt(arrays.start_variance), [0.04, 0.04, 0.007], rtol=1e-12)
+    first = method.estimate(beginning(noisy, samples=10)).states.iloc[0]
+    assert first[ATTITUDE_SD[2]] == pytest.approx(np.sqrt(0.007**2 + considered[0, 2]), rel=1e-9)

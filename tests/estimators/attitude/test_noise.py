@@ -92,6 +92,20 @@ def test_residual_bias_shrinks_with_the_rest_to_the_drift(recording: Recording) 
     assert not bias_variance(perfect, np.array([0.0, 20.0])).any()
 
 
+def test_what_is_considered_is_a_tilt_by_the_accelerometers_bias_and_the_heading_since_the_rest(
+    recording: Recording,
+) -> None:
+    """A bias uniform within its bound b tilts by b / (sqrt(3) g); a rate's error adds up from the rest on."""
+    sheet, rest = recording.imu_sheet, rest_bias(recording)
+    considered = recommended_noise(recording, rest, curves=None).considered
+    tilt = sheet.accel_turn_on_bias_mps2 / np.sqrt(3.0) / GRAVITY
+    np.testing.assert_allclose(np.sqrt(considered[:, :2]), tilt, rtol=1e-9)
+    last = int(np.flatnonzero(np.diff(rest.samples))[-1]) + 1  # from here on the bias stays as it is
+    drift = np.sqrt(bias_variance(sheet, rest.samples[last:] / 250.0))
+    since = (np.arange(last, len(considered)) - rest.samples[last]) / 250.0
+    np.testing.assert_allclose(np.sqrt(considered[last:, 2]), drift * since, rtol=1e-9)
+
+
 def test_a_perfect_imu_gets_finite_positive_noise(recording: Recording) -> None:
     zero = {
         field: 0.0

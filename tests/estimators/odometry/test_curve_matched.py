@@ -649,6 +649,9 @@ def test_where_the_wheel_is():
     recording = record_fast(0, 0)
     assert recording.encoder_sheet.wheel == "rear.left"
     assert wheel_ahead(recording) == pytest.approx(-1.8)
+    x, y, z = recording.mount_position_m
+    ahead = replace(recording, mount_position_m=(x + 0.25, y, z))
+    assert wheel_ahead(ahead) == pytest.approx(-1.8 - 0.25)
     assert wheel_ahead(replace(recording, vehicle_sheet=None)) == 0.0
 
 

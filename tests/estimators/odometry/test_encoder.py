@@ -9,7 +9,7 @@ from simrail.estimators.kalman import update
 from simrail.estimators.odometry.encoder import EncoderOdometry, ahead, predict
 
 from simrail.core.columns import ODOMETRY, ODOMETRY_SD
-from simrail.recording.recording import EncoderSheet
+from simrail.recording.recording import EncoderSheet, OdometerSheet
 from simrail.sensors.encoder import EncoderSpec, sample_encoder
 from simrail.vehicle.speed_profile import SpeedProfile
 
@@ -205,3 +205,15 @@ def test_a_slow_encoder_serves_a_fast_imu():
     assert list(found.columns) == COLUMNS
     assert np.isfinite(found.to_numpy()).all()
     assert (found[list(ODOMETRY_SD)] > 0.0).all(axis=None)
+
+
+def test_an_odometer_below_what_it_can_tell_is_a_train_that_stands():
+    """Its speed is uniform within the bound; a reading at the bound is one that moves."""
+    still, time = 0.02, np.arange(200) / 10.0
+    for reading, stands in ((0.0, True), (0.019, True), (0.02, False)):
+        odometer = pd.DataFrame({"speed_mps": reading}, index=pd.Index(time, name="time_s"))
+        found = EncoderOdometry(still_mps=still).from_speed(odometer, OdometerSheet(0.05, 0.0), time, 7.0)
+        last = found.iloc[-1]
+        assert (last["speed_mps"] == 0.0) == stands and (last["position_m"] == 7.0) == stands
+        if stands:
+            assert last["speed_sd_mps"] == pytest.approx(still / np.sqrt(3.0), rel=1e-12)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -493,3 +494,14 @@ def test_found_has_room_for_all(wavy: Callable) -> None:
     low = (found.first_node) * model.step_m
     assert low <= model.place.min() - model.wheelbase_m
     assert low + len(found.oldest) * model.step_m >= model.place.max()
+
+
+def test_rails_of_a_train_that_runs_towards_smaller_s_have_their_own_sds() -> None:
+    """Nodes lie along the way of the train; the geometry along the track."""
+    nodes = np.column_stack([[1e-3, 2e-3, np.nan, 4e-3], np.square([1e-4, 2e-4, 3e-4, 4e-4])])
+    found = SimpleNamespace(first_node=-40, oldest=nodes, front=nodes)
+    model = SimpleNamespace(side=-1.0, step_m=0.5, place=np.array([-20.0, -18.0]))
+    geometry = ProfileFilter()._geometry(model, found)  # type: ignore[arg-type]
+    assert geometry.index.tolist() == [18.5, 19.5, 20.0]
+    assert geometry["vertical_profile_m"].tolist() == [4e-3, 2e-3, 1e-3]
+    assert geometry["vertical_profile_sd_m"].tolist() == pytest.approx([4e-4, 2e-4, 1e-4])

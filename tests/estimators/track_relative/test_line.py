@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from simrail.estimators.odometry.line_table import PLACES_PER_M
 from simrail.estimators.track_relative.line import ground_at, lines_of, numbers_at
+from simrail.estimators.track_relative.states import S
 
 from simrail.core.jit import FloatArray
 from simrail.core.rotation import rotation_matrix
 from simrail.recording.recording import Recording
 from simrail.recording.sheets.vehicle_sheet import SheetBody, Support, VehicleSheet
 from simrail.track.alignment import element_starts
-from simrail.track.design import Curve, Straight, Transition
+from simrail.track.design import Curve, Gradient, Straight, Transition
 
 COACH = VehicleSheet(
     (
@@ -160,3 +163,27 @@ def test_places_have_the_numbers_of_their_element_and_curve(exact_bend: Recordin
     # Vertical curves: R |slope behind - slope before|, half to either side of 180 m.
     assert numbers_at(lines, np.array([150.0, 156.0, 180.0, 204.0, 210.0]))[2].tolist() == [0, 1, 1, 1, 0]
     assert set(vertical.tolist()) <= {0.0, 1.0}
+
+
+def test_gravity_on_the_tracks_axes_turns_with_its_cant_and_its_slope(exact_bend: Recording) -> None:
+    """In a canted transition on a vertical curve, against differences of the direction itself."""
+    gradients = (Gradient(0.0, 0.02), Gradient(100.0, -0.02))
+    line = replace(exact_bend.track, gradients=gradients, vertical_radius_m=1500.0)
+    recording = replace(exact_bend, track=line)
+    place, step = np.arange(80.0, 121.0, 2.5), 1e-3
+    slopes = np.column_stack([part.slopes[S] for part in ground_at(recording, lines_of(recording), place).up])
+    ahead, behind = (line.frame(place + side * step).rotation[:, 2, :] for side in (1.0, -1.0))
+    np.testing.assert_allclose(slopes, (ahead - behind) / (2.0 * step), atol=1e-9)
+    # The share of the slope in what is across must be seen.
+    frame = line.frame(place)
+    tilts = np.sin(frame.pitch_rad) * np.sin(frame.roll_rad) * frame.rates[:, 1]
+    assert np.abs(tilts).max() > 1e-7
+
+
+def test_an_element_is_that_of_the_nearest_place_of_the_grid() -> None:
+    row = np.arange(8.0)
+    lines = SimpleNamespace(places=10.0 + row / PLACES_PER_M, element=row, curve=row, vertical=row)
+    step = 1.0 / PLACES_PER_M
+    place = 10.0 + step * np.array([-3.0, 0.4, 0.6, 3.4, 3.6, 20.0])
+    for numbers in numbers_at(lines, place):  # type: ignore[arg-type]
+        assert numbers.tolist() == [0, 0, 1, 3, 4, 7]

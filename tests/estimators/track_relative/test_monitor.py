@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from simrail.estimators.odometry.line_table import PLACES_PER_M
 from simrail.estimators.track_relative import states as at
 from simrail.estimators.track_relative.monitor import (
     ALLOWED,
@@ -21,12 +23,13 @@ from simrail.estimators.track_relative.monitor import (
     in_curves,
 )
 from simrail.estimators.track_relative.noise import AT_MPS
+from simrail.estimators.track_relative.output import with_bounds
 from simrail.estimators.track_relative.smoother import TrackRelativeSmoother
 
 from simrail.core.columns import ACCEL, BOUND, FAULT, GYRO
 from simrail.recording.recording import Recording, beginning
 from simrail.recording.sheets.vehicle_sheet import SheetBody, VehicleSheet
-from simrail.track.design import STRAIGHT
+from simrail.track.design import STRAIGHT, Curve, Straight
 from simrail.track.file import track_by_name
 
 DRAWN = VehicleSheet((SheetBody("body"),))
@@ -166,3 +169,36 @@ def test_contradiction_is_the_largest_of_states_and_sums(rough: Callable) -> Non
     assert faults[-1] == 1.0
     assert widening[-1] == pytest.approx(ALLOWED * BOUND_SDS * 4.0 * wanted)
     assert widening[0] == pytest.approx(ALLOWED * BOUND_SDS)
+
+
+def test_a_curve_is_judged_by_where_the_train_runs_through_it() -> None:
+    """Two seconds at half a metre a second, which say nothing, then two at five."""
+    places = np.arange(100 * PLACES_PER_M + 1) / PLACES_PER_M
+    element = np.searchsorted([40.0, 60.0], places, side="right").astype(np.float64)
+    lines = SimpleNamespace(places=places, element=element, curve=0.0 * places, vertical=0.0 * places)
+    elements = (Straight(40.0), Curve(20.0, 300.0), Straight(40.0))
+    states, surprises = np.zeros((80, at.STATES)), np.zeros((80, 6))
+    states[:, at.S] = np.repeat([10.0, 45.0, 55.0, 80.0], 20)
+    states[:, at.V] = np.repeat([5.0, 0.5, 5.0, 5.0], 20)
+    surprises[:, 2] = np.repeat([3.0, 7.0, 1.0, 3.0], 20)
+    course = SimpleNamespace(
+        steps=SimpleNamespace(dt=0.1),
+        around=SimpleNamespace(states=states),
+        lines=lines,
+        recording=SimpleNamespace(track=SimpleNamespace(elements=elements)),
+    )
+    bent = in_curves(SimpleNamespace(course=course, surprises=surprises))  # type: ignore[arg-type]
+    assert not bent[:60].any()
+    np.testing.assert_allclose(bent[60:], 20.0**2 / 20.0 * 5.0 / AT_MPS / (1 + PATIENCE), rtol=1e-12)
+
+
+def test_bounds_of_a_sample_are_those_of_the_last_step_that_is_over() -> None:
+    """Row 0 is of before the first step; nothing is a step late."""
+    time = np.array([0.00, 0.01, 0.02, 0.03, 0.04, 0.05])
+    steps = SimpleNamespace(end_s=np.array([0.01, 0.03, 0.05]))
+    trace = SimpleNamespace(course=SimpleNamespace(steps=steps))
+    states = pd.DataFrame({"roll_sd_rad": 2.0, "position_sd_m": 3.0}, index=pd.Index(time, name="time_s"))
+    widened = with_bounds(states, trace, np.array([0.0, 0.0, 1.0, 1.0]), np.array([1.0, 2.0, 4.0, 8.0]))  # type: ignore[arg-type]
+    assert widened[BOUND[0]].tolist() == [2.0, 4.0, 4.0, 8.0, 8.0, 16.0]
+    assert widened[BOUND[1]].tolist() == [3.0, 6.0, 6.0, 12.0, 12.0, 24.0]
+    assert widened[FAULT].tolist() == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]

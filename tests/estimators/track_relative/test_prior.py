@@ -19,6 +19,7 @@ from simrail.estimators.track_relative.noise import (
     SLOW_M,
     WAGON,
     Motion,
+    at_scale,
     motion_of,
 )
 from simrail.estimators.track_relative.prior import PARTS, first_state, heading_sd, noise_of, start_of
@@ -129,9 +130,9 @@ def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:
     of 1.5 sqrt(3) p at zero. Local gravity is known to 1 mm/s2.
     """
     recording = rough()
-    recording = replace(
-        recording, imu_sheet=replace(recording.imu_sheet, gyro_nonlinearity=1e-3, accel_nonlinearity=2e-3)
-    )
+    more = {"gyro_nonlinearity": 1e-3, "accel_nonlinearity": 2e-3}
+    more |= {"gyro_random_walk_radpspsqrts": 3e-6, "accel_random_walk_mps2psqrts": 2e-4}
+    recording = replace(recording, imu_sheet=replace(recording.imu_sheet, **more))
     sheet, base = recording.imu_sheet, recording.track.rail_base_m
     noise = noise_of(recording, AXLE)
     sd = np.sqrt(np.diag(start_of(recording, AXLE, noise)[1]))
@@ -153,8 +154,8 @@ def test_sizes_are_those_of_the_sheets(rough: Callable) -> None:
     assert sd[at.EVEN] == sd[at.ODD] == 0.3
     assert sd[at.SLOPE] == recording.map_errors.gradient_sd
     assert sd[at.SCALE] == pytest.approx(recording.encoder_sheet.radius_relative_sd)
-    walk = 2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + sheet.gyro_random_walk_radpspsqrts**2
-    assert noise.gyro_walk == pytest.approx(walk)
+    assert noise.gyro_walk == pytest.approx(2.0 * sheet.gyro_bias_instability_radps**2 / 300.0 + 9e-12)
+    assert noise.accel_walk == pytest.approx(2.0 * sheet.accel_bias_instability_mps2**2 / 300.0 + 4e-8)
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -195,3 +196,17 @@ def test_a_mount_is_carried_inside_a_curve_by_the_versine(rough: Callable) -> No
     arc = lambda u: radius - math.sqrt(radius**2 - u**2)  # noqa: E731
     assert x[at.Y_BEND] / radius == pytest.approx(arc(half) - arc(0.5), rel=1e-3)
     assert x[at.S] == drawn.start_position_m
+
+
+def test_a_model_of_a_scale_keeps_angles_and_its_own_metres() -> None:
+    """By their units: metres by the scale, square metres by its square, angles and times not at all."""
+    whole, model = JOINTED, at_scale(JOINTED, 0.1)
+    of_metres = {
+        "y_sd",
+        "z_sd",
+        "y_tilt_sd",
+        *(f"{one}_length" for one in ("roll", "pitch", "yaw", "y", "z")),
+    }
+    for name, value in vars(whole).items():
+        power = 1 if name in of_metres else 2 if name == "y_bend_sd" else 0
+        assert getattr(model, name) == pytest.approx(0.1**power * value, rel=1e-12), name

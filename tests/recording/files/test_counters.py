@@ -79,3 +79,22 @@ def test_late_readings_and_single_pulses_are_no_jumps() -> None:
     assert undone(counts).times == 0
     few = (TIME > 5.0).astype(np.int64) + (TIME > 20.0)
     assert undone(few).times == 0
+
+
+def test_a_counter_that_has_counted_further_has_no_such_modulus() -> None:
+    """1004 counts were seen: the jump of some 1000 is none of a counter that begins anew after 1000."""
+    counts = 4 * np.arange(len(TIME))
+    counts[252:] -= 1000
+    assert counts[251] == 1004
+    with pytest.raises(InputError, match="the counter jumps"):
+        undone(counts)
+    counts[252:] += 1000
+    assert undone(np.mod(counts, 1024)).modulus == 1024
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_up_to_nearly_half_a_modulus_a_step_tells_its_direction(sign: int) -> None:
+    counts = sign * np.arange(len(TIME))
+    np.testing.assert_array_equal(undone(np.mod(440 * counts, 1000), 1000).counts, 440 * counts)
+    with pytest.raises(InputError, match=r"too few to tell.*480 pulses between two readings"):
+        undone(np.mod(480 * counts, 1000), 1000)

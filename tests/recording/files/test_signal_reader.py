@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations, product
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,8 +15,10 @@ from hypothesis import strategies as st
 from simrail.core.errors import InputError
 from simrail.core.rotation import rotation_matrix
 from simrail.core.toml_files import judge, parse_toml
+from simrail.recording.files.imu_reader import sheet_at
 from simrail.recording.files.ride_file import ImuSignalPart
 from simrail.recording.files.signal_reader import SignalReader
+from simrail.recording.recording import ImuSheet
 from simrail.recording.signals import FORCES, RATES
 
 AXES = [
@@ -84,3 +88,32 @@ units = {{ gyro = "{gyro_unit}", accel = "{accel_unit}" }}
     part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
     found = SignalReader(folder).frame(part, "imu").to_numpy()
     np.testing.assert_allclose(found, body, rtol=0.0, atol=1e-14 if any(angles) else 2e-15)
+
+
+def test_samples_without_stamps_are_counted_from_where_they_begin(tmp_path):
+    """Sample k of a file of 50 Hz that begins at 12.5 s is of 12.5 s + k / 50 Hz."""
+    pd.DataFrame({name: np.arange(4.0) for name in "pqruvw"}).to_csv(tmp_path / "a.csv", index=False)
+    text = """file = "a.csv"
+body = "b"
+position_m = [0, 0, 0]
+grade = "x"
+rate_hz = 50.0
+start_s = 12.5
+columns = { gyro = ["p", "q", "r"], accel = ["u", "v", "w"] }
+"""
+    part = judge(ImuSignalPart, parse_toml(text, file="t"), file="t")
+    assert SignalReader(tmp_path).frame(part, "imu").index.tolist() == [12.5, 12.52, 12.54, 12.56]
+    # A clock that is slow by 5000 ppm and 2 s behind.
+    told = "time_offset_s = 2.0\ntime_drift_ppm = 5000.0\n" + text
+    clock = judge(ImuSignalPart, parse_toml(told, file="t"), file="t")
+    times = SignalReader(tmp_path).frame(clock, "imu").index
+    np.testing.assert_allclose(times, 14.5 + 1.005 * np.arange(4) / 50.0, rtol=0.0, atol=1e-12)
+
+
+def test_an_increment_is_the_mean_of_the_interval_before_its_stamp(tmp_path):
+    """So it is half an interval old, unless the sheet has it older still; a rate is as old as it says."""
+    sheet = ImuSheet("mine", 100.0, 0.002, *([1e-3] * 6))
+    for increments, lag_s, wanted in ((("gyro",), 0.002, 0.01), (("gyro",), 0.03, 0.03), ((), 0.002, 0.002)):
+        part = SimpleNamespace(sheet=replace(sheet, lag_s=lag_s), increments=increments)
+        found = sheet_at(part, tmp_path, 50.0)
+        assert (found.rate_hz, found.lag_s) == (50.0, pytest.approx(wanted, rel=1e-12))
