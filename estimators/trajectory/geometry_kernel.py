@@ -3,7 +3,7 @@
 What comes of it, and over what places, is `simrail.estimators.trajectory.track_geometry`.
 """
 
-from simrail.core.jit import FloatArray, njit_borrowed
+from simrail.core.jit import FloatArray, IntArray, njit_borrowed
 from simrail.core.sine import sine_cosine
 
 
@@ -74,3 +74,46 @@ def variances(arms: FloatArray, covariance: FloatArray, found: FloatArray) -> No
         found[k, 1] = profile * (profile * roll + 2.0 * covariance[k, 0, 2]) + covariance[k, 2, 2]
         found[k, 2] = (left_y - right_y) ** 2 * roll
         found[k, 3] = (left_z - right_z) ** 2 * roll
+
+
+@njit_borrowed
+def means_of_cells(kinds: IntArray, values: FloatArray, count: IntArray, means: FloatArray) -> None:
+    """Mean of values (n, m) of each kind (n,), into means (c, m), which are zero before; count is (c,)."""
+    for k in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            means[kinds[k], i] += values[k, i]
+    for kind in range(means.shape[0]):
+        for i in range(means.shape[1]):
+            means[kind, i] /= count[kind]
+
+
+@njit_borrowed
+def thinned(line: FloatArray, taps: FloatArray, every: int, is_odd: bool, found: FloatArray) -> None:
+    """Low-pass a line and keep every so many samples of it.
+
+    Parameters
+    ----------
+    line : ndarray (n, 4 m)
+    taps : ndarray (2 r + 1,)
+        Symmetric.
+    every : int
+    is_odd : bool
+        Beyond its ends the line is turned about its end points, else mirrored; again if it is short.
+    found : ndarray ((n - 1) // every + 1, 4 m), out
+    """
+    last, reach = line.shape[0] - 1, taps.shape[0] // 2
+    for first in range(0, line.shape[1], 4):
+        for j in range(found.shape[0]):
+            a = b = c = d = 0.0  # four at once: the compiler takes them for one vector
+            for t in range(taps.shape[0]):
+                at, share = j * every + t - reach, taps[t]
+                while not 0 <= at <= last:
+                    end = 0 if at < 0 else last
+                    at = 2 * end - at
+                    if is_odd:
+                        twice, share = 2.0 * share, -share
+                        a, b = a + twice * line[end, first], b + twice * line[end, first + 1]
+                        c, d = c + twice * line[end, first + 2], d + twice * line[end, first + 3]
+                a, b = a + share * line[at, first], b + share * line[at, first + 1]
+                c, d = c + share * line[at, first + 2], d + share * line[at, first + 3]
+            found[j, first], found[j, first + 1], found[j, first + 2], found[j, first + 3] = a, b, c, d

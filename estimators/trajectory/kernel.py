@@ -503,8 +503,8 @@ def shrink(
 
 
 @njit
-def trajectory_back(model: Model, past: Past, chosen: IntArray) -> None:
-    """Turn predicted states and covariances into smoothed ones, in place.
+def trajectory_back(model: Model, past: Past, chosen: IntArray, found: FloatArray) -> None:
+    """Turn predicted states into smoothed ones, in place, and say how sure they are.
 
     `simrail.estimators.kalman.fixed_interval` has the equations. The Jacobian is made again, which is cheaper
     than to fetch it.
@@ -514,8 +514,9 @@ def trajectory_back(model: Model, past: Past, chosen: IntArray) -> None:
     model, past
         What the filter had, and what it left behind.
     chosen : ndarray of int (m,)
-        States whose covariance is wanted, in increasing order: the first m (m + 1)/2 columns of the
-        covariances become upper triangles of theirs, row by row. Without any all stay as they are, predicted.
+        States whose covariance is wanted, in increasing order.
+    found : ndarray (n, m (m + 1)/2), out
+        Upper triangles of that covariance, row by row; of all twelve it may be that of ``past`` itself.
     """
     # Named once, before the loop, as in the filter.
     track, slips, gravity, dt = model.track, model.slips, model.gravity, model.step_s
@@ -536,7 +537,7 @@ def trajectory_back(model: Model, past: Past, chosen: IntArray) -> None:
         for i in range(STATES):
             states[k, i] -= v[i]
         if with_covariance:
-            shrink(info, p, chosen, v, covariance, k)
+            shrink(info, p, chosen, v, found, k)
             information_back(info, dt)
         chain_back(lam, INTO, ORIGIN, share)
 

@@ -337,8 +337,9 @@ def run_model(
         errors = state_errors(model, past, streams)
     at = packed_at(covariance_of)
     if smoothed:
-        trajectory_back(model, past, np.array(covariance_of, dtype=np.int64))
-        states, covariance = past.states, past.covariance[:, : len(at)]
+        covariance = past.covariance if len(at) == PACKED else np.empty((n, len(at)))
+        trajectory_back(model, past, np.array(covariance_of, dtype=np.int64), covariance)
+        states = past.states
     else:
         states, covariance = out.states, out.covariance[:, at] if len(at) < PACKED else out.covariance
     return Trajectory(states, covariance if len(at) else covariance[:0], out.innovations, likelihood, errors)

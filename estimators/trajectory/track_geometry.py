@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from scipy import ndimage, signal
 from scipy.interpolate import CubicSpline
-from simrail.estimators.trajectory.geometry_kernel import rails_seen, variances
+from simrail.estimators.trajectory.geometry_kernel import means_of_cells, rails_seen, thinned, variances
 
 from simrail.core.columns import ATTITUDE, IRREGULARITY, IRREGULARITY_SD, RELATIVE_POSITION, require
 from simrail.core.errors import InputError
@@ -295,7 +295,9 @@ def over_space(
     count = np.bincount(kinds)
 
     def mean(columns: FloatArray) -> FloatArray:
-        return np.stack([np.bincount(kinds, column) / count for column in columns.T], axis=-1)
+        found = np.zeros((len(count), columns.shape[1]))
+        means_of_cells(kinds, columns, count, found)
+        return found
 
     at = mean(place[:, None])[:, 0]
     position = np.arange(first, last + 1) * step_m
@@ -313,7 +315,9 @@ def over_space(
 
 def _thinned(line: FloatArray, taps: FloatArray, *, odd: bool) -> FloatArray:
     """Low-pass a line (n, m) and keep every `FINE`-th sample; beyond its ends it is turned or mirrored."""
-    beyond = ((_REACH * FINE, _REACH * FINE), (0, 0))
-    longer = np.pad(line, beyond, mode="reflect", reflect_type="odd" if odd else "even")
-    passed: FloatArray = signal.upfirdn(taps, longer, up=1, down=FINE, axis=0)
-    return passed[2 * _REACH : 2 * _REACH + (len(line) - 1) // FINE + 1]
+    n, columns = line.shape
+    padded = np.zeros((n, 4 * -(-columns // 4)))
+    padded[:, :columns] = line
+    found = np.empty(((n - 1) // FINE + 1, padded.shape[1]))
+    thinned(padded, taps, FINE, odd, found)
+    return found[:, :columns]

@@ -282,7 +282,7 @@ def run_trajectory(model: Model, *, with_covariance: bool) -> Callable[[], None]
 
     def run() -> None:
         trajectory_filter(model, past, out)
-        trajectory_back(model, past, np.arange(STATES if with_covariance else 0))
+        trajectory_back(model, past, np.arange(STATES if with_covariance else 0), past.covariance)
 
     return run
 
