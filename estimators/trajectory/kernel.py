@@ -398,7 +398,7 @@ def dot(a: FloatArray, b: FloatArray) -> float:
     first = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
     second = (a[4] * b[4] + a[5] * b[5]) + (a[6] * b[6] + a[7] * b[7])
     third = (a[8] * b[8] + a[9] * b[9]) + (a[10] * b[10] + a[11] * b[11])
-    return first + second + third
+    return float(first + second + third)
 
 
 @njit_inline
