@@ -32,6 +32,7 @@ from simrail.estimators.trajectory.kernel import (
     PACKED,
     STATES,
     Model,
+    outputs,
     room_for_filtered,
     room_for_past,
     trajectory_back,
@@ -51,7 +52,7 @@ from simrail.core.columns import (
     RELATIVE_POSITION_SD,
 )
 from simrail.core.errors import InputError
-from simrail.core.jit import FloatArray
+from simrail.core.jit import FloatArray, IntArray
 from simrail.estimation.estimate import Estimate
 from simrail.estimation.tunable import Tunable
 from simrail.recording.recording import Recording
@@ -64,8 +65,8 @@ class Trajectory(NamedTuple):
     ----------
     states : ndarray (n, 12)
         Smoothed or filtered.
-    covariance : ndarray (n, 78) or (0, 78)
-        Upper triangles of their covariances, row by row; of no rows if not wanted.
+    covariance : ndarray (n, m (m + 1)/2) or (0, m (m + 1)/2)
+        Upper triangles of the covariances of the m states asked for, row by row; of no rows if not wanted.
     innovations : ndarray (n, 7)
         Measured minus predicted rates and forces, and their normalised innovation squared.
     log_likelihood : float
@@ -243,35 +244,39 @@ class TrajectorySmoother:
 
     def _trajectory(self, recording: Recording) -> tuple[Estimate, FloatArray | None]:
         """Without the geometry; the trace is let go before that is made, since it is large."""
-        trace = self.trace(recording)
-        index = recording.imu.index
-        names = [*ATTITUDE, *RELATIVE_POSITION]
-        columns = [trace.states[:, list(OUTPUT)]]
-        covariance = None
+        trace = self._run(recording, OUTPUT)
+        n, index, names = len(trace.states), recording.imu.index, [*ATTITUDE, *RELATIVE_POSITION]
+        wide = len(OUTPUT) if self.with_covariance else 0
+        found, covariance = np.empty((n, len(OUTPUT) + wide)), np.empty((n if wide else 0, wide, wide))
+        # Uniform within their bounds.
+        beside = np.zeros(len(OUTPUT))
+        beside[:2] = sum(bound**2 for bound in self._tilts(recording)) / 3.0
+        outputs(trace.states, trace.covariance, np.array(OUTPUT), beside, found, covariance)
         if self.with_covariance:
-            covariance = block(trace.covariance, OUTPUT)
-            # Uniform within their bounds.
-            covariance[:, [0, 1], [0, 1]] += sum(bound**2 for bound in self._tilts(recording)) / 3.0
-            columns.append(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
             names += [*ATTITUDE_SD, *RELATIVE_POSITION_SD]
         estimate = Estimate(
-            states=pd.DataFrame(np.hstack(columns), index=index, columns=names),
+            states=pd.DataFrame(found, index=index, columns=names),
             mount=recording.mount,
             innovations=pd.DataFrame(trace.innovations, index=index, columns=[*RATE_INNOVATION, *INNOVATION]),
-            covariance=covariance,
+            covariance=covariance if self.with_covariance else None,
             covariance_of=(*ATTITUDE, *RELATIVE_POSITION) if self.with_covariance else (),
         )
         return estimate, trace.errors
 
     def trace(self, recording: Recording) -> Trajectory:
         """All twelve states with their covariances, the innovations, and the log-likelihood."""
+        return self._run(recording, tuple(range(STATES)))
+
+    def _run(self, recording: Recording, states: tuple[int, ...]) -> Trajectory:
+        """The same, with the covariance of some of the states."""
         around = None
         for _ in range(self.passes - 1):
             model = self.model(recording, around=around)
-            around = run_model(model, smoothed=True, with_covariance=False).states
+            around = run_model(model, smoothed=True, covariance_of=()).states
         model = self.model(recording, around=around)
         streams = [stream_of(recording, draw, "trajectory") for draw in range(self.draws)]
-        return run_model(model, smoothed=self.smoothed, with_covariance=self.with_covariance, streams=streams)
+        wanted = states if self.with_covariance else ()
+        return run_model(model, smoothed=self.smoothed, covariance_of=wanted, streams=streams)
 
     def tunables(self, settings: Mapping[str, Any]) -> Mapping[str, Tunable]:
         """What `simrail tune` searches; see `simrail.estimators.tuning.objectives`."""
@@ -295,13 +300,10 @@ class TrajectorySmoother:
         )
 
 
-def block(packed: FloatArray, states: tuple[int, ...]) -> FloatArray:
-    """Covariance of some of the states, (n, m, m), from upper triangles (n, 78)."""
-    at = np.zeros((STATES, STATES), dtype=np.intp)
-    upper = np.triu_indices(STATES)
-    at[upper] = np.arange(PACKED)
-    at = np.maximum(at, at.T)
-    return np.ascontiguousarray(packed[:, at[np.ix_(states, states)]])
+def packed_at(states: tuple[int, ...]) -> IntArray:
+    """Columns of an upper triangle of all twelve, row by row, that hold the one of some of them, in order."""
+    rows, columns = (np.array(states, dtype=np.int64)[i] for i in np.triu_indices(len(states)))
+    return np.asarray(rows * (2 * STATES - rows - 1) // 2 + columns)
 
 
 def log_likelihood(model: Model) -> float:
@@ -317,18 +319,27 @@ def likelihoods(model: Model) -> FloatArray:
 
 
 def run_model(
-    model: Model, *, smoothed: bool, with_covariance: bool, streams: Sequence[np.random.Generator] = ()
+    model: Model,
+    *,
+    smoothed: bool,
+    covariance_of: tuple[int, ...] = tuple(range(STATES)),
+    streams: Sequence[np.random.Generator] = (),
 ) -> Trajectory:
-    """Filter and smoother by the kernels; one draw of the smoother's error for each of the streams."""
+    """Filter and smoother by the kernels; one draw of the smoother's error for each of the streams.
+
+    ``covariance_of`` are the states whose covariance is wanted, in increasing order: fewer take less time.
+    """
     n = len(model.signals)
     past = room_for_past(n if smoothed else 0)
     out = room_for_filtered(states=0 if smoothed else n, innovations=n)
     likelihood, errors = trajectory_filter(model, past, out), None
     if smoothed and streams:
         errors = state_errors(model, past, streams)
+    at = packed_at(covariance_of)
     if smoothed:
-        trajectory_back(model, past, with_covariance)
-    states, covariance = past[:2] if smoothed else out[:2]
-    return Trajectory(
-        states, covariance if with_covariance else covariance[:0], out.innovations, likelihood, errors
-    )
+        covariance = past.covariance if len(at) == PACKED else np.empty((n, len(at)))
+        trajectory_back(model, past, np.array(covariance_of, dtype=np.int64), covariance)
+        states = past.states
+    else:
+        states, covariance = out.states, out.covariance[:, at] if len(at) < PACKED else out.covariance
+    return Trajectory(states, covariance if len(at) else covariance[:0], out.innovations, likelihood, errors)

@@ -17,11 +17,11 @@ import numpy as np
 import pandas as pd
 from scipy import ndimage, signal
 from scipy.interpolate import CubicSpline
+from simrail.estimators.trajectory.geometry_kernel import means_of_cells, rails_seen, thinned, variances
 
 from simrail.core.columns import ATTITUDE, IRREGULARITY, IRREGULARITY_SD, RELATIVE_POSITION, require
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
-from simrail.core.rotation import rotation_matrix
 from simrail.estimation.estimate import Estimate
 from simrail.recording.recording import Recording, odometry_of
 
@@ -143,12 +143,10 @@ def sight_of(estimate: Estimate, recording: Recording) -> Sight:
             limit="finite numbers",
             remedy="mend the estimate",
         )
-    frame = track.frame(place)
-    design = rotation_matrix(np.column_stack([frame.roll_rad, frame.pitch_rad, frame.yaw_rad]))
-    turn = np.swapaxes(design, 1, 2) @ rotation_matrix(values[:, :3])
-    seen = _seen(recording, base)
-    arms = np.einsum("nij,nrj->nri", turn, seen)  # from the IMU to left and right rail, track axes
-    rails = arms[:, :, 1:] + values[:, None, 3:] - np.array([[0.5 * base, 0.0], [-0.5 * base, 0.0]])
+    frame = track.frame(place, places=False)
+    seen, arms, rails = _seen(recording, base), np.empty((len(place), 2, 3)), np.empty((len(place), 2, 2))
+    design = np.array([frame.roll_rad, frame.pitch_rad, frame.yaw_rad])
+    rails_seen(design, values, seen, 0.5 * base, arms, rails)
     use, noise_sd = np.ones(len(place), dtype=bool), 0.0
     if sheet is not None:
         use, noise_sd = trusted(seen[:, :, 1:].reshape(-1, 4), sheet.noise_m), sheet.noise_m
@@ -185,9 +183,9 @@ def irregularities(rails: FloatArray) -> FloatArray:
 
 
 def _seen(recording: Recording, base_m: float) -> FloatArray:
-    """Rails seen from the IMU, body axes (n, left and right, 3)."""
+    """Rails seen from the IMU, body axes (n, left and right, 3); one row if nothing sees them."""
     frame = recording.rail_displacement
-    seen = np.zeros((len(recording.imu), 2, 3))
+    seen = np.zeros((1 if frame is None else len(recording.imu), 2, 3))
     if frame is not None:
         seen[:, :, 1:] = frame.to_numpy(dtype=np.float64).reshape(-1, 2, 2)
         return seen
@@ -214,18 +212,19 @@ def _covariance(estimate: Estimate) -> FloatArray | None:
     names = ("roll_rad", *RELATIVE_POSITION)
     if estimate.covariance is not None and set(names) <= set(estimate.covariance_of):
         at = [estimate.covariance_of.index(name) for name in names]
-        return np.asarray(estimate.covariance[:, at][:, :, at])
+        return np.ascontiguousarray(estimate.covariance[:, at][:, :, at])
     sds = ("roll_sd_rad", "lateral_sd_m", "vertical_sd_m")
     if not set(sds) <= set(estimate.states.columns):
         return None
     squares = np.square(estimate.states[list(sds)].to_numpy(dtype=np.float64))
-    return np.asarray(squares[:, :, None] * np.eye(3))
+    return np.ascontiguousarray(squares[:, :, None] * np.eye(3))
 
 
 def _variance(arms: FloatArray, covariance: FloatArray) -> FloatArray:
     """Variance (n, 4) of the irregularities."""
-    slope = slopes(arms)
-    return np.asarray(np.einsum("nij,njk,nik->ni", slope, covariance, slope))
+    found = np.empty((len(arms), len(IRREGULARITY)))
+    variances(arms, covariance, found)
+    return found
 
 
 def slopes(arms: FloatArray) -> FloatArray:
@@ -296,7 +295,9 @@ def over_space(
     count = np.bincount(kinds)
 
     def mean(columns: FloatArray) -> FloatArray:
-        return np.stack([np.bincount(kinds, column) / count for column in columns.T], axis=-1)
+        found = np.zeros((len(count), columns.shape[1]))
+        means_of_cells(kinds, columns, count, found)
+        return found
 
     at = mean(place[:, None])[:, 0]
     position = np.arange(first, last + 1) * step_m
@@ -314,7 +315,9 @@ def over_space(
 
 def _thinned(line: FloatArray, taps: FloatArray, *, odd: bool) -> FloatArray:
     """Low-pass a line (n, m) and keep every `FINE`-th sample; beyond its ends it is turned or mirrored."""
-    beyond = ((_REACH * FINE, _REACH * FINE), (0, 0))
-    longer = np.pad(line, beyond, mode="reflect", reflect_type="odd" if odd else "even")
-    passed: FloatArray = signal.upfirdn(taps, longer, up=1, down=FINE, axis=0)
-    return passed[2 * _REACH : 2 * _REACH + (len(line) - 1) // FINE + 1]
+    n, columns = line.shape
+    padded = np.zeros((n, 4 * -(-columns // 4)))
+    padded[:, :columns] = line
+    found = np.empty(((n - 1) // FINE + 1, padded.shape[1]))
+    thinned(padded, taps, FINE, odd, found)
+    return found[:, :columns]

@@ -123,7 +123,7 @@ class KnownOutput:
         self, recording: Recording, model: Model, reference: pd.DataFrame, parameters: Hyperparameters
     ) -> FloatArray:
         """Estimate less reference at the places that count, (p, 3)."""
-        trace = run_model(with_noise(model, parameters), smoothed=True, with_covariance=False)
+        trace = run_model(with_noise(model, parameters), smoothed=True, covariance_of=())
         names = [*ATTITUDE, *RELATIVE_POSITION]
         states = pd.DataFrame(trace.states[:, list(OUTPUT)], index=recording.imu.index, columns=names)
         if not np.isfinite(trace.states).all():

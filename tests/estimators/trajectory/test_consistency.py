@@ -83,7 +83,7 @@ def run(scale: float = 1.0) -> dict[bool, tuple[np.ndarray, np.ndarray]]:
             start, START_SD**2, STEP, GRAVITY,
         )  # fmt: skip
         for smoothed in (False, True):
-            result = run_model(model, smoothed=smoothed, with_covariance=True)
+            result = run_model(model, smoothed=smoothed)
             covariance = np.zeros((len(AT), STATES, STATES))
             covariance[:, *upper] = covariance[:, *upper[::-1]] = result.covariance[list(AT)]
             error = (result.states - truth)[list(AT)]

@@ -182,7 +182,7 @@ def test_covariances_are_those_of_the_smoother() -> None:
 
     At each sample those of the smoother; from one to the next P(k+1) G', G the textbook's gain backwards.
     """
-    smoothed = run_model(left().model, smoothed=True, with_covariance=True)
+    smoothed = run_model(left().model, smoothed=True)
     twin, count = dense(), STATES + ROWS
     maps = np.array([drawn(unit.reshape(SAMPLES, count)) for unit in np.eye(SAMPLES * count)])
     upper = np.triu_indices(STATES)

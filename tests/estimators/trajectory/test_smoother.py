@@ -385,7 +385,7 @@ def test_steady_for_hours() -> None:
     # Standing level, heading is a random walk that nothing observes; all else has a steady state.
     steady = [index for state, index in enumerate(DIAGONAL) if state != 4]
     for smoothed in (False, True):
-        found = run_model(model, smoothed=smoothed, with_covariance=True)
+        found = run_model(model, smoothed=smoothed)
         early, late = found.covariance[18_000:36_000, steady], found.covariance[-36_000:-18_000, steady]
         np.testing.assert_allclose(late, np.broadcast_to(early.mean(axis=0), late.shape), rtol=0.2)
         assert np.abs(found.states[:, [0, 2, 6]]).max() < 1.0

@@ -165,7 +165,7 @@ def test_recovery_would_notice_a_wrong_likelihood(fault: str, monkeypatch: pytes
         # Of each sample, sum of e^2/s over the IMU's rows; those of the virtual positions are negligible.
         from simrail.estimators.trajectory.smoother import run_model
 
-        nis = run_model(model, smoothed=False, with_covariance=False).innovations[:, 6]
+        nis = run_model(model, smoothed=False, covariance_of=()).innovations[:, 6]
         return {"no_log": -0.5 * nis, "sign": -right, "no_rows": 0.0 * right}[fault]
 
     monkeypatch.setattr(simrail.estimators.tuning.objectives, "likelihoods", spoilt)
