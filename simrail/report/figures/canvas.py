@@ -489,11 +489,10 @@ def label_upright(axis: Axes, words: str, **how: Any) -> None:
 
 def legend_above(*axes: Axes) -> None:
     """Put the legend of some panels above the first, outside of the data; truth and design first."""
-    by_label = {
-        str(label): handle
-        for axis in reversed(axes)
-        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
-    }
+    by_label: dict[str, Any] = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            by_label.setdefault(str(label), handle)
     labels = sorted(by_label, key=lambda label: {"truth": 0, "design": 1}.get(label, 2))
     words, columns, lines = fitting_words(labels, width_in() - LEFT_IN)
     figure = axes[0].get_figure(root=True)
@@ -613,7 +612,7 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     # A tenth of a point is 0.13 pixels. Only within tags: a label of 0.0001 is no place.
-    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d)\d{3,}", r"\1", tag.group()), text)
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d)\d{3,}", "", tag.group()), text)
     # Several figures share the page: an id that nothing refers to would only stand there twice.
     used = set(re.findall(r"#([\w-]+)", text))
     text = re.sub(r' id="([\w.-]+)"', lambda m: m.group(0) if m.group(1) in used else "", text)
