@@ -31,7 +31,7 @@ def print_verdicts(console: Console, verdicts: pd.DataFrame, styles: Sequence[Me
         console.print()
         console.print(Text(verdict_sentence(rows, styles), style="bold"), soft_wrap=True)
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        table.add_column("IMU", overflow="fold")
+        table.add_column("IMU", no_wrap=True)
         methods = judged_methods(rows, styles)
         for style in methods:
             table.add_column(style.label, overflow="fold")

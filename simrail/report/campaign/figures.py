@@ -100,9 +100,15 @@ def curvature_figure(
         return ""
     with canvas.look():
         figure, axes = canvas.panels_beside(
-            len(rides), tall_in=2.5, across=len(rides), gap_in=0.3, right_in=0.2, share_y=True
+            len(rides),
+            tall_in=2.5,
+            across=len(rides),
+            gap_in=0.3,
+            row_gap_in=0.95,
+            right_in=0.2,
+            share_y=True,
         )
-        for axis, (example, word, middles, number_of) in zip(axes, rides, strict=True):
+        for axis, (example, _, middles, number_of) in zip(axes, rides, strict=True):
             for style in styles:
                 if style.name not in example.estimates:
                     continue
@@ -111,10 +117,10 @@ def curvature_figure(
                 face = "white" if style.baseline else style.colour
                 axis.plot(middles, means, "o-", color=style.colour, mfc=face, ms=4.4, mew=1.1, lw=1.0)
             axis.axhline(0.0, color=canvas.MUTED, lw=0.7, zorder=1)
-            axis.set_title(word, color=canvas.INK)
             axis.set_xlabel("curvature, 1/km (positive to the left)")
             axis.tick_params(labelleft=axis is axes[0])
         axes[0].set_ylabel("mean roll error, \u00b0")
+        canvas.title_panels(axes, [word for _, word, *_ in rides], color=canvas.INK)
         _legend(figure, [style for style in styles if any(style.name in e.estimates for e, *_ in rides)])
         return canvas.to_svg(figure, description=what)
 

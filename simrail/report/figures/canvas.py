@@ -329,6 +329,16 @@ def parted(name: str, *, longest: int = 10) -> str:
     return "\n".join(line.rstrip(" ") for line in lines)
 
 
+def title_panels(axes: Sequence[Axes], titles: Sequence[str], **how: Any) -> None:
+    """Titles of panels, in as many lines as the width of a panel asks for; before their legend."""
+    figure = axes[0].get_figure(root=True)
+    assert figure is not None
+    wide, _ = figure.get_size_inches()
+    for axis, title in zip(axes, titles, strict=True):
+        letters = int(axis.get_position().width * wide * 72.0 / (0.6 * _RC["axes.titlesize"]))
+        axis.set_title(textwrap.fill(title, letters), **how)
+
+
 def categories(axis: Axes, words: Sequence[str], *, size: float | None = None) -> None:
     """Give each word a slot of the x axis, parted by lines."""
     for place in range(1, len(words)):
@@ -514,7 +524,8 @@ def figure_legend(
 ) -> None:
     """Put a legend at the top of a figure."""
     words, columns, lines = fitting_words(labels, width_in() - (0.0 if is_narrow() else left_in))
-    titles_in = 0.22 if any(axis.get_title(loc="left") for axis in figure.axes) else 0.0
+    lines_above = max(len(axis.get_title(loc="left").splitlines()) for axis in figure.axes)
+    titles_in = 0.22 + 0.16 * (lines_above - 1) if lines_above else 0.0
     _make_room(figure, lines, columns, free_in=_free_above(figure) - titles_in)
     figure.legend(
         handles,
