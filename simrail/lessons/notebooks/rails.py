@@ -31,7 +31,9 @@ with app.setup:
     }
     GRADES = ["consumer", "industrial", "lord_3dm_gx4_25", "tactical", "navigation", "ideal"]
     SHOWN = {"all": None, **{name: BANDS[name] for name in ("D0", "D1", "D2")}}
-    WAVES = ", ".join(f"{one.name} {one.shortest_m:g} to {one.longest_m:g} m" for one in SHOWN.values() if one)
+    WAVES = ", ".join(
+        f"{one.name} {one.shortest_m:g} to {one.longest_m:g} m" for one in SHOWN.values() if one
+    )
 
 
 @app.cell(hide_code=True)
