@@ -39,7 +39,16 @@ def box_figure(
     limits = 0.8 * float(positive.quantile(0.001)), 1.25 * float(positive.quantile(0.999))
     across = min(len(axes), 2)
     with canvas.look():
-        figure, panels = canvas.panels_beside(len(axes), tall_in=2.2, across=across, gap_in=0.7, right_in=0.2)
+        lines = max(word.count("\n") for axis in axes for word in _slot_words(axis))
+        figure, panels = canvas.panels_beside(
+            len(axes),
+            tall_in=2.2,
+            across=across,
+            gap_in=0.7,
+            row_gap_in=0.75 + 0.14 * lines,
+            right_in=0.2,
+            bottom_in=0.5 + 0.14 * lines,
+        )
         for number, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
             _draw_boxes(panel, held(axes, axis).of(along(draws, axis)), styles, axis)
             panel.set_ylim(*limits)
@@ -72,9 +81,13 @@ def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle],
             # A box without height is seen as a bar.
             panel.plot(ends, [middle, middle], color=style.colour, lw=3.6, solid_capstyle="butt", zorder=2)
             panel.plot(ends, [middle, middle], color="white", lw=1.3, solid_capstyle="butt", zorder=4)
-    longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
-    canvas.categories(panel, [in_two(word, longest=longest) for word in axis.words])
+    canvas.categories(panel, _slot_words(axis))
     panel.set_xlabel(axis.title)
+
+
+def _slot_words(axis: CampaignAxis) -> list[str]:
+    longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
+    return [in_two(word, longest=longest) for word in axis.words]
 
 
 def in_two(word: str, *, longest: int = LONG_WORD) -> str:

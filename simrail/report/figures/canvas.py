@@ -287,13 +287,13 @@ def panels_beside(
     top_in: float = 0.62,
     gap_in: float = 0.42,
     row_gap_in: float = 0.75,
+    bottom_in: float = 0.5,
     share_y: bool = False,
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels beside each other, in rows; lengths in inches."""
-    bottom = 0.5
     across = 1 if is_narrow() else across
     rows = -(-count // across)
-    height = top_in + rows * tall_in + (rows - 1) * row_gap_in + bottom
+    height = top_in + rows * tall_in + (rows - 1) * row_gap_in + bottom_in
     wide = (width_in() - left_in - right_in - gap_in * (across - 1)) / across
     figure = Figure(figsize=(width_in(), height))
     axes: list[Axes] = []
