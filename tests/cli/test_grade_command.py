@@ -80,7 +80,9 @@ def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.Ca
     assert grade("./coarse.toml,./fine.toml", "--for", "roll<0.1deg", "--mount", "axle") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "fine.toml is the coarsest that is enough" in told
-    assert re.search(r"which IMU errs less.* axle EKF fine\.toml (?:1[0-9]|20) of 20 0\.\d+ \(0\.\d+ to", told)
+    assert re.search(
+        r"which IMU errs less.* axle EKF fine\.toml (?:1[0-9]|20) of 20 0\.\d+ \(0\.\d+ to", told
+    )
     (folder,) = (ladder / "results").iterdir()
     verdicts = pd.read_csv(folder / "verdicts.csv").set_index("imu")
     assert verdicts["verdict"].str.cat(sep=", ") == "not enough, enough"
