@@ -1,6 +1,6 @@
 """Verdicts as the command line shows them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -110,7 +110,7 @@ def print_pairs(console: Console, results: Results) -> None:
         console.print(table)
 
 
-def pair_words(pair: Mapping[str, Any]) -> tuple[str, str, str]:
+def pair_words(pair: Mapping[Hashable, Any]) -> tuple[str, str, str]:
     """Which of a pair errs less, or that it is open; on how many rides, and by how much with its interval."""
     first_is_better = pair["difference"] < 0.0
     better = short_name(pair["first"] if first_is_better else pair["second"])
