@@ -170,14 +170,16 @@ class ProgressWatcher(Watcher):
         since, had = self._paces[0]
         each_s = max(now - since, 1e-6) / max(done - had, 1)
         self._paces.append((now, done))
-        left = f"{timedelta(seconds=round((count - done) * each_s))} left"
+        left = f", {timedelta(seconds=round((count - done) * each_s))} left"
         of = f"{done} of {count}"
         if self._most is not None and self._most > count:
             of += f" (at most {self._most})"
             left += f", at most {timedelta(seconds=round((self._most - done) * each_s))}"
+        if done - self._before < 2 and done < count:
+            left = ""  # the first has waited for a ride, and for what was compiled: it says nothing of others
         each = "+".join(map(str, self._by_worker.values()))
         by = f", by {len(self._by_worker)} workers: {each}" if len(self._by_worker) > 1 else ""
-        note = f"{of}, {failed} failed, {(done - self._before) / seconds:.3g} per second, {left}{by}"
+        note = f"{of}, {failed} failed, {(done - self._before) / seconds:.3g} per second{left}{by}"
         if self._cells is not None:
             self._progress.update(self._cells, completed=done, note=note)
         if not self._console.is_terminal and (now > self._said + _EVERY_S or done == count):

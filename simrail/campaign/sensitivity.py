@@ -29,7 +29,7 @@ import pandas as pd
 
 from simrail.core.errors import InputError, one_of
 from simrail.core.jit import FloatArray
-from simrail.scenario.designs import DESIGNS, LEVELS, block_size, design_seed, problem_of
+from simrail.scenario.designs import DESIGNS, LEVELS, block_size, design_seed, problem_of, salib
 from simrail.scenario.distributions import dimensions, sample_count, shares_of
 from simrail.scenario.scenario import ScenarioFile
 from simrail.scoring.aggregate import axis_columns
@@ -141,15 +141,11 @@ def indices_of(
         return none, dropped, "it does not change with any of the values"
     problem, salib_seed = problem_of(names), design_seed(seed, "sensitivity", method)
     if method == "morris":
-        from SALib.analyze import morris
-
-        found = morris.analyze(
+        found = salib("analyze.morris").analyze(
             problem, points, responses, num_resamples=RESAMPLES, num_levels=LEVELS, seed=salib_seed
         )
     else:
-        from SALib.analyze import sobol
-
-        found = sobol.analyze(
+        found = salib("analyze.sobol").analyze(
             problem, responses, calc_second_order=False, num_resamples=RESAMPLES, seed=salib_seed
         )
     table = {

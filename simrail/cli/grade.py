@@ -20,6 +20,9 @@ DEFAULT_SCENARIO = "which_imu"
 BUDGET_DRAWS = 8
 """Draws of which the error is taken apart, where one IMU is asked for: each costs some twenty estimates."""
 
+MOST_IN_TITLE = 3
+"""IMUs that the title of a page names."""
+
 LEAST_DRAWS = 20
 """Of the first look at the verdicts: what is far from enough is known by then."""
 
@@ -84,7 +87,7 @@ def grade(
 
     from simrail.campaign.progress import ProgressWatcher
     from simrail.cli.score_tables import print_scores
-    from simrail.cli.verdict_tables import print_budgets, print_coarsest
+    from simrail.cli.verdict_tables import print_budgets, print_coarsest, print_pairs
     from simrail.results import run
     from simrail.scenario.scenario import load_scenario
 
@@ -96,6 +99,7 @@ def grade(
         imu_setting(asked.text, asked.file, grades, mount),
         *scope_settings(asked, wanted),
         *device_settings(asked, devices),
+        *title_setting(grades),
     ]
     read = load_scenario(scenario, overrides=[*overrides, *(settings or [])], seed=seed)
     folder = out or Path("results") / ("grade_" + re.sub(r"\W+", "_", Path(name).stem))
@@ -105,6 +109,7 @@ def grade(
     print_scores(console, results)
     print_budgets(console, results.budgets)
     if len(grades) > 1:
+        print_pairs(console, results)
         print_coarsest(console, results)
     return CELL_FAILED if results.campaign.failures else DONE
 
@@ -135,6 +140,13 @@ def grades_of(name: str) -> list[str]:
         )
     # A file is named as seen from here, not from the scenario's folder.
     return [str(find("imu", one).resolve()) if _is_file(one) else one for one in names if find("imu", one)]
+
+
+def title_setting(grades: list[str]) -> list[str]:
+    """Setting that entitles the page by what was asked; none of more names than a title holds."""
+    names = [Path(grade).name.removesuffix(".toml").removesuffix(".imu") for grade in grades]
+    title = " or ".join(names) + ": good enough?"
+    return [f"title={json.dumps(title)}"] if len(names) <= MOST_IN_TITLE else []
 
 
 def _is_file(name: str) -> bool:

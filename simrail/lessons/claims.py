@@ -46,7 +46,7 @@ def table(claims: Sequence[Claim]) -> str:
     rows = ["| | claim | found | bounds |", "|:-:|:--|--:|--:|"]
     for claim in claims:
         mark = "\N{CHECK MARK}" if claim.holds else "**\N{BALLOT X}**"
-        value = f"{claim.value:.4g} {claim.unit}".rstrip()
+        value = f"{claim.value:.4g}\N{NO-BREAK SPACE}{claim.unit}".rstrip()
         rows.append(f"| {mark} | {claim.words} | {value} | {claim.low:.4g} to {claim.high:.4g} |")
     return "\n".join(rows)
 

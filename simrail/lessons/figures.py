@@ -4,8 +4,22 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
 from simrail.core.jit import FloatArray
-from simrail.report.figures.canvas import INK, LIGHT, MUTED, legend_above, look, panels, to_svg
+from simrail.report.figures.canvas import (
+    INK,
+    LIGHT,
+    MUTED,
+    WIDE_IN,
+    drawn,
+    legend_above,
+    log_scale,
+    look,
+    panels,
+    to_svg,
+)
 
 COLOURS = {
     "true": "#0b7a55",
@@ -71,13 +85,23 @@ _STYLE = "; ".join(
 )
 
 
+_ONE_OF_BOTH = (
+    ".lesson-figure { container-type: inline-size } .lesson-figure > .narrow { display: none } "
+    f"@container (max-width: {96.0 * 0.5 * WIDE_IN:.0f}px) "
+    "{ .lesson-figure > .narrow { display: block } .lesson-figure > .wide { display: none } }"
+)
+"""Where the notebook's column has less than half of a desk's width, the figure for a phone is shown."""
+
+
 def draw(
     parts: Sequence[Panel], *, x_label: str, description: str, log_x: bool = False, tall_in: float = 1.7
 ) -> str:
-    """Draw panels for a notebook, which gives figures their colours; otherwise as `svg_of`."""
-    svg = svg_of(parts, x_label=x_label, description=description, log_x=log_x, tall_in=tall_in)
-    # On a phone its words would be too small to read: there it is as wide as this, and pushed aside.
-    return f'<div style="overflow-x: auto; {_STYLE}"><div style="min-width: 620px">{svg}</div></div>'
+    """Draw panels for a notebook, for a desk and a phone, in its colours; otherwise as `svg_of`."""
+    both = drawn(
+        "lesson",
+        lambda: svg_of(parts, x_label=x_label, description=description, log_x=log_x, tall_in=tall_in),
+    )
+    return f'<div class="lesson-figure" style="{_STYLE}"><style>{_ONE_OF_BOTH}</style>{both}</div>'
 
 
 def svg_of(
@@ -117,15 +141,17 @@ def svg_of(
                     ms=4,
                     label=line.name or None,
                 )
-            if log_x:
-                axis.set_xscale("log")
-            if panel.log:
-                axis.set_yscale("log")
-            else:
-                axis.axhline(0.0, color=MUTED, lw=0.6, zorder=-1)
             if panel.limits is not None:
                 axis.set_ylim(*panel.limits)
+            if log_x:
+                log_scale(axis.xaxis)
+            if panel.log:
+                log_scale(axis.yaxis)
+            else:
+                axis.axhline(0.0, color=MUTED, lw=0.6, zorder=-1)
             axis.set_ylabel(panel.label)
+        if all(np.array_equal(line.x, np.rint(line.x)) for panel in parts for line in panel.lines):
+            axes[-1].xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=True))
         axes[-1].set_xlabel(x_label)
         if any(axis.get_legend_handles_labels()[1] for axis in axes):
             legend_above(*axes)

@@ -18,8 +18,11 @@ p. 259; by SALib (Iwanaga, Usher, Herman 2022).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
+from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.core.seeds import stream
 
@@ -44,6 +47,26 @@ def design_seed(seed: int, *names: str) -> int:
     return int(stream(seed, *names).integers(2**31))
 
 
+def salib(part: str) -> ModuleType:
+    """A module of SALib, which is slow to import, and needed by few scenarios.
+
+    Raises
+    ------
+    InputError
+        If it is not installed, naming the extra that has it.
+    """
+    try:
+        return import_module(f"SALib.{part}")
+    except ImportError:
+        raise InputError(
+            "a sensitivity analysis needs the library SALib, which is not installed",
+            field="monte_carlo.method",
+            value=" or ".join(DESIGNS),
+            limit="SALib installed",
+            remedy="pip install 'simrail[sensitivity]'",
+        ) from None
+
+
 def design_shares(method: str, blocks: int, names: Sequence[str], seed: int) -> FloatArray:
     """Points (blocks * block_size, dimensions) of a design in the unit cube.
 
@@ -57,16 +80,18 @@ def design_shares(method: str, blocks: int, names: Sequence[str], seed: int) -> 
         Of the dimensions.
     seed : int
         Seed of the scenario.
+
+    Raises
+    ------
+    InputError
+        If SALib is not installed.
     """
-    # SALib is slow to import, and needed by few scenarios.
     if method == "morris":
-        from SALib.sample import morris
-
-        points = morris.sample(problem_of(names), blocks, num_levels=LEVELS, seed=design_seed(seed, "morris"))
+        points = salib("sample.morris").sample(
+            problem_of(names), blocks, num_levels=LEVELS, seed=design_seed(seed, "morris")
+        )
     else:
-        from SALib.sample import sobol
-
-        points = sobol.sample(
+        points = salib("sample.sobol").sample(
             problem_of(names), blocks, calc_second_order=False, seed=design_seed(seed, "saltelli")
         )
     shares: FloatArray = points

@@ -1,6 +1,7 @@
 """Score tables held against requirements: which IMU, where, with which method, is good enough."""
 
 from collections.abc import Iterable, Sequence
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ from simrail.scoring.ablations import without_ablations
 from simrail.scoring.aggregate import axis_columns
 from simrail.scoring.requirement import Requirement
 from simrail.scoring.share import ENOUGH, NOT_ENOUGH, NOT_JUDGED, UNDECIDED, decide, effective, wilson
+from simrail.scoring.statistics import compare
 from simrail.scoring.table import OK, is_failure
 
 CASE = ("vehicle", "mount", "imu", "odometry", "map", "vibration", "estimator", "tuning")
@@ -134,6 +136,51 @@ def _verdict(devices: pd.DataFrame, wanted: Requirement, looks: Sequence[int]) -
         "unit": wanted.unit,
         "reason": reason,
     }
+
+
+PAIR = ("vehicle", "mount", "odometry", "map", "vibration", "estimator", "tuning")
+"""What two IMUs have in common that are compared."""
+
+
+def imu_pairs(scores: pd.DataFrame, cells: pd.DataFrame, requirements: Iterable[Requirement]) -> pd.DataFrame:
+    """Pairs of IMUs by the same method on the same rides: whatever rails and map do to both drops out.
+
+    Parameters
+    ----------
+    scores, cells : pandas.DataFrame
+        A campaign's.
+    requirements : iterable of Requirement
+        Whose figures are compared.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``requirement``, ``number``, `PAIR`, ``first``, ``second``; ``difference``, the mean of the first's
+        figure less the second's, with ``low95`` and ``high95``, tracks being the clusters; ``won``, on how
+        many of ``pairs`` the first's is smaller; ``unit``. A device on which a method failed is left out.
+    """
+    rows = []
+    for number, wanted in enumerate(requirements):
+        devices = device_figures(scores, cells, wanted)
+        devices = devices[np.isfinite(devices["value"].to_numpy(dtype=np.float64))]
+        for names, group in devices.groupby(list(PAIR), observed=True, sort=False):
+            rides = [name for name in group.columns if name not in (*CASE, "value", "status")]
+            table = group.pivot_table("value", rides, "imu", sort=False)
+            for one, other in combinations(dict.fromkeys(group["imu"]), 2):
+                both = table[[one, other]].dropna()
+                tracks = (
+                    both.index.to_frame(index=False).groupby(["sample", "track_draw"], sort=False).ngroup()
+                )
+                pair = compare(both[one], both[other], tracks.to_numpy())
+                rows.append(
+                    {"requirement": wanted.words, "number": number}
+                    | dict(zip(PAIR, names, strict=True))
+                    | {"first": one, "second": other, "difference": pair.difference.value}
+                    | {"low95": pair.difference.low, "high95": pair.difference.high}
+                    | {"won": int((both[one] < both[other]).sum()), "pairs": pair.pairs}
+                    | {"unit": wanted.unit}
+                )
+    return pd.DataFrame.from_records(rows)
 
 
 def settled(table: pd.DataFrame) -> set[tuple[str, ...]]:

@@ -50,6 +50,12 @@ def served(request: pytest.FixtureRequest) -> Iterator[str]:
 
 FIGURES = "[...document.querySelectorAll('svg')].map(svg => svg.outerHTML).filter(text => text.length > 4000)"
 
+SHOWN = """[...document.querySelectorAll('svg[role=img]')].map(svg => ({
+    right: svg.getBoundingClientRect().right,
+    wide: svg.getBoundingClientRect().width,
+    scale: svg.getBoundingClientRect().width / svg.viewBox.baseVal.width * 72 / 96,
+})).filter(one => one.wide > 0)"""
+
 
 @pytest.mark.long
 @pytest.mark.parametrize("served", LESSONS, indirect=True)
@@ -76,6 +82,14 @@ def test_a_slider_moves_a_figure(chromium, served):
         slider.press("ArrowRight")
     changed = f"before => JSON.stringify({FIGURES}) !== JSON.stringify(before)"
     page.wait_for_function(changed, arg=before, timeout=1e3 * LONG_S)
+    # On a phone others stand there, made for its width: words keep their size, nothing is pushed aside.
+    shown = page.evaluate(SHOWN)
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.wait_for_function(f"{SHOWN}.every(one => one.right <= innerWidth)")
+    on_phone = page.evaluate(SHOWN)
+    assert len(on_phone) == len(shown) > 0
+    assert min(one["scale"] for one in on_phone) > 0.9
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.close()
     assert errors == []
     away = [url for url in asked if not url.startswith((served, "data:", "blob:"))]

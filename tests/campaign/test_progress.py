@@ -78,3 +78,16 @@ def test_what_is_left_follows_the_pace_of_late(clock: list[float]) -> None:
             clock[0] += 1.0 if done <= 100 else 11.0
             watcher.cells_done(done, 140, 0, "here")
     assert "130 of 140, 0 failed, 0.302 per second, 0:01:50 left" in stream.getvalue().splitlines()[-1]
+
+
+def test_nothing_is_foretold_from_the_first_cell(clock: list[float]) -> None:
+    """It waits for a ride and for kernels to compile: two minutes, where the others take a second each."""
+    watcher, stream = watched()
+    with watcher:
+        watcher.cells_begin(0, 120)
+        for done, after in ((1, 120.0), (2, 1.0), (14, 12.0)):
+            clock[0] += after
+            watcher.cells_done(done, 120, 0, "here")
+    first, later = stream.getvalue().splitlines()
+    assert first == "cells: 1 of 120, 0 failed, 0.00833 per second"
+    assert "14 of 120" in later and " left" in later

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,19 @@ def test_sobol_of_ishigami() -> None:
     assert (dropped, why) == (0, "")
     agree(found, *ishigami_indices())
     assert found.filter(like="_pm").to_numpy().max() < 0.12
+
+
+@pytest.mark.parametrize("method", ["morris", "saltelli"])
+def test_a_library_that_is_not_there_is_named(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    shares = design_shares(method, 4, ["a", "b"], seed=1)
+    for part in ("sample", "analyze"):
+        for name in ("morris", "sobol"):
+            monkeypatch.setitem(sys.modules, f"SALib.{part}.{name}", None)
+    with pytest.raises(InputError, match=r"SALib, which is not installed.*simrail\[sensitivity\]") as error:
+        design_shares(method, 4, ["a", "b"], seed=1)
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match=r"simrail\[sensitivity\]"):
+        indices_of(method, ["a", "b"], shares, shares[:, 0], seed=1)
 
 
 def test_sobol_of_a_linear_response() -> None:

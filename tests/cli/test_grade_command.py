@@ -1,6 +1,7 @@
 """``simrail grade``: a verdict of a sheet, its files, and what is no requirement."""
 
 import json
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -79,6 +80,9 @@ def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.Ca
     assert grade("./coarse.toml,./fine.toml", "--for", "roll<0.1deg", "--mount", "axle") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "fine.toml is the coarsest that is enough" in told
+    assert re.search(
+        r"which IMU errs less.* axle EKF fine\.toml (?:1[0-9]|20) of 20 0\.\d+ \(0\.\d+ to", told
+    )
     (folder,) = (ladder / "results").iterdir()
     verdicts = pd.read_csv(folder / "verdicts.csv").set_index("imu")
     assert verdicts["verdict"].str.cat(sep=", ") == "not enough, enough"
@@ -87,7 +91,8 @@ def test_a_bias_that_leans_too_far_is_not_enough(ladder: Path, capsys: pytest.Ca
     assert coarse["devices"] == 20  # was settled at the first look, and drawn no more
     assert verdicts.iloc[1]["devices"] == 60
     assert coarse["low95"] < 0.44 < coarse["high95"]
-    assert "not enough" in (folder / "report.html").read_text()
+    page = (folder / "report.html").read_text()
+    assert "not enough" in page and "coarse or fine: good enough?" in page
     stop = json.loads((folder / "manifest.json").read_text())["stop"]
     assert stop["reached"] and sorted(stop["settled"].values()) == [20, 60]
 

@@ -194,6 +194,7 @@ def test_a_figure_has_a_colour_for_every_variable_that_it_uses():
     x = np.arange(3.0)
     figure = draw([Panel("m", [Line("a", x, x)], spans=[(0.0, 1.0)])], x_label="s", description="a line")
     style, svg = figure.split("<svg", 1)
+    assert "svg" in svg.split("<svg", 1)[1], "one for a desk, one for a phone"
     used = set(re.findall(r"var\(--(\w+)\)", svg))
     assert {"page", "ink", "line", "curve"} <= used
     assert used <= set(re.findall(r"--(\w+): ", style))
@@ -201,6 +202,19 @@ def test_a_figure_has_a_colour_for_every_variable_that_it_uses():
     alone = by_itself(f"<svg{svg}")
     assert "var(--" not in alone
     assert "#ffffff" in alone
+
+
+def test_a_figure_of_two_panels_names_first_what_is_in_the_first_and_counts_whole_devices():
+    import re
+
+    from simrail.lessons.figures import Line, Panel, svg_of
+
+    x = np.arange(1.0, 5.0)  # which would be marked at each half
+    parts = [Panel("m", [Line("first", x, x)]), Panel("m", [Line("second", x, x)])]
+    svg = svg_of(parts, x_label="device", description="two panels")
+    words = re.findall(r">([^<>\n]+)</text", svg)
+    assert words.index("first") < words.index("second")
+    assert words[words.index("second") + 1 : words.index("device")] == ["1", "2", "3", "4"]
 
 
 def test_every_lesson_ends_alike():

@@ -53,6 +53,16 @@ def opened(chromium: Any) -> Iterator[Callable[..., Any]]:
     assert errors == []
 
 
+CUT_OFF = """[...document.querySelectorAll('svg')].flatMap(svg => {
+    const all = svg.getBoundingClientRect();
+    return [...svg.querySelectorAll('text')].filter(text => {
+        const own = text.getBoundingClientRect();
+        return own.width && (own.left < all.left - 1 || own.right > all.right + 1);
+    }).map(text => text.textContent.trim());
+})"""
+"""Words of figures that reach beyond their figure."""
+
+
 def picture(page: Any, panel: int = 0) -> str:
     """What a panel shows, as a data URL."""
     return str(page.locator(".panel canvas").nth(panel).evaluate("canvas => canvas.toDataURL()"))
@@ -140,7 +150,14 @@ def test_a_campaign_fits_a_phone_and_opens_its_folded_parts(
     path = tmp_path / "report.html"
     write_report(path, scenario=scenario, scores=scores, cells=cells, examples=rides, manifest=MANIFEST)
     page = opened(path, width=390, dark=True)
+    # A ride's words may be longer than a phone is wide.
+    page.locator('select[data-pick="ride"] option').first.evaluate(
+        "one => { one.textContent += ' and on'.repeat(9) }"
+    )
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.locator("details").evaluate_all("all => all.forEach(one => { one.open = true })")
+    assert page.evaluate(CUT_OFF) == []
+    page.locator("details").evaluate_all("all => all.forEach(one => { one.open = false })")
     assert page.locator("figure .narrow svg").first.is_visible()
     assert not page.locator("figure .wide svg").first.is_visible()
     assert not page.locator("#words table").is_visible()

@@ -19,6 +19,7 @@ from simrail.report.campaign.axes import campaign_axes, draws_of, finest, is_cam
 from simrail.report.campaign.figures import box_figure, curvature_figure, in_two
 from simrail.report.campaign.heat import heat_maps, rails_figures, short_number, side_of
 from simrail.report.campaign.tables import TABLES, campaign_tables, write_tables
+from simrail.report.figures.canvas import drawn
 from simrail.report.pages.page import write_report
 from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.scenario.scenario import Scenario, load_scenario, read_scenario
@@ -331,6 +332,12 @@ def test_boxes_and_curvature_are_drawn(small: Scores, styles: list[MethodStyle],
     one: CellResult = example()  # type: ignore[operator]
     svg = curvature_figure([one], styles, words=["20 km/h"], what="curvature")
     assert "curvature, 1/km" in svg and "20 km/h" in svg
+    long = "forward \u00b7 lord_3dm_gx4_25 \u00b7 two_axle_wagon"
+    wide, narrow = drawn("c", lambda: curvature_figure([one], styles, words=[long], what="c")).split(
+        'class="narrow"'
+    )
+    assert f">{long}</text>" in wide
+    assert ">two_axle_wagon</text>" in narrow, "on a phone a long title has a second line"
     straight = replace(one, motion=one.motion.assign(position_m=20.0))
     assert curvature_figure([straight], styles, words=["x"], what="curvature") == ""
 

@@ -508,6 +508,10 @@ def test_many_methods_are_told_together(scenario: Scenario, example: Rides, tabl
 
 def test_numbers_and_units_stay_together() -> None:
     assert unbroken("off by 0.4 mm in 95 % of 3 methods") == "off by 0.4\u00a0mm in 95\u00a0% of 3 methods"
+    assert (
+        unbroken("floor -5.1 to (-2), 13848-1 of 2026-11-30, 1e-3")
+        == "floor \u22125.1 to (\u22122), 13848-1 of 2026-11-30, 1e-3"
+    )
 
 
 # ---- the peak ----------------------------------------------------------------------------------

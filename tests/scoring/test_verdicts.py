@@ -7,7 +7,7 @@ import pytest
 from simrail.scoring.requirement import Requirement
 from simrail.scoring.share import ENOUGH, NOT_ENOUGH, NOT_JUDGED, UNDECIDED
 from simrail.scoring.table import as_score_table, failed_figures, table_of
-from simrail.scoring.verdicts import device_figures, settled, verdict_table
+from simrail.scoring.verdicts import device_figures, imu_pairs, settled, verdict_table
 
 
 def campaign(values: dict[str, np.ndarray], *, quantity: str = "roll") -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -99,3 +99,27 @@ def test_the_worst_ride_is_the_figure_of_a_device() -> None:
     values = np.array([[0.01, 0.03], [0.04, 0.02]])
     devices = device_figures(*campaign({"a": values}), WANTED)
     assert devices["value"].tolist() == [0.03, 0.04]
+
+
+def test_two_imus_are_compared_ride_by_ride() -> None:
+    """Rails differ by much, the IMUs on them by 0.01: verdicts are alike, and the pair is told apart."""
+    rails = np.linspace(0.02, 0.08, 30)[:, None]
+    own = 0.002 * np.sin(np.arange(30.0))[:, None]
+    scores, cells = campaign({"a": rails + 0.01 + own, "b": rails, "c": rails[::-1]})
+    scores, cells = (table.assign(track_draw=table["sensor_draw"]) for table in (scores, cells))
+    assert set(verdict_table(scores, cells, [WANTED])["verdict"]) == {UNDECIDED}
+    pairs = imu_pairs(scores, cells, [WANTED]).set_index(["first", "second"])
+    assert list(pairs.index) == [("a", "b"), ("a", "c"), ("b", "c")]
+    row = pairs.loc[("a", "b")]
+    assert row["difference"] == pytest.approx(0.01, abs=1e-3)
+    assert 0.0 < row["low95"] < row["difference"] < row["high95"]
+    assert (row["won"], row["pairs"], row["unit"]) == (0, 30, "deg")
+    assert pairs.loc[("b", "c"), "low95"] < 0.0 < pairs.loc[("b", "c"), "high95"]
+    assert pairs.loc[("b", "c"), "won"] == 15
+
+
+def test_a_device_that_fails_is_in_no_pair() -> None:
+    broken = np.full((4, 1), 0.05)
+    broken[0] = np.nan
+    (row,) = imu_pairs(*campaign({"a": broken, "b": np.full((4, 1), 0.04)}), [WANTED]).to_dict("records")
+    assert (row["won"], row["pairs"]) == (0, 3)

@@ -70,6 +70,7 @@ TOO_LONG = {
 
 ELSEWHERE = {
     "pip install 'simrail[lessons]'": "by hand, in a new environment",
+    "pip install 'simrail[sensitivity]'": "in the extra test",
     "pip install 'simrail[loggers]'": "what it brings is in the extra test",
     'pip install "simrail[loggers]"': "likewise",
     "pip install 'simrail[ifc]'": "by hand: 55 MB for one kind of file",

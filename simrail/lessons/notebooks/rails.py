@@ -31,6 +31,9 @@ with app.setup:
     }
     GRADES = ["consumer", "industrial", "lord_3dm_gx4_25", "tactical", "navigation", "ideal"]
     SHOWN = {"all": None, **{name: BANDS[name] for name in ("D0", "D1", "D2")}}
+    WAVES = ", ".join(
+        f"{one.name} {one.shortest_m:g} to {one.longest_m:g} m" for one in SHOWN.values() if one
+    )
 
 
 @app.cell(hide_code=True)
@@ -52,9 +55,7 @@ def _():
 def _():
     place = mo.ui.radio(list(PLACES), value="axle", label="IMU on the", inline=True)
     quantity = mo.ui.dropdown(list(QUANTITIES), value="vertical profile", label="quantity")
-    band = mo.ui.dropdown(
-        list(SHOWN), value="D1", label="wavelengths (D0 1 to 3 m, D1 3 to 25 m, D2 25 to 70 m)"
-    )
+    band = mo.ui.dropdown(list(SHOWN), value="D1", label=f"wavelengths ({WAVES})")
     grade = mo.ui.dropdown(GRADES, value="lord_3dm_gx4_25", label="IMU")
     smoothed = mo.ui.switch(value=True, label="smoothed (looks back from the end of the ride)")
     device = mo.ui.slider(0, 9, 1, value=0, label="device number", show_value=True)

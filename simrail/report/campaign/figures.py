@@ -39,7 +39,16 @@ def box_figure(
     limits = 0.8 * float(positive.quantile(0.001)), 1.25 * float(positive.quantile(0.999))
     across = min(len(axes), 2)
     with canvas.look():
-        figure, panels = canvas.panels_beside(len(axes), tall_in=2.2, across=across, gap_in=0.7, right_in=0.2)
+        lines = max(word.count("\n") for axis in axes for word in _slot_words(axis))
+        figure, panels = canvas.panels_beside(
+            len(axes),
+            tall_in=2.2,
+            across=across,
+            gap_in=0.7,
+            row_gap_in=0.75 + 0.14 * lines,
+            right_in=0.2,
+            bottom_in=0.5 + 0.14 * lines,
+        )
         for number, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
             _draw_boxes(panel, held(axes, axis).of(along(draws, axis)), styles, axis)
             panel.set_ylim(*limits)
@@ -72,9 +81,13 @@ def _draw_boxes(panel: Axes, draws: pd.DataFrame, styles: Sequence[MethodStyle],
             # A box without height is seen as a bar.
             panel.plot(ends, [middle, middle], color=style.colour, lw=3.6, solid_capstyle="butt", zorder=2)
             panel.plot(ends, [middle, middle], color="white", lw=1.3, solid_capstyle="butt", zorder=4)
-    longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
-    canvas.categories(panel, [in_two(word, longest=longest) for word in axis.words])
+    canvas.categories(panel, _slot_words(axis))
     panel.set_xlabel(axis.title)
+
+
+def _slot_words(axis: CampaignAxis) -> list[str]:
+    longest = LONG_WORD if len(axis.words) <= MOST_IN_ONE_LINE else LONG_WORD // 2
+    return [in_two(word, longest=longest) for word in axis.words]
 
 
 def in_two(word: str, *, longest: int = LONG_WORD) -> str:
@@ -100,9 +113,15 @@ def curvature_figure(
         return ""
     with canvas.look():
         figure, axes = canvas.panels_beside(
-            len(rides), tall_in=2.5, across=len(rides), gap_in=0.3, right_in=0.2, share_y=True
+            len(rides),
+            tall_in=2.5,
+            across=len(rides),
+            gap_in=0.3,
+            row_gap_in=0.95,
+            right_in=0.2,
+            share_y=True,
         )
-        for axis, (example, word, middles, number_of) in zip(axes, rides, strict=True):
+        for axis, (example, _, middles, number_of) in zip(axes, rides, strict=True):
             for style in styles:
                 if style.name not in example.estimates:
                     continue
@@ -111,10 +130,10 @@ def curvature_figure(
                 face = "white" if style.baseline else style.colour
                 axis.plot(middles, means, "o-", color=style.colour, mfc=face, ms=4.4, mew=1.1, lw=1.0)
             axis.axhline(0.0, color=canvas.MUTED, lw=0.7, zorder=1)
-            axis.set_title(word, color=canvas.INK)
             axis.set_xlabel("curvature, 1/km (positive to the left)")
             axis.tick_params(labelleft=axis is axes[0])
         axes[0].set_ylabel("mean roll error, \u00b0")
+        canvas.title_panels(axes, [word for _, word, *_ in rides], color=canvas.INK)
         _legend(figure, [style for style in styles if any(style.name in e.estimates for e, *_ in rides)])
         return canvas.to_svg(figure, description=what)
 

@@ -39,6 +39,9 @@ MOST_CELLS = 800
 CELL_IN = (0.46, 0.27)
 """Least width and height of a cell of a heat map: its number must be read."""
 
+LETTER_IN = 0.075
+"""Width of a letter of nine points."""
+
 
 @dataclass(frozen=True)
 class Side:
@@ -99,8 +102,8 @@ def heat_maps(
         return ""
     low, high = float(positive.min()), float(positive.max())
     norm = LogNorm(low, max(high, 1.05 * low))
-    left, right, gap, title_in = 0.35 + 0.075 * max(len(word) for word in down.words), 0.85, 0.22, 0.34
-    wide = max(CELL_IN[0], 0.075 * max(len(word) for word in across.words)) * len(across.words)
+    left, right, gap, title_in = 0.35 + LETTER_IN * max(len(word) for word in down.words), 0.85, 0.22, 0.34
+    wide = max(CELL_IN[0], LETTER_IN * max(len(word) for word in across.words)) * len(across.words)
     tall = CELL_IN[1] * len(down.words)
     room = width_in() - left - right
     per_row = max(1, min(len(tables), int((room + gap) / (wide + gap))))
@@ -108,6 +111,8 @@ def heat_maps(
     per_row = -(-len(tables) // rows)
     wide = min((room - gap * (per_row - 1)) / per_row, 1.8 * wide)
     end = left + per_row * (wide + gap)
+    # Words of neighbours must not touch where a phone leaves less than they need.
+    free = wide / len(across.words) / (LETTER_IN * (1 + max(len(word) for word in across.words)))
     with look():
         figure, axes = panels_beside(
             len(tables),
@@ -124,7 +129,9 @@ def heat_maps(
             axis.set_title(title, color=MUTED if title in muted else INK, pad=4.0)
             is_first, is_last = number % per_row == 0, number + per_row >= len(tables)
             axis.set_yticks(range(len(down.words)), down.words if is_first else [])
-            axis.set_xticks(range(len(across.words)), across.words if is_last else [])
+            axis.set_xticks(
+                range(len(across.words)), across.words if is_last else [], fontsize=9.0 * min(free, 1.0)
+            )
             if is_last:
                 axis.set_xlabel(across.title)
             if is_first:
@@ -231,4 +238,4 @@ def _colour_bar(figure: Figure, norm: LogNorm, unit: str, left: float, top: floa
     bar.set_ticks(marks, labels=[short_number(mark) for mark in marks])
     axis.grid(visible=False)
     axis.minorticks_off()
-    axis.set_title(unit, fontsize=8.5, pad=5.0)
+    axis.set_title(unit, fontsize=8.5, pad=8.0)  # clear of the topmost number

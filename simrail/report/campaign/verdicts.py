@@ -22,6 +22,7 @@ from simrail.report.words.verdicts import (
     devices_words,
     glance_sentence,
     judged_methods,
+    short_name,
     verdict_sentence,
 )
 from simrail.scenario.requirements import looks_of, requirements_of
@@ -103,8 +104,11 @@ def verdict_tiles(
     tiles = [Tile("IMUs that are enough", f"{len(enough)} of {count}", f"on the {mount}, with {best.label}")]
     asked = f"{100.0 * requirement.share:g} % of the devices stay below"
     if own["at_share"].notna().any():
-        least = own.iloc[int(np.nanargmin(own["at_share"].to_numpy()))]
-        note = f"{least['imu']}: {asked}; asked are {requirement.limit:g}{unit}"
+        least, *others = own.sort_values("at_share").to_dict("records")
+        note = f"{short_name(least['imu'])}: {asked}"
+        if others and np.isfinite(others[0]["at_share"]):
+            note += f", of {short_name(others[0]['imu'])} below {significant(others[0]['at_share'])}{unit}"
+        note += f"; asked are {requirement.limit:g}{unit}"
         tiles.append(Tile("the best IMU", f"{significant(least['at_share'])}{unit}", note))
     floors = [style for style in styles if not style.uses_imu]
     zero = rows[rows["estimator"].isin([style.name for style in floors]) & rows["at_share"].notna()]

@@ -287,13 +287,13 @@ def panels_beside(
     top_in: float = 0.62,
     gap_in: float = 0.42,
     row_gap_in: float = 0.75,
+    bottom_in: float = 0.5,
     share_y: bool = False,
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels beside each other, in rows; lengths in inches."""
-    bottom = 0.5
     across = 1 if is_narrow() else across
     rows = -(-count // across)
-    height = top_in + rows * tall_in + (rows - 1) * row_gap_in + bottom
+    height = top_in + rows * tall_in + (rows - 1) * row_gap_in + bottom_in
     wide = (width_in() - left_in - right_in - gap_in * (across - 1)) / across
     figure = Figure(figsize=(width_in(), height))
     axes: list[Axes] = []
@@ -327,6 +327,16 @@ def parted(name: str, *, longest: int = 10) -> str:
             lines.append("")
         lines[-1] += part
     return "\n".join(line.rstrip(" ") for line in lines)
+
+
+def title_panels(axes: Sequence[Axes], titles: Sequence[str], **how: Any) -> None:
+    """Titles of panels, in as many lines as the width of a panel asks for; before their legend."""
+    figure = axes[0].get_figure(root=True)
+    assert figure is not None
+    wide, _ = figure.get_size_inches()
+    for axis, title in zip(axes, titles, strict=True):
+        letters = int(axis.get_position().width * wide * 72.0 / (0.6 * _RC["axes.titlesize"]))
+        axis.set_title(textwrap.fill(title, letters), **how)
 
 
 def categories(axis: Axes, words: Sequence[str], *, size: float | None = None) -> None:
@@ -489,11 +499,10 @@ def label_upright(axis: Axes, words: str, **how: Any) -> None:
 
 def legend_above(*axes: Axes) -> None:
     """Put the legend of some panels above the first, outside of the data; truth and design first."""
-    by_label = {
-        str(label): handle
-        for axis in reversed(axes)
-        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
-    }
+    by_label: dict[str, Any] = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            by_label.setdefault(str(label), handle)
     labels = sorted(by_label, key=lambda label: {"truth": 0, "design": 1}.get(label, 2))
     words, columns, lines = fitting_words(labels, width_in() - LEFT_IN)
     figure = axes[0].get_figure(root=True)
@@ -515,7 +524,8 @@ def figure_legend(
 ) -> None:
     """Put a legend at the top of a figure."""
     words, columns, lines = fitting_words(labels, width_in() - (0.0 if is_narrow() else left_in))
-    titles_in = 0.22 if any(axis.get_title(loc="left") for axis in figure.axes) else 0.0
+    lines_above = max(len(axis.get_title(loc="left").splitlines()) for axis in figure.axes)
+    titles_in = 0.22 + 0.16 * (lines_above - 1) if lines_above else 0.0
     _make_room(figure, lines, columns, free_in=_free_above(figure) - titles_in)
     figure.legend(
         handles,
@@ -613,7 +623,7 @@ def to_svg(figure: Figure, *, description: str) -> Markup:
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     # A tenth of a point is 0.13 pixels. Only within tags: a label of 0.0001 is no place.
-    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d)\d{3,}", r"\1", tag.group()), text)
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d)\d{3,}", "", tag.group()), text)
     # Several figures share the page: an id that nothing refers to would only stand there twice.
     used = set(re.findall(r"#([\w-]+)", text))
     text = re.sub(r' id="([\w.-]+)"', lambda m: m.group(0) if m.group(1) in used else "", text)

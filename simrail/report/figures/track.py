@@ -22,10 +22,14 @@ from simrail.report.words.sentences import listed
 from simrail.track.design import CURVE, STRAIGHT, TRANSITION, Curve, TrackDesign
 
 _KIND_COLOUR = {STRAIGHT: "#98a1af", TRANSITION: "#56B4E9", CURVE: "#D55E00"}
-_ROOM_IN = (0.52, 0.34)
+_ROOM_IN = (0.66, 0.34)
 """Width and height that the words of a curve need for themselves."""
 _AWAY = 26.0
 """Points from a curve to the middle of its words."""
+_SIDE_IN = 0.45
+"""Left and right of the plan."""
+_HALF_NAME_IN = 0.36
+"""Half the width of a curve's words, as "cant 150 mm" has it."""
 _KIND_WORD = {STRAIGHT: "straight", TRANSITION: "transition", CURVE: "curve"}
 
 
@@ -44,10 +48,10 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
         xy = track.frame(s).position[:, :2]
         turned = _along_the_page(xy)
         span = np.ptp(turned, axis=0)
-        wide = width_in() - 0.9
+        wide = width_in() - 2.0 * _SIDE_IN
         tall = float(np.clip(wide * (span[1] / span[0]) + 1.1, 1.8, 4.2))
         figure = Figure(figsize=(width_in(), tall + 0.4))
-        axis = add_panel(figure, 0.45, 0.12, wide, tall)
+        axis = add_panel(figure, _SIDE_IN, 0.12, wide, tall)
         kind = track.kind(s)
         steps = np.flatnonzero(np.diff(kind)) + 1
         named: set[int] = set()
@@ -66,7 +70,7 @@ def plan_figure(track: TrackDesign, *, stops: dict[str, float]) -> str:
         axis.grid(False)
         axis.set(xticks=[], yticks=[])
         axis.spines[:].set_visible(False)
-        axis.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=3)
+        axis.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0 + 0.26 / tall), ncols=3)
         _scale_bar(axis, span[0])
         return to_svg(figure, description=f"Plan of the track {track.name}")
 
@@ -176,11 +180,15 @@ def _name_curves(
         place = xy[i] + words_m * outside
         if all((np.abs(place - other) > room).any() for other in taken):
             taken.append(place)
+            # At the ends of the line a name would reach over the edge of the figure.
+            share = (xy[i, 0] - xy[:, 0].min()) / max(float(np.ptp(xy[:, 0])), 1e-9)
+            at_in = _SIDE_IN + share * (width_in() - 2.0 * _SIDE_IN) + _AWAY / 72.0 * outside[0]
+            inside_in = np.clip(at_in, _HALF_NAME_IN, width_in() - _HALF_NAME_IN) - at_in
             axis.annotate(
                 f"R {abs(element.radius_m):.0f} m"
                 + (f"\ncant {1e3 * abs(element.cant_m):.0f} mm" if element.cant_m else ""),
                 (float(xy[i, 0]), float(xy[i, 1])),
-                (_AWAY * outside[0], _AWAY * outside[1]),
+                (_AWAY * outside[0] + 72.0 * inside_in, _AWAY * outside[1]),
                 textcoords="offset points",
                 ha="center",
                 va="center",

@@ -52,7 +52,8 @@ def interval_verdict(share: float) -> tuple[str, str]:
 
 
 def unbroken(text: str) -> str:
-    """A text whose numbers and units are not parted at the end of a line."""
+    """A text whose numbers and units are not parted at the end of a line, with a minus that is no hyphen."""
+    text = re.sub(r"(?<![\w.)])-(?=\d)", "\u2212", text)
     return re.sub(r"(?<=\d) (?=(?:mm|m|s|km/h|Hz|kHz|%)(?![a-z]))", "\u00a0", text)
 
 

@@ -1,6 +1,7 @@
 """Verdicts in words: which IMUs are good enough, of how many devices that is known, and what is open."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import pandas as pd
 
@@ -84,8 +85,13 @@ def share_words(row: pd.Series) -> str:
     return f"{row['verdict']}: {row['passed']} of {row['devices']}, {low:.0f} to {high:.0f} %"
 
 
+def short_name(imu: object) -> str:
+    """Name of an IMU, of a sheet of one's own that of its file without its folders."""
+    return Path(str(imu)).name
+
+
 def _names(imus: "pd.Series[str]") -> str:
-    names = list(dict.fromkeys(imus.astype(str)))
+    names = [short_name(imu) for imu in dict.fromkeys(imus.astype(str))]
     if len(names) > _MOST_NAMES:
         return ", ".join(names[:_MOST_NAMES]) + f" and {len(names) - _MOST_NAMES} more"
     return ", ".join(names)

@@ -277,6 +277,9 @@ def test_the_table_has_every_part_in_mg_and_the_range_of_the_distance() -> None:
     assert table.rows[0].cells[0].text == "4" and table.rows[1].cells[0].text == "4.0"
     smooth = table.rows[1 + list(PAPER.parts).index("smooth")].cells[6].text
     assert smooth == "+24.6 to +25.4"
+    near = next(i for i, part in enumerate(PAPER.parts, start=1) if part not in DISTANCE)
+    assert table.rows[near].cells[6].text == "+0.492 to +0.508", "a tenth would say nothing of it"
+    assert "\u22120.00" not in {cell.text for row in table.rows for cell in row.cells}
     assert pytest.approx(1e3 / G) == PER_MG
 
 

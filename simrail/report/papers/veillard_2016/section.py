@@ -84,7 +84,9 @@ def _mean_cell(draws: Draws, decimals: int) -> Cell:
     if not len(draws.values):
         return NONE
     mean, low, high = draws.mean()
-    ends = signed(f"{low:.{decimals}f} to {high:.{decimals}f}") if np.isfinite([low, high]).all() else ""
+    if not np.isfinite([low, high]).all():
+        return number_cell(mean, decimals=decimals)
+    ends = " to ".join(number_cell(end, decimals=decimals).text for end in (low, high))
     return replace(number_cell(mean, decimals=decimals), spread=ends)
 
 
@@ -93,4 +95,5 @@ def _range_cell(draws: Draws) -> Cell:
     if not len(draws.values):
         return NONE
     low, high = float(np.min(draws.values)), float(np.max(draws.values))
-    return Cell(signed(f"{low:+.1f} to {high:+.1f}"))
+    decimals = 1 if max(-low, high) >= 1.0 else 3  # of what keeps its way to metres no tenth would be left
+    return Cell(signed(f"{low:+.{decimals}f} to {high:+.{decimals}f}"))
