@@ -21,8 +21,10 @@ def weigh_all(recording: Recording) -> Evidence:
     recording : Recording
         A ride that has passed `simrail.recording.check_form.check_recording`.
     """
-    first, axes = weigh(recording), weigh_axes(recording)
-    if any(finding.verdict == "surely wrong" for finding in first.findings):
+    first = weigh(recording)
+    axes = weigh_axes(recording, first.single)
+    is_single = first.single is not None and bool(first.single.free)
+    if not is_single and any(finding.verdict == "surely wrong" for finding in first.findings):
         if are_columns(axes):
             first = replace(first, findings=tuple(_unjudged(finding) for finding in first.findings))
         else:

@@ -15,7 +15,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from simrail.core.errors import InputError
-from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
+from simrail.core.jit import FloatArray
+from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.fit import Fit
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
@@ -33,8 +34,10 @@ from simrail.recording.evidence.search import (
     apart_fit,
     are_apart,
     best_fit,
-    clock_slack,
 )
+from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
+from simrail.recording.evidence.slack import accused, slack_of
+from simrail.recording.evidence.slides import with_slides
 from simrail.recording.recording import Recording
 
 FOLLOWED = 0.5
@@ -98,12 +101,15 @@ class Evidence:
         Turn of the track on the ride, and its changes of speed, both summed.
     middle_s : float
         Time from the first stamp of the device of the way to where the offset of its clock holds.
+    single : Single, optional
+        What it says of single axes, sensors and its time; the findings hold beside that.
     """
 
     findings: tuple[Finding, ...]
     turn_rad: float = 0.0
     push_mps: float = 0.0
     middle_s: float = 0.0
+    single: Single | None = None
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
@@ -136,9 +142,8 @@ def weigh(recording: Recording) -> Evidence:
         return Evidence(tuple(_unjudged(key, math.inf, "nothing", why) for key in KINDS))
     # The matrices are small: threads of BLAS cost more than they bring.
     with threadpool_limits(1):
-        one = best_fit(ride)
-        two = apart_fit(ride, one)
-    best = two if are_apart(ride, one, two) else one
+        ride, fits = _explained(ride)
+    one, two, single, best = fits
     # Of three clocks that one is wrong that agrees with neither of the others.
     is_accel = best is two and accel_is_apart(ride, two)
     told = two.by_gyro() if is_accel else best
@@ -150,7 +155,7 @@ def weigh(recording: Recording) -> Evidence:
         "push": bool(push > LEAST_PUSH_MPS),
     }
     rests = {"turn": f"{turn / _DEG:.0f} deg of curves", "push": f"{push:.0f} m/s of changes of speed"}
-    slack = _slack(ride, best)
+    slack = slack_of(ride, best)
     findings = []
     for key, kind in KINDS.items():
         sources = [rests[by] for by in kind.by if has[by]]
@@ -170,31 +175,50 @@ def weigh(recording: Recording) -> Evidence:
             finding = _beside_a_late_gyro(finding, two, slack[key])
         findings.append(finding)
     middle = ride.middle_s - float(ride.way.time_s[0])
-    return Evidence(tuple(findings), turn, float(push), middle)
+    return Evidence(tuple(findings), turn, float(push), middle, single)
 
 
-def _slack(ride: Ride, found: Fit) -> dict[str, float]:
-    """How far from its nominal value each may be in a sound ride, besides the fit's own sd; in SI."""
-    recording = ride.recording
-    sheet, errors = recording.imu_sheet, recording.map_errors
-    package = sheet.package_misalignment_rad / math.sqrt(3.0)
-    moved = motion(ride, found.x)
-    curves = max(1, len(ride.table.curves_in(float(moved.place_m.min()), float(moved.place_m.max()))))
-    seconds = float(ride.fine_s[-1] - ride.fine_s[0])
-    clock = 0.02 + 0.02 * ride.reading_s
-    return {
-        "gyro": math.hypot(
-            sheet.gyro_scale_error / math.sqrt(3.0), errors.radius_relative_sd / math.sqrt(curves), 0.003
-        ),
-        "wheel": math.hypot(ride.way.scale_sd, errors.chainage_scale_sd, 0.001),
-        "shift": math.hypot(errors.chainage_offset_sd_m, 2.0),
-        "yaw": math.hypot(package, 0.3 * _DEG),
-        "pitch": math.hypot(package, errors.gradient_sd, 0.2 * _DEG),
-        "roll": math.hypot(package, errors.cant_along_sd_m / recording.track.rail_base_m, 0.2 * _DEG),
-        "offset": clock,
-        "gyro_offset": clock_slack(ride),
-        "drift": math.hypot(sheet.clock_drift, 0.03 / seconds, 3e-5),
-    }
+class _Fits(NamedTuple):
+    """Fits of a ride: with one clock in the IMU, with two, with faults of single axes, and the believed one."""
+
+    one: Fit
+    two: Fit
+    single: Single
+    best: Fit
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether that with two clocks is believed."""
+        return self.best is self.two
+
+    def price(self, ride: Ride, noise: FloatArray) -> float:
+        """What the believed one leaves by a noise (2, 5), and what it blames."""
+        blamed = accused(self.best, slack_of(ride, self.best), WHOLE) + len(self.single.free) + self.is_apart
+        return left_over(self.best, noise) + WORTH * (blamed + len(ride.slides))
+
+    def blames(self, ride: Ride) -> bool:
+        """Whether it says that anything is wrong."""
+        accuses = accused(self.best, slack_of(ride, self.best), WHOLE) > 0
+        return accuses or bool(self.single.free) or self.is_apart
+
+
+def _explained(ride: Ride) -> tuple[Ride, _Fits]:
+    """A ride and its fits; without what its wheel says while it slides, where that explains more."""
+    fits = _fits(ride)
+    slid = with_slides(ride) if fits.blames(ride) else None
+    if slid is None:
+        return ride, fits
+    others = _fits(slid)
+    noise = others.best.noise
+    return (slid, others) if others.price(slid, noise) < fits.price(ride, noise) else (ride, fits)
+
+
+def _fits(ride: Ride) -> _Fits:
+    one = best_fit(ride)
+    two = apart_fit(ride, one)
+    is_apart = are_apart(ride, one, two)
+    single = weigh_single(ride, one, two, is_apart=is_apart)
+    return _Fits(one, two, single, single.found if single.free else two if is_apart else one)
 
 
 def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Finding:
@@ -203,8 +227,7 @@ def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Fi
     value, sd = found.value(key), found.sd(key)
     if key in ("yaw", "pitch", "roll"):
         value = math.remainder(value, 2.0 * math.pi)
-    off = abs(value - nominal) / math.hypot(sd, slack)
-    verdict: Verdict = "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"
+    verdict = verdict_of(abs(value - nominal) / math.hypot(sd, slack))
     why, remedy = "", ""
     setting, field = setting_of(key, ride.recording, ride.way.device)
     if verdict != "sound":

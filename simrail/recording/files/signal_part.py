@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from simrail.core.errors import InputError
 from simrail.recording.files.data_file import DataPart, near
@@ -38,6 +38,22 @@ Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
 """Columns: one name, or number from 1 on, or an array of them."""
 
 Positive = Annotated[float, Field(gt=0.0)]
+
+
+def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
+    if not all(np.isfinite(values)) or 0.0 in values:
+        raise InputError(
+            "holds what is no factor",
+            value=list(values),
+            limit="numbers that are not zero",
+            remedy="1.0 for a column that is right",
+        )
+    return values
+
+
+OfEach = Annotated[tuple[float, ...], AfterValidator(_not_zero)]
+"""A factor for each column."""
+
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
 
 
@@ -64,7 +80,8 @@ class SignalPart(DataPart):
         Longest distance of two samples that is bridged; that of the ride file where nothing is said, and
         for devices slower than that, three of their intervals.
     scale : dict
-        Quantity -> factor on its values, for a device that is found to be off by one.
+        Quantity -> factor on its values, for a device that is found to be off by one; of a vector also an
+        array of three, one for each of its columns, of either sign.
     time_offset_s : float
         Seconds that are added to its stamps: negative for a device whose stamps are late.
     time_drift_ppm : float
@@ -81,7 +98,7 @@ class SignalPart(DataPart):
     rate_hz: Positive | None = None
     start_s: float = 0.0
     longest_gap_s: Annotated[float, Field(gt=0.0, le=600.0)] | None = None
-    scale: dict[str, Positive] = Field(default_factory=dict)
+    scale: dict[str, Positive | OfEach] = Field(default_factory=dict)
     time_offset_s: Annotated[float, Field(ge=-LARGEST_OFFSET_S, le=LARGEST_OFFSET_S)] = 0.0
     time_drift_ppm: Annotated[float, Field(ge=-10_000.0, le=10_000.0)] = 0.0
 
@@ -105,7 +122,15 @@ class SignalPart(DataPart):
                         remedy=near(key, keys) or "remove it",
                     )
         scaled = [key for key, quantity in quantities.items() if not quantity.whole]
-        for key in self.scale:
+        for key, factors in self.scale.items():
+            if key in scaled and isinstance(factors, tuple) and len(factors) != len(quantities[key].columns):
+                raise InputError(
+                    "has another number of factors than columns",
+                    field=f"scale.{key}",
+                    value=list(factors),
+                    limit=f"one for all, or {len(quantities[key].columns)}",
+                    remedy="1.0 for a column that is right",
+                )
             if key not in scaled:
                 raise InputError(
                     "has no scale",
