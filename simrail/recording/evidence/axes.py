@@ -24,7 +24,7 @@ from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.finding import SURE as CERTAIN
 from simrail.recording.evidence.model import ACCEL_GAIN, GAINS, LATES, OF_CHANNEL, PACE, SLOW
-from simrail.recording.evidence.single import Single, up_of
+from simrail.recording.evidence.single import Single, Up, up_of
 from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording
 
@@ -92,6 +92,11 @@ AXES = {
 }
 """Which axes are judged, in the order in which they are told."""
 
+APART = 1.5
+"""Standard deviations between two explanations from which on one is preferred."""
+
+ALL_ACCEL = "factor of the accelerometer"
+
 SENSORS = {SLOW[0]: "gyro", SLOW[1]: "accelerometer"}
 
 LEAST = dict.fromkeys((RX, RY, RZ), 2e-4) | dict.fromkeys((FX, FY), 0.02)
@@ -141,9 +146,24 @@ def weigh_axes(recording: Recording, single: Single | None = None) -> tuple[Find
 
 def _slopes(recording: Recording) -> tuple[dict[str, Slope], Slope]:
     """Slope of each axis on what is expected of it, and of the gyro's Y on its X's; nothing without a way."""
+    expected = expected_of(recording)
+    if not expected:
+        return {}, Slope(1.0, math.inf)
+    found = {name: seconds_of(recording, name) for name in AXES}
+    slopes = {name: slope(found[name], expected[name], LEAST[name]) for name in AXES}
+    return slopes, slope(found[RY], expected[RX], LEAST[RX])
+
+
+def seconds_of(recording: Recording, name: str) -> FloatArray:
+    """Means (n,) over a second of a column of the IMU."""
+    return means(recording.imu[name].to_numpy(), max(1, round(recording.imu_sheet.rate_hz)))
+
+
+def expected_of(recording: Recording) -> dict[str, FloatArray]:
+    """Means (n,) over a second that map and way let expect of each of `AXES`; nothing without either."""
     way = way_of(recording) if recording.track.is_map else None
     if way is None:
-        return {}, Slope(1.0, math.inf)
+        return {}
     count, time = max(1, round(recording.imu_sheet.rate_hz)), recording.imu.index.to_numpy(dtype=np.float64)
     went, speed, push = (
         means(np.interp(time, way.time_s, values), count)
@@ -152,16 +172,13 @@ def _slopes(recording: Recording) -> tuple[dict[str, Slope], Slope]:
     frame = recording.track.frame_extended(recording.start_position_m + went)
     along, level = -np.sin(frame.pitch_rad), np.cos(frame.pitch_rad) * np.sin(frame.roll_rad)
     gravity = recording.gravity_mps2
-    expected = {
+    return {
         RX: frame.k[:, 0] * speed,
         RY: frame.k[:, 1] * speed,
         RZ: frame.k[:, 2] * speed,
         FX: push + gravity * along,
         FY: frame.k[:, 2] * speed**2 + gravity * level,
     }
-    found = {name: means(recording.imu[name].to_numpy(), count) for name in AXES}
-    slopes = {name: slope(found[name], expected[name], LEAST[name]) for name in AXES}
-    return slopes, slope(found[RY], expected[RX], LEAST[RX])
 
 
 def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
@@ -244,9 +261,12 @@ def of_all(name: str, single: Single) -> Finding:
         why = (
             f"the time stamps run {value:.4g} times as fast as the ride, by its curves, its push and its way"
         )
-        remedy = f"mend units.time, tick_rate_hz or rate_hz of all its files: one of its seconds is {1.0 / value:.4g} s"
+        remedy = (
+            "mend units.time, tick_rate_hz or rate_hz of all its files: one of its seconds is "
+            f"{1.0 / value:.4g} s"
+        )
     elif name == ACCEL_GAIN:
-        quantity, unit, nominal, field = "factor of the accelerometer", "1", 1.0, "imu.accel"
+        quantity, unit, nominal, field = ALL_ACCEL, "1", 1.0, "imu.accel"
         setting, remedy = "imu.scale.accel", ""
         why = f"shows {value:.3g} times the push, the curves and gravity"
     else:
@@ -281,27 +301,56 @@ def _upright(recording: Recording, single: Single | None) -> Finding:
     up = up_of(recording)
     found, off = Slope(up.value, up.sd), abs(up.value - 1.0) / up.sd
     verdict: Verdict = "surely wrong" if off > CERTAIN else "likely wrong" if off > LIKELY else "sound"
-    axis = Axis("accelerometer Z alone", "gravity", "")
-    why, remedy, setting = "", "", ""
+    name, why, remedy, setting = "accelerometer Z alone", "", "", ""
     if verdict != "sound":
         why, setting = f"is {up.value:.3g} times gravity", "imu.scale.accel"
         remedy = "mend the scale: one axis alone has another one, or gravity_mps2 is another"
-        if single is not None and ACCEL_GAIN in single.free:
+        whole = _by_all(up, single)
+        if whole is None:
+            setting, remedy = (
+                "",
+                "mend imu.scale.accel, of Z alone or of all (the ride does not tell), or gravity_mps2",
+            )
+        elif whole and single is not None and ACCEL_GAIN in single.free:
             verdict, why, setting = "could not be judged", "all of the accelerometer has another factor", ""
+        elif whole:
+            return Finding(
+                ALL_ACCEL,
+                ACCEL_GAIN,
+                up.value,
+                up.sd,
+                1.0,
+                "1",
+                "gravity, push and curves",
+                verdict,
+                why,
+                setting,
+                f"imu.{FZ}",
+                "",
+            )
     return Finding(
-        axis.name,
+        name,
         key_of(FZ),
         found.value,
         found.sd,
         1.0,
         "1",
-        axis.of,
+        "gravity",
         verdict,
         why,
         setting=setting,
         field=f"imu.{FZ}",
         remedy=remedy,
     )
+
+
+def _by_all(up: Up, single: Single | None) -> bool | None:
+    """Whether push and curves have the factor that gravity has; None where they do not tell."""
+    if single is None or ACCEL_GAIN not in single.told:
+        return None
+    value, sd = single.told[ACCEL_GAIN]
+    alone, whole = abs(value - 1.0) / sd, abs(value - up.value) / sd
+    return whole < alone if abs(alone - whole) > APART else None
 
 
 def are_columns(findings: Sequence[Finding]) -> bool:

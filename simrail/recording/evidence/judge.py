@@ -17,14 +17,16 @@ from threadpoolctl import threadpool_limits
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
-from simrail.recording.evidence.fit import Fit
+from simrail.recording.evidence.fit import Fit, fit
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
     GYRO_Z,
     INDEX,
+    PACE,
     Motion,
     Ride,
     motion,
+    retimed,
     ride_of,
     start_values,
 )
@@ -51,6 +53,9 @@ SURE_TURN_RAD = 0.3
 
 SPEEDS_TAKEN = {"km/h": 1.0 / 3.6, "miles an hour": 0.44704, "knots": 0.51444, "feet a second": 0.3048}
 """Units that a speed in m/s may be in, in m/s, and how far a factor may be off one of them."""
+
+ROUNDS = 3
+"""Of a search for the pace of the stamps."""
 
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
@@ -143,6 +148,8 @@ def weigh(recording: Recording) -> Evidence:
     # The matrices are small: threads of BLAS cost more than they bring.
     with threadpool_limits(1):
         ride, fits = _explained(ride)
+        if PACE in fits.single.free:
+            ride, fits = _retimed(ride, fits)
     one, two, single, best = fits
     # Of three clocks that one is wrong that agrees with neither of the others.
     is_accel = best is two and accel_is_apart(ride, two)
@@ -191,26 +198,46 @@ class _Fits(NamedTuple):
         """Whether that with two clocks is believed."""
         return self.best is self.two
 
+    def blamed(self, ride: Ride) -> int:
+        """How many figures it says are wrong."""
+        accuses = accused(self.best, slack_of(ride, self.best), WHOLE)
+        return accuses + len(self.single.free) + self.is_apart
+
     def price(self, ride: Ride, noise: FloatArray) -> float:
         """What the believed one leaves by a noise (2, 5), and what it blames."""
-        blamed = accused(self.best, slack_of(ride, self.best), WHOLE) + len(self.single.free) + self.is_apart
-        return left_over(self.best, noise) + WORTH * (blamed + len(ride.slides))
-
-    def blames(self, ride: Ride) -> bool:
-        """Whether it says that anything is wrong."""
-        accuses = accused(self.best, slack_of(ride, self.best), WHOLE) > 0
-        return accuses or bool(self.single.free) or self.is_apart
+        return left_over(self.best, noise) + WORTH * (self.blamed(ride) + len(ride.slides))
 
 
 def _explained(ride: Ride) -> tuple[Ride, _Fits]:
     """A ride and its fits; without what its wheel says while it slides, where that explains more."""
     fits = _fits(ride)
-    slid = with_slides(ride) if fits.blames(ride) else None
+    slid = with_slides(ride) if fits.blamed(ride) else None
     if slid is None:
         return ride, fits
     others = _fits(slid)
     noise = others.best.noise
     return (slid, others) if others.price(slid, noise) < fits.price(ride, noise) else (ride, fits)
+
+
+def _retimed(ride: Ride, fits: _Fits) -> tuple[Ride, _Fits]:
+    """A ride whose stamps have another pace, and its fits, by stamps that are set right.
+
+    How rough a way is, and how long a block, is said in seconds: by stamps of another pace they are wrong.
+    """
+    pace, sd, other = fits.single.told[PACE][0], math.inf, ride
+    for _ in range(ROUNDS):
+        set_right = ride_of(retimed(ride.recording, pace)) if pace > 0.0 else None
+        if set_right is None:
+            return ride, fits
+        found = fit(set_right, start_values(), free=(PACE,))
+        pace, sd, other = pace * found.value(PACE), pace * found.sd(PACE), set_right
+    again = _fits(other)
+    if again.blamed(other) + 1 > fits.blamed(ride) or PACE in again.single.free:
+        return ride, fits
+    single = again.single
+    told = single.told | {PACE: (pace, sd)}
+    single = replace(single, free=(PACE, *single.free), told=told)
+    return other, again._replace(single=single)
 
 
 def _fits(ride: Ride) -> _Fits:

@@ -63,13 +63,14 @@ def _blamed(found: Fit) -> int:
 
 
 def explains(ride: Ride, found: Fit) -> bool:
+    """Whether a fit explains what the gyro turns and what pushes, if there is any."""
     turning = float(np.abs(ride.measured[:, GYRO_Z]).mean() * ride.block_s * len(ride.measured))
     turns = turning < LEAST_TURN_RAD or found.explained[GYRO_Z] > EXPLAINED
     return bool(turns and found.explained[FORCE_X] > EXPLAINED)
 
 
 def price(found: Fit) -> float:
-    """What a fit leaves, and what it blames."""
+    """What a fit leaves, and what it blames: to compare fits of one ride."""
     return (found.cost + GOOD) * (1.0 + DEARER * _blamed(found))
 
 

@@ -4,7 +4,7 @@ A fit that may change whole devices only bends several of them around one axis t
 whose X is halved makes it a wheel, a gyro and a place. So each of `SINGLE` is set free in turn. By one step
 from the fit of the whole devices first (`hints`); those that may be off are fitted, from there and, where
 that fit blames something itself, from a sound ride's values. The one is believed that leaves least by its
-own noise, if it is off by more than `LIKELY` standard deviations and pays for itself; then the next beside it.
+own noise, if it is off by more than `LIKELY` standard deviations and pays for itself; then the next one.
 """
 
 import math
@@ -96,7 +96,7 @@ class Up(NamedTuple):
 
 
 def up_of(recording: Recording) -> Up:
-    """What the median of a ride says of the accelerometer's Z: curves of height and cant pass, gravity stays."""
+    """What the median of a ride says of the accelerometer's Z: what curves add passes, gravity stays."""
     sheet, gravity = recording.imu_sheet, recording.gravity_mps2
     value = float(np.median(recording.imu[ACCEL[2]].to_numpy())) / gravity
     bias = sheet.accel_turn_on_bias_mps2 / math.sqrt(3.0) + sheet.accel_bias_instability_mps2
@@ -105,7 +105,7 @@ def up_of(recording: Recording) -> Up:
 
 
 def left_over(found: Fit, noise: FloatArray) -> float:
-    """Squares of what a fit leaves, by a noise (2, 5), and of what it strains; large residuals by their size."""
+    """Squares of what a fit leaves, by a noise (2, 5), and of what it strains; large ones by their size."""
     size = np.abs(found.left) / noise[found.standing.astype(np.int64)]
     return float(np.sum(np.where(size < OUTLIER, size**2, OUTLIER * (2.0 * size - OUTLIER)))) + found.strain
 
@@ -222,7 +222,7 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
 
 
 def _left_of(other: Fit, noise: FloatArray, slack: dict[str, float], clocks: int) -> float:
-    """What a fit of whole devices leaves, and what it blames; one with a gyro's clock of its own blames that."""
+    """What a fit of whole devices leaves, and what it blames; a gyro's clock of its own is blamed, too."""
     return left_over(other, noise) + WORTH * (accused(other, slack, WHOLE) + clocks)
 
 

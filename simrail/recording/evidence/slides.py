@@ -87,8 +87,6 @@ def _apart(ride: Ride) -> FloatArray:
 def _end(apart: FloatArray, first: int, block_s: float) -> int | None:
     """Block in which a wheel that slides since `first` has come back; None if it does not."""
     gained = np.cumsum(apart[first : first + int(LONGEST_S / block_s)]) * block_s
-    most = np.maximum.accumulate(np.abs(gained))
-    leads = np.sign(gained[np.argmax(np.abs(gained))])
-    peak = int(np.argmax(np.abs(gained)))
-    back = np.flatnonzero(leads * gained[peak:] < BACK * most[peak:])
-    return first + peak + int(back[0]) if len(back) else None
+    leads = np.sign(gained[0])
+    back = np.flatnonzero(leads * gained < BACK * np.maximum.accumulate(leads * gained))
+    return first + int(back[0]) if len(back) else None
