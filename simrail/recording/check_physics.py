@@ -103,7 +103,7 @@ def _check_gravity(recording: Recording, table: str) -> None:
     shown = f"{size:.4g} m/s2 {when}"
     if abs(size - gravity) > slack:
         remedy = (
-            f"it is {size / gravity:.3g} times gravity: set units.accel, or mend the scale (imu.scale.accel), of "
+            f"it is {size / gravity:.3g} times gravity: set units.accel, or mend imu.scale.accel, of "
             "all columns or of Z alone"
         )
         if size < slack:

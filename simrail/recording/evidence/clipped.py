@@ -48,7 +48,7 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
 
 
 def _flat(values: FloatArray) -> tuple[int, float, float]:
-    """Samples that stand at the greatest value, if more than chance; that value, and the step of the values."""
+    """Samples at the greatest value, if more than chance; that value, and the step of the values."""
     if len(values) < 10 * BELOW:
         return 0, 0.0, 0.0
     part = np.sort(np.partition(values, -10 * BELOW)[-10 * BELOW :])[::-1]

@@ -18,7 +18,7 @@ from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, weigh
 from simrail.recording.recording import Recording
 
-MARGIN = 0.5
+MARGIN = 0.1
 """By how much the correlations of another order, summed, have to be larger than those of the given one."""
 
 SIDES = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))

@@ -186,7 +186,7 @@ def weigh(recording: Recording) -> Evidence:
 
 
 class _Fits(NamedTuple):
-    """Fits of a ride: with one clock in the IMU, with two, with faults of single axes, and the believed one."""
+    """Fits of a ride: one clock in the IMU, two, faults of single axes; and the one that is believed."""
 
     one: Fit
     two: Fit

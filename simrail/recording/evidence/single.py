@@ -130,14 +130,13 @@ def weigh_single(ride: Ride, whole: Fit, apart: Fit, *, is_apart: bool) -> Singl
     while len(free) < MOST:
         slack = slack_of(ride, current)
         names = [name for name in known if name not in free]
-        doubtful = not explains(ride, current) or accused(current, slack, WHOLE) > 0
-        doubtful = doubtful or (is_apart and not free)
         hinted = [name for name in names if name in told and distance(name, *told[name], 0.0) > HINT]
         hinted += [name for name in SLOW if name in names and any(late in hinted for late in LATES)]
         fits = _tried(ride, current, free, hinted)
-        if doubtful:
-            fits = _better(fits, _from_sound(ride, current, free, names))
         against = [current] if free or not is_apart else [current, apart]
+        doubted = _doubted(ride, against, free, names, slack)
+        if doubted:
+            fits = _better(fits, _from_sound(ride, current, free, doubted))
         best = _best(fits, against, slack)
         if best is None:
             break
@@ -147,6 +146,29 @@ def weigh_single(ride: Ride, whole: Fit, apart: Fit, *, is_apart: bool) -> Singl
         told = hints(ride, current, others, free=free)
     told |= {name: (current.value(name), current.sd(name)) for name in free}
     return Single(current, free, told, slack_of(ride, current), rivals)
+
+
+def _doubted(
+    ride: Ride, against: Sequence[Fit], free: Sequence[str], names: Sequence[str], slack: dict[str, float]
+) -> list[str]:
+    """Which parameters may explain what fits of whole devices blame, so that they are begun anew.
+
+    All of them where no fit explains the ride, or the best one blames several figures, or one and another
+    parameter would still help it; of a clock that is blamed alone, a low-pass; else none.
+    """
+    best, is_apart = against[-1], len(against) > 1
+    blamed = accused(best, slack, WHOLE) + is_apart
+    if not explains(ride, best) or blamed > 1:
+        return list(names)
+    if not blamed:
+        return []
+    told = hints(
+        ride, best, [name for name in names if name not in SLOW], free=(*free, *("gyro_offset",) * is_apart)
+    )
+    if any(distance(name, *found, 0.0) > HINT for name, found in told.items()):
+        return list(names)
+    is_late = is_apart or accused(best, slack, ("offset",)) > 0
+    return [name for name in SLOW if is_late and name in names]
 
 
 def _tried(ride: Ride, current: Fit, free: Sequence[str], names: Sequence[str]) -> dict[str, Fit]:

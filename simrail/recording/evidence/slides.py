@@ -1,9 +1,9 @@
 """Where a wheel spins or slides: that is what the ride has, and no fault of its file.
 
-Under power a wheel spins up, and comes back to the train; under the brake it falls behind, and comes back. Its
-acceleration leaves the accelerometer's by more than a clock or a factor would, twice, and what it has gained
-in speed at the first it gives back at the second. Between the two its way is not the train's, and behind them
-it is off by some metres, which the fit leaves open.
+Under power a wheel spins up, and comes back to the train; under the brake it falls behind, and comes back.
+Its acceleration leaves the accelerometer's by more than a clock or a factor would, twice, and what it has
+gained in speed at the first it gives back at the second. Between the two its way is not the train's, and
+behind them it is off by some metres, which the fit leaves open.
 """
 
 from dataclasses import replace

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, PlainValidator, field_validator, model_validator
 
 from simrail.core.errors import InputError
 from simrail.recording.files.data_file import DataPart, near
@@ -40,19 +40,32 @@ Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
 Positive = Annotated[float, Field(gt=0.0)]
 
 
-def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
-    if not all(np.isfinite(values)) or 0.0 in values:
+def _factors(value: object) -> object:
+    """One factor above 0, or one for each column: of either sign, and not 0."""
+    each = value if isinstance(value, list | tuple) else [value]
+    numbers = [one for one in each if isinstance(one, int | float) and not isinstance(one, bool)]
+    if len(numbers) < len(each) or not numbers or not all(np.isfinite(numbers)) or 0.0 in numbers:
         raise InputError(
             "holds what is no factor",
-            value=list(values),
-            limit="numbers that are not zero",
+            value=value if isinstance(value, list | str | int | float) else str(value),
+            limit="a number above 0, or an array of numbers that are not 0, one for each column",
             remedy="1.0 for a column that is right",
         )
-    return values
+    if each is value:
+        return tuple(float(one) for one in numbers)
+    if numbers[0] < 0.0:
+        raise InputError(
+            "has the other sign",
+            value=value if isinstance(value, int | float) else str(value),
+            limit="a number above 0",
+            remedy="for columns of the other sign give an array of one factor for each column",
+        )
+    return float(numbers[0])
 
 
-OfEach = Annotated[tuple[float, ...], AfterValidator(_not_zero)]
-"""A factor for each column."""
+Factors = Annotated[float | tuple[float, ...], PlainValidator(_factors)]
+"""A factor of a quantity, or one of each of its columns."""
+
 
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
 
@@ -98,7 +111,7 @@ class SignalPart(DataPart):
     rate_hz: Positive | None = None
     start_s: float = 0.0
     longest_gap_s: Annotated[float, Field(gt=0.0, le=600.0)] | None = None
-    scale: dict[str, Positive | OfEach] = Field(default_factory=dict)
+    scale: dict[str, Factors] = Field(default_factory=dict)
     time_offset_s: Annotated[float, Field(ge=-LARGEST_OFFSET_S, le=LARGEST_OFFSET_S)] = 0.0
     time_drift_ppm: Annotated[float, Field(ge=-10_000.0, le=10_000.0)] = 0.0
 
