@@ -25,6 +25,7 @@ from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict
 from simrail.recording.evidence.finding import SURE as CERTAIN
 from simrail.recording.evidence.model import ACCEL_GAIN, GAINS, LATES, OF_CHANNEL, PACE, SLOW
 from simrail.recording.evidence.single import Single, Up, up_of
+from simrail.recording.evidence.slack import distance
 from simrail.recording.evidence.way import way_of
 from simrail.recording.recording import Recording
 
@@ -185,7 +186,7 @@ def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
     """The finding of an axis with its number, by the fit of all."""
     name, gain, late = OF_CHANNEL[channel], GAINS[channel], LATES[channel]
     if gain in single.free:
-        return _scaled(name, Slope(*single.told[gain]), single.off(gain), _or(gain, single))
+        return _scaled(name, Slope(*single.told[gain]), _told(gain, single), _or(gain, single))
     if late in single.free:
         value, side = single.told[late][0], "late" if single.told[late][0] < 0.0 else "early"
         return replace(
@@ -212,7 +213,7 @@ def _numbered(finding: Finding, channel: int, single: Single) -> Finding:
     return finding
 
 
-def _scaled(name: str, found: Slope, off: float, rival: str) -> Finding:
+def _scaled(name: str, found: Slope, verdict: Verdict, rival: str) -> Finding:
     """The finding of an axis that has another factor, or the other sign."""
     of = AXES[name].of
     unit = "mend the unit: one axis alone has another one"
@@ -225,14 +226,15 @@ def _scaled(name: str, found: Slope, off: float, rival: str) -> Finding:
     else:
         why, remedy = f"is {found.value:.3g} times {of}", "mend the scale: one axis alone has another one"
     remedy = "; or ".join(part for part in (remedy, rival) if part)
-    verdict: Verdict = "surely wrong" if off > CERTAIN else "likely wrong"
     kind = "gyro" if name in GYRO else "accel"
     return replace(_finding(name, found, verdict, why, remedy), setting=f"imu.scale.{kind}")
 
 
 def _told(name: str, single: Single) -> Verdict:
-    """The judgement of what the fit sets free: it is never sound."""
-    return "surely wrong" if single.off(name) > CERTAIN else "likely wrong"
+    """The judgement of what the fit sets free; what others that came after it explain is no fault."""
+    if single.off(name) > CERTAIN:
+        return "surely wrong"
+    return "likely wrong" if distance(name, *single.told[name], 0.0) > LIKELY else "could not be judged"
 
 
 def _or(name: str, single: Single) -> str:
@@ -361,9 +363,10 @@ def are_columns(findings: Sequence[Finding]) -> bool:
     Parameters
     ----------
     findings : sequence of Finding
-        Those of `weigh_axes`.
+        Those of `weigh_axes`, by the slopes alone.
     """
-    told = {finding.key: finding for finding in findings if finding.sd < WANTED}
+    judged = {key_of(name) for name in AXES}
+    told = {finding.key: finding for finding in findings if finding.sd < WANTED and finding.key in judged}
     against = {key for key, finding in told.items() if finding.value < 0.0}
     follow = all(1.0 / SQUARE < abs(finding.value) < SQUARE for finding in told.values())
     whole = any(

@@ -11,6 +11,7 @@ from scipy.stats import poisson
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
+from simrail.recording.check_samples import LIVING
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.recording import Recording
 
@@ -39,10 +40,12 @@ def weigh_clipped(recording: Recording) -> tuple[Finding, ...]:
         (ACCEL, sheet.accel_noise_mpsqrts, sheet.accel_range_mps2, "m/s2"),
     ):
         for name in names if noise > 0.0 else ():
-            values = recording.imu[name].to_numpy()
+            values, sample = recording.imu[name].to_numpy(), noise * math.sqrt(sheet.rate_hz)
+            if float(np.diff(values, n=2).std()) < LIVING * sample:
+                continue  # what was smoothed stands at a value
             for side in (1.0, -1.0):
                 count, top, step = _flat(side * values)
-                if count and (most is None or abs(top) < AT_RANGE * most):
+                if count and step < sample and (most is None or abs(top) < AT_RANGE * most):
                     found.append(_finding(name, side * top, step, count, unit, most))
     return tuple(found)
 

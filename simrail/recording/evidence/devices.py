@@ -31,7 +31,7 @@ def weigh_all(recording: Recording) -> Evidence:
             first, axes = exchanged, ()
     is_single = first.single is not None and bool(first.single.free)
     if not is_single and any(finding.verdict == "surely wrong" for finding in first.findings):
-        if are_columns(axes):
+        if are_columns(weigh_axes(recording)):
             first = replace(first, findings=tuple(_unjudged(finding) for finding in first.findings))
         else:
             axes = ()
