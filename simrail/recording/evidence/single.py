@@ -21,6 +21,7 @@ from simrail.recording.evidence.fit import OUTLIER, Fit, fit, hints
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
     GAINS,
+    GYRO_Z,
     INDEX,
     LATES,
     PACE,
@@ -45,6 +46,9 @@ WORTH = 12.25
 
 GRAVITY_SD_MPS2, TILTED = 0.026, 2e-3
 """How far gravity is from 9.81 between the equator and a pole, and what cant and gradient take off Z."""
+
+LEAST_SHARE = 0.7
+"""Share of the gyro's X and Y that a fit has to explain, if it blames one of them."""
 
 LEAST_UP = 0.01
 """How far the accelerometer's Z is off gravity where all of it may have another factor."""
@@ -231,6 +235,7 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
         for name in fits
         if off[name] > LIKELY or (least > 0 and blamed[name] == 0 and bare[name] > LIKELY)
     ]
+    kept = [name for name in kept if _follows(name, fits[name])]
     if not kept:
         return None
     noise = np.min([fits[name].noise for name in kept], axis=0)
@@ -241,6 +246,14 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
         left + WORTH * (i > 0) < _left_of(other, noise, slack, i) for i, other in enumerate(against)
     )
     return best if is_worth else None
+
+
+def _follows(name: str, found: Fit) -> bool:
+    """Whether an axis that is blamed follows the line at all: bodies on springs roll by themselves."""
+    for names in (GAINS, LATES):
+        if name in names[:GYRO_Z]:
+            return bool(found.explained[names.index(name)] > LEAST_SHARE)
+    return True
 
 
 def _left_of(other: Fit, noise: FloatArray, slack: dict[str, float], clocks: int) -> float:
