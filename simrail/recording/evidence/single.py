@@ -21,7 +21,6 @@ from simrail.recording.evidence.fit import OUTLIER, Fit, fit, hints
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
     GAINS,
-    GYRO_Z,
     INDEX,
     LATES,
     PACE,
@@ -48,7 +47,7 @@ GRAVITY_SD_MPS2, TILTED = 0.026, 2e-3
 """How far gravity is from 9.81 between the equator and a pole, and what cant and gradient take off Z."""
 
 LEAST_SHARE = 0.7
-"""Share of the gyro's X and Y that a fit has to explain, if it blames one of them."""
+"""Share of an axis that a fit has to explain, if it blames that."""
 
 LEAST_UP = 0.01
 """How far the accelerometer's Z is off gravity where all of it may have another factor."""
@@ -251,7 +250,7 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
 def _follows(name: str, found: Fit) -> bool:
     """Whether an axis that is blamed follows the line at all: bodies on springs roll by themselves."""
     for names in (GAINS, LATES):
-        if name in names[:GYRO_Z]:
+        if name in names:
             return bool(found.explained[names.index(name)] > LEAST_SHARE)
     return True
 
