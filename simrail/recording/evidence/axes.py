@@ -234,6 +234,8 @@ def _told(name: str, single: Single) -> Verdict:
     """The judgement of what the fit sets free; what others that came after it explain is no fault."""
     if single.off(name) > CERTAIN:
         return "surely wrong"
+    if name in SLOW and single.off(name) < LIKELY:
+        return "could not be judged"  # springs do as much
     return "likely wrong" if distance(name, *single.told[name], 0.0) > LIKELY else "could not be judged"
 
 

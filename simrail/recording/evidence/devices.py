@@ -30,10 +30,14 @@ def weigh_all(recording: Recording) -> Evidence:
         if exchanged is not None:
             first, axes = exchanged, ()
     is_single = first.single is not None and bool(first.single.free)
-    if not is_single and any(finding.verdict == "surely wrong" for finding in first.findings):
-        if are_columns(weigh_axes(recording)):
-            first = replace(first, findings=tuple(_unjudged(finding) for finding in first.findings))
-        else:
+    if any(finding.verdict == "surely wrong" for finding in first.findings):
+        slopes = weigh_axes(recording)
+        if are_columns(slopes):
+            first, axes = (
+                replace(first, findings=tuple(_unjudged(finding) for finding in first.findings)),
+                slopes,
+            )
+        elif not is_single:
             axes = ()
     clipped = weigh_clipped(recording)
     cut = {finding.key.replace("clipped", "alone", 1) for finding in clipped}

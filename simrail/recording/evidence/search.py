@@ -42,6 +42,9 @@ NO_DEARER, NO_MORE = 1.2, 1.005
 """So much of the other's price a fit with two clocks may have: it may blame one figure more, and leave no
 more, but for residuals that are weighed by others."""
 
+KNOWN_S = 1.0
+"""Standard deviation of a gyro's clock from which on a ride knows none of it, whatever its value."""
+
 
 def best_fit(ride: Ride) -> Fit:
     """The fit from the sound ride's values; from others too where it blames or leaves much."""
@@ -97,9 +100,10 @@ def apart_fit(ride: Ride, one: Fit) -> Fit:
 
 def are_apart(ride: Ride, one: Fit, two: Fit) -> bool:
     """Whether a fit with two clocks is to be believed, rather than that with one."""
-    off = abs(two.value("gyro_offset")) / math.hypot(two.sd("gyro_offset"), clock_slack(ride))
+    sd = two.sd("gyro_offset")
+    off = abs(two.value("gyro_offset")) / math.hypot(sd, clock_slack(ride))
     leaves_more = two.cost + GOOD > NO_MORE * (one.cost + GOOD)
-    return off > LIKELY and not leaves_more and price(two) <= NO_DEARER * price(one)
+    return sd < KNOWN_S and off > LIKELY and not leaves_more and price(two) <= NO_DEARER * price(one)
 
 
 def accel_is_apart(ride: Ride, two: Fit) -> bool:

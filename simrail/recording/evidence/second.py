@@ -39,11 +39,17 @@ def weigh_second(recording: Recording, first: Evidence) -> tuple[Finding, ...]:
         return ()
     second = weigh(alone)
     findings = [_renamed(second.of(key)) for key in OWN]
-    findings += [_renamed(finding) for finding in weigh_axes(alone, second.single) if finding.wrong]
-    findings.append(_spacing(first, second, recording, sheet))
-    findings.append(_clock("offset", first, second, sheet.clock_offset_sd_s))
-    findings.append(_clock("drift", first, second, sheet.imu.clock_drift))
-    return tuple(findings)
+    beside = [
+        _spacing(first, second, recording, sheet),
+        _clock("offset", first, second, sheet.clock_offset_sd_s),
+        _clock("drift", first, second, sheet.imu.clock_drift),
+    ]
+    # Slopes on a line that is met elsewhere, or at another time, say nothing of an axis.
+    is_single = second.single is not None and bool(second.single.free)
+    is_elsewhere = any(finding.verdict == "surely wrong" for finding in (*findings, *beside))
+    if is_single or not is_elsewhere:
+        findings += [_renamed(finding) for finding in weigh_axes(alone, second.single) if finding.wrong]
+    return (*findings, *beside)
 
 
 def _renamed(finding: Finding) -> Finding:

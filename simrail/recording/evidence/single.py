@@ -16,7 +16,7 @@ import numpy as np
 
 from simrail.core.columns import ACCEL
 from simrail.core.jit import FloatArray
-from simrail.recording.evidence.finding import LIKELY
+from simrail.recording.evidence.finding import LIKELY, SURE
 from simrail.recording.evidence.fit import OUTLIER, Fit, fit, hints
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
@@ -46,8 +46,8 @@ WORTH = 12.25
 GRAVITY_SD_MPS2, TILTED = 0.026, 2e-3
 """How far gravity is from 9.81 between the equator and a pole, and what cant and gradient take off Z."""
 
-LEAST_SHARE = 0.7
-"""Share of an axis that a fit has to explain, if it blames that."""
+LEAST_SHARE, LEAST_SURE_SHARE = 0.9, 0.7
+"""Share of an axis that a fit has to explain, if it blames that, likely and surely."""
 
 LEAST_UP = 0.01
 """How far the accelerometer's Z is off gravity where all of it may have another factor."""
@@ -125,7 +125,9 @@ def weigh_single(ride: Ride, whole: Fit, apart: Fit, *, is_apart: bool) -> Singl
     is_apart : bool
         Whether that with two is believed.
     """
-    current, free, rivals = whole, (), ()
+    current = whole
+    free: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
     known = [
         name for name in SINGLE if name != ACCEL_GAIN or abs(up_of(ride.recording).value - 1.0) > LEAST_UP
     ]
@@ -234,7 +236,7 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
         for name in fits
         if off[name] > LIKELY or (least > 0 and blamed[name] == 0 and bare[name] > LIKELY)
     ]
-    kept = [name for name in kept if _follows(name, fits[name])]
+    kept = [name for name in kept if _follows(name, fits[name], off[name])]
     if not kept:
         return None
     noise = np.min([fits[name].noise for name in kept], axis=0)
@@ -247,11 +249,12 @@ def _best(fits: dict[str, Fit], against: Sequence[Fit], slack: dict[str, float])
     return best if is_worth else None
 
 
-def _follows(name: str, found: Fit) -> bool:
-    """Whether an axis that is blamed follows the line at all: bodies on springs roll by themselves."""
+def _follows(name: str, found: Fit, off: float) -> bool:
+    """Whether an axis that is so far off follows the line at all: bodies on springs roll by themselves."""
+    least = LEAST_SURE_SHARE if off > SURE else LEAST_SHARE
     for names in (GAINS, LATES):
         if name in names:
-            return bool(found.explained[names.index(name)] > LEAST_SHARE)
+            return bool(found.explained[names.index(name)] > least)
     return True
 
 
