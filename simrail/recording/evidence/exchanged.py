@@ -74,7 +74,8 @@ def _correlations(
 def _best(follows: FloatArray) -> tuple[tuple[int, ...], tuple[int, ...], float]:
     """Which column each axis is, and with which sign; and how well the given order follows beside that."""
     given = float(np.trace(follows))
-    best, order, signs = given + MARGIN, (0, 1, 2), SIDES[0]
+    best, signs = given + MARGIN, SIDES[0]
+    order: tuple[int, ...] = (0, 1, 2)
     for columns, sides in product(permutations(range(3)), SIDES):
         found = sum(sides[j] * follows[columns[j], j] for j in range(3))
         if columns != (0, 1, 2) and found > best:
