@@ -42,7 +42,7 @@ LONG = pytest.mark.long
     [
         ("gyro_x_radps", 0.5),
         ("accel_y_mps2", 2.0),
-        ("gyro_y_radps", -0.5),
+        pytest.param("gyro_y_radps", -0.5, marks=LONG),
         pytest.param("gyro_x_radps", 1.1, marks=LONG),
         pytest.param("gyro_y_radps", 2.0, marks=LONG),
         pytest.param("gyro_z_radps", 1.1, marks=LONG),
@@ -128,6 +128,7 @@ def test_a_wheel_that_slips_is_no_fault_of_the_file(sound: Recording) -> None:
     assert evidence.of("wheel").value == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.long
 def test_factors_of_single_columns_are_written_and_mend_the_ride(sound: Recording, tmp_path: Path) -> None:
     """The Y of the body is minus the y of the device: the column is found through its axes."""
     frame = np.genfromtxt(BASE / "ride.csv", delimiter=",", names=True)
