@@ -118,8 +118,9 @@ HOLD_S = 2.0
 
 
 WHEELSET_SHARE = 0.4
-"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset: what one of its wheels
-gains by a shift to the side the other loses, and its taper steers it back."""
+"""Of the wandering of a free wheel's rolling radius, so much is that of a wheelset in a bogie: what one of
+its wheels gains by a shift to the side the other loses, and its taper steers it back. Under a long wagon it
+runs on its flange in curves, as a free wheel does."""
 
 STILL_SD_MPS = 1e-3
 """Of the speed of a train that is known to stand."""
@@ -478,7 +479,11 @@ def rolling_share(recording: Recording) -> float:
     """How much the encoder's rolling radius wanders, of what that of a free wheel does."""
     sheet, wheel = recording.vehicle_sheet, recording.encoder_sheet
     axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
-    return WHEELSET_SHARE if axle is not None and axle.wheelset else 1.0
+    if sheet is None or axle is None or not axle.wheelset:
+        return 1.0
+    above = {body.name for body in sheet.bodies if any(one.on == axle.name for one in body.supports)}
+    in_bogie = any(one.on in above for body in sheet.bodies for one in body.supports)
+    return WHEELSET_SHARE if in_bogie else 1.0
 
 
 def _acceleration_of(

@@ -667,3 +667,8 @@ def test_a_wheelset_wanders_less(wheelset: bool | None, share: float):
     covariance = method._start(told, 2e-3, chord, YAW_OF_AXLE)[1]
     assert covariance[TREAD, TREAD] == pytest.approx(1e-6 * share**2)
     assert covariance[LEFT, LEFT] == covariance[RIGHT, RIGHT] == pytest.approx(4e-6 * share**2)
+    # Under a wagon it is not steered: what rests on the axles bears nothing.
+    axles = {b.name for b in bodies if not b.supports}
+    wagon = tuple(b for b in bodies if all(one.on in axles for one in b.supports))
+    told = replace(recording, vehicle_sheet=replace(sheet, bodies=wagon))
+    assert method._model(told, 2e-3, YAW_OF_AXLE).tread_sd == pytest.approx(0.001)
