@@ -21,7 +21,9 @@ def fuzzer() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "count", [pytest.param(30, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.slow)]
+)
 def test_every_mutated_input_is_answered_in_one_line(count: int, fuzzer: ModuleType, tmp_path: Path) -> None:
     answers = fuzzer.fuzz(7, range(count), tmp_path, told=lambda answer: None)
     assert len(answers) == count

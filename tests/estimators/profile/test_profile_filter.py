@@ -109,7 +109,7 @@ def there_and_back(samples: int = 500) -> np.ndarray:
 
 
 @pytest.mark.parametrize("gyro", [True, False])
-@pytest.mark.parametrize("linear", [True, False])
+@pytest.mark.parametrize("linear", [pytest.param(True, marks=pytest.mark.long), False])
 def test_kernel_equals_filterpy(gyro: bool, linear: bool) -> None:
     model = made(1, there_and_back(), gyro=gyro, linear=linear)
     ours, theirs = room(model), room(model)

@@ -102,6 +102,7 @@ def interval(draws: int, freedom: int, *, tests: int = 1) -> tuple[float, float]
     return float(low), float(high)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("smoothed", [False, True], ids=["filter", "smoother"])
 def test_consistent_over_200_draws(smoothed: bool) -> None:
     nees, nis = run()[smoothed]

@@ -286,6 +286,7 @@ def shares(scale: float, rides: int) -> tuple[np.ndarray, int]:
 SLOW = pytest.mark.parametrize("slow", [False, pytest.param(True, marks=pytest.mark.slow)])
 
 
+@pytest.mark.long
 @SLOW
 def test_the_interval_in_a_band_holds_95_of_100(slow: bool) -> None:
     inside, count = shares(1.0, RIDES[slow])
