@@ -481,8 +481,7 @@ def rolling_share(recording: Recording) -> float:
     axle = None if sheet is None or wheel is None else sheet.body(wheel.wheel.rpartition(".")[0])
     if sheet is None or axle is None or not axle.wheelset:
         return 1.0
-    above = {body.name for body in sheet.bodies if any(one.on == axle.name for one in body.supports)}
-    in_bogie = any(one.on in above for body in sheet.bodies for one in body.supports)
+    in_bogie = any(sheet.above(body.name) for body in sheet.above(axle.name))
     return WHEELSET_SHARE if in_bogie else 1.0
 
 

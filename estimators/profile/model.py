@@ -104,8 +104,7 @@ def axles_under(recording: Recording) -> Axles | None:
     here = None if sheet is None else sheet.body(recording.mount_body)
     if sheet is None or here is None:
         return None
-    over = [body for body in sheet.bodies if here.name in {support.on for support in body.supports}]
-    for carrier in [here] if here.supports else over:
+    for carrier in [here] if here.supports else sheet.above(here.name):
         axles = [sheet.body(support.on) for support in carrier.supports]
         places = {axle.x_m for axle in axles if axle is not None and not axle.supports}
         if len(places) > 1:

@@ -102,8 +102,6 @@ class Held(NamedTuple):
         body on several axles the mean of what is under them.
     deficiency, track_roll : ndarray (n,)
         Cant deficiency over g, and roll of the track as it lies, rad.
-    cant : ndarray (n,)
-        That the map has not, rad.
     """
 
     rest: FloatArray
@@ -115,7 +113,6 @@ class Held(NamedTuple):
     y: FloatArray
     deficiency: FloatArray
     track_roll: FloatArray
-    cant: FloatArray
 
 
 def held_of(recording: Recording, trace: Trace) -> Held:
@@ -145,7 +142,6 @@ def held_of(recording: Recording, trace: Trace) -> Held:
         pose.y.value - around.nominal[0],
         speed**2 * bent / g + track_roll,
         track_roll,
-        np.broadcast_to(track.cant.value, speed.shape),
     ]
     table = _at_samples(recording, trace, np.column_stack(slow))
     rest = recording.imu[list(SENSED)].to_numpy(dtype=np.float64) - table[:, :4]

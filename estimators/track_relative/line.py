@@ -151,7 +151,7 @@ def _roll_above(recording: Recording, places: FloatArray, borne: FloatArray) -> 
     here = None if sheet is None else sheet.body(recording.mount_body)
     if sheet is None or here is None or not here.supports:
         return borne
-    above = [body for body in sheet.bodies if any(support.on == here.name for support in body.supports)]
+    above = sheet.above(here.name)
     chord = sheet.chord(above[0].name) if len(above) == 1 else None
     if chord is None:
         return borne

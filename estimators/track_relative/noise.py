@@ -254,7 +254,6 @@ def class_of(recording: Recording) -> Motion:
         return JOINTED
     below = [sheet.body(support.on) for support in here.supports]
     on_axles = all(body is None or not body.supports for body in below)
-    bears = any(support.on == here.name for body in sheet.bodies for support in body.supports)
     if on_axles:
-        return FRAME if bears else WAGON
+        return FRAME if sheet.above(here.name) else WAGON
     return BODY

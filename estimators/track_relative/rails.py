@@ -217,8 +217,7 @@ def _on_springs(recording: Recording, trace: Trace, estimate: Estimate) -> pd.Da
     """
     states = _by_rails(recording, trace, estimate)
     if recording.rail_displacement is None:
-        steady = 0.0 if trace.course.around.in_time else trace.states[:, ROLL_SLOW]
-        sways = float(np.square(trace.states[:, ROLL] - steady).mean())
+        sways = float(np.square(trace.states[:, ROLL] - trace.states[:, ROLL_SLOW]).mean())
         states["roll_sd_rad"] = np.sqrt(np.square(states["roll_sd_rad"]) + sways + AXLE.roll_sd**2)
     return states
 

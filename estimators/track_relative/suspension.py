@@ -111,7 +111,7 @@ def bogie_of(sheet: VehicleSheet, name: str) -> Bogie | None:
     itself is added to it.
     """
     frame = sheet.body(name)
-    above = [body for body in sheet.bodies if any(support.on == name for support in body.supports)]
+    above = sheet.above(name)
     if frame is None or len(above) != 1 or len(frame.springs) != 2 or not _is_whole(frame):
         return None
     load = above[0]

@@ -189,6 +189,10 @@ class VehicleSheet:
         """The body of a name; None if it is not on the drawing."""
         return next((body for body in self.bodies if body.name == name), None)
 
+    def above(self, name: str) -> list[SheetBody]:
+        """The bodies that rest on the one of a name, in the order of the drawing."""
+        return [body for body in self.bodies if any(support.on == name for support in body.supports)]
+
     def chord(self, body: str) -> Chord | None:
         """The chord that a body points along, in its own coordinates; None if it is not on the drawing.
 
@@ -228,7 +232,7 @@ class VehicleSheet:
             return None if below is None or chord is None else _seen_from(here, below, chord)
         if here.supports:
             return self._from_support_to_support(here)
-        over = [entry for entry in self.bodies if any(support.on == here.name for support in entry.supports)]
+        over = self.above(here.name)
         if len(over) == 1 and len({support.x_m for support in over[0].supports}) > 1:
             return _seen_from(here, over[0], self._from_support_to_support(over[0]))
         return Chord(0.0, 0.0, 0.0, self.place_sd_m)

@@ -101,7 +101,7 @@ def ride(
     x, y, _ = recording.mount_position_m
     motion[:, 2] += y * motion[:, 0] - x * motion[:, 3]
     place = place + x
-    held = Held(np.zeros((n, 4)), place, np.full(n, SPEED), zero, zero, zero, zero, *forced.T, zero)
+    held = Held(np.zeros((n, 4)), place, np.full(n, SPEED), zero, zero, zero, zero, *forced.T)
     found = rails_under(recording, held, motion, drawn, 0.2, AT)
     return found, np.column_stack([profile(AT), level(AT)])
 
