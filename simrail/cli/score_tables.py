@@ -74,10 +74,11 @@ def print_scores(console: Console, results: Results) -> None:
     verdicts = campaign.verdicts
     shown = shown[:0] if alone or len(verdicts) else shown
     print_verdicts(console, verdicts, styles)
-    tables = _members(shown)
+    tables, vehicles = _members(shown), shown["vehicle"].nunique()
     for members in tables[:MOST_TABLES]:
         rows = scores[scores["cell"].isin(members["cell"])]
-        console.print(_cases(console, rows, members, styles, bands, limit))
+        parts = _cases(console, rows, members, styles, bands, limit)
+        console.print(Group(Text(_title(members, with_vehicle=vehicles > 1), style="bold"), *parts))
     if len(tables) > MOST_TABLES:
         console.print(f"... and {len(tables) - MOST_TABLES} more tables: see the report, or scores.csv")
     if len(shown) and any(has_both(cells, one) for one in ABLATIONS):
@@ -128,13 +129,14 @@ def _members(cell_table: pd.DataFrame) -> list[pd.DataFrame]:
     return [members for _, members in cell_table.groupby(shared, sort=few, observed=True, dropna=False)]
 
 
-def _title(members: pd.DataFrame) -> str:
-    """Which rides, on which vehicle's mount, and what the train knows."""
+def _title(members: pd.DataFrame, *, with_vehicle: bool) -> str:
+    """Which rides, on which mount, and what the train knows."""
     first = members.iloc[0]
     rides = list(dict.fromkeys(members["ride"]))
     more = f" and {len(rides) - MOST_NAMES} more" if len(rides) > MOST_NAMES else ""
+    mount = f"{first['mount']} of {first['vehicle']}" if with_vehicle else first["mount"]
     return (
-        f"{', '.join(rides[:MOST_NAMES])}{more}: {_way(members)}, {first['imu']} on {first['mount']}, "
+        f"{', '.join(rides[:MOST_NAMES])}{more}: {_way(members)}, {first['imu']} on {mount}, "
         f"odometry: {first['odometry']}, {state_words(first.to_dict(), comma=', ')}"
     )
 
@@ -145,7 +147,7 @@ def _way(members: pd.DataFrame) -> str:
         passes = sorted(set(members["passes"]))
         many = f"{'' if len(passes) == 1 else f'{passes[0]} to '}{passes[-1]} passes"
         return many if passes[-1] > 1 else "one pass"
-    least, most = f"{members['speed_kmh'].min():g}", f"{members['speed_kmh'].max():g}"
+    least, most = f"{members['speed_kmh'].min():.3g}", f"{members['speed_kmh'].max():.3g}"
     directions = list(dict.fromkeys(members["direction"]))
     speed = least if least == most else f"{least} to {most}"
     return f"{speed} km/h {directions[0] if len(directions) == 1 else 'both ways'}"
@@ -158,16 +160,13 @@ def _cases(
     styles: list[MethodStyle],
     bands: dict[str, Band],
     derailment_limit: float,
-) -> Group:
-    """Title, the ride itself and rails where they are scored, attitude, and notes.
-
-    Title and notes may be wider than a table.
-    """
-    parts: list[RenderableType] = [Text(_title(members), style="bold")]
+) -> list[RenderableType]:
+    """The ride itself and rails where they are scored, attitude, and notes, which may be wider."""
+    parts: list[RenderableType] = []
     wanted = rows["metric"].isin(("rms", "sd", "us_per_sample")) | (rows["estimator"] == RIDE)
     every = cases(rows[(rows["status"] == OK) & wanted], members)
     if not every:
-        return Group(*parts)
+        return parts
     alone = every[0] if len(every) == 1 else None
     each = len(members) // len(every)
     draws = f"mean of {each} draws" if each > 1 else "one draw"
@@ -190,8 +189,7 @@ def _cases(
         parts.append(_attitude(console, every, attitude, bool(mapping)))
         notes += _lost_attitude(alone, attitude) if alone else []
     notes = [*_baselines([*mapping, *attitude]), *_astray(every), *notes]
-    parts.append(Text("; ".join(notes), style="dim"))
-    return Group(*parts)
+    return [*parts, Text("; ".join(notes), style="dim")]
 
 
 def _baselines(styles: list[MethodStyle]) -> list[str]:

@@ -247,6 +247,15 @@ def test_many_cases_share_a_table_of_least_and_most(scenario: Scenario) -> None:
     assert "design" not in " ".join(lines[:8]), "no column against the design angles"
 
 
+def test_where_vehicles_differ_a_table_says_which_and_else_does_not(scenario: Scenario) -> None:
+    table, cells = many(MOST_TABLES + 1)
+    assert not any(" of v," in line for line in shown(scenario, table, cells))
+    other, more = table.assign(vehicle="other", cell=table["cell"] + 100), cells.assign(vehicle="other")
+    more = more.assign(cell=more["cell"] + 100, case=more["case"] + 100)
+    text = "\n".join(shown(scenario, pd.concat([table, other]), pd.concat([cells, more]), width=200))
+    assert text.count(" on body of v,") == text.count(" on body of other,") == 1
+
+
 def test_tables_that_are_too_many_are_counted(scenario: Scenario) -> None:
     mounts = tuple("abcdefg")
     lines = shown(scenario, *many(2, mounts))
