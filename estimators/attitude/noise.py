@@ -248,8 +248,8 @@ def _time_constants(
 
     fourth tau^4 + third tau^3 - sensor tau - 2 swing = 0 has one positive root, above which the left side
     is convex: from a start above it, or a little below, the steps fall towards the root and never below. The
-    last step is so small that what it leaves is rounding, so that the start leaves no trace. Each sample stops
-    by itself, so that none depends on those that come after it.
+    last step is so small that what it leaves is rounding, so that the start leaves no trace. Each sample
+    stops by itself, so that none depends on those that come after it.
 
     Parameters
     ----------

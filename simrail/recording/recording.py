@@ -365,7 +365,7 @@ class Recording(Shown):
 
 
 def rows_of(frame: pd.DataFrame, columns: Iterable[str]) -> tuple[FloatArray, ...]:
-    """Columns of a frame for a kernel, (n,) each, contiguous; where the frame holds them so nothing is copied.
+    """Columns of a frame for a kernel, (n,) each, contiguous; not copied where the frame holds them so.
 
     All are read-only: of arrays that are not a kernel would be compiled once more.
     """

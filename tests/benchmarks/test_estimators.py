@@ -282,7 +282,8 @@ def run_trajectory(model: Model, *, with_covariance: bool) -> Callable[[], None]
 
     def run() -> None:
         trajectory_filter(model, past, out)
-        trajectory_back(model, past, np.arange(STATES if with_covariance else 0), past.covariance)
+        chosen = np.arange(STATES if with_covariance else 0)
+        trajectory_back(model, past, chosen, past.states, past.covariance)
 
     return run
 
