@@ -182,7 +182,7 @@ class AttitudeEkf:
         return Estimate(
             states=pd.DataFrame(states.T, index=index, columns=[*ATTITUDE, *ATTITUDE_SD], copy=False),
             mount=recording.mount,
-            innovations=pd.DataFrame(room.innovations, index=index, columns=list(INNOVATION)),
+            innovations=pd.DataFrame(room.innovations, index=index, columns=list(INNOVATION), copy=False),
             covariance=room.covariance.reshape(-1, 3, 3),
             covariance_of=ATTITUDE,
         )
