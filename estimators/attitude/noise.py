@@ -283,7 +283,7 @@ def _time_constants(
 @njit_borrowed
 def _start(sensor: float, swing: float, third: float, fourth: float) -> float:
     """Where Newton's method begins without a time constant near by."""
-    tau = max(math.sqrt(2.0 * sensor / third), (4.0 * swing / third) ** (1.0 / 3.0))
+    tau: float = max(math.sqrt(2.0 * sensor / third), (4.0 * swing / third) ** (1.0 / 3.0))
     if fourth > 0.0:
         other = max((2.0 * sensor / fourth) ** (1.0 / 3.0), math.sqrt(math.sqrt(4.0 * swing / fourth)))
         tau = min(tau, other)

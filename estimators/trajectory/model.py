@@ -141,9 +141,9 @@ def beyond_first_order(angles: FloatArray, rates: FloatArray, gravity: float) ->
     ndarray (n, 6)
         rad/s and m/s2.
     """
-    rows = [np.ascontiguousarray(row) for row in (*angles.T[:2], *rates.T[1:])]
+    roll, pitch, pitch_rate, yaw_rate = (np.ascontiguousarray(row) for row in (*angles.T[:2], *rates.T[1:]))
     found = np.empty((len(angles), 6))
-    beyond(*rows, gravity, found)
+    beyond(roll, pitch, pitch_rate, yaw_rate, gravity, found)
     return found
 
 
