@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,11 +13,13 @@ from PIL import Image
 
 from simrail import InputError, load_scenario
 from simrail.cli.main import call
-from simrail.report.film.film import FRAME_HZ, Film, film_of, scenario_of
+from simrail.core.toml_files import load
+from simrail.report.film.film import FRAME_HZ, Film, _rows, film_of, scenario_of
 from simrail.report.film.gif import GIF_HZ, pace, write_gif
 from simrail.report.film.page import film_data, write_film
 from simrail.report.film.shapes import boxes_of, discs_of, profile_lines
 from simrail.scoring.table import SCORE_COLUMNS
+from simrail.vehicle.file import VehicleFile
 
 SHORT = ["ride.end_m=190.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "monte_carlo.sensor_draws=1"]
 
@@ -115,10 +118,13 @@ def test_faulty_input_is_one_line(own_cache, options, field, limit):
 
 def test_command_refuses_before_it_writes(here, capsys):
     assert call(["film", "quick_kinematic", "--out", "film.txt"]) == 2
+    assert call(["film", "quick_kinematic", "--gif", "film.html"]) == 2
     assert call(["film", "quick_kinematic", "--gif", "a.gif", "--out", "a.html"]) == 2
     assert call(["film", "no_such"]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 4
+    told = ("--out", "FILE.html"), ("--gif", "FILE.gif"), ("--out --gif", "one of"), ("no_such", "")
+    assert all(field in line and limit in line for line, (field, limit) in zip(lines, told, strict=True))
     assert not list(here.iterdir())
 
 
@@ -173,3 +179,39 @@ def test_shapes_are_made_of_the_model(film):
     # Set down in the middle, the wheel just touches its rail: they meet within 0.2 mm, and nowhere deeper.
     gap = np.interp(rail[:, 0] - offset, wheel[:, 0], wheel[:, 1]) - rail[:, 1]
     assert abs(gap.min()) < 2e-4
+
+
+def test_a_frame_is_beams_over_the_axle_boxes_with_transoms_between() -> None:
+    vehicle = load(VehicleFile, "vehicle", "manchester_1").model("manchester_1")
+    frame = vehicle.body("frame_front")
+    boxes = [box for box in boxes_of(vehicle) if box.body == frame.name]
+    corners = np.array([box.corners for box in boxes if box.kind == "frame"])
+    assert len(corners) == len(boxes) == 14
+    beams, transoms = corners[:12], corners[12:]
+    inner = np.abs(beams[..., 1]).min()
+    assert np.abs(transoms[..., 1]).max() == pytest.approx(inner)  # they end where the beams begin
+    ends = np.sort(np.abs(beams[..., 0]).max(axis=1))
+    assert np.diff(np.unique(ends.round(9))) == pytest.approx(ends[0])  # pieces without gaps between
+    axles = np.array([box.corners for box in boxes_of(vehicle) if box.kind == "axle"])
+    assert corners[..., 1].max() == pytest.approx(axles[..., 1].max())
+
+
+def test_rows_of_a_range_hold_both_of_its_ends() -> None:
+    """At 100 rows a second and 25 frames a second; 0.1 m a row, out and back."""
+    place = np.concatenate([np.arange(0.0, 100.0, 0.1), np.arange(100.0, 0.0, -0.1)])
+    track = SimpleNamespace(
+        start_m=0.0, end_m=200.0, curvature=lambda s: np.where((s > 40.0) & (s < 60.0), -1e-3, 0.0)
+    )
+    time = np.arange(len(place)) / 100.0
+    ride = SimpleNamespace(reference_position_m=place, time_s=time, rate_hz=100.0, track=track)
+    assert _rows(ride, 19.95, 60.05) == range(200, 601, 4)  # type: ignore[arg-type]
+    assert _rows(ride, 60.05, 19.95) == range(200, 601, 4)  # type: ignore[arg-type]
+    assert _rows(ride, None, 60.05) == range(0, 601, 4)  # type: ignore[arg-type]
+    assert _rows(ride, 79.95, None) == range(800, 1201, 4)  # type: ignore[arg-type]
+    assert _rows(ride, None, None) == range(0, 2000, 4)  # type: ignore[arg-type]
+    # Of a long ride the minute about its sharpest curve, which begins 24 s into it.
+    ride.reference_position_m = np.arange(20_000) / 100.0
+    ride.time_s = np.arange(20_000) / 100.0
+    assert _rows(ride, None, None) == range(1604, 7605, 4)  # type: ignore[arg-type]
+    track.curvature = lambda s: np.where(s > 190.0, 1e-3, 0.0)
+    assert _rows(ride, None, None) == range(13_999, 20_000, 4)  # type: ignore[arg-type]
