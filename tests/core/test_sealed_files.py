@@ -30,5 +30,5 @@ def test_faults_of_the_machine_say_nothing_of_the_file(fault: type[BaseException
 
 
 def test_damage_that_is_told_keeps_its_words() -> None:
-    with pytest.raises(DamagedError, match="^truth is not what was written$"), damage_told():
+    with pytest.raises(DamagedError, match=r"^truth is not what was written$"), damage_told():
         raise DamagedError("truth is not what was written")
