@@ -96,6 +96,20 @@ def planted(sound: Recording, key: str, size: float) -> Recording:
     return replace(sound, second_imu=PLANTS[key](second, size).imu)
 
 
+def test_the_second_imu_alone_is_behind_on_its_own_body(sound: Recording) -> None:
+    """Its place is the first one's less the spacing, at the start and on the way; the rest is its own."""
+    place = pd.DataFrame({"position_m": [20.0, 30.0], "speed_mps": [0.0, 5.0]}, index=[0.0, 3.0])
+    alone = second_alone(replace(sound, odometry=place))
+    sheet = sound.second_imu_sheet
+    assert alone is not None and alone.odometry is not None and sheet is not None
+    assert alone.start_position_m == sound.start_position_m - SPACING
+    np.testing.assert_array_equal(alone.odometry, [[20.0 - SPACING, 0.0], [30.0 - SPACING, 5.0]])
+    assert place["position_m"].tolist() == [20.0, 30.0]
+    assert alone.imu.equals(sound.second_imu) and alone.imu_sheet == sheet.imu
+    assert (alone.mount_body, alone.mount_position_m) == ("other", (0.0, 0.0, 0.6))
+    assert second_alone(alone) is None
+
+
 def test_a_sound_ride_is_left_alone_and_what_was_told_before_stays(sound: Recording) -> None:
     """To the bit: the fit of a ride with one IMU is as it was, that of two says the same of the first."""
     both = weigh_all(sound)

@@ -13,8 +13,10 @@ from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
 from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
+from simrail.report.tables.provenance import _irregularities, facts
 from simrail.report.tables.running import running_table
 from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
+from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.ride_figures import RIDE
 
@@ -144,3 +146,43 @@ def test_running_safety_is_told_by_what_is_left_and_by_shares_of_its_own_limits(
     cells = [cell.text for cell in table.rows[0].cells]
     assert dict(zip(table.columns, cells, strict=True))["\u03a3Y max, kN"] == "12.3"
     assert [text for text in cells if text != "12.3"] == ["0.600", "0.200", "25", "70"]
+
+
+def test_what_the_rails_deviate_by_is_told_with_its_sizes() -> None:
+    spectrum = IrregularityPart(spectrum="erri_b176_low", wavelengths_m=(1.5, 80.0))
+    (drawn,) = _irregularities(spectrum)
+    assert drawn == (
+        "irregularity",
+        "erri_b176_low",
+        "synthetic",
+        "random draw from the spectrum, wavelengths 1.5 to 80 m",
+    )
+    defect = {"form": "dip", "at_m": 120.0, "length_m": 6.0, "size_mm": 4.0, "rails": "left"}
+    dip = IrregularityPart.model_validate(
+        {"spectrum": "none", "defect": (defect | {"direction": "vertical"},)}
+    )
+    assert _irregularities(dip) == [
+        (
+            "defect",
+            "dip of 4 mm over 6 m at 120 m",
+            "synthetic",
+            "as the scenario says; left rails, vertical",
+        )
+    ]
+    (none,) = _irregularities(IrregularityPart(spectrum="none"))
+    assert none.name == "none"
+
+
+def test_the_manifest_is_told_in_words() -> None:
+    told = facts(
+        {"seed": 0, "cells": 12, "failed": 0, "warnings": [], "wall_s": 12.3456, "beside": "x"}
+        | {"versions": {"numpy": "2.1", "python": "3.11"}, "stop": {"told": "after 4 draws", "draws": 4}}
+    )
+    assert dict(told) == {
+        "seed": "0",
+        "cells": "12",
+        "failed": "0",
+        "stop rule": "after 4 draws",
+        "wall time, s": "12.3",
+        "versions": "numpy 2.1, python 3.11",
+    }
