@@ -26,8 +26,6 @@ from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scenario.stop_rule import StopRule, StopState
 from simrail.scoring.bootstrap import interval
 
-pytestmark = pytest.mark.long
-
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 Short = Callable[..., Scenario]
 
@@ -147,6 +145,7 @@ def test_an_imu_with_draws_of_its_own_is_not_waited_for(short: Short) -> None:
     assert not planted(tracks, lambda cell: 9.0 * cell.track_draw * (cell.imu.name == "a"), 3).reached
 
 
+@pytest.mark.long
 def test_coverage_at_the_stop_stays_near_that_of_one_look(short: Short) -> None:
     """Optional stopping costs a little: measured on 200 campaigns of skewed scores (Rayleigh).
 
@@ -226,6 +225,7 @@ def test_it_stops_at_the_same_draws_with_the_same_bits_whoever_runs_it(
     )
 
 
+@pytest.mark.long
 def test_order_of_rides_and_what_is_finished_already_do_not_count(
     all_draws: CampaignResult,
     short: Short,
@@ -245,6 +245,7 @@ def test_order_of_rides_and_what_is_finished_already_do_not_count(
     assert len(found.cells) == 16
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ended_after", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_interrupted_within_a_round_it_goes_on_to_the_same(
     ended_after: int, all_draws: CampaignResult, short: Short, tmp_path: Path, assert_same: Same
@@ -270,6 +271,7 @@ def test_interrupted_within_a_round_it_goes_on_to_the_same(
     assert_same(rows_of(all_draws, 8), found.scores)
 
 
+@pytest.mark.long
 def test_progress_counts_the_cells_of_a_round(
     all_draws: CampaignResult, short: Short, tmp_path: Path
 ) -> None:
@@ -291,6 +293,7 @@ def test_progress_counts_the_cells_of_a_round(
     assert watcher.done == [(3, 6), (6, 6), (8, 10), (10, 10), (13, 16), (16, 16)]
 
 
+@pytest.mark.long
 def test_not_reached_after_all_draws_names_the_widest_case(
     all_draws: CampaignResult, short: Short, assert_same: Same
 ) -> None:
@@ -303,6 +306,7 @@ def test_not_reached_after_all_draws_names_the_widest_case(
     assert f"not reached after all {draws} draws of the sensors" in words and "ride.speed_kmh = " in words
 
 
+@pytest.mark.long
 def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: None, short: Short) -> None:
     settings = ["monte_carlo.sensor_draws=3", stop(1.0, estimator="design_angles", quantity="gyro_bias")]
     found = run_campaign(short(*settings), workers=1)
@@ -310,6 +314,7 @@ def test_a_figure_that_an_estimator_never_gives_is_not_reached(module_rides: Non
     assert "unknown for want of values" in found.stopped.words
 
 
+@pytest.mark.long
 def test_one_cell_alone_asks_no_rule(module_rides: None, short: Short) -> None:
     found = run_campaign(short("monte_carlo.sensor_draws=9", stop(9.0)), only=8)
     assert found.stopped is None and list(found.cells["cell"]) == [8]
