@@ -31,8 +31,6 @@ from simrail.scenario.cells import cells
 from simrail.scenario.check import judge_scenario
 from simrail.scenario.scenario import Scenario, load_scenario
 
-pytestmark = pytest.mark.long
-
 Same = Callable[[pd.DataFrame, pd.DataFrame], None]
 
 
@@ -52,6 +50,7 @@ def hidden(folder: Path) -> list[Path]:
     return sorted((folder / "results").glob(".*"))
 
 
+@pytest.mark.long
 def test_batches_come_back_as_they_were(rides: Path, short: Callable[..., Scenario], tmp_path: Path) -> None:
     kept = Checkpoint(tmp_path / "kept")
     assert kept.is_empty and kept.cells() == set()
@@ -64,6 +63,7 @@ def test_batches_come_back_as_they_were(rides: Path, short: Callable[..., Scenar
     assert kept.cells() == {0, 1, 2} and kept.damaged == 0
 
 
+@pytest.mark.long
 def test_a_batch_that_cannot_be_written_leaves_nothing(
     rides: Path, short: Callable[..., Scenario], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +81,7 @@ def test_a_batch_that_cannot_be_written_leaves_nothing(
     assert list(other.folder.iterdir()) == []
 
 
+@pytest.mark.long
 def test_damaged_batches_are_dropped_and_run_again(
     mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame, assert_same: Same
 ) -> None:
@@ -103,6 +104,7 @@ def test_damaged_batches_are_dropped_and_run_again(
     assert hidden(here) == []
 
 
+@pytest.mark.long
 def test_a_damaged_ride_and_one_that_is_gone_are_simulated_again(
     mine: list[str],
     here: Path,
@@ -126,6 +128,7 @@ def test_a_damaged_ride_and_one_that_is_gone_are_simulated_again(
     assert_same(whole, pd.read_parquet(here / "results" / "mine" / "scores.parquet"))
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_in_one_line_and_the_next_run_goes_on(
     mine: list[str],
     here: Path,
@@ -152,6 +155,7 @@ def test_a_full_disk_ends_in_one_line_and_the_next_run_goes_on(
     assert hidden(here) == []
 
 
+@pytest.mark.long
 def test_a_disk_that_is_really_full(
     noting_file: Path, tmp_path: Path, no_drawing: None, capsys: pytest.CaptureFixture[str], here: Path
 ) -> None:
@@ -179,6 +183,7 @@ def test_a_disk_that_is_really_full(
         subprocess.run(["umount", str(small)], check=True)
 
 
+@pytest.mark.long
 def test_fresh_and_resume(mine: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call([*mine, "--resume"]) == BAD_INPUT
     said = capsys.readouterr().err
@@ -195,6 +200,7 @@ def test_fresh_and_resume(mine: list[str], here: Path, capsys: pytest.CaptureFix
     assert "8 cells to run" in log and "going on" not in log
 
 
+@pytest.mark.long
 def test_another_plan_or_other_code_is_not_gone_on_with(
     mine: list[str], here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,6 +218,7 @@ def test_another_plan_or_other_code_is_not_gone_on_with(
             assert key_of(plan) not in (key, with_other_file)
 
 
+@pytest.mark.long
 def test_code_that_is_left_out_of_the_key_is_there_and_makes_no_score() -> None:
     """A batch imports none of it; a new command or page must not abandon a run that is under way."""
     left_out = source_hash.NO_MATTER
@@ -285,6 +292,7 @@ def test_runs_that_nobody_goes_on_with_are_dropped_after_a_month(tmp_path: Path)
         assert not old.exists() and young.exists()
 
 
+@pytest.mark.long
 def test_retry_failed_runs_exactly_the_failed_cells(
     mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame, assert_same: Same
 ) -> None:
@@ -311,6 +319,7 @@ def test_retry_failed_runs_exactly_the_failed_cells(
     assert (folder / "report.html").exists() and hidden(here) == []
 
 
+@pytest.mark.long
 def test_a_cell_alone_is_printed_and_written(
     mine: list[str], here: Path, capsys: pytest.CaptureFixture[str], whole: pd.DataFrame
 ) -> None:

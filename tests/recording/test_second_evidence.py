@@ -15,7 +15,7 @@ from simrail.estimation.choose_odometry import with_odometry
 from simrail.recording.check_physics import check_plausible
 from simrail.recording.check_sheet import check_ranges, noise_warnings
 from simrail.recording.evidence.devices import weigh_all
-from simrail.recording.evidence.field_clock import weigh_field_clock
+from simrail.recording.evidence.field_clock import _longer, weigh_field_clock
 from simrail.recording.evidence.finding import Finding
 from simrail.recording.evidence.judge import Evidence, weigh
 from simrail.recording.evidence.second import _clock, _spacing
@@ -201,6 +201,16 @@ def test_on_the_straight_a_magnetometer_tells_nothing_of_its_clock(sound: Record
     still = sound.magnetometer - sound.magnetometer + sound.magnetometer.iloc[0]
     found = weigh_all(replace(sound, imu=quiet, magnetometer=still)).of("magnetometer_offset")
     assert found.verdict == "could not be judged" and not found.wrong
+
+
+def test_residuals_that_hang_together_count_for_fewer() -> None:
+    """Blocks of 1 s, ten lags with weights 1 - lag / 11: all alike 1 + 2 sum = 11, in turn no less than 1."""
+    alike = np.full((80, 3), 0.5)
+    assert _longer(alike, 1.0) == pytest.approx(0.5 * np.sqrt(11.0))
+    assert _longer(alike * (-1.0) ** np.arange(80)[:, None], 1.0) == pytest.approx(0.5)
+    # 2 s: five lags; of 8 blocks two.
+    assert _longer(alike, 2.0) == pytest.approx(0.5 * np.sqrt(6.0))
+    assert _longer(alike[:8], 1.0) == pytest.approx(0.5 * np.sqrt(3.0))
 
 
 def test_clocks_and_distances_of_two_fits() -> None:

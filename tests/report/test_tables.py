@@ -15,7 +15,7 @@ from simrail.report.tables.methods import method_styles
 from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
 from simrail.report.tables.provenance import _irregularities, facts
 from simrail.report.tables.running import running_table
-from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, without_empty
+from simrail.report.tables.tables import NONE, Cell, Row, Table, error_table, number_cell, without_empty
 from simrail.scenario.line_tables import IrregularityPart
 from simrail.scenario.scenario import Scenario, load_scenario
 from simrail.scoring.ride_figures import RIDE
@@ -186,3 +186,10 @@ def test_the_manifest_is_told_in_words() -> None:
         "wall time, s": "12.3",
         "versions": "numpy 2.1, python 3.11",
     }
+
+
+def test_a_number_has_its_decimals_and_its_spread_as_many() -> None:
+    assert number_cell(1.23456) == Cell("1.235")
+    assert number_cell(-1.26, decimals=1, spread=0.349, mark="best") == Cell("\u22121.3", "0.3", "best")
+    assert number_cell(-0.0004) == Cell("0.000")
+    assert number_cell(float("nan"), spread=1.0) == number_cell(float("inf")) == NONE

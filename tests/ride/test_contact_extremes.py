@@ -93,7 +93,7 @@ def test_extremes_of_the_rows_themselves(bogie):
 
 
 def test_wheels_that_press_against_each_other_leave_their_axle_the_rest(bogie):
-    """Rails that push with 8 kN to the right and 5 kN to the left leave 3 kN; behind, 1 and 2 kN to the left."""
+    """Rails push with 8 kN to the right and 5 kN to the left, and leave 3 kN; behind, 1 and 2 to the left."""
     place = np.arange(1000) * 0.01
     told = told_of(place, np.full((1000, 4), 40e3), np.tile([-8e3, 5e3, 1e3, 2e3], (1000, 1)))
     said, _ = summary(bogie, np.arange(1000) / RATE_HZ, told)
