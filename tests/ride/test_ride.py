@@ -268,7 +268,10 @@ def test_extremes_of_a_ride_are_those_of_its_rows(driven):
     said = truth.manifest["contact"]
     assert said["greatest_q_n"]["value"] == load.max()
     assert said["smallest_q_over_q0"]["value"] == (load / driven.vehicle.wheel_load_n(9.81)).min()
-    assert truth.manifest["warnings"] == []
+    manifest = truth.manifest
+    assert manifest["warnings"] == [] and manifest["setup_s"] > 0.0
+    assert manifest["simulated_s"] == pytest.approx(truth.time_s[-1], abs=1e-9)
+    assert manifest["real_time_factor"] == manifest["simulated_s"] / manifest["wall_s"]
 
 
 def test_contact_that_was_not_kept_is_said_with_the_remedy(ride):
