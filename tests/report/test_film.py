@@ -14,6 +14,7 @@ from PIL import Image
 from simrail import InputError, load_scenario
 from simrail.cli.main import call
 from simrail.core.toml_files import load
+from simrail.report.film import gif
 from simrail.report.film.film import FRAME_HZ, Film, _rows, film_of, scenario_of
 from simrail.report.film.gif import GIF_HZ, pace, write_gif
 from simrail.report.film.page import film_data, write_film
@@ -215,3 +216,23 @@ def test_rows_of_a_range_hold_both_of_its_ends() -> None:
     assert _rows(ride, None, None) == range(1604, 7605, 4)  # type: ignore[arg-type]
     track.curvature = lambda s: np.where(s > 190.0, 1e-3, 0.0)
     assert _rows(ride, None, None) == range(13_999, 20_000, 4)  # type: ignore[arg-type]
+
+
+def test_what_is_farther_is_drawn_before_what_hides_it(film, monkeypatch):
+    """Seen from behind: depth is the place along the track; car bodies come last, as glass."""
+    drawn = []
+    monkeypatch.setattr(gif, "_draw_box", lambda *given, glass=False: drawn.append((*given[2:4], glass)))
+    monkeypatch.setattr(gif, "_draw_disc", lambda *given: drawn.append((*given[2:4], False)))
+    camera = SimpleNamespace(depth=lambda places: places.T[0] if places.ndim == 2 else places[0])
+    gif._draw_vehicle(film, None, camera, 50)
+    depth = [
+        gif._placed(pose, part.corners if hasattr(part, "corners") else np.array([part.middle_m]))[
+            :, 0
+        ].mean()
+        for pose, part, glass in drawn
+        if not glass
+    ]
+    glasses = [glass for _, _, glass in drawn]
+    assert len(depth) > len(film.vehicle.wheels) and np.ptp(depth) > 1.0
+    assert (np.diff(depth) <= 1e-9).all()
+    assert glasses == sorted(glasses) and glasses[-1]
