@@ -22,7 +22,9 @@ import simrail
 from simrail import results
 from simrail.campaign import checkpoint
 from simrail.campaign.campaign import key_of, run_campaign
+from simrail.campaign.cell import Failure
 from simrail.campaign.checkpoint import Checkpoint, Start, checkpoint_of
+from simrail.campaign.worker import BatchResult
 from simrail.cli.main import BAD_INPUT, CELL_FAILED, DONE, call
 from simrail.core import source_hash
 from simrail.core.errors import InputError
@@ -347,3 +349,49 @@ def test_the_hidden_name_is_what_keeps_a_half_batch_out(tmp_path: Path) -> None:
     assert kept.is_empty
     assert Checkpoint(tmp_path / "kept").is_empty and list(kept.folder.iterdir()) == []
     assert checkpoint.LOG == "run.log"
+
+
+def made(*numbers: int) -> BatchResult:
+    """A batch of cells, with a failure of the first."""
+    return BatchResult(
+        cells=numbers,
+        ride_number=min(numbers) // 4,
+        scores=pd.DataFrame({"cell": numbers, "value": [0.1 * n for n in numbers], "metric": "rms"}),
+        failures=(Failure(numbers[0], "mine", "a reason", "a trace"),),
+        ride={"from_cache": True, "wall_s": 1.5},
+        wall_s={"simulate": 1.0},
+        cpu_s={"simulate": 0.1 + 0.2},
+        notes=("a note",),
+        worker="here",
+    )
+
+
+def test_what_is_kept_comes_back_in_order_and_what_is_damaged_is_counted(tmp_path: Path) -> None:
+    kept = Checkpoint(tmp_path / "kept")
+    batches = [
+        made(8, 9),
+        made(0, 1),
+        made(4, 5, 6),
+        made(
+            12,
+        ),
+    ]
+    for batch in batches:
+        kept.add(batch)
+    back = list(kept.results())
+    assert [batch.cells for batch in back] == [(0, 1), (4, 5, 6), (8, 9), (12,)]
+    for batch, given in zip(back, sorted(batches, key=lambda one: one.cells), strict=True):
+        pd.testing.assert_frame_equal(batch.scores, given.scores, check_exact=True)
+        assert {**vars(batch), "scores": 0} == {**vars(given), "scores": 0}
+    assert kept.cells() == {0, 1, 4, 5, 6, 8, 9, 12} and kept.damaged == 0
+    files = sorted(kept.folder.glob("*.parquet"))
+    for file in (files[0], files[2]):
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+    again = Checkpoint(kept.folder)
+    assert again.cells() == {4, 5, 6, 12} and again.damaged == 2
+    assert sorted(kept.folder.glob("*.parquet")) == [files[1], files[3]]
+    assert again.cells() == {4, 5, 6, 12} and again.damaged == 2
+    again.clear()
+    assert again.is_empty and again.cells() == set()
