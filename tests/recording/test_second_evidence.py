@@ -203,6 +203,30 @@ def test_on_the_straight_a_magnetometer_tells_nothing_of_its_clock(sound: Record
     assert found.verdict == "could not be judged" and not found.wrong
 
 
+@pytest.mark.parametrize(
+    ("whole", "columns", "verdicts"),
+    [
+        ("sound", True, ["sound", "axis", "second", "clock"]),
+        ("surely wrong", False, ["surely wrong", "second", "clock"]),
+        ("surely wrong", True, ["could not be judged", "axis", "second", "clock"]),
+    ],
+)
+def test_axes_are_judged_where_no_device_is_wrong_or_each_column_by_itself(
+    whole: str, columns: bool, verdicts: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def found(verdict: str) -> Finding:
+        return Finding("gyro", "the gyro", 1.0, 0.1, 0.0, "1", "curves", verdict)
+
+    place = "simrail.recording.evidence.devices"
+    monkeypatch.setattr(f"{place}.weigh", lambda _: Evidence((found(whole),)))
+    monkeypatch.setattr(f"{place}.weigh_axes", lambda _: (found("axis"),))
+    monkeypatch.setattr(f"{place}.are_columns", lambda _: columns)
+    monkeypatch.setattr(f"{place}.weigh_second", lambda *_: (found("second"),))
+    monkeypatch.setattr(f"{place}.weigh_field_clock", lambda _: (found("clock"),))
+    told = weigh_all(None)  # type: ignore[arg-type]
+    assert [finding.verdict for finding in told.findings] == verdicts
+
+
 def test_residuals_that_hang_together_count_for_fewer() -> None:
     """Blocks of 1 s, ten lags with weights 1 - lag / 11: all alike 1 + 2 sum = 11, in turn no less than 1."""
     alike = np.full((80, 3), 0.5)
