@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -355,3 +356,35 @@ def test_results_tell_of_it_and_failed_cells_are_tried_again(
     manifest = json.loads((here / "results" / "mine" / "manifest.json").read_text())
     assert manifest["cells"] == 8 and manifest["stop"]["draws"] == 4 and manifest["stop"]["reached"]
     assert "reached after 4 of 12" in (here / "results" / "mine" / "report.html").read_text()
+
+
+def test_each_look_knows_the_one_before_and_the_last_ends_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the stages 2, 3 and 5 the second settles it: which cells run next follows from the look before."""
+    asked: list[tuple[int | None, object]] = []
+    looks: list[tuple[int, object]] = []
+    states = {draws: SimpleNamespace(reached=draws == 3, words=f"after {draws}") for draws in (2, 3, 5)}
+
+    def chosen_cells(
+        _plan: object, _only: object = None, *, draws: int | None = None, former: object = None
+    ) -> list:
+        asked.append((draws, former))
+        return []
+
+    def state(_cells: object, _tables: object, draws: int, former: object) -> object:
+        looks.append((draws, former))
+        return states[draws]
+
+    rule = SimpleNamespace(stages=(2, 3, 5), draws=5, state=state)
+    monkeypatch.setattr(campaign, "stop_rule_of", lambda scenario: rule)
+    monkeypatch.setattr(campaign, "chosen_cells", chosen_cells)
+    plan = SimpleNamespace(cells=10, scenario=None)
+    loop = campaign._Loop(plan, b"", Checkpoint(tmp_path), Watcher(), None, None)  # type: ignore[arg-type]
+    assert loop.run(None) is states[3]  # type: ignore[arg-type]
+    assert looks == [(2, None), (3, states[2])]
+    first, second = asked[:3], asked[3:]
+    assert first == [(2, None), (5, None), (None, None)]
+    assert second == [(3, states[2]), (5, states[2]), (None, None)]
+    # What is left to run is chosen as it was counted.
+    assert list(loop._chosen()) == [] and asked[-1] == (3, states[2])
