@@ -11,7 +11,8 @@ import pytest
 
 from simrail.campaign.cell import CellResult
 from simrail.report.figures import canvas
-from simrail.report.tables.methods import method_styles
+from simrail.report.tables.geometry import behind_baseline, is_zero
+from simrail.report.tables.methods import MethodStyle, method_styles
 from simrail.report.tables.pivot import Case, Mean, _index, cases, of_cell
 from simrail.report.tables.provenance import _irregularities, facts
 from simrail.report.tables.running import running_table
@@ -193,3 +194,25 @@ def test_a_number_has_its_decimals_and_its_spread_as_many() -> None:
     assert number_cell(-1.26, decimals=1, spread=0.349, mark="best") == Cell("\u22121.3", "0.3", "best")
     assert number_cell(-0.0004) == Cell("0.000")
     assert number_cell(float("nan"), spread=1.0) == number_cell(float("inf")) == NONE
+
+
+def test_behind_the_baseline_is_what_errs_more_than_no_imu() -> None:
+    """In the quantity and band that are asked of; an equal one is not behind, nor is the baseline."""
+    sizes = {"zero": 1.0, "better": 0.9, "equal": 1.0, "worse": 1.1, "worst": 9.0}
+    scores = {
+        (name, quantity, band, "truth", "whole", "sd"): Mean(size if band == "D1" else 1.0 / size, 0.0, 2)
+        for name, size in sizes.items()
+        for quantity in ("vertical_profile", "cross_level")
+        for band in ("D1", "full")
+    }
+    case = Case({}, pd.DataFrame({"draws": [2]}), scores)
+    styles = [
+        MethodStyle(name, name, "no IMU" if name == "zero" else "", name != "zero", "", None, "#000000", "-")
+        for name in sizes
+    ]
+    assert is_zero(styles[0]) and not any(map(is_zero, styles[1:]))
+    told = behind_baseline(case, styles, "cross_level", band="D1")
+    assert [style.name for style in told] == ["worse", "worst"]
+    told = behind_baseline(case, styles, "cross_level", band="full")
+    assert [style.name for style in told] == ["better"]
+    assert behind_baseline(case, styles[1:], "cross_level", band="D1") == []
