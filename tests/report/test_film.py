@@ -15,12 +15,15 @@ from simrail import InputError, load_scenario
 from simrail.cli.main import call
 from simrail.core.toml_files import load
 from simrail.report.film import gif
-from simrail.report.film.film import FRAME_HZ, Film, _rows, film_of, scenario_of
+from simrail.report.film.film import FRAME_HZ, Film, _film, _rows, film_of, scenario_of
 from simrail.report.film.gif import GIF_HZ, pace, write_gif
 from simrail.report.film.page import film_data, write_film
 from simrail.report.film.shapes import boxes_of, discs_of, profile_lines
+from simrail.ride.kinematic import kinematic_truth
 from simrail.scoring.table import SCORE_COLUMNS
+from simrail.track.design import Straight, TrackDesign
 from simrail.vehicle.file import VehicleFile
+from simrail.vehicle.speed_profile import SpeedProfile
 
 SHORT = ["ride.end_m=190.0", "ride.rest_s=1.0", "ride.final_rest_s=1.0", "monte_carlo.sensor_draws=1"]
 
@@ -236,3 +239,35 @@ def test_what_is_farther_is_drawn_before_what_hides_it(film, monkeypatch):
     assert len(depth) > len(film.vehicle.wheels) and np.ptp(depth) > 1.0
     assert (np.diff(depth) <= 1e-9).all()
     assert glasses == sorted(glasses) and glasses[-1]
+
+
+def test_everything_of_a_film_is_at_its_frames(monkeypatch):
+    """Forces of every fifth row, wheels of each, attitudes by the IMU's times: each tells its time."""
+    line = TrackDesign("line", 0.0, (Straight(200.0),))
+    truth = kinematic_truth(line, SpeedProfile(50.0, 90.0, 10.0, rest_s=1.0))
+    time = truth.time_s
+    kept = np.column_stack([time[::5], 2.0 * time[::5]])
+    truth = replace(truth, contacts={"w": kept}, contact_every=5, wheel_angles={"w": 3.0 * time})
+    when = pd.Index(time[7:-9:4], name="time_s")
+    told = pd.DataFrame({"roll_rad": 4.0 * when.to_numpy(), "pitch_rad": 5.0 * when.to_numpy()}, index=when)
+    cell = SimpleNamespace(ride=SimpleNamespace(name="r"), imu=SimpleNamespace(grade="g.toml", name="n"))
+    ride = SimpleNamespace(vehicle=SimpleNamespace(bodies=()), engine="compiled")
+    parts = SimpleNamespace(
+        resolve=lambda _: SimpleNamespace(ride=ride, mount=None), rails=lambda _: "the rails"
+    )
+    seen = SimpleNamespace(
+        recording=SimpleNamespace(imu=told),
+        estimates={"ekf": SimpleNamespace(states=0.5 * told), "speed": SimpleNamespace(states=told[[]])},
+        motion=told,
+    )
+    monkeypatch.setattr("simrail.report.film.film._signals", lambda *_: ())
+    monkeypatch.setattr("simrail.report.film.film._notes", lambda *_: ())
+    made = _film(SimpleNamespace(name="s"), cell, parts, truth, seen, range(500, 1900, 40))
+    frames = time[500:1900:40]
+    np.testing.assert_array_equal(made.time_s, frames)
+    np.testing.assert_array_equal(made.reference_m, truth.reference_position_m[500:1900:40])
+    np.testing.assert_allclose(made.contacts["w"], np.column_stack([frames, 2.0 * frames]), atol=1e-12)
+    np.testing.assert_allclose(made.turns_rad["w"], 3.0 * frames, atol=1e-12)
+    np.testing.assert_allclose(made.true_rad, np.column_stack([4.0 * frames, 5.0 * frames]), atol=1e-12)
+    assert list(made.estimated_rad) == ["ekf"] and made.imu == "g (n)"
+    np.testing.assert_allclose(made.estimated_rad["ekf"], 0.5 * made.true_rad, atol=1e-12)
