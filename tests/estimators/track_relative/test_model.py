@@ -101,6 +101,14 @@ def test_the_linear_model_is_the_measurement_where_it_is_linearised(rough: Calla
     )
 
 
+def test_the_mount_stands_where_it_is_told(rough: Callable) -> None:
+    """Left of the middle and above the rails: y before z, and the lever along stays out of both."""
+    recording: Recording = replace(rough(), mount_position_m=(1.2, -0.3, 0.7))
+    course = course_of(recording, steps_of(recording, 25.0), BODY, (), ())
+    assert course.around.nominal == (-0.3, 0.7)
+    assert course.around.gravity == recording.gravity_mps2 and course.around.sees_rails is False
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_joint_is_forgotten_once_it_is_behind(rough: Callable, direction: int) -> None:
     """EVEN and ODD are of the joints at the ends of the element: one changes just where its joint does."""
