@@ -18,7 +18,7 @@ from simrail.report.tables.pivot import Case
 from simrail.report.words.ablations import WORDS
 from simrail.scoring.ablations import ABLATIONS, Ablation
 
-MOST_GROUPS = 1
+MOST_GROUPS = 4
 """Mounts, IMUs and odometries whose comparison is printed; the page has all."""
 
 _SHORT = {"drawn": "errs", "both ways": "both", "all speeds": "all", "forward": "forth", "backward": "back"}

@@ -82,7 +82,10 @@ def print_scores(console: Console, results: Results) -> None:
     if len(tables) > MOST_TABLES:
         console.print(f"... and {len(tables) - MOST_TABLES} more tables: see the report, or scores.csv")
     if len(shown) and any(has_both(cells, one) for one in ABLATIONS):
-        print_costs(console, cases(scores, cells), styles)
+        if shown["case"].nunique() <= MOST_TABLES:
+            print_costs(console, cases(scores, cells), styles)
+        else:
+            console.print(Text("What the ablations change stands in the report.", style="dim"))
     print_odometries(console, odometries, by_class=alone)
     kicks = scores[(scores["estimator"] == RIDE) & (scores["status"] == OK)]
     for sentence in decay_words(cases(kicks, cells)):
