@@ -15,15 +15,18 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from simrail.core.errors import InputError
-from simrail.recording.evidence.finding import LIKELY, SURE, Finding, Verdict
-from simrail.recording.evidence.fit import Fit
+from simrail.core.jit import FloatArray
+from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
+from simrail.recording.evidence.fit import Fit, fit
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
     GYRO_Z,
     INDEX,
+    PACE,
     Motion,
     Ride,
     motion,
+    retimed,
     ride_of,
     start_values,
 )
@@ -33,8 +36,10 @@ from simrail.recording.evidence.search import (
     apart_fit,
     are_apart,
     best_fit,
-    clock_slack,
 )
+from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
+from simrail.recording.evidence.slack import accused, slack_of
+from simrail.recording.evidence.slides import with_slides
 from simrail.recording.recording import Recording
 
 FOLLOWED = 0.5
@@ -48,6 +53,9 @@ SURE_TURN_RAD = 0.3
 
 SPEEDS_TAKEN = {"km/h": 1.0 / 3.6, "miles an hour": 0.44704, "knots": 0.51444, "feet a second": 0.3048}
 """Units that a speed in m/s may be in, in m/s, and how far a factor may be off one of them."""
+
+ROUNDS = 3
+"""Of a search for the pace of the stamps."""
 
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
@@ -98,12 +106,15 @@ class Evidence:
         Turn of the track on the ride, and its changes of speed, both summed.
     middle_s : float
         Time from the first stamp of the device of the way to where the offset of its clock holds.
+    single : Single, optional
+        What it says of single axes, sensors and its time; the findings hold beside that.
     """
 
     findings: tuple[Finding, ...]
     turn_rad: float = 0.0
     push_mps: float = 0.0
     middle_s: float = 0.0
+    single: Single | None = None
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
@@ -136,9 +147,10 @@ def weigh(recording: Recording) -> Evidence:
         return Evidence(tuple(_unjudged(key, math.inf, "nothing", why) for key in KINDS))
     # The matrices are small: threads of BLAS cost more than they bring.
     with threadpool_limits(1):
-        one = best_fit(ride)
-        two = apart_fit(ride, one)
-    best = two if are_apart(ride, one, two) else one
+        ride, fits = _explained(ride)
+        if PACE in fits.single.free:
+            ride, fits = _retimed(ride, fits)
+    one, two, single, best = fits
     # Of three clocks that one is wrong that agrees with neither of the others.
     is_accel = best is two and accel_is_apart(ride, two)
     told = two.by_gyro() if is_accel else best
@@ -150,7 +162,7 @@ def weigh(recording: Recording) -> Evidence:
         "push": bool(push > LEAST_PUSH_MPS),
     }
     rests = {"turn": f"{turn / _DEG:.0f} deg of curves", "push": f"{push:.0f} m/s of changes of speed"}
-    slack = _slack(ride, best)
+    slack = slack_of(ride, best)
     findings = []
     for key, kind in KINDS.items():
         sources = [rests[by] for by in kind.by if has[by]]
@@ -170,31 +182,70 @@ def weigh(recording: Recording) -> Evidence:
             finding = _beside_a_late_gyro(finding, two, slack[key])
         findings.append(finding)
     middle = ride.middle_s - float(ride.way.time_s[0])
-    return Evidence(tuple(findings), turn, float(push), middle)
+    return Evidence(tuple(findings), turn, float(push), middle, single)
 
 
-def _slack(ride: Ride, found: Fit) -> dict[str, float]:
-    """How far from its nominal value each may be in a sound ride, besides the fit's own sd; in SI."""
-    recording = ride.recording
-    sheet, errors = recording.imu_sheet, recording.map_errors
-    package = sheet.package_misalignment_rad / math.sqrt(3.0)
-    moved = motion(ride, found.x)
-    curves = max(1, len(ride.table.curves_in(float(moved.place_m.min()), float(moved.place_m.max()))))
-    seconds = float(ride.fine_s[-1] - ride.fine_s[0])
-    clock = 0.02 + 0.02 * ride.reading_s
-    return {
-        "gyro": math.hypot(
-            sheet.gyro_scale_error / math.sqrt(3.0), errors.radius_relative_sd / math.sqrt(curves), 0.003
-        ),
-        "wheel": math.hypot(ride.way.scale_sd, errors.chainage_scale_sd, 0.001),
-        "shift": math.hypot(errors.chainage_offset_sd_m, 2.0),
-        "yaw": math.hypot(package, 0.3 * _DEG),
-        "pitch": math.hypot(package, errors.gradient_sd, 0.2 * _DEG),
-        "roll": math.hypot(package, errors.cant_along_sd_m / recording.track.rail_base_m, 0.2 * _DEG),
-        "offset": clock,
-        "gyro_offset": clock_slack(ride),
-        "drift": math.hypot(sheet.clock_drift, 0.03 / seconds, 3e-5),
-    }
+class _Fits(NamedTuple):
+    """Fits of a ride: one clock in the IMU, two, faults of single axes; and the one that is believed."""
+
+    one: Fit
+    two: Fit
+    single: Single
+    best: Fit
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether that with two clocks is believed."""
+        return self.best is self.two
+
+    def blamed(self, ride: Ride) -> int:
+        """How many figures it says are wrong."""
+        accuses = accused(self.best, slack_of(ride, self.best), WHOLE)
+        return accuses + len(self.single.free) + self.is_apart
+
+    def price(self, ride: Ride, noise: FloatArray) -> float:
+        """What the believed one leaves by a noise (2, 5), and what it blames."""
+        return left_over(self.best, noise) + WORTH * (self.blamed(ride) + len(ride.slides))
+
+
+def _explained(ride: Ride) -> tuple[Ride, _Fits]:
+    """A ride and its fits; without what its wheel says while it slides, where that explains more."""
+    fits = _fits(ride)
+    slid = with_slides(ride) if fits.blamed(ride) else None
+    if slid is None:
+        return ride, fits
+    others = _fits(slid)
+    noise = others.best.noise
+    return (slid, others) if others.price(slid, noise) < fits.price(ride, noise) else (ride, fits)
+
+
+def _retimed(ride: Ride, fits: _Fits) -> tuple[Ride, _Fits]:
+    """A ride whose stamps have another pace, and its fits, by stamps that are set right.
+
+    How rough a way is, and how long a block, is said in seconds: by stamps of another pace they are wrong.
+    """
+    pace, sd, other = fits.single.told[PACE][0], math.inf, ride
+    for _ in range(ROUNDS):
+        set_right = ride_of(retimed(ride.recording, pace)) if pace > 0.0 else None
+        if set_right is None:
+            return ride, fits
+        found = fit(set_right, start_values(), free=(PACE,))
+        pace, sd, other = pace * found.value(PACE), pace * found.sd(PACE), set_right
+    again = _fits(other)
+    if again.blamed(other) + 1 > fits.blamed(ride) or PACE in again.single.free:
+        return ride, fits
+    single = again.single
+    told = single.told | {PACE: (pace, sd)}
+    single = replace(single, free=(PACE, *single.free), told=told)
+    return other, again._replace(single=single)
+
+
+def _fits(ride: Ride) -> _Fits:
+    one = best_fit(ride)
+    two = apart_fit(ride, one)
+    is_apart = are_apart(ride, one, two)
+    single = weigh_single(ride, one, two, is_apart=is_apart)
+    return _Fits(one, two, single, single.found if single.free else two if is_apart else one)
 
 
 def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Finding:
@@ -203,8 +254,7 @@ def _judged(key: str, found: Fit, slack: float, rests_on: str, ride: Ride) -> Fi
     value, sd = found.value(key), found.sd(key)
     if key in ("yaw", "pitch", "roll"):
         value = math.remainder(value, 2.0 * math.pi)
-    off = abs(value - nominal) / math.hypot(sd, slack)
-    verdict: Verdict = "surely wrong" if off > SURE else "likely wrong" if off > LIKELY else "sound"
+    verdict = verdict_of(abs(value - nominal) / math.hypot(sd, slack))
     why, remedy = "", ""
     setting, field = setting_of(key, ride.recording, ride.way.device)
     if verdict != "sound":

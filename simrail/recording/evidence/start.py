@@ -64,7 +64,7 @@ def scan_turns(ride: Ride, x: FloatArray) -> FloatArray | None:
     for offset in TURN_OFFSETS_S:
         trial = x.copy()
         trial[INDEX["gyro_offset"]] = offset
-        moved = motion(ride, trial, turns=True)
+        moved = motion(ride, trial, later_s=float(offset))
         bend = blocks_of(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps)
         off = bend - bend.mean()
         power = float(off @ off)
