@@ -15,7 +15,7 @@ from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.axes import LEAST, expected_of, seconds_of, weigh_axes
 from simrail.recording.evidence.finding import Finding
-from simrail.recording.evidence.judge import Evidence, weigh
+from simrail.recording.evidence.judge import Evidence, is_near_sound, weigh
 from simrail.recording.recording import Recording
 
 MARGIN = 0.1
@@ -43,6 +43,8 @@ def weigh_exchange(recording: Recording) -> Evidence | None:
         for i, name in enumerate(names):
             imu[name] = signs[i] * recording.imu[names[order[i]]]
         put_back = replace(recording, imu=imu)
+        if not is_near_sound(put_back):
+            continue
         evidence = weigh(put_back)
         axes = weigh_axes(put_back, evidence.single)
         if any(finding.wrong for finding in (*evidence.findings, *axes)):

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from simrail.core.jit import FloatArray, IntArray
 from simrail.recording.evidence.line import K3
@@ -36,11 +37,11 @@ from simrail.recording.evidence.model import (
     Motion,
     Ride,
     blocks_of,
-    expected,
     inside,
     motion,
     start_values,
 )
+from simrail.recording.evidence.readings import readings, slopes
 
 ROUNDS = 15
 """Relinearisations at most; from a start near by, three or four are enough."""
@@ -78,10 +79,6 @@ BEHIND_SD_M = 1.0
 
 SLUGGISH_SD_S = 0.5
 """How late a body on springs may roll and pitch; it turns about Z with the track."""
-
-STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, "drift": 1e-6, "gyro_offset": 5e-3}
-STEPS |= dict.fromkeys((*LATES, *SLOW), 5e-3)
-"""Steps of the differences for the slopes; 1e-5 for the others."""
 
 STILL_MPS = 0.05
 """Slower than this in its mean, a block is one at rest."""
@@ -258,14 +255,14 @@ class _Near(NamedTuple):
 
 def _near(ride: Ride, x: FloatArray, noise: FloatArray, weights: FloatArray, free: Sequence[str]) -> _Near:
     solved_for = np.array([i for i, name in enumerate(GLOBALS) if name not in HELD or name in free])
-    seen, model, moved = inside(ride, x), expected(ride, x), motion(ride, x)
+    seen, here, moved = inside(ride, x), readings(ride, x), motion(ride, x)
     standing = np.abs(blocks_of(np.abs(moved.speed_mps))) < STILL_MPS
-    slopes = _slopes(ride, x, model, solved_for)
-    beside, beside_sd = _nuisance(ride, slopes, _places(ride, x, moved), standing, free=free)
+    by_all = slopes(ride, x, here, solved_for)
+    beside, beside_sd = _nuisance(ride, by_all, _places(ride, x, moved), standing, free=free)
     return _Near(
         solved_for,
-        np.concatenate([slopes[:, :, solved_for], beside], axis=2),
-        ride.measured - model,
+        np.concatenate([by_all[:, :, solved_for], beside], axis=2),
+        ride.measured - here.expected,
         weights / noise[standing.astype(np.int64)] ** 2 * seen[:, None],
         np.concatenate([prior_of(ride)[solved_for], beside_sd]),
         np.concatenate([(start_values() - x)[solved_for], np.zeros(len(beside_sd))]),
@@ -314,19 +311,6 @@ _LONGEST = np.array(
     [{"wheel": 0.2, "shift": 60.0, "drift": 2e-3, PACE: 0.2}.get(name, 1.0) for name in GLOBALS]
 )
 """Longest step of a round: a long one leaves where the model is nearly linear."""
-
-
-def _slopes(ride: Ride, x: FloatArray, model: FloatArray, solved_for: IntArray) -> FloatArray:
-    """Slopes (b, 5, len(GLOBALS)) of the expected readings by what is solved for; no others."""
-    slopes = np.zeros((*model.shape, len(GLOBALS)))
-    for i in solved_for[:-CHANNELS]:
-        step = STEPS.get(GLOBALS[i], 1e-5)
-        other = x.copy()
-        other[i] += step
-        slopes[:, :, i] = (expected(ride, other) - model) / step
-    for channel in range(CHANNELS):
-        slopes[:, channel, len(GLOBALS) - CHANNELS + channel] = 1.0
-    return slopes
 
 
 class _Places(NamedTuple):
@@ -440,10 +424,10 @@ def _noise(
         sd = np.maximum(np.sqrt(np.mean(clipped**2, axis=0)), floor)
         weights[flags] = np.minimum(1.0, OUTLIER * sd / np.maximum(np.abs(rest), 1e-12))
         most = min(lags, len(rest) // 4)
-        power = np.mean(clipped**2, axis=0)
-        longer = np.ones(CHANNELS)
-        for lag in range(1, most + 1):
-            with_lag = np.mean(clipped[lag:] * clipped[:-lag], axis=0) / np.maximum(power, 1e-30)
-            longer += 2.0 * (1.0 - lag / (most + 1.0)) * with_lag
+        lag = np.arange(most + 1)
+        later = sliding_window_view(np.vstack([clipped, np.zeros((most, CHANNELS))]), most + 1, axis=0)
+        with_lag = np.einsum("nc,ncl->cl", clipped, later) / (len(rest) - lag)
+        share = with_lag / np.maximum(with_lag[:, :1], 1e-30)
+        longer = share @ ((1.0 + (lag > 0)) * (1.0 - lag / (most + 1.0)))
         noise[kind] = sd * np.sqrt(np.maximum(longer, 1.0))
     return noise, weights

@@ -36,6 +36,7 @@ from simrail.recording.evidence.search import (
     apart_fit,
     are_apart,
     best_fit,
+    is_sound_start,
 )
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
 from simrail.recording.evidence.slack import accused, slack_of
@@ -183,6 +184,15 @@ def weigh(recording: Recording) -> Evidence:
         findings.append(finding)
     middle = ride.middle_s - float(ride.way.time_s[0])
     return Evidence(tuple(findings), turn, float(push), middle, single)
+
+
+def is_near_sound(recording: Recording) -> bool:
+    """Whether a ride is explained from near a sound ride's values: one fit of it, before all others."""
+    ride = ride_of(recording)
+    if ride is None:
+        return False
+    with threadpool_limits(1):
+        return is_sound_start(ride, fit(ride, start_values()))
 
 
 class _Fits(NamedTuple):

@@ -25,17 +25,15 @@ are pace and pace^2 times what they are by the stamps, while the way stays.
 Not here: motion of the body in the track, which averages out or is noise, and the height of the mount.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
 
 from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
-from simrail.core.rotation import rotation_matrix
-from simrail.recording.evidence.line import K1, K3, PITCH, ROLL, MapTable, map_table
+from simrail.recording.evidence.line import MapTable, map_table
 from simrail.recording.evidence.way import Way, way_of
 from simrail.recording.recording import Recording
 
@@ -121,6 +119,11 @@ class Ride:
     slides: tuple[tuple[int, int, float], ...] = ()
     slid: np.ndarray | None = None
 
+    @cached_property
+    def told(self) -> FloatArray:
+        """Way and its derivatives (n, 3), as the device of the way tells them."""
+        return np.column_stack([self.way.way_m, self.way.speed_mps, self.way.acceleration_mps2])
+
     @property
     def reading_s(self) -> float:
         """Interval of the readings of the device that says the way."""
@@ -188,24 +191,29 @@ def start_values() -> FloatArray:
     return np.array([NOMINAL.get(name, 0.0) for name in GLOBALS])
 
 
-def motion(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> Motion:
-    """How the train moved some time after the stamps of the accelerometer, for parameters (len(GLOBALS),)."""
-    wheel, shift, offset, drift = x[:4]
-    way, pace = ride.way, x[INDEX[PACE]]
-    when = ride.fine_s + later_s
+def when_of(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> FloatArray:
+    """What the way says (b * FINE, 3) some time after the stamps of the accelerometer: way and derivatives."""
+    offset, drift = x[INDEX["offset"]], x[INDEX["drift"]]
+    way, when = ride.way, ride.fine_s + later_s
     times = when - offset - drift * (when - ride.middle_s)
     # Uniform times: the cell of each is found without a search.
     at = np.clip((times - way.time_s[0]) / way.step_s, 0.0, len(way.time_s) - 1.000001)
     cell = at.astype(np.int64)
-    share = at - cell
+    first = ride.told[cell]
+    told: FloatArray = first + (at - cell)[:, None] * (ride.told[cell + 1] - first)
+    return told
 
-    def of(values: FloatArray) -> FloatArray:
-        between: FloatArray = values[cell] + share * (values[cell + 1] - values[cell])
-        return between
 
-    place = ride.recording.start_position_m + shift + wheel * of(way.way_m)
-    speed, push = wheel * pace * of(way.speed_mps), wheel * pace**2 * of(way.acceleration_mps2)
-    return Motion(place, speed, push)
+def motion_of(ride: Ride, x: FloatArray, told: FloatArray) -> Motion:
+    """How the train moved, for parameters (len(GLOBALS),), of what the way says (b * FINE, 3)."""
+    wheel, shift, pace = x[INDEX["wheel"]], x[INDEX["shift"]], x[INDEX[PACE]]
+    place = ride.recording.start_position_m + shift + wheel * told[:, 0]
+    return Motion(place, wheel * pace * told[:, 1], wheel * pace**2 * told[:, 2])
+
+
+def motion(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> Motion:
+    """How the train moved some time after the stamps of the accelerometer, for parameters (len(GLOBALS),)."""
+    return motion_of(ride, x, when_of(ride, x, later_s=later_s))
 
 
 def laters(x: FloatArray) -> FloatArray:
@@ -223,60 +231,6 @@ def inside(ride: Ride, x: FloatArray) -> np.ndarray:
         times + max(apart.max(), 0.0) + ride.block_s <= time[-1]
     )
     return seen if ride.slid is None else seen & ~ride.slid
-
-
-def expected(ride: Ride, x: FloatArray) -> FloatArray:
-    """Means of the five channels (b, 5) that parameters (len(GLOBALS),) let expect."""
-    by, later = dict(zip(GLOBALS, x, strict=True)), laters(x)
-    read = _readings(ride, x, by, float(later[FORCE_X]))
-    for seconds in {*later.tolist()} - {float(later[FORCE_X])}:
-        read[:, later == seconds] = _readings(ride, x, by, seconds)[:, later == seconds]
-    for name, first, last in zip(SLOW, (GYRO_X, FORCE_X), (FORCE_X, CHANNELS), strict=True):
-        if by[name] > 0.0:
-            read[:, first:last] = _low_pass(read[:, first:last], by[name] / ride.block_s * FINE)
-    means: FloatArray = read.reshape(-1, FINE, CHANNELS).mean(axis=1)
-    return means * x[[INDEX[name] for name in GAINS]] + x[-CHANNELS:]
-
-
-def _readings(ride: Ride, x: FloatArray, by: Mapping[str, float], later_s: float) -> FloatArray:
-    """What a device without bias reads (b * FINE, 5), of a motion some time after the stamps."""
-    moved, gravity = motion(ride, x, later_s=later_s), ride.recording.gravity_mps2
-    line = ride.table.at(moved.place_m)
-    speed, push = moved.speed_mps, moved.acceleration_mps2
-    beside = _beside(line, speed, gravity)
-    along = push * (1.0 + by["squat"] + by["stretch"]) - gravity * np.sin(line[:, PITCH])
-    up = gravity * np.cos(line[:, PITCH]) * np.cos(line[:, ROLL]) - speed**2 * line[:, K1 + 1]
-    force = np.column_stack([along, beside * (1.0 + by["lean"]), up])
-    turn = rotation_matrix(np.array([[by["roll"], by["pitch"], by["yaw"]]]))[0]
-    read = np.empty((len(speed), CHANNELS))
-    read[:, :FORCE_X] = by["gyro"] * (_rates(ride, by, moved, line) @ turn)
-    read[:, FORCE_X:] = by[ACCEL_GAIN] * (force @ turn)[:, :2]
-    return read
-
-
-def _low_pass(values: FloatArray, samples: float) -> FloatArray:
-    """Signals (n, m) behind a low-pass of the first order, of a time constant in samples."""
-    decay = np.exp(-1.0 / samples)
-    passed: FloatArray = lfilter([1.0 - decay], [1.0, -decay], values, axis=0, zi=decay * values[:1])[0]
-    return passed
-
-
-def _beside(line: FloatArray, speed: FloatArray, gravity: float) -> FloatArray:
-    """What curve and cant leave across the track (n,)."""
-    left: FloatArray = speed**2 * line[:, K3] + gravity * np.cos(line[:, PITCH]) * np.sin(line[:, ROLL])
-    return left
-
-
-def _rates(ride: Ride, by: Mapping[str, float], moved: Motion, line: FloatArray) -> FloatArray:
-    """Rates (n, 3) of the body at the times of a motion."""
-    gravity, speed = ride.recording.gravity_mps2, moved.speed_mps
-    step = ride.block_s / FINE / by[PACE]
-    roll = by["lean"] * _beside(line, speed, gravity) / gravity
-    pitch = -by["squat"] * moved.acceleration_mps2 / gravity
-    rate: FloatArray = speed[:, None] * line[:, K1 : K3 + 1]
-    rate[:, 1] += roll * rate[:, 2] + np.gradient(pitch, step)
-    rate[:, 0] += np.gradient(roll, step)
-    return rate
 
 
 def blocks_of(values: FloatArray) -> FloatArray:

@@ -49,12 +49,17 @@ KNOWN_S = 1.0
 def best_fit(ride: Ride) -> Fit:
     """The fit from the sound ride's values; from others too where it blames or leaves much."""
     first = fit(ride, start_values())
-    if explains(ride, first) and not _blamed(first):
+    if is_sound_start(ride, first):
         return first
     fits = [first, *(fit(ride, x) for x in scan(ride))]
     # Whatever a fit blames has to pay for itself: a ride on other rails, the other way, may look much like
     # one whose gyro has the other sign.
     return min(fits, key=price)
+
+
+def is_sound_start(ride: Ride, found: Fit) -> bool:
+    """Whether a fit explains the ride and blames nothing, so that no other start is tried."""
+    return explains(ride, found) and not _blamed(found)
 
 
 def _blamed(found: Fit) -> int:
@@ -88,7 +93,7 @@ def apart_fit(ride: Ride, one: Fit) -> Fit:
         The best one with one clock.
     """
     first = fit(ride, one.x, free=("gyro_offset",), noise=one.noise)
-    if explains(ride, first) and not _blamed(first):
+    if is_sound_start(ride, first):
         return first
     fits = [first]
     for x in (one.x, start_values()):

@@ -27,9 +27,9 @@ from simrail.recording.evidence.model import (
     SINGLE,
     SLOW,
     Ride,
-    expected,
     start_values,
 )
+from simrail.recording.evidence.readings import expected
 from simrail.recording.evidence.search import explains, price
 from simrail.recording.evidence.slack import accused, distance, slack_of
 from simrail.recording.recording import Recording

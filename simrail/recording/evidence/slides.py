@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from simrail.core.jit import FloatArray
-from simrail.recording.evidence.model import FORCE_X, Ride, blocks_of, expected, motion, start_values
+from simrail.recording.evidence.model import FORCE_X, Ride, blocks_of, motion, start_values
+from simrail.recording.evidence.readings import expected
 
 LEAST_MPS2, SPREADS = 0.4, 5.0
 """Difference of wheel and accelerometer at which a slide begins: no rail and no body makes so much for half a
