@@ -307,8 +307,8 @@ def _upright(recording: Recording, single: Single | None) -> Finding:
     verdict: Verdict = "surely wrong" if off > CERTAIN else "likely wrong" if off > LIKELY else "sound"
     name, why, remedy, setting = "accelerometer Z alone", "", "", ""
     if verdict != "sound":
-        why, setting = f"is {up.value:.3g} times gravity", "imu.scale.accel"
-        remedy = "mend the scale: one axis alone has another one, or gravity_mps2 is another"
+        why, setting = f"is {up.value:.3g} times gravity in the median of the ride", "imu.scale.accel"
+        remedy = "mend the scale, if one axis alone has another one, its offset, or gravity_mps2"
         whole = _by_all(up, single)
         if whole is None:
             setting, remedy = (
