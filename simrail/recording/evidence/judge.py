@@ -37,10 +37,12 @@ from simrail.recording.evidence.search import (
     are_apart,
     best_fit,
     is_sound_start,
+    price,
 )
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
 from simrail.recording.evidence.slack import accused, slack_of
 from simrail.recording.evidence.slides import with_slides
+from simrail.recording.evidence.start import pace_by_turns
 from simrail.recording.recording import Recording
 
 FOLLOWED = 0.5
@@ -57,6 +59,9 @@ SPEEDS_TAKEN = {"km/h": 1.0 / 3.6, "miles an hour": 0.44704, "knots": 0.51444, "
 
 ROUNDS = 3
 """Of a search for the pace of the stamps."""
+
+LESS = 0.9
+"""Share of what whole devices leave, that another pace of the stamps may leave at most to be believed."""
 
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
@@ -149,8 +154,6 @@ def weigh(recording: Recording) -> Evidence:
     # The matrices are small: threads of BLAS cost more than they bring.
     with threadpool_limits(1):
         ride, fits = _explained(ride)
-        if PACE in fits.single.free:
-            ride, fits = _retimed(ride, fits)
     one, two, single, best = fits
     # Of three clocks that one is wrong that agrees with neither of the others.
     is_accel = best is two and accel_is_apart(ride, two)
@@ -219,40 +222,55 @@ class _Fits(NamedTuple):
 
 
 def _explained(ride: Ride) -> tuple[Ride, _Fits]:
-    """A ride and its fits; without what its wheel says while it slides, where that explains more."""
-    fits = _fits(ride)
+    """A ride and its fits; by other stamps, or without what its wheel says while it slides, if that is it."""
+    one = best_fit(ride)
+    two = apart_fit(ride, one)
+    if not (is_sound_start(ride, one) and is_sound_start(ride, two)):
+        pace = pace_by_turns(ride)
+        paced = None if pace is None else _paced(ride, pace, one)
+        if paced is not None:
+            return paced
+    fits = _fits(ride, one, two)
+    if PACE in fits.single.free:
+        return _paced(ride, fits.single.told[PACE][0], one) or (ride, fits)
     slid = with_slides(ride) if fits.blamed(ride) else None
     if slid is None:
         return ride, fits
-    others = _fits(slid)
+    others = _fits_of(slid)
     noise = others.best.noise
     return (slid, others) if others.price(slid, noise) < fits.price(ride, noise) else (ride, fits)
 
 
-def _retimed(ride: Ride, fits: _Fits) -> tuple[Ride, _Fits]:
-    """A ride whose stamps have another pace, and its fits, by stamps that are set right.
+def _paced(ride: Ride, pace: float, one: Fit) -> tuple[Ride, _Fits] | None:
+    """A ride whose stamps have another pace, and its fits by stamps that are set right; None if it has not.
 
     How rough a way is, and how long a block, is said in seconds: by stamps of another pace they are wrong.
+    Gravity does not grow with the pace, what curves push does with its square, and what a gyro turns with
+    itself: a gyro of another factor leaves the push, and what cant and curves leave, unexplained.
     """
-    pace, sd, other = fits.single.told[PACE][0], math.inf, ride
+    sd, other = math.inf, ride
     for _ in range(ROUNDS):
         set_right = ride_of(retimed(ride.recording, pace)) if pace > 0.0 else None
         if set_right is None:
-            return ride, fits
+            return None
         found = fit(set_right, start_values(), free=(PACE,))
         pace, sd, other = pace * found.value(PACE), pace * found.sd(PACE), set_right
-    again = _fits(other)
-    if again.blamed(other) + 1 > fits.blamed(ride) or PACE in again.single.free:
-        return ride, fits
+        if abs(pace - 1.0) < LIKELY * sd:
+            return None
+    again = _fits_of(other)
     single = again.single
-    told = single.told | {PACE: (pace, sd)}
-    single = replace(single, free=(PACE, *single.free), told=told)
+    if PACE in single.free or again.blamed(other) or price(again.best) > LESS * price(one):
+        return None
+    single = replace(single, free=(PACE, *single.free), told=single.told | {PACE: (pace, sd)})
     return other, again._replace(single=single)
 
 
-def _fits(ride: Ride) -> _Fits:
+def _fits_of(ride: Ride) -> _Fits:
     one = best_fit(ride)
-    two = apart_fit(ride, one)
+    return _fits(ride, one, apart_fit(ride, one))
+
+
+def _fits(ride: Ride, one: Fit, two: Fit) -> _Fits:
     is_apart = are_apart(ride, one, two)
     single = weigh_single(ride, one, two, is_apart=is_apart)
     return _Fits(one, two, single, single.found if single.free else two if is_apart else one)

@@ -192,7 +192,7 @@ def start_values() -> FloatArray:
 
 
 def when_of(ride: Ride, x: FloatArray, *, later_s: float = 0.0) -> FloatArray:
-    """What the way says (b * FINE, 3) some time after the stamps of the accelerometer: way and derivatives."""
+    """Way, and its derivatives (b * FINE, 3), some time after the stamps of the accelerometer."""
     offset, drift = x[INDEX["offset"]], x[INDEX["drift"]]
     way, when = ride.way, ride.fine_s + later_s
     times = when - offset - drift * (when - ride.middle_s)

@@ -135,7 +135,7 @@ def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> F
             other[INDEX[name]] += step
             told = None if name == "offset" else here.told
             found[:, :, INDEX[name]] = (readings(ride, other, told).expected - here.expected) / step
-    # A clock that is later by a second shows what another shows that is earlier; a drift is an offset that grows.
+    # What a clock of one sensor does, another's does the other way; and a drift is an offset that grows.
     earlier, middles = found[:, :, INDEX["offset"]], ride.fine_s[FINE // 2 :: FINE] - ride.middle_s
     found[:, :, INDEX["drift"]] = earlier * middles[:, None]
     found[:, : GYRO_Z + 1, INDEX["gyro_offset"]] = -(1.0 - by["drift"]) * earlier[:, : GYRO_Z + 1]

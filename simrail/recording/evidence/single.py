@@ -23,7 +23,6 @@ from simrail.recording.evidence.model import (
     GAINS,
     INDEX,
     LATES,
-    PACE,
     SINGLE,
     SLOW,
     Ride,
@@ -199,16 +198,11 @@ def _from_sound(ride: Ride, current: Fit, free: Sequence[str], names: Sequence[s
         x = start_values()
         for other in free:
             x[INDEX[other]] = current.value(other)
-        firsts = [x[INDEX[name]], *((0.5, 2.0) if name == PACE else ())]
         if name in SLOW:
-            firsts = [FIRST_S]
+            x[INDEX[name]] = FIRST_S
         elif name in GAINS:
-            firsts = [_slope(ride, x, GAINS.index(name))]
-        trials = []
-        for first in firsts:
-            x[INDEX[name]] = first
-            trials.append(fit(ride, x, free=(*free, name), rounds=FEW))
-        begun[name] = min(trials, key=price)
+            x[INDEX[name]] = _slope(ride, x, GAINS.index(name))
+        begun[name] = fit(ride, x, free=(*free, name), rounds=FEW)
     best = sorted(begun, key=lambda name: price(begun[name]))[:FOLLOWED]
     return {name: fit(ride, begun[name].x, free=(*free, name), rounds=TRIAL) for name in best}
 

@@ -28,6 +28,9 @@ FACTORS = (1.0, -1.0, 0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.318, 3.14, 0.667, 1.5, 0.
 LEAST_PUSH = 0.05
 """Share of what else is left of the accelerometer that the push has to explain for its scan to be a start."""
 
+FOLLOWS, LEAST_PACE = 0.8, 0.02
+"""Share of the gyro's Z that curves explain where only their speed is wrong; and how far off that is."""
+
 QUARTERS_RAD = (np.pi, 0.5 * np.pi, -0.5 * np.pi)
 """Angles at which devices are mounted that are not told of."""
 
@@ -75,6 +78,21 @@ def scan_turns(ride: Ride, x: FloatArray) -> FloatArray | None:
             best, found = slope * slope * power, trial
             found[INDEX["gyro"]] = slope
     return found
+
+
+def pace_by_turns(ride: Ride) -> float | None:
+    """How many times as fast as the ride its stamps run, if they are why the gyro turns more than the track.
+
+    The way and so the curves are where they are by any stamps; the speed by which they are passed is not.
+    None where the gyro does not follow the curves, or as it should.
+    """
+    moved = motion(ride, start_values())
+    bend = blocks_of(ride.table.at(moved.place_m)[:, K3] * moved.speed_mps)
+    off, measured = bend - bend.mean(), ride.measured[:, GYRO_Z] - ride.measured[:, GYRO_Z].mean()
+    power = float(off @ off)
+    found = float(off @ measured) / power if power > 1e-6 else 0.0
+    follows = found * found * power > FOLLOWS * float(measured @ measured)
+    return found if follows and found > 0.0 and abs(found - 1.0) > LEAST_PACE else None
 
 
 def _by_push(ride: Ride) -> FloatArray | None:
