@@ -46,6 +46,9 @@ from simrail.recording.evidence.readings import readings, slopes
 ROUNDS = 15
 """Relinearisations at most; from a start near by, three or four are enough."""
 
+LESS_NOISE = 0.95
+"""Share of the noise that is left, above which nothing hid in it."""
+
 CORRELATED_S = 10.0
 """Time over which correlations of a residual are summed."""
 
@@ -294,12 +297,15 @@ def hints(
     for name, column in columns.items():
         part = near.only(np.append(others, column))
         # What is wrong makes noise of its own, and would hide behind it: the noise is taken again without it.
+        before = found.noise
         for _ in range(3):
             normal, right = part.normal()
             inverse = np.linalg.inv(normal)
             solved = inverse @ right
             noise, weights = _noise(ride, part.rest - part.jacobian @ solved, part.standing, part.seen)
-            part = part.weighed(noise, weights)
+            if np.all(noise > LESS_NOISE * before):
+                break
+            part, before = part.weighed(noise, weights), noise
         told[name] = (found.value(name) + float(solved[-1]), float(np.sqrt(inverse[-1, -1])))
     return told
 
