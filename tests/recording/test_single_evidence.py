@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from simrail.core.columns import ACCEL, GYRO
@@ -16,7 +17,7 @@ from simrail.recording.evidence.judge import Evidence
 from simrail.recording.files.mend import write_mended
 from simrail.recording.files.ride_reader import read_signals
 from simrail.recording.recording import Recording
-from tests.shared.planted_faults import axis, exchanged, late, pace, slipping, slow
+from tests.shared.planted_faults import axis, exchanged, gyro, late, pace, slipping, slow
 
 BASE = Path(__file__).parents[1] / "field" / "cases" / "00-base"
 
@@ -80,10 +81,38 @@ def test_one_column_that_is_late_alone_is_told(column: str, seconds: float, soun
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("factor", [0.5, 1.1, 2.0])
+@pytest.mark.parametrize("factor", [0.1, 0.5, 1.1, 2.0, 3.0, 3.6, 10.0])
 def test_stamps_of_another_unit_are_no_wheel(factor: float, sound: Recording) -> None:
     """Gyro times accelerometer: curves and push grow by factor and its square, the way does not."""
     assert_told(weigh_all(pace(sound, factor)), "pace", factor, 0.03 * factor, "time stamps run")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("factor", [0.1, 2.0, 3.0, 10.0])
+def test_a_gyro_of_another_factor_is_no_pace_of_the_stamps(factor: float, sound: Recording) -> None:
+    """The push and what curves leave do not grow with it."""
+    evidence = weigh_all(gyro(sound, factor))
+    assert [finding.key for finding in evidence.wrong] == ["gyro"]
+    assert evidence.of("gyro").value == pytest.approx(factor, rel=0.1)
+
+
+@pytest.mark.parametrize("share", [0.04, pytest.param(-0.03, marks=LONG)])
+def test_an_imu_of_another_rate_is_told_with_it(share: float, sound: Recording) -> None:
+    """Its stamps are counted at a rate that is greater by that share; those of the encoder are right."""
+    imu = sound.imu.set_axis(pd.Index(sound.imu.index.to_numpy() / (1.0 + share), name="time_s"), axis=0)
+    sheet = replace(sound.imu_sheet, rate_hz=sound.imu_sheet.rate_hz * (1.0 + share))
+    evidence = weigh_all(replace(sound, imu=imu, imu_sheet=sheet))
+    (found,) = evidence.wrong
+    assert found.key == "drift" and found.value == pytest.approx(-1e6 * share, abs=2000.0)
+    assert f"{sound.imu_sheet.rate_hz:.3g} Hz" in found.remedy and not found.setting
+
+
+@pytest.mark.long
+def test_a_ride_that_no_single_mistake_explains_is_not_mended_by_figures(sound: Recording) -> None:
+    """A mean over two seconds: speeds, places and clocks come out wrong, and none of them is."""
+    smooth = sound.imu.rolling(41, center=True, min_periods=1).mean()
+    (found,) = weigh_all(replace(sound, imu=smooth)).wrong
+    assert found.key == "at_once" and not found.setting and "filter" in found.remedy
 
 
 @pytest.mark.long

@@ -29,6 +29,7 @@ from simrail.recording.evidence.model import (
     retimed,
     ride_of,
     start_values,
+    without_drift,
 )
 from simrail.recording.evidence.search import (
     LEAST_TURN_RAD,
@@ -36,13 +37,14 @@ from simrail.recording.evidence.search import (
     apart_fit,
     are_apart,
     best_fit,
+    explains,
     is_sound_start,
     price,
 )
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
 from simrail.recording.evidence.slack import accused, slack_of
 from simrail.recording.evidence.slides import with_slides
-from simrail.recording.evidence.start import pace_by_turns
+from simrail.recording.evidence.start import drift_by_turns, pace_by_turns
 from simrail.recording.recording import Recording
 
 FOLLOWED = 0.5
@@ -185,6 +187,8 @@ def weigh(recording: Recording) -> Evidence:
         if best is one and key in ("gyro_offset", "offset", *ALIKE):
             finding = _beside_a_late_gyro(finding, two, slack[key])
         findings.append(finding)
+    if ride.drift:
+        findings = [_counted(finding, ride) if finding.key == "drift" else finding for finding in findings]
     middle = ride.middle_s - float(ride.way.time_s[0])
     return Evidence(tuple(findings), turn, float(push), middle, single)
 
@@ -225,14 +229,16 @@ def _explained(ride: Ride) -> tuple[Ride, _Fits]:
     """A ride and its fits; by other stamps, or without what its wheel says while it slides, if that is it."""
     one = best_fit(ride)
     two = apart_fit(ride, one)
-    if not (is_sound_start(ride, one) and is_sound_start(ride, two)):
+    if accused(one, slack_of(ride, one), WHOLE) or not explains(ride, one) or are_apart(ride, one, two):
         pace = pace_by_turns(ride)
         paced = None if pace is None else _paced(ride, pace, one)
         if paced is not None:
             return paced
+        drift = drift_by_turns(ride)
+        undrifted = None if drift is None else _undrifted(ride, drift, one)
+        if undrifted is not None:
+            return undrifted
     fits = _fits(ride, one, two)
-    if PACE in fits.single.free:
-        return _paced(ride, fits.single.told[PACE][0], one) or (ride, fits)
     slid = with_slides(ride) if fits.blamed(ride) else None
     if slid is None:
         return ride, fits
@@ -257,12 +263,27 @@ def _paced(ride: Ride, pace: float, one: Fit) -> tuple[Ride, _Fits] | None:
         pace, sd, other = pace * found.value(PACE), pace * found.sd(PACE), set_right
         if abs(pace - 1.0) < LIKELY * sd:
             return None
+    if not is_sound_start(other, found) or price(found) > LESS * price(one):
+        return None
     again = _fits_of(other)
     single = again.single
-    if PACE in single.free or again.blamed(other) or price(again.best) > LESS * price(one):
+    if again.blamed(other):
         return None
     single = replace(single, free=(PACE, *single.free), told=single.told | {PACE: (pace, sd)})
     return other, again._replace(single=single)
+
+
+def _undrifted(ride: Ride, drift: float, one: Fit) -> tuple[Ride, _Fits] | None:
+    """A ride whose way has a clock that drifts by per cents, and its fits without; None if it has not."""
+    for of_imu in (True, False):
+        other = ride_of(without_drift(ride.recording, drift, of_imu=of_imu))
+        first = None if other is None else fit(other, start_values())
+        if not other or not first or not is_sound_start(other, first) or price(first) > LESS * price(one):
+            continue
+        again = _fits_of(other)
+        if not again.blamed(other):
+            return replace(other, drift=drift, of_imu=of_imu), again
+    return None
 
 
 def _fits_of(ride: Ride) -> _Fits:
@@ -357,6 +378,27 @@ def _beside_a_late_gyro(finding: Finding, two: Fit, slack: float) -> Finding:
         other = f"{_late('gyro', seconds, 'accelerometer')} (this ride does not tell): set {OF_GYRO}"
         finding = replace(finding, remedy="; or ".join(part for part in (finding.remedy, other) if part))
     return finding
+
+
+def _counted(finding: Finding, ride: Ride) -> Finding:
+    """The finding of a drift by per cents: of stamps that were counted at another rate than the device's."""
+    drift, device = ride.drift + 1e-6 * finding.value, ride.way.device
+    wrong, right = ("IMU", device) if ride.of_imu else (device, "IMU")
+    remedy = f"give {wrong} and {right} the stamps of one clock"
+    if ride.of_imu:
+        rate = ride.recording.imu_sheet.rate_hz
+        remedy += (
+            f"; if samples were counted, their rate was {rate:.4g} Hz, or {abs(drift):.1%} of them are lost"
+        )
+    return replace(
+        finding,
+        value=1e6 * drift,
+        verdict="surely wrong",
+        why=f"the stamps of the {wrong} drift by {abs(drift):.1%} against the {right}'s, by the curves",
+        setting="",
+        field="imu.time_s" if ride.of_imu else f"{device}.time_s",
+        remedy=remedy,
+    )
 
 
 def _of_the_accelerometer(finding: Finding) -> Finding:

@@ -108,6 +108,10 @@ class Ride:
         First and last block of each slide of the wheel, and the way that it may have cost, m.
     slid : ndarray (b,), optional
         Blocks in which the wheel slides; none if nothing is said.
+    drift : float
+        What has been taken off the clock of the device of the way against the IMU's, from its first stamp on.
+    of_imu : bool
+        Whether by the stamps of the IMU.
     """
 
     recording: Recording
@@ -118,6 +122,8 @@ class Ride:
     block_s: float
     slides: tuple[tuple[int, int, float], ...] = ()
     slid: np.ndarray | None = None
+    drift: float = 0.0
+    of_imu: bool = False
 
     @cached_property
     def told(self) -> FloatArray:
@@ -147,6 +153,23 @@ def retimed(recording: Recording, pace: float) -> Recording:
     sheet = recording.imu_sheet
     sheet = replace(sheet, rate_hz=sheet.rate_hz * pace, lag_s=sheet.lag_s / pace)
     return replace(recording, imu_sheet=sheet, **frames)
+
+
+def without_drift(recording: Recording, drift: float, *, of_imu: bool) -> Recording:
+    """A recording whose way has a clock that drifts against the IMU's from its first stamp on, set right.
+
+    By the stamps of the IMU, which another rate counted, or else by those of the device of the way.
+    """
+    way = {name: getattr(recording, name) for name in ("encoder", "odometer", "odometry")}
+    frames = {name: frame for name, frame in way.items() if frame is not None}
+    first, factor = float(next(iter(frames.values())).index[0]), 1.0 / (1.0 - drift)
+    if of_imu:
+        frames, factor = {"imu": recording.imu}, 1.0 - drift
+    for name, frame in frames.items():
+        stamps = first + factor * (frame.index.to_numpy(dtype=np.float64) - first)
+        frames[name] = frame.set_axis(pd.Index(stamps, name="time_s"), axis=0)
+    rate = recording.imu_sheet.rate_hz / (factor if of_imu else 1.0)
+    return replace(recording, imu_sheet=replace(recording.imu_sheet, rate_hz=rate), **frames)
 
 
 def ride_of(recording: Recording) -> Ride | None:

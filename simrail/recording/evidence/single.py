@@ -23,6 +23,7 @@ from simrail.recording.evidence.model import (
     GAINS,
     INDEX,
     LATES,
+    PACE,
     SINGLE,
     SLOW,
     Ride,
@@ -132,9 +133,9 @@ def weigh_single(ride: Ride, whole: Fit, apart: Fit, *, is_apart: bool) -> Singl
     current = whole
     free: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
-    known = [
-        name for name in SINGLE if name != ACCEL_GAIN or abs(up_of(ride.recording).value - 1.0) > LEAST_UP
-    ]
+    # Another pace is no step from here: the ride is fitted by stamps that are set right, before.
+    out = {PACE} if abs(up_of(ride.recording).value - 1.0) > LEAST_UP else {PACE, ACCEL_GAIN}
+    known = [name for name in SINGLE if name not in out]
     told = hints(ride, current, [name for name in known if name not in SLOW])
     while len(free) < MOST:
         slack = slack_of(ride, current)
