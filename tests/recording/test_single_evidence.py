@@ -108,6 +108,27 @@ def test_an_imu_of_another_rate_is_told_with_it(share: float, sound: Recording) 
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("column", ["gyro_z_radps", "gyro_x_radps", "accel_y_mps2"])
+def test_an_offset_that_grows_is_no_factor_and_no_clock(column: str, sound: Recording) -> None:
+    size = 0.05 if column in GYRO else 1.0
+    grown = sound.imu[column] + np.linspace(0.0, size, len(sound.imu))
+    (found,) = weigh_all(replace(sound, imu=sound.imu.assign(**{column: grown}))).wrong
+    assert found.key == f"ramp_{column}"
+    assert found.value == pytest.approx(np.degrees(size) if column in GYRO else size, rel=0.05)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("columns", "key"), [(GYRO, "cut_gyro"), (ACCEL[:2], "cut_accel")])
+def test_a_filter_that_takes_off_what_is_slow_is_told_with_its_corner(
+    columns: tuple[str, ...], key: str, sound: Recording
+) -> None:
+    passed = slow(columns)(sound, 5.0).imu
+    imu = sound.imu.assign(**{name: sound.imu[name] - passed[name] for name in columns})
+    (found,) = weigh_all(replace(sound, imu=imu)).wrong
+    assert found.key == key and found.value == pytest.approx(0.2, rel=0.05)
+
+
+@pytest.mark.long
 def test_a_ride_that_no_single_mistake_explains_is_not_mended_by_figures(sound: Recording) -> None:
     """A mean over two seconds: speeds, places and clocks come out wrong, and none of them is."""
     smooth = sound.imu.rolling(41, center=True, min_periods=1).mean()

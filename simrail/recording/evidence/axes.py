@@ -23,7 +23,7 @@ from simrail.core.columns import ACCEL, GYRO
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
 from simrail.recording.evidence.finding import SURE as CERTAIN
-from simrail.recording.evidence.model import ACCEL_GAIN, GAINS, LATES, OF_CHANNEL, PACE, SLOW
+from simrail.recording.evidence.model import ACCEL_GAIN, CUTS, GAINS, LATES, OF_CHANNEL, PACE, RAMPS, SLOW
 from simrail.recording.evidence.single import Single, Up, up_of
 from simrail.recording.evidence.slack import distance
 from simrail.recording.evidence.way import way_of
@@ -141,7 +141,7 @@ def weigh_axes(recording: Recording, single: Single | None = None) -> tuple[Find
         )
     if single is not None:
         findings = [_numbered(finding, i, single) for i, finding in enumerate(findings)]
-        findings += [of_all(name, single) for name in single.free if name in (*SLOW, PACE, ACCEL_GAIN)]
+        findings += [of_all(name, single) for name in single.free if name not in (*GAINS, *LATES)]
     return (*findings, _upright(recording, single))
 
 
@@ -260,6 +260,8 @@ def _words(name: str) -> str:
 def of_all(name: str, single: Single) -> Finding:
     """The finding of a sensor, or of the time, that the fit has set free."""
     value, sd = single.told[name]
+    if name in (*RAMPS, *CUTS):
+        return _unsteady(name, value, sd, single)
     if name == PACE:
         quantity, unit, nominal, field, setting = "pace of the time", "1", 1.0, "imu.units.time", ""
         why = (
@@ -295,6 +297,36 @@ def of_all(name: str, single: Single) -> Finding:
         _told(name, single),
         why,
         setting,
+        field,
+        remedy,
+    )
+
+
+def _unsteady(name: str, value: float, sd: float, single: Single) -> Finding:
+    """The finding of a sensor whose offset grows in the ride, or that takes off what is slow."""
+    if name in RAMPS:
+        column = OF_CHANNEL[RAMPS.index(name)]
+        by, unit = (math.pi / 180.0, "deg/s") if column in GYRO else (1.0, "m/s2")
+        axis = AXES[column].name.removesuffix(" alone")
+        quantity, field = f"growth of the offset of {axis}", f"imu.{column}"
+        why = f"the offset of {axis} grows by {value / by:.3g} {unit} in the ride"
+        remedy = "take off what it shows at stops before and after; let the device warm up before a ride"
+    else:
+        sensor, key = ("gyro", "gyro") if name == CUTS[0] else ("accelerometer", "accel")
+        by, unit, quantity, field = 1.0, "rad/s", f"high-pass in the {sensor}", f"imu.{key}"
+        why = f"a high-pass of {1.0 / value:.2g} s takes off what the {sensor} shows longer"
+        remedy = "log raw samples: no automatic zero, no 'linear acceleration', no AC coupling"
+    return Finding(
+        quantity,
+        name,
+        value / by,
+        sd / by,
+        0.0,
+        unit,
+        "all of the ride",
+        _told(name, single),
+        why,
+        "",
         field,
         remedy,
     )

@@ -22,6 +22,7 @@ from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
     CHANNELS,
+    CUTS,
     FORCE_X,
     FORCE_Y,
     GAINS,
@@ -32,6 +33,7 @@ from simrail.recording.evidence.model import (
     INDEX,
     LATES,
     PACE,
+    RAMPS,
     SINGLE,
     SLOW,
     Motion,
@@ -56,10 +58,10 @@ OUTLIER = 3.0
 """Standard deviations from which on a residual weighs less."""
 
 FREE = {"wheel": 10.0, "shift": 3e3, "offset": 30.0, "drift": 1e-3, "gyro_offset": 30.0, "gyro": 30.0}
-FREE |= dict.fromkeys((*GAINS, PACE, ACCEL_GAIN), 30.0) | dict.fromkeys((*LATES, *SLOW), 30.0)
+FREE |= dict.fromkeys((*GAINS, PACE, ACCEL_GAIN, *LATES, *SLOW, *RAMPS, *CUTS), 30.0)
 """Prior sds of faults: so wide that they say nothing."""
 
-HELD = ("gyro_offset", *SINGLE)
+HELD = ("gyro_offset", *SINGLE, *RAMPS, *CUTS)
 """Parameters that stay as they are where a fit does not set them free."""
 
 MOUNT_SD_RAD = 3.0
@@ -313,9 +315,8 @@ def hints(
 _CLASS = np.array([0.02, 0.02, 0.003, 0.05, 0.1])
 """Sizes of residuals by which two fits of one ride are compared."""
 
-_LONGEST = np.array(
-    [{"wheel": 0.2, "shift": 60.0, "drift": 2e-3, PACE: 0.2}.get(name, 1.0) for name in GLOBALS]
-)
+_FAR = {"wheel": 0.2, "shift": 60.0, "drift": 2e-3, PACE: 0.2} | dict.fromkeys(CUTS, 0.1)
+_LONGEST = np.array([_FAR.get(name, 1.0) for name in GLOBALS])
 """Longest step of a round: a long one leaves where the model is nearly linear."""
 
 

@@ -17,12 +17,16 @@ from threadpoolctl import threadpool_limits
 from simrail.core.errors import InputError
 from simrail.core.jit import FloatArray
 from simrail.recording.evidence.finding import LIKELY, Finding, Verdict, verdict_of
-from simrail.recording.evidence.fit import Fit, fit
+from simrail.recording.evidence.fit import Fit, fit, hints
 from simrail.recording.evidence.line import K3
 from simrail.recording.evidence.model import (
+    CUTS,
+    GAINS,
     GYRO_Z,
     INDEX,
+    LATES,
     PACE,
+    RAMPS,
     Motion,
     Ride,
     motion,
@@ -42,7 +46,7 @@ from simrail.recording.evidence.search import (
     price,
 )
 from simrail.recording.evidence.single import WHOLE, WORTH, Single, left_over, weigh_single
-from simrail.recording.evidence.slack import accused, slack_of
+from simrail.recording.evidence.slack import accused, distance, slack_of
 from simrail.recording.evidence.slides import with_slides
 from simrail.recording.evidence.start import drift_by_turns, pace_by_turns
 from simrail.recording.recording import Recording
@@ -64,6 +68,9 @@ ROUNDS = 3
 
 LESS = 0.9
 """Share of what whole devices leave, that another pace of the stamps may leave at most to be believed."""
+
+MUCH = 1.0
+"""Cost of a fit from which on it leaves more than rails and bodies make: some 0.1 m/s2 and 1 deg/s."""
 
 LEAST_PUSH_MPS = 2.0
 """Changes of speed, summed, from which on the push says something."""
@@ -229,7 +236,7 @@ def _explained(ride: Ride) -> tuple[Ride, _Fits]:
     """A ride and its fits; by other stamps, or without what its wheel says while it slides, if that is it."""
     one = best_fit(ride)
     two = apart_fit(ride, one)
-    if accused(one, slack_of(ride, one), WHOLE) or not explains(ride, one) or are_apart(ride, one, two):
+    if _is_suspect(ride, one) or are_apart(ride, one, two):
         pace = pace_by_turns(ride)
         paced = None if pace is None else _paced(ride, pace, one)
         if paced is not None:
@@ -238,6 +245,9 @@ def _explained(ride: Ride) -> tuple[Ride, _Fits]:
         undrifted = None if drift is None else _undrifted(ride, drift, one)
         if undrifted is not None:
             return undrifted
+        unsteady = _unsteady(ride, one)
+        if unsteady is not None:
+            return ride, unsteady
     fits = _fits(ride, one, two)
     slid = with_slides(ride) if fits.blamed(ride) else None
     if slid is None:
@@ -245,6 +255,15 @@ def _explained(ride: Ride) -> tuple[Ride, _Fits]:
     others = _fits_of(slid)
     noise = others.best.noise
     return (slid, others) if others.price(slid, noise) < fits.price(ride, noise) else (ride, fits)
+
+
+def _is_suspect(ride: Ride, one: Fit) -> bool:
+    """Whether a fit of whole devices blames one, or leaves much, or leaves more and more."""
+    slack = slack_of(ride, one)
+    if accused(one, slack, WHOLE) or not explains(ride, one) or one.cost > MUCH:
+        return True
+    grows = hints(ride, one, RAMPS)
+    return any(distance(name, *told, slack[name]) > LIKELY for name, told in grows.items())
 
 
 def _paced(ride: Ride, pace: float, one: Fit) -> tuple[Ride, _Fits] | None:
@@ -283,6 +302,21 @@ def _undrifted(ride: Ride, drift: float, one: Fit) -> tuple[Ride, _Fits] | None:
         again = _fits_of(other)
         if not again.blamed(other):
             return replace(other, drift=drift, of_imu=of_imu), again
+    return None
+
+
+def _unsteady(ride: Ride, one: Fit) -> _Fits | None:
+    """Fits of a ride of a sensor whose offset grows, or that takes off what is slow; None if it does not."""
+    for names in (RAMPS, *((cut,) for cut in CUTS)):
+        found = fit(ride, start_values(), free=names)
+        slack = slack_of(ride, found)
+        if accused(found, slack, WHOLE) or not explains(ride, found) or price(found) > LESS * price(one):
+            continue
+        told = {name: (found.value(name), found.sd(name)) for name in names}
+        free = tuple(name for name in names if distance(name, *told[name], slack[name]) > LIKELY)
+        if free:
+            told |= hints(ride, found, [*GAINS, *LATES], free=names)
+            return _Fits(found, found, Single(found, free, told, slack), found)
     return None
 
 

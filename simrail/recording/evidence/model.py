@@ -58,6 +58,10 @@ SLOW, PACE, ACCEL_GAIN = ("slow_gyro", "slow_accel"), "pace", "accel"
 SINGLE = (*GAINS, *LATES, *SLOW, PACE, ACCEL_GAIN)
 """Parameters of a fault of one axis, one sensor or the time: each free only where it is asked for."""
 
+RAMPS, CUTS = tuple(f"ramp_{name}" for name in OF_CHANNEL), ("cut_gyro", "cut_accel")
+"""Parameters of a sensor that is not steady: how far the offset of a channel grows in the ride; and the
+corner, in rad/s, of a high-pass of the first order."""
+
 GLOBALS = (
     "wheel",
     "shift",
@@ -72,6 +76,8 @@ GLOBALS = (
     "lean",
     "stretch",
     *SINGLE,
+    *RAMPS,
+    *CUTS,
     "gyro_bias_x",
     "gyro_bias_y",
     "gyro_bias_z",

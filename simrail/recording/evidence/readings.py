@@ -17,6 +17,7 @@ from simrail.recording.evidence.line import ALONG, K1, K2, K3, LEVEL, UP
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
     CHANNELS,
+    CUTS,
     FINE,
     FORCE_X,
     GAINS,
@@ -25,6 +26,7 @@ from simrail.recording.evidence.model import (
     INDEX,
     LATES,
     PACE,
+    RAMPS,
     SLOW,
     Ride,
     laters,
@@ -32,7 +34,8 @@ from simrail.recording.evidence.model import (
     when_of,
 )
 
-STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, PACE: 1e-5} | dict.fromkeys(SLOW, 5e-3)
+STEPS = {"wheel": 1e-4, "shift": 0.05, "offset": 5e-3, PACE: 1e-5}
+STEPS |= dict.fromkeys(SLOW, 5e-3) | dict.fromkeys(CUTS, 1e-3)
 """Parameters whose slopes are differences, and their steps."""
 
 TURN_STEP_RAD = 1e-5
@@ -106,7 +109,8 @@ def readings(ride: Ride, x: FloatArray, told: list[tuple[float, FloatArray]] | N
         plain[:, channels] = _device(_body(part, by), turn, by)[:, channels]
         parts.append((channels, part))
     gains = x[[INDEX[name] for name in GAINS]]
-    return Readings(by, told, parts, plain, plain * gains + x[-CHANNELS:])
+    grown = x[[INDEX[name] for name in RAMPS]] * _share(ride)[:, None]
+    return Readings(by, told, parts, plain, plain * gains + grown + x[-CHANNELS:])
 
 
 def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> FloatArray:
@@ -143,7 +147,14 @@ def slopes(ride: Ride, x: FloatArray, here: Readings, solved_for: IntArray) -> F
         found[:, channel, INDEX[gain]] = here.plain[:, channel]
         found[:, channel, INDEX[late]] = -(1.0 - by["drift"]) * earlier[:, channel]
         found[:, channel, len(GLOBALS) - CHANNELS + channel] = 1.0
+        found[:, channel, INDEX[RAMPS[channel]]] = _share(ride)
     return found
+
+
+def _share(ride: Ride) -> FloatArray:
+    """Share (b,) of the ride that is over."""
+    share: FloatArray = (np.arange(len(ride.measured)) + 0.5) / len(ride.measured)
+    return share
 
 
 def _parts(ride: Ride, x: FloatArray, by: Mapping[str, float], told: FloatArray) -> FloatArray:
@@ -162,6 +173,9 @@ def _parts(ride: Ride, x: FloatArray, by: Mapping[str, float], told: FloatArray)
     for name, which in zip(SLOW, (slice(0, _PUSH), slice(_PUSH, _PARTS)), strict=True):
         if by[name] > 0.0:
             parts[:, which] = _low_pass(parts[:, which], by[name] / ride.block_s * FINE)
+    for name, which in zip(CUTS, (slice(0, _PUSH), slice(_PUSH, _PARTS)), strict=True):
+        if by[name] > 0.0:
+            parts[:, which] -= _low_pass(parts[:, which], FINE / (by[name] * ride.block_s))
     means: FloatArray = parts.reshape(-1, FINE, _PARTS).mean(axis=1)
     return means
 

@@ -8,11 +8,13 @@ from simrail.recording.evidence.finding import LIKELY
 from simrail.recording.evidence.fit import Fit
 from simrail.recording.evidence.model import (
     ACCEL_GAIN,
+    CUTS,
     GAINS,
     GYRO_Z,
     INDEX,
     LATES,
     PACE,
+    RAMPS,
     SLOW,
     Ride,
     motion,
@@ -25,6 +27,10 @@ its push (bodies of six vehicles have up to 0.3 s), and a way, for the joints of
 
 GAIN_SD = 0.02
 """Relative, of one axis: what sway and the joints of the rails leave of a slope."""
+
+RAMP_SD_RADPS, RAMP_SD_MPS2, CUT_SD_RADPS = 2e-3, 0.05, 0.01
+"""Of an offset, over a ride, beside what its sheet calls instability: warming up; and of the corner of a
+high-pass: one of 100 s."""
 
 PACE_SD = 0.003
 """Of stamps, beside their clock: as little as the factor of a gyro, which a pace is much like."""
@@ -73,6 +79,14 @@ def slack_of(ride: Ride, found: Fit) -> dict[str, float]:
         slack[late] = clock_slack(ride)
     slack[ACCEL_GAIN] = math.hypot(sheet.accel_scale_error / math.sqrt(3.0), GAIN_SD)
     slack[PACE] = math.hypot(PACE_SD, bent)
+    for channel, ramp in enumerate(RAMPS):
+        is_gyro = channel <= GYRO_Z
+        slack[ramp] = (
+            math.hypot(RAMP_SD_RADPS, 3.0 * sheet.gyro_bias_instability_radps)
+            if is_gyro
+            else math.hypot(RAMP_SD_MPS2, 3.0 * sheet.accel_bias_instability_mps2)
+        )
+    slack |= dict.fromkeys(CUTS, CUT_SD_RADPS)
     return slack | dict.fromkeys(SLOW, clock_slack(ride))
 
 
