@@ -57,9 +57,12 @@ def _flat(values: FloatArray) -> tuple[int, float, float]:
     part = np.sort(np.partition(values, -10 * BELOW)[-10 * BELOW :])[::-1]
     top, slack = float(part[0]), 1e-9 * float(np.abs(part).max())
     count = int(np.sum(values >= top - slack))
-    below = np.sort(values[values < top - slack])[::-1][:BELOW]
-    if count < LEAST or len(below) < BELOW:
+    if count < LEAST:
         return 0, top, 0.0
+    rest = values[values < top - slack]
+    if len(rest) < BELOW:
+        return 0, top, 0.0
+    below = np.sort(np.partition(rest, -BELOW)[-BELOW:])[::-1]
     steps = -np.diff(below)
     step = float(min(steps[steps > slack].min(initial=math.inf), top - below[0]))
     expected = BELOW * step / float(top - below[-1])

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+from threadpoolctl import threadpool_limits
+
 from simrail.recording.evidence.axes import are_columns, weigh_axes
 from simrail.recording.evidence.clipped import weigh_clipped
 from simrail.recording.evidence.exchanged import weigh_exchange
@@ -51,7 +53,8 @@ def weigh_all(recording: Recording) -> Evidence:
     cut = {finding.key.replace("clipped", "alone", 1) for finding in clipped}
     axes = tuple(_cut(finding) if finding.key in cut else finding for finding in axes)
     beside = (*axes, *clipped, *weigh_second(recording, first))
-    beside += weigh_field_clock(recording)
+    with threadpool_limits(1):  # as for the fits: its matrices are small, too
+        beside += weigh_field_clock(recording)
     return replace(first, findings=first.findings + beside) if beside else first
 
 
