@@ -250,7 +250,7 @@ def _explained(ride: Ride) -> tuple[Ride, _Fits]:
             return ride, unsteady
     fits = _fits(ride, one, two)
     slid = with_slides(ride) if fits.blamed(ride) else None
-    if slid is None:
+    if slid is None or not is_sound_start(slid, fit(slid, start_values())):
         return ride, fits
     others = _fits_of(slid)
     noise = others.best.noise
